@@ -1,0 +1,1 @@
+"""Writers of rule bases and trees, one module per format."""

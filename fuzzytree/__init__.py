@@ -1,0 +1,1 @@
+"""Learn fuzzy decision trees, read them as rules, run them anywhere, and prove it."""

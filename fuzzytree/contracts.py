@@ -1,0 +1,118 @@
+"""The records that readers, writers and runtimes fill in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import msgspec
+
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    FloatArray = npt.NDArray[np.float64]
+    IntArray = npt.NDArray[np.int64]
+
+Model = FuzzyTree | RuleBase
+Carrier = Literal["tree", "rules"]
+Dtype = Literal["float64", "mixed", "float32"]
+
+
+class Loss(msgspec.Struct, frozen=True):
+    """One thing that a format or runtime cannot carry.
+
+    Attributes:
+        where: The part of the model, as people name it.
+        what: What is lost, and what stands in its place.
+        bound: The largest error of a degree that it causes, if it is that kind.
+    """
+
+    where: str
+    what: str
+    bound: float | None = None
+
+
+class Written(msgspec.Struct, frozen=True):
+    """What a writer made: the content, and what was lost on the way."""
+
+    content: bytes
+    losses: tuple[Loss, ...] = ()
+
+
+class Writer(Protocol):
+    """A writer: a model to bytes; options are the writer's own, by keyword."""
+
+    def __call__(self, model: Model, /, *, allow_loss: bool = False) -> Written:
+        """Write a model, or raise LossError when something would be lost."""
+        ...
+
+
+class Format(msgspec.Struct, frozen=True):
+    """A file format.
+
+    Attributes:
+        name: As in `--to`.
+        suffixes: With the dot; the first is the usual one.
+        carries: What the format can hold.
+        write: Model to bytes.
+        read: Bytes and a name for messages to a model; None if it cannot be read.
+        cannot: What it cannot hold, a sentence each.
+        extra: The optional packages it needs, if any.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    carries: tuple[Carrier, ...]
+    write: Writer
+    read: Callable[[bytes, str], Model] | None = None
+    cannot: tuple[str, ...] = ()
+    extra: str | None = None
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """The answers of a runtime to many rows.
+
+    Attributes:
+        rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
+        status: A `fuzzytree.reference.Status` for each row.
+        strengths: Shape (rules, rows), or None where only the path was followed or
+            the strengths were not asked for. NaN in rows with missing values.
+    """
+
+    rule: IntArray
+    status: IntArray
+    strengths: FloatArray | None = None
+
+
+Run = Callable[["FloatArray"], Outcome]
+"""Answers to values of shape (inputs, rows), in the order of the model's inputs."""
+
+
+class Runtime(msgspec.Struct, frozen=True):
+    """Something that can execute a model.
+
+    Attributes:
+        name: As in reports, such as `onnxruntime float32`.
+        runs: Which models it can execute.
+        load: Prepare a model; raises LossError if the model is outside its means.
+        dtype: The number type of degrees and strengths.
+        bound: The largest difference of a strength that is allowed against the
+            reference, for a model, and where it comes from; None demands equal bits
+            with the runtime `native` of the same number type.
+        cannot: What it cannot do, a sentence each.
+        extra: The optional packages it needs, if any.
+        modules: The modules that must be importable.
+    """
+
+    name: str
+    runs: tuple[Carrier, ...]
+    load: Callable[[Model], Run]
+    dtype: Dtype = "float64"
+    bound: Callable[[Model], tuple[float, str]] | None = None
+    cannot: tuple[str, ...] = ()
+    extra: str | None = None
+    modules: tuple[str, ...] = ()

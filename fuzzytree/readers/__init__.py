@@ -1,0 +1,1 @@
+"""Readers of rule bases and trees, one module per format."""

@@ -1,0 +1,1 @@
+"""Results as text: they show, they compute nothing."""

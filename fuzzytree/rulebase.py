@@ -1,0 +1,474 @@
+"""The hub: a fuzzy rule base as a frozen value that knows no file and no array.
+
+What a rule base *means* is computed, slowly and plainly, in `fuzzytree.reference`;
+everything that could change an answer stands in the values below.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+import msgspec
+
+from fuzzytree.errors import InvalidModelError
+
+_LARGEST_COEFFICIENT = 1e6  # keeps every polynomial finite, in float32 too
+
+Path = tuple[str | int, ...]
+Mistake = tuple[Path, str]
+
+
+class Value(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
+):
+    """A frozen, comparable, hashable record."""
+
+
+class Flank(Value, frozen=True):
+    """How a degree falls from `start` (towards 1) to `end` (exactly 0).
+
+    With `q = clip((x - end) / (start - end), 0, 1)` the degree is
+    `q * (c0 + q * (c1 + ...))`, held in [0, largest number below 1]. `end` may lie
+    on either side of `start`.
+
+    Attributes:
+        start: Where q is 1, in the variable's unit.
+        end: Where q and the degree are 0; not equal to `start`.
+        curve: c0, c1, ...: one to eight coefficients.
+        error: The largest difference from the curve that it was fitted to.
+    """
+
+    start: float
+    end: float
+    curve: tuple[float, ...] = (1.0,)
+    error: float | None = None
+
+
+class Band(Value, frozen=True, tag="band"):
+    """A plateau with flanks: degree exactly 1 for `low < x <= high`.
+
+    Attributes:
+        low: The plateau's open lower end; None reaches down without end.
+        high: The plateau's closed upper end; None reaches up without end.
+        left: The degree for `x <= low`; None is 0.
+        right: The degree for `x > high`; None is 0.
+    """
+
+    low: float | None = None
+    high: float | None = None
+    left: Flank | None = None
+    right: Flank | None = None
+
+
+class Side(Value, frozen=True):
+    """One side of an LR set, in `u`, the distance from the mean in spreads.
+
+    With `t = min(u, 1)`, `v = 2 t - 1` and `w = clip((reach - u) / (reach - 1), 0, 1)`
+    the degree is `clip(1 - t * (c0 + v * (c1 + ...)), 0, 1) * w**4`: the paper's
+    fitted polynomial within one spread, a falling tail beyond.
+
+    Attributes:
+        spread: The unit of u, in the variable's unit; above 0.
+        curve: c0, c1, ...: one to eight coefficients.
+        reach: Where the degree becomes exactly 0, in spreads; above 1.
+    """
+
+    spread: float
+    curve: tuple[float, ...]
+    reach: float = 5.0
+
+
+class LR(Value, frozen=True, tag="lr"):
+    """The paper's LR-type fuzzy set (2.2.2): degree exactly 1 at the mean.
+
+    Attributes:
+        mean: The peak, in the variable's unit.
+        left: The side below the mean.
+        right: The side above the mean.
+    """
+
+    mean: float
+    left: Side
+    right: Side
+
+
+Shape = Band | LR
+
+
+class Term(Value, frozen=True):
+    """A label of a variable and its curve."""
+
+    name: str
+    shape: Shape
+
+
+class Part(Value, frozen=True):
+    """One summand of a combination: `weight * (input - centre)`."""
+
+    input: str
+    weight: float
+    centre: float = 0.0
+
+
+class Variable(Value, frozen=True):
+    """An input column, or a linear combination of input columns.
+
+    Attributes:
+        name: Unique in its rule base.
+        terms: The labels; names are unique within the variable.
+        unit: The unit of its values, for people.
+        low: The smallest value seen or allowed; None if unknown.
+        high: The largest value seen or allowed; None if unknown.
+        parts: Empty for an input column. Otherwise the summands of a combination,
+            added in this order, each operation rounded once to double.
+    """
+
+    name: str
+    terms: tuple[Term, ...] = ()
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    parts: tuple[Part, ...] = ()
+
+
+class Clause(Value, frozen=True):
+    """`variable is term`, `variable is term or term`, or the negation of either."""
+
+    variable: str
+    terms: tuple[str, ...]
+    negated: bool = False
+
+
+class Rule(Value, frozen=True):
+    """IF all clauses hold THEN the class is `then`; no clause holds always.
+
+    Attributes:
+        when: The clauses, joined by AND in this order.
+        then: The class.
+        support: How many training rows reached it, if known.
+    """
+
+    when: tuple[Clause, ...]
+    then: str
+    support: int | None = None
+
+
+Conjunction = Literal["min", "product"]
+
+
+class Semantics(Value, frozen=True):
+    """What the rules leave open and an answer depends on.
+
+    The class is that of the strongest rule, of the first of them on a tie.
+
+    Attributes:
+        conjunction: How the degrees of a rule's clauses become its strength.
+        uncovered: The answer where no rule fires; None answers "no class".
+        missing: The answer where a needed value is missing or not finite, or a
+            combination overflows; None answers "no class".
+    """
+
+    conjunction: Conjunction = "min"
+    uncovered: str | None = None
+    missing: str | None = None
+
+
+Kind = Literal["relative", "raw"]
+
+
+class RuleBase(Value, frozen=True):
+    """A named, ordered set of fuzzy rules that decides for one class.
+
+    Attributes:
+        name: For people and files.
+        classes: The possible answers, in the order of their numbers.
+        variables: Inputs and combinations; a combination stands after its inputs.
+        rules: In order: the first of equally strong rules wins.
+        semantics: What an answer depends on beside the rules.
+        kind: `relative` (equal to its tree) or `raw` (the paper's sets); None for
+            rules that come from no tree.
+        columns: The columns of the training table, of which the inputs are some.
+
+    Raises:
+        InvalidModelError: If the parts contradict each other; it lists everything.
+    """
+
+    name: str
+    classes: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    rules: tuple[Rule, ...]
+    semantics: Semantics = Semantics()
+    kind: Kind | None = None
+    columns: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a rule base that contradicts itself."""
+        mistakes = [
+            *naming_mistakes(self.name, self.classes, self.semantics),
+            *variable_mistakes(self.variables, self.columns),
+            *_rule_mistakes(self),
+        ]
+        if mistakes:
+            raise InvalidModelError(mistakes)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the columns that the rules need, in order."""
+        return tuple(v.name for v in self.variables if not v.parts)
+
+    def __str__(self) -> str:
+        """Show the rules as numbered sentences."""
+        return "\n".join(
+            f"{number}. {sentence(rule)}" for number, rule in enumerate(self.rules, 1)
+        )
+
+
+def sentence(rule: Rule) -> str:
+    """Return a rule as people read it.
+
+    Example:
+        >>> sentence(Rule((Clause("grip", ("firm", "hard")),), "hand"))
+        'IF grip is firm or hard THEN hand'
+    """
+    if not rule.when:
+        return f"ALWAYS {rule.then}"
+    clauses = " AND ".join(clause_text(clause) for clause in rule.when)
+    return f"IF {clauses} THEN {rule.then}"
+
+
+def clause_text(clause: Clause) -> str:
+    """Return a clause as people read it, such as `grip is not soft or loose`."""
+    verb = "is not" if clause.negated else "is"
+    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
+
+
+def fingerprint(value: msgspec.Struct) -> str:
+    """Return the SHA-256 of a model's content, as 64 hexadecimal digits.
+
+    Equal models have equal fingerprints on every machine; numbers enter with all
+    their digits.
+    """
+    return hashlib.sha256(msgspec.json.encode(value)).hexdigest()
+
+
+def naming_mistakes(
+    name: str, classes: tuple[str, ...], semantics: Semantics
+) -> Iterator[Mistake]:
+    """Yield what is wrong with a model's name, classes and default answers."""
+    if not name:
+        yield ("name",), "a model needs a name"
+    if not classes:
+        yield ("classes",), "a model needs at least one class"
+    yield from _repeated(("classes",), "class", classes)
+    for position, label in enumerate(classes):
+        if not label:
+            yield ("classes", position), "a class name cannot be empty"
+    for field in ("uncovered", "missing"):
+        answer: str | None = getattr(semantics, field)
+        if answer is not None and answer not in classes:
+            yield (
+                ("semantics", field),
+                f"the answer for {field} is no class: {answer!r}; "
+                f"{_choice(answer, classes)}",
+            )
+
+
+def variable_mistakes(
+    variables: tuple[Variable, ...], columns: tuple[str, ...] = ()
+) -> Iterator[Mistake]:
+    """Yield what is wrong with variables: names, ranges, shapes, combinations."""
+    yield from _repeated(("variables",), "variable", [v.name for v in variables])
+    yield from _repeated(("columns",), "column", columns)
+    known: dict[str, bool] = {}
+    for position, variable in enumerate(variables):
+        path: Path = ("variables", position)
+        if not variable.name:
+            yield (*path, "name"), "a variable needs a name"
+        if columns and not variable.parts and variable.name not in columns:
+            yield (
+                (*path, "name"),
+                f"input {variable.name!r} is not among the columns; "
+                f"{_choice(variable.name, columns)}",
+            )
+        yield from _range_mistakes(path, variable)
+        yield from _part_mistakes(path, variable, known)
+        names = [term.name for term in variable.terms]
+        yield from _repeated((*path, "terms"), f"term of {variable.name!r}", names)
+        for index, term in enumerate(variable.terms):
+            where = f"term {term.name!r} of {variable.name!r}"
+            if not term.name:
+                yield (
+                    (*path, "terms", index),
+                    f"a term of {variable.name!r} has no name",
+                )
+            for text in shape_mistakes(term.shape):
+                yield (*path, "terms", index, "shape"), f"{where}: {text}"
+        known[variable.name] = bool(variable.parts)
+
+
+def _range_mistakes(path: Path, variable: Variable) -> Iterator[Mistake]:
+    for field in ("low", "high"):
+        value: float | None = getattr(variable, field)
+        if value is not None and not math.isfinite(value):
+            yield (*path, field), f"the range of {variable.name!r} must be finite"
+            return
+    low, high = variable.low, variable.high
+    if low is not None and high is not None and low > high:
+        yield (
+            (*path, "low"),
+            f"the range of {variable.name!r} starts at {low!r} "
+            f"and ends below it, at {high!r}",
+        )
+
+
+def _part_mistakes(
+    path: Path, variable: Variable, known: dict[str, bool]
+) -> Iterator[Mistake]:
+    inputs = [name for name, combined in known.items() if not combined]
+    for index, part in enumerate(variable.parts):
+        where = (*path, "parts", index)
+        if part.input not in inputs:
+            yield (
+                (*where, "input"),
+                f"combination {variable.name!r} needs input {part.input!r}, "
+                f"which does not stand before it; {_choice(part.input, inputs)}",
+            )
+        if not math.isfinite(part.weight) or part.weight == 0.0:
+            yield (
+                (*where, "weight"),
+                f"the weight of {part.input!r} in {variable.name!r} must be finite "
+                f"and not 0, not {part.weight!r}",
+            )
+        if not math.isfinite(part.centre):
+            yield (
+                (*where, "centre"),
+                f"the centre of {part.input!r} in {variable.name!r} must be finite",
+            )
+
+
+def shape_mistakes(shape: Shape) -> Iterator[str]:
+    """Yield what is wrong with a shape, without saying whose it is."""
+    match shape:
+        case Band():
+            yield from _band_mistakes(shape)
+        case LR():
+            if not math.isfinite(shape.mean):
+                yield f"the mean must be finite, not {shape.mean!r}"
+            for name, side in (("left", shape.left), ("right", shape.right)):
+                yield from _side_mistakes(name, side)
+
+
+def _band_mistakes(band: Band) -> Iterator[str]:
+    for name, value in (("low", band.low), ("high", band.high)):
+        if value is not None and not math.isfinite(value):
+            yield f"{name} must be finite or left out, not {value!r}"
+            return
+    low, high = band.low, band.high
+    if low is not None and high is not None and low >= high:
+        yield f"the plateau starts at {low!r} and must end above it, not at {high!r}"
+    for name, bound, flank, sign in (
+        ("left", low, band.left, 1),
+        ("right", high, band.right, -1),
+    ):
+        if flank is None:
+            continue
+        if bound is None:
+            yield f"a plateau that is open on the {name} has no {name} flank"
+        ends = (flank.start, flank.end)
+        if not all(map(math.isfinite, ends)) or not math.isfinite(
+            flank.start - flank.end
+        ):
+            yield f"the {name} flank must start and end at finite values"
+        elif (flank.start - flank.end) * sign <= 0:
+            side = "below" if sign > 0 else "above"
+            yield f"the {name} flank must end {side} its start {flank.start!r}"
+        yield from _curve_mistakes(f"{name} flank", flank.curve)
+
+
+def _side_mistakes(name: str, side: Side) -> Iterator[str]:
+    if not (math.isfinite(side.spread) and side.spread > 0):
+        yield f"the {name} spread must be finite and above 0, not {side.spread!r}"
+    if not (math.isfinite(side.reach) and side.reach > 1):
+        yield f"the {name} reach must be finite and above 1, not {side.reach!r}"
+    yield from _curve_mistakes(f"{name} side", side.curve)
+
+
+def _curve_mistakes(name: str, curve: tuple[float, ...]) -> Iterator[str]:
+    if not 1 <= len(curve) <= 8:
+        yield f"the {name} needs 1 to 8 coefficients, not {len(curve)}"
+    if not all(abs(coefficient) <= _LARGEST_COEFFICIENT for coefficient in curve):
+        yield f"the coefficients of the {name} must lie within +-1e6"
+
+
+def clause_mistakes(
+    path: Path, where: str, clause: Clause, terms: dict[str, tuple[str, ...]]
+) -> Iterator[Mistake]:
+    """Yield what is wrong with a clause, given the term names of each variable."""
+    if clause.variable not in terms:
+        yield (
+            (*path, "variable"),
+            f"{where}: no variable {clause.variable!r}; "
+            f"{_choice(clause.variable, list(terms))}",
+        )
+        return
+    if not clause.terms:
+        yield (
+            (*path, "terms"),
+            f"{where}: the clause on {clause.variable!r} names no term",
+        )
+    known = terms[clause.variable]
+    for index, term in enumerate(clause.terms):
+        if term not in known:
+            yield (
+                (*path, "terms", index),
+                f"{where}: {clause.variable!r} has no term {term!r}; "
+                f"{_choice(term, known)}",
+            )
+    yield from _repeated((*path, "terms"), f"term in {where}", clause.terms)
+
+
+def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
+    if not rules.rules:
+        yield ("rules",), "a rule base needs at least one rule"
+    terms = {v.name: tuple(t.name for t in v.terms) for v in rules.variables}
+    checked: set[int] = set()  # clauses are shared between rules of one tree
+    for number, rule in enumerate(rules.rules, 1):
+        path: Path = ("rules", number - 1)
+        if rule.then not in rules.classes:
+            yield (
+                (*path, "then"),
+                f"rule {number}: no class {rule.then!r}; "
+                f"{_choice(rule.then, rules.classes)}",
+            )
+        if rule.support is not None and rule.support < 0:
+            yield (*path, "support"), f"rule {number}: the support cannot be below 0"
+        for index, clause in enumerate(rule.when):
+            if id(clause) not in checked:
+                checked.add(id(clause))
+                yield from clause_mistakes(
+                    (*path, "when", index), f"rule {number}", clause, terms
+                )
+
+
+def _repeated(path: Path, what: str, names: Iterable[str]) -> Iterator[Mistake]:
+    seen: set[str] = set()
+    for position, name in enumerate(names):
+        if name in seen:
+            yield (*path, position), f"{what} {name!r} stands twice"
+        seen.add(name)
+
+
+def _choice(wrong: str, names: Iterable[str]) -> str:
+    """Return `there is a, b (did you mean 'a'?)`, at most a dozen names long."""
+    import difflib
+
+    known = list(names)
+    if not known:
+        return "there is none"
+    shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+    close = difflib.get_close_matches(wrong, known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return f"there is {shown}{hint}"
