@@ -1,1 +1,47 @@
-"""What can execute a model, one module per runtime."""
+"""What can execute a model, one module per runtime family, and their table.
+
+A runtime is a value in the tuple `RUNTIMES` of its module (see
+`fuzzytree.contracts.Runtime`), and the module a line in `TABLE`. These modules import
+what they run on only inside `load`, so the table can be read without it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+
+from fuzzytree.contracts import Runtime
+
+TABLE = (
+    "fuzzytree.runtimes.reference",
+    "fuzzytree.runtimes.native",
+    "fuzzytree.runtimes.onnxruntime",
+    "fuzzytree.runtimes.python",
+    "fuzzytree.runtimes.skfuzzy",
+)
+"""The modules that hold `RUNTIMES`; the reference comes first."""
+
+
+def all_runtimes() -> tuple[Runtime, ...]:
+    """Return every runtime of the table, installed or not, in its order."""
+    found: list[Runtime] = []
+    for module in TABLE:
+        found.extend(importlib.import_module(module).RUNTIMES)
+    return tuple(found)
+
+
+def find_runtime(name: str) -> Runtime:
+    """Return the runtime of that name.
+
+    Raises:
+        ValueError: If there is none; the message lists all of them.
+    """
+    known = {runtime.name: runtime for runtime in all_runtimes()}
+    if name not in known:
+        raise ValueError(f"no runtime {name!r}; there is {', '.join(known)}")
+    return known[name]
+
+
+def is_installed(runtime: Runtime) -> bool:
+    """Return whether every module that a runtime needs can be imported."""
+    return all(importlib.util.find_spec(name) for name in runtime.modules)

@@ -1,0 +1,39 @@
+"""The reference as a runtime: row by row, slow, and right by definition."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fuzzytree.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.reference import Answer, descend, evaluate
+from fuzzytree.rulebase import RuleBase
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+
+def load(model: Model) -> Run:
+    """Return a function that answers rows one after another."""
+
+    def run(values: FloatArray) -> Outcome:
+        import numpy as np
+
+        rows = [dict(zip(model.inputs, row, strict=True)) for row in values.T.tolist()]
+        answers: list[Answer]
+        if isinstance(model, RuleBase):
+            answers = [evaluate(model, row) for row in rows]
+            strengths = np.array([answer.strengths for answer in answers], np.float64)
+            strengths = strengths.reshape(len(rows), len(model.rules)).T
+        else:
+            answers = [descend(model, row) for row in rows]
+            strengths = None
+        return Outcome(
+            rule=np.array([answer.rule for answer in answers], np.int64),
+            status=np.array([answer.status for answer in answers], np.int64),
+            strengths=strengths,
+        )
+
+    return run
+
+
+RUNTIMES = (Runtime("reference", ("tree", "rules"), load),)

@@ -1,0 +1,347 @@
+"""Models to test with, for us and for people who write formats and runtimes.
+
+`random_tree` makes valid trees of any size from a seed, `probes` the rows that matter
+for a model: every cut, plateau end, support end and mean, their neighbouring floats,
+extremes, and missing values.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator, Sequence
+
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Flank,
+    Part,
+    RuleBase,
+    Semantics,
+    Shape,
+    Side,
+    Term,
+    Variable,
+)
+from fuzzytree.tree import (
+    Branch,
+    FuzzyTree,
+    Leaf,
+    Node,
+    Sets,
+    interval_names,
+    intervals,
+)
+
+SPECIAL = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    0.0,
+    -0.0,
+    5e-324,
+    -1e-310,
+    1e30,
+    -1e30,
+    1e300,
+    -1e300,
+    1.7976931348623157e308,
+)
+"""Values at which runtimes tend to part."""
+
+
+def random_tree(
+    seed: int,
+    *,
+    leaves: int = 7,
+    inputs: int = 4,
+    classes: int = 3,
+    combinations: float = 0.3,
+    semantics: Semantics | None = None,
+) -> FuzzyTree:
+    """Return a valid tree with relative terms and fitted sets, made from a seed.
+
+    Args:
+        seed: The same seed and sizes give the same tree.
+        leaves: How many leaves; 1 gives a tree without nodes.
+        inputs: How many input columns, on scales from 1e-3 to 1e6.
+        classes: How many classes; every class that has a leaf can win.
+        combinations: The share of nodes that ask a combination of inputs.
+        semantics: The defaults unless given.
+    """
+    chance = random.Random(seed)
+    columns = tuple(f"x{number}" for number in range(1, inputs + 1))
+    labels = tuple(f"class {number}" for number in range(1, classes + 1))
+    scale = {name: 10.0 ** chance.randint(-3, 6) for name in columns}
+    asked: list[tuple[str, tuple[float, ...], tuple[int, ...]]] = []
+    derived: list[Variable] = []
+    plan = _grow(chance, leaves, [])
+
+    def ask(branches: int) -> None:
+        if len(columns) > 1 and chance.random() < combinations:
+            chosen = chance.sample(columns, chance.randint(2, len(columns)))
+            parts = tuple(
+                Part(
+                    name,
+                    chance.uniform(0.2, 2.0) * chance.choice((-1, 1)) / scale[name],
+                    chance.uniform(-1.0, 1.0) * scale[name],
+                )
+                for name in chosen
+            )
+            name, unit = f"mix {len(derived) + 1}", 1.0
+            derived.append(Variable(name, parts=parts))
+        else:
+            name = chance.choice(columns)
+            unit = scale[name]
+        owners = list(range(branches))
+        if branches == 2 and chance.random() < 0.25:
+            owners = [0, 1, 0]
+        cuts = sorted(chance.uniform(-2.0, 2.0) * unit for _ in owners[1:])
+        asked.append((name, tuple(cuts), tuple(owners)))
+
+    for children in plan:
+        ask(len(children))
+    return _assemble(
+        chance, columns, labels, derived, asked, plan, semantics or Semantics()
+    )
+
+
+Plan = list[list[tuple[str, int]]]
+
+
+def _grow(chance: random.Random, leaves: int, plan: Plan) -> Plan:
+    """Return, for each node in depth-first order, its children as (kind, number)."""
+    count = 0
+
+    def grow(size: int) -> tuple[str, int]:
+        nonlocal count
+        if size == 1:
+            count += 1
+            return ("leaf", count)
+        number = len(plan) + 1
+        plan.append([])
+        branches = 3 if size > 2 and chance.random() < 0.25 else 2
+        marks = sorted(chance.sample(range(1, size), branches - 1))
+        sizes = [b - a for a, b in zip([0, *marks], [*marks, size], strict=True)]
+        plan[number - 1].extend(grow(part) for part in sizes)
+        return ("node", number)
+
+    grow(leaves)
+    return plan
+
+
+def _assemble(
+    chance: random.Random,
+    columns: tuple[str, ...],
+    labels: tuple[str, ...],
+    derived: list[Variable],
+    asked: list[tuple[str, tuple[float, ...], tuple[int, ...]]],
+    plan: Plan,
+    semantics: Semantics,
+) -> FuzzyTree:
+    total = 1 + max((n for c in plan for kind, n in c if kind == "leaf"), default=1) - 1
+    leaves = tuple(
+        Leaf(chance.choice(labels), f"pattern {number}", chance.randint(0, 99))
+        for number in range(1, total + 1)
+    )
+    below = _leaves_below(plan)
+    terms: dict[str, list[Term]] = {}
+    names: dict[int, list[str]] = {}
+    for variable in dict.fromkeys(name for name, _, _ in asked):
+        here = [i for i, entry in enumerate(asked) if entry[0] == variable]
+        texts = interval_names([asked[i][1] for i in here])
+        names.update(zip(here, texts, strict=True))
+    nodes: list[Node] = []
+    for position, (variable, cuts, owners) in enumerate(asked):
+        own = names[position]
+        bare = Node(variable, cuts, owners, ())
+        known = terms.setdefault(variable, [])
+        for name, (low, high) in zip(own, intervals(bare), strict=True):
+            if name not in {term.name for term in known}:
+                known.append(Term(name, _band(chance, low, high, cuts)))
+        branches = tuple(
+            Branch(
+                terms=tuple(n for n, o in zip(own, owners, strict=True) if o == index),
+                sets=tuple(f"pattern {leaf}" for leaf in below[kind, number]),
+                node=number if kind == "node" else None,
+                leaf=number if kind == "leaf" else None,
+            )
+            for index, (kind, number) in enumerate(plan[position])
+        )
+        nodes.append(Node(variable, cuts, owners, branches))
+    used = {name for name, _, _ in asked}
+    parts = {part.input for v in derived for part in v.parts}
+    variables = tuple(
+        Variable(n, tuple(terms.get(n, ())), unit="cm", low=-9.5e6, high=9.5e6)
+        for n in columns
+        if n in used | parts
+    ) + tuple(Variable(v.name, tuple(terms[v.name]), parts=v.parts) for v in derived)
+    spans = {name: cuts for name, cuts, _ in asked}
+    sets = tuple(
+        Sets(
+            name,
+            tuple(
+                Term(f"pattern {number}", _lr(chance, spans[name]))
+                for number in range(1, total + 1)
+            ),
+        )
+        for name in spans
+    )
+    return FuzzyTree(
+        f"random {len(leaves)}",
+        labels,
+        variables,
+        tuple(nodes),
+        leaves,
+        sets,
+        semantics,
+        columns,
+    )
+
+
+def _leaves_below(plan: Plan) -> dict[tuple[str, int], tuple[int, ...]]:
+    below: dict[tuple[str, int], tuple[int, ...]] = {}
+    for number in range(len(plan), 0, -1):
+        for kind, child in plan[number - 1]:
+            if kind == "leaf":
+                below[kind, child] = (child,)
+        below["node", number] = tuple(
+            leaf for entry in plan[number - 1] for leaf in below[entry]
+        )
+    return below
+
+
+def _band(
+    chance: random.Random,
+    low: float | None,
+    high: float | None,
+    cuts: Sequence[float],
+) -> Band:
+    unit = max(map(abs, cuts)) or 1.0
+
+    def flank(start: float, sign: int) -> Flank:
+        b1 = chance.uniform(0.3, 1.0)
+        b2 = chance.uniform(0.0, b1)
+        # Bernstein coefficients 0, b2, b1, 1 in q: rising, 0 at q = 0, 1 at q = 1.
+        curve: tuple[float, ...] = (3 * b2, 3 * b1 - 6 * b2, 1 - 3 * b1 + 3 * b2)
+        if chance.random() < 0.3:
+            curve = (1.0,)
+        return Flank(start, start + sign * unit * chance.uniform(0.1, 2.0), curve)
+
+    return Band(
+        low,
+        high,
+        None if low is None else flank(low, -1),
+        None if high is None else flank(high, 1),
+    )
+
+
+def _lr(chance: random.Random, cuts: Sequence[float]) -> LR:
+    unit = max(map(abs, cuts)) or 1.0
+
+    def side() -> Side:
+        drop = chance.uniform(0.2, 0.8)
+        curve = (drop,) if chance.random() < 0.5 else (drop, chance.uniform(-0.1, 0.1))
+        return Side(unit * chance.uniform(0.05, 1.0), curve)
+
+    left = side()
+    right = left if chance.random() < 0.5 else side()
+    return LR(chance.uniform(-2.0, 2.0) * unit, left, right)
+
+
+def landmarks(shape: Shape) -> Iterator[float]:
+    """Yield the values at which a shape changes its formula."""
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            yield from (value for value in (low, high) if value is not None)
+            for flank in (left, right):
+                if flank is not None:
+                    yield flank.start
+                    yield flank.end
+        case LR(mean=mean, left=below, right=above):
+            yield mean
+            for sign, side in ((-1.0, below), (1.0, above)):
+                yield mean + sign * side.spread
+                yield mean + sign * side.spread * side.reach
+
+
+def probes(
+    model: FuzzyTree | RuleBase, *, limit: int = 20_000, seed: int = 0
+) -> list[dict[str, float]]:
+    """Return rows at which carriers of a model tend to part.
+
+    For each landmark of each variable: the value and its two neighbouring floats, in
+    double and in float32. A combination is met by solving for one of its inputs, which
+    lands at or next to the landmark. The other inputs are drawn from a seed; special
+    values come in last, one input at a time.
+    """
+    chance = random.Random(seed)
+    spread = _spreads(model)
+    rows: list[dict[str, float]] = []
+
+    def draw() -> dict[str, float]:
+        return {name: chance.uniform(low, high) for name, (low, high) in spread.items()}
+
+    points = [
+        (variable, value)
+        for variable, value in _points(model)
+        for value in neighbours(value)
+    ]
+    chance.shuffle(points)
+    room = max(limit - len(spread) * len(SPECIAL) - 100, 0)
+    for variable, value in points[:room]:
+        row = draw()
+        if variable.parts:
+            _solve(variable, value, row)
+        else:
+            row[variable.name] = value
+        rows.append(row)
+    rows += [draw() for _ in range(100)]
+    for name in spread:
+        rows += [{**draw(), name: value} for value in SPECIAL]
+    return rows
+
+
+def neighbours(value: float) -> tuple[float, ...]:
+    """Return a value, the floats next to it, and what float32 makes of them."""
+    import struct
+
+    steps = [value, math.nextafter(value, -math.inf), math.nextafter(value, math.inf)]
+    if abs(value) < 1e38:
+        single: float = struct.unpack("f", struct.pack("f", value))[0]
+        bits = math.ulp(abs(single)) * 2.0**29
+        steps += [single, single - bits, single + bits]
+    return tuple(dict.fromkeys(steps))
+
+
+def _points(model: FuzzyTree | RuleBase) -> Iterator[tuple[Variable, float]]:
+    sets = model.sets if isinstance(model, FuzzyTree) else ()
+    fitted = {group.variable: group.terms for group in sets}
+    for variable in model.variables:
+        terms = (*variable.terms, *fitted.get(variable.name, ()))
+        values = {v for term in terms for v in landmarks(term.shape)}
+        for value in sorted(values):
+            yield variable, value
+
+
+def _spreads(model: FuzzyTree | RuleBase) -> dict[str, tuple[float, float]]:
+    """Return, for each input, a range that holds its landmarks."""
+    spread: dict[str, tuple[float, float]] = {}
+    for variable, value in _points(model):
+        if not variable.parts:
+            low, high = spread.get(variable.name, (value, value))
+            spread[variable.name] = min(low, value), max(high, value)
+    centres = {p.input: p for v in model.variables for p in v.parts}
+    for name in model.inputs:
+        if name not in spread:
+            part = centres.get(name)
+            centre, unit = (part.centre, 3 / abs(part.weight)) if part else (0.0, 1.0)
+            spread[name] = centre - unit, centre + unit
+    return spread
+
+
+def _solve(variable: Variable, value: float, row: dict[str, float]) -> None:
+    """Set the last input of a combination so that its sum comes close to a value."""
+    *others, last = variable.parts
+    rest = sum(p.weight * (row[p.input] - p.centre) for p in others)
+    row[last.input] = (value - rest) / last.weight + last.centre
