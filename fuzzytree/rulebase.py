@@ -465,7 +465,7 @@ def _choice(wrong: str, names: Iterable[str]) -> str:
     """Return `there is a, b (did you mean 'a'?)`, at most a dozen names long."""
     import difflib
 
-    known = list(names)
+    known = list(dict.fromkeys(names))
     if not known:
         return "there is none"
     shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
