@@ -1,0 +1,180 @@
+"""The layout: every package is in the map, and every kind of installation works."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+HOMES = {
+    "fuzzytree": "fuzzytree",
+    "exporters": "fuzzytree.exporters",
+    "schemas": "fuzzytree.schemas",
+}
+GROW_A_MODEL = """
+import sys
+import fuzzytree
+from importlib.resources import files
+heavy = {"numpy", "onnx", "onnxruntime", "sklearn", "yaml", "pandas"} & set(sys.modules)
+assert not heavy, heavy
+assert "site-packages" in fuzzytree.__file__ or EDITABLE, fuzzytree.__file__
+assert (files("fuzzytree") / "py.typed").is_file()
+for name in ("tree.schema.json", "rulebase.schema.json"):
+    assert (files("fuzzytree.schemas") / name).is_file(), name
+table = {"size": [1.0, 1.5, 2.0, 2.5, 7.0, 7.5, 8.0, 8.5], "kind": ["a"] * 4 + ["b"] * 4}
+import numpy as np
+values = np.array(table["size"]).reshape(-1, 1)
+from fuzzytree.learning import learn_arrays
+tree = learn_arrays(values, table["kind"], columns=["size"], classes=["a", "b"]).tree
+rules = fuzzytree.rules_from_tree(tree)
+fuzzytree.save(rules, "model.yaml")
+assert fuzzytree.load("model.yaml") == rules
+print(len(tree.leaves), "leaves")
+"""
+
+
+def test_every_package_is_in_the_map() -> None:
+    found: set[str] = set()
+    for folder, name in HOMES.items():
+        for init in (ROOT / folder).rglob("__init__.py"):
+            inner = init.parent.relative_to(ROOT / folder).parts
+            if not any((ROOT / folder / part).is_symlink() for part in inner):
+                found.add(".".join([name, *inner]))
+    assert found == set(_project()["tool"]["setuptools"]["packages"])
+
+
+@pytest.mark.parametrize("folder", ["exporters", "schemas"])
+def test_a_link_in_the_package_leads_to_the_folder_at_the_top(folder: str) -> None:
+    link = ROOT / "fuzzytree" / folder
+    assert link.is_symlink()
+    assert link.readlink() == Path("..") / folder
+    assert link.resolve() == ROOT / folder
+
+
+def test_every_file_that_is_no_code_is_package_data() -> None:
+    data = _project()["tool"]["setuptools"]["package-data"]
+    for folder, name in HOMES.items():
+        for path in sorted((ROOT / folder).rglob("*")):
+            is_code = path.suffix in {".py", ".pyc"} or path.is_dir()
+            if is_code or (folder == "fuzzytree" and _is_linked(path)):
+                continue
+            package = ".".join([name, *path.relative_to(ROOT / folder).parent.parts])
+            assert any(path.match(pattern) for pattern in data.get(package, [])), path
+
+
+def test_the_version_of_the_package_is_that_of_the_changelog() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    newest = re.search(r"^## (\d+\.\d+\.\d+)", text, re.MULTILINE)
+    assert newest is not None
+    assert newest.group(1) == _project()["project"]["version"]
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("how", ["editable", "wheel", "wheel from sdist"])
+def test_an_installation_without_extras_learns_and_names_a_missing_one(
+    how: str, tmp_path: Path
+) -> None:
+    source = _copy_of_the_project(tmp_path / "source")
+    if how == "editable":
+        what = ["--editable", str(source)]
+    else:
+        what = [str(_wheel(source, tmp_path, from_sdist=how == "wheel from sdist"))]
+    python = _fresh_environment(tmp_path, *what)
+    script = GROW_A_MODEL.replace("EDITABLE", str(how == "editable"))
+    grown = _run([str(python), "-c", script], tmp_path)
+    assert grown.stdout == "2 leaves\n"
+    (tmp_path / "rows.csv").write_text("size\n1.2\n8.1\n", "utf-8")
+    program = str(python.parent / "fuzzytree")
+    shown = _run([program, "show", "model.yaml"], tmp_path)
+    assert "size" in shown.stdout
+    answered = _run([program, "run", "model.yaml", "rows.csv"], tmp_path)
+    classes = [line.split(",")[0] for line in answered.stdout.split()]
+    assert classes == ["class", "a", "b"]
+    refused = _run(
+        [program, "export", "model.yaml", "-o", "model.onnx"], tmp_path, expected=2
+    )
+    assert "pip install 'fuzzytree-toolkit[onnx]'" in refused.stderr
+    assert "Traceback" not in refused.stderr
+
+
+@pytest.mark.heavy
+def test_wheel_and_source_archive_hold_every_module_and_every_data_file(
+    tmp_path: Path,
+) -> None:
+    source = _copy_of_the_project(tmp_path / "source")
+    wheel = _wheel(source, tmp_path, from_sdist=False)
+    rebuilt = _wheel(source, tmp_path / "again", from_sdist=True)
+    expected = {
+        "/".join([*name.split("."), *path.relative_to(source / folder).parts])
+        for folder, name in HOMES.items()
+        for path in (source / folder).rglob("*")
+        if path.is_file()
+        and path.suffix != ".pyc"
+        and not (folder == "fuzzytree" and _is_linked(path, source))
+    }
+    for built in (wheel, rebuilt):
+        inside = {n for n in zipfile.ZipFile(built).namelist() if ".dist-info" not in n}
+        assert inside == expected
+    archive = next((tmp_path / "again").glob("*.tar.gz"))
+    with tarfile.open(archive) as held:
+        names = {name.split("/", 1)[-1] for name in held.getnames()}
+    assert {"LICENSE", "README.md", "exporters/__init__.py"} <= names
+
+
+def _project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+
+
+def _is_linked(path: Path, root: Path = ROOT) -> bool:
+    return path.relative_to(root / "fuzzytree").parts[0] in {"exporters", "schemas"}
+
+
+def _copy_of_the_project(target: Path) -> Path:
+    """Copy what belongs to the project and nothing that was built or installed."""
+    ignored = shutil.ignore_patterns(
+        ".git", ".venv", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info",
+        "build", "dist", "out",
+    )  # fmt: skip
+    shutil.copytree(ROOT, target, symlinks=True, ignore=ignored)
+    return target
+
+
+def _wheel(source: Path, folder: Path, *, from_sdist: bool) -> Path:
+    """Build a wheel, and first a source archive to build it from if asked for."""
+    kinds = ["--sdist"] if from_sdist else ["--wheel"]
+    command = [sys.executable, "-m", "build", *kinds, "--outdir", str(folder)]
+    if from_sdist:
+        _run([*command, str(source)], source)
+        archive = next(folder.glob("*.tar.gz"))
+        pip = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"]
+        _run([*pip, "--wheel-dir", str(folder), str(archive)], source)
+    else:
+        _run([*command, str(source)], source)
+    return next(folder.glob("*.whl"))
+
+
+def _fresh_environment(folder: Path, *what: str) -> Path:
+    """Make an environment, install what is given, and return its Python."""
+    _run([sys.executable, "-m", "venv", str(folder / "env")], folder)
+    python = folder / "env" / "bin" / "python"
+    _run([str(python), "-m", "pip", "install", "--quiet", *what], folder)
+    return python
+
+
+def _run(
+    command: list[str], folder: Path, *, expected: int = 0
+) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, timeout=500, check=False
+    )
+    assert done.returncode == expected, done.stdout + done.stderr
+    return done
