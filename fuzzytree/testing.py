@@ -1,24 +1,21 @@
 """Models to test with, for us and for people who write formats and runtimes.
 
-`random_tree` makes valid trees of any size from a seed, `probes` the rows that matter
-for a model: every cut, plateau end, support end and mean, their neighbouring floats,
-extremes, and missing values.
+`random_tree` makes valid trees of any size from a seed; `probes` (from
+`fuzzytree.probing`) the rows that matter for a model.
 """
 
 from __future__ import annotations
 
-import math
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
+from fuzzytree.probing import SPECIAL, probes
 from fuzzytree.rulebase import (
     LR,
     Band,
     Flank,
     Part,
-    RuleBase,
     Semantics,
-    Shape,
     Side,
     Term,
     Variable,
@@ -33,21 +30,7 @@ from fuzzytree.tree import (
     intervals,
 )
 
-SPECIAL = (
-    math.nan,
-    math.inf,
-    -math.inf,
-    0.0,
-    -0.0,
-    5e-324,
-    -1e-310,
-    1e30,
-    -1e30,
-    1e300,
-    -1e300,
-    1.7976931348623157e308,
-)
-"""Values at which runtimes tend to part."""
+__all__ = ["SPECIAL", "probes", "random_tree"]
 
 
 def random_tree(
@@ -247,101 +230,3 @@ def _lr(chance: random.Random, cuts: Sequence[float]) -> LR:
     left = side()
     right = left if chance.random() < 0.5 else side()
     return LR(chance.uniform(-2.0, 2.0) * unit, left, right)
-
-
-def landmarks(shape: Shape) -> Iterator[float]:
-    """Yield the values at which a shape changes its formula."""
-    match shape:
-        case Band(low=low, high=high, left=left, right=right):
-            yield from (value for value in (low, high) if value is not None)
-            for flank in (left, right):
-                if flank is not None:
-                    yield flank.start
-                    yield flank.end
-        case LR(mean=mean, left=below, right=above):
-            yield mean
-            for sign, side in ((-1.0, below), (1.0, above)):
-                yield mean + sign * side.spread
-                yield mean + sign * side.spread * side.reach
-
-
-def probes(
-    model: FuzzyTree | RuleBase, *, limit: int = 20_000, seed: int = 0
-) -> list[dict[str, float]]:
-    """Return rows at which carriers of a model tend to part.
-
-    For each landmark of each variable: the value and its two neighbouring floats, in
-    double and in float32. A combination is met by solving for one of its inputs, which
-    lands at or next to the landmark. The other inputs are drawn from a seed; special
-    values come in last, one input at a time.
-    """
-    chance = random.Random(seed)
-    spread = _spreads(model)
-    rows: list[dict[str, float]] = []
-
-    def draw() -> dict[str, float]:
-        return {name: chance.uniform(low, high) for name, (low, high) in spread.items()}
-
-    points = [
-        (variable, value)
-        for variable, value in _points(model)
-        for value in neighbours(value)
-    ]
-    chance.shuffle(points)
-    room = max(limit - len(spread) * len(SPECIAL) - 100, 0)
-    for variable, value in points[:room]:
-        row = draw()
-        if variable.parts:
-            _solve(variable, value, row)
-        else:
-            row[variable.name] = value
-        rows.append(row)
-    rows += [draw() for _ in range(100)]
-    for name in spread:
-        rows += [{**draw(), name: value} for value in SPECIAL]
-    return rows
-
-
-def neighbours(value: float) -> tuple[float, ...]:
-    """Return a value, the floats next to it, and what float32 makes of them."""
-    import struct
-
-    steps = [value, math.nextafter(value, -math.inf), math.nextafter(value, math.inf)]
-    if abs(value) < 1e38:
-        single: float = struct.unpack("f", struct.pack("f", value))[0]
-        bits = math.ulp(abs(single)) * 2.0**29
-        steps += [single, single - bits, single + bits]
-    return tuple(dict.fromkeys(steps))
-
-
-def _points(model: FuzzyTree | RuleBase) -> Iterator[tuple[Variable, float]]:
-    sets = model.sets if isinstance(model, FuzzyTree) else ()
-    fitted = {group.variable: group.terms for group in sets}
-    for variable in model.variables:
-        terms = (*variable.terms, *fitted.get(variable.name, ()))
-        values = {v for term in terms for v in landmarks(term.shape)}
-        for value in sorted(values):
-            yield variable, value
-
-
-def _spreads(model: FuzzyTree | RuleBase) -> dict[str, tuple[float, float]]:
-    """Return, for each input, a range that holds its landmarks."""
-    spread: dict[str, tuple[float, float]] = {}
-    for variable, value in _points(model):
-        if not variable.parts:
-            low, high = spread.get(variable.name, (value, value))
-            spread[variable.name] = min(low, value), max(high, value)
-    centres = {p.input: p for v in model.variables for p in v.parts}
-    for name in model.inputs:
-        if name not in spread:
-            part = centres.get(name)
-            centre, unit = (part.centre, 3 / abs(part.weight)) if part else (0.0, 1.0)
-            spread[name] = centre - unit, centre + unit
-    return spread
-
-
-def _solve(variable: Variable, value: float, row: dict[str, float]) -> None:
-    """Set the last input of a combination so that its sum comes close to a value."""
-    *others, last = variable.parts
-    rest = sum(p.weight * (row[p.input] - p.centre) for p in others)
-    row[last.input] = (value - rest) / last.weight + last.centre

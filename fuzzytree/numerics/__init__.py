@@ -1,0 +1,1 @@
+"""What rounding can do to a model, derived and not tuned."""

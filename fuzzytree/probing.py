@@ -1,0 +1,247 @@
+"""Rows at which the carriers of a model tend to part.
+
+Uniform rows almost never fall where two carriers could differ: within rounding of a
+cut, of a support's end, of a mean. A probe puts one clause of one rule exactly there,
+or on a neighbouring float, while the other clauses of that rule hold as far as they
+can, so that a fault in the clause reaches the answer.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+import struct
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import axis_values
+from fuzzytree.rulebase import LR, Band, Clause, Rule, RuleBase, Shape, Variable
+from fuzzytree.tree import FuzzyTree
+
+SPECIAL = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    0.0,
+    -0.0,
+    5e-324,
+    -1e-310,
+    1e30,
+    -1e30,
+    1e300,
+    -1e300,
+    1.7976931348623157e308,
+)
+"""Values that number types and runtimes treat differently."""
+
+_ROUNDS = 12  # of moving a row towards what a path asks of its combinations
+_TRIES = 24  # of meeting one value of a combination to the last bit
+
+Row = dict[str, float]
+Interval = tuple[float, float]
+
+
+def probes(
+    model: FuzzyTree | RuleBase, *, limit: int = 20_000, seed: int = 0
+) -> list[Row]:
+    """Return rows that put each distinct clause on its landmarks and beside them.
+
+    Args:
+        model: A rule base, or a tree, which is probed through its relative rules.
+        limit: The most rows to return. Above it, clauses' landmarks are drawn from
+            the seed; random rows and special values always keep their place.
+        seed: The same model, limit and seed give the same rows.
+
+    Returns:
+        A value for each input in each row: landmarks first, then 100 random rows,
+        then each of `SPECIAL` in each input.
+    """
+    rules = model if isinstance(model, RuleBase) else rules_from_tree(model)
+    chance = random.Random(seed)
+    maker = _Maker(rules, chance)
+    tail = [maker.draw() for _ in range(100)]
+    for name in rules.inputs:
+        tail += [{**maker.draw(), name: value} for value in SPECIAL]
+    tail = tail[:limit]
+    targets = list(_targets(rules, maker.shapes))
+    if len(targets) > limit - len(tail):
+        targets = chance.sample(targets, max(limit - len(tail), 0))
+    return [maker.meet(*target) for target in targets] + tail
+
+
+def landmarks(shape: Shape) -> tuple[float, ...]:
+    """Return the values at which a shape changes its formula, and one within each."""
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            ends = [value for value in (low, high) if value is not None]
+            for flank in (left, right):
+                if flank is not None:
+                    ends += [flank.start, flank.end]
+                    ends.append(flank.start + 0.4 * (flank.end - flank.start))
+        case LR(mean=mean, left=below, right=above):
+            ends = [mean]
+            for sign, side in ((-1.0, below), (1.0, above)):
+                for u in (0.6, 1.0, 0.5 + 0.5 * side.reach, side.reach):
+                    ends.append(mean + sign * side.spread * u)
+    return tuple(dict.fromkeys(filter(math.isfinite, ends)))
+
+
+def neighbours(value: float) -> tuple[float, ...]:
+    """Return a value, the doubles next to it, and its float32 with its neighbours."""
+    near = [value, math.nextafter(value, -math.inf), math.nextafter(value, math.inf)]
+    if abs(value) < 1e38:
+        single: float = struct.unpack("f", struct.pack("f", value))[0]
+        step = max(math.ulp(single) * 2.0**29, 2.0**-149)
+        near += [single, single - step, single + step]
+    return tuple(filter(math.isfinite, dict.fromkeys(near)))
+
+
+def _targets(
+    rules: RuleBase, shapes: Mapping[tuple[str, str], Shape]
+) -> Iterator[tuple[Rule, Clause, float]]:
+    """Yield a rule, a clause of it and a value, once for each distinct clause."""
+    seen: set[Clause] = set()
+    for rule in rules.rules:
+        for clause in rule.when:
+            if clause in seen:
+                continue
+            seen.add(clause)
+            values = itertools.chain.from_iterable(
+                landmarks(shapes[clause.variable, term]) for term in clause.terms
+            )
+            for value in dict.fromkeys(values):
+                for near in neighbours(value):
+                    yield rule, clause, near
+
+
+class _Maker:
+    """Makes rows for one rule base; keeps what every row needs."""
+
+    def __init__(self, rules: RuleBase, chance: random.Random) -> None:
+        self.chance = chance
+        self.shapes = {
+            (v.name, t.name): t.shape for v in rules.variables for t in v.terms
+        }
+        self.variables = {v.name: v for v in rules.variables}
+        self.ranges = _ranges(rules)
+
+    def draw(self) -> Row:
+        """Return a row within the range of the model's own landmarks."""
+        return {
+            name: self.chance.uniform(low, high)
+            for name, (low, high) in self.ranges.items()
+        }
+
+    def meet(self, rule: Rule, clause: Clause, value: float) -> Row:
+        """Return a row that holds a rule but puts one clause's variable on a value."""
+        wanted = [
+            (self.variables[other.variable], self._inside(other))
+            for other in rule.when
+            if other.variable != clause.variable
+        ]
+        # Inputs can be set at once; combinations have to be moved, round by round.
+        wanted.sort(key=lambda entry: not entry[0].parts, reverse=True)
+        row = self.draw()
+        target = self.variables[clause.variable]
+        for _ in range(_ROUNDS if any(v.parts for v, _ in wanted) else 1):
+            moved = [self._move(row, variable, inside) for variable, inside in wanted]
+            self._move(row, target, (value, value))
+            if not any(moved):
+                break
+        self._hit(row, target, value)
+        return row
+
+    def _inside(self, clause: Clause) -> Interval:
+        """Return an interval on which a clause holds best."""
+        shape = self.shapes[clause.variable, self.chance.choice(clause.terms)]
+        match shape:
+            case Band(low=low, high=high, left=left, right=right):
+                width = max(
+                    [abs(f.start - f.end) for f in (left, right) if f is not None],
+                    default=1.0,
+                )
+                if low is None:
+                    low = -math.inf if high is None else high - width
+                if high is None:
+                    high = math.inf if low == -math.inf else low + width
+                return low, high
+            case LR(mean=mean, left=below, right=above):
+                return mean - 0.1 * below.spread, mean + 0.1 * above.spread
+
+    def _move(self, row: Row, variable: Variable, inside: Interval) -> bool:
+        """Shift a row so that a variable falls inside an interval; say if it did."""
+        low, high = inside
+        value = axis_values((variable,), row)[variable.name]
+        if low < value < high or value == low == high or not math.isfinite(value):
+            return False
+        if math.isinf(low) or math.isinf(high):
+            return False
+        goal = (
+            low if low == high else low + (high - low) * self.chance.uniform(0.1, 0.9)
+        )
+        if not variable.parts:
+            row[variable.name] = goal
+            return True
+        # The step of least length, with each input measured in its own range.
+        pull = [p.weight * self._width(p.input) ** 2 for p in variable.parts]
+        total = sum(p.weight * g for p, g in zip(variable.parts, pull, strict=True))
+        for part, gain in zip(variable.parts, pull, strict=True):
+            row[part.input] += (goal - value) * gain / total
+        return True
+
+    def _width(self, name: str) -> float:
+        low, high = self.ranges[name]
+        return min(max(high - low, 1e-100), 1e100)
+
+    def _hit(self, row: Row, variable: Variable, value: float) -> None:
+        """Set the finest of a variable's inputs so that it has a value exactly.
+
+        The values of a combination that doubles can reach are a lattice; where the
+        value is not on it, the row stays on the nearest point that was found.
+        """
+        if not variable.parts:
+            row[variable.name] = value
+            return
+        finest = min(
+            variable.parts,
+            key=lambda p: (
+                abs(p.weight) * math.ulp(max(abs(row[p.input]), abs(p.centre)))
+            ),
+        )
+        best, nearest = math.inf, row[finest.input]
+        for _ in range(_TRIES):
+            gap = value - axis_values((variable,), row)[variable.name]
+            if abs(gap) < best:
+                best, nearest = abs(gap), row[finest.input]
+            if not abs(gap) > 0:
+                break
+            step = gap / finest.weight
+            here = row[finest.input]
+            if here + step == here:
+                step = math.copysign(math.ulp(here), step)
+            row[finest.input] = here + step
+        row[finest.input] = nearest
+
+
+def _ranges(rules: RuleBase) -> dict[str, Interval]:
+    """Return, for each input, a range that holds its landmarks and weights' units."""
+    points: dict[str, list[float]] = {name: [] for name in rules.inputs}
+    for variable in rules.variables:
+        if not variable.parts:
+            points[variable.name] += _known(variable)
+    for variable in rules.variables:
+        for part in variable.parts:
+            unit = min(max(1.0 / abs(part.weight), 1e-100), 1e100)
+            points[part.input] += [part.centre - unit, part.centre + unit]
+    return {name: _hull(values) for name, values in points.items()}
+
+
+def _known(variable: Variable) -> Iterable[float]:
+    ends = [end for end in (variable.low, variable.high) if end is not None]
+    return [*ends, *(v for term in variable.terms for v in landmarks(term.shape))]
+
+
+def _hull(values: Sequence[float]) -> Interval:
+    low, high = min(values, default=0.0), max(values, default=1.0)
+    return (low, high) if low < high else (low - 1.0, high + 1.0)
