@@ -36,7 +36,7 @@ SPECIAL = (
 """Values that number types and runtimes treat differently."""
 
 _ROUNDS = 12  # of moving a row towards what a path asks of its combinations
-_TRIES = 24  # of meeting one value of a combination to the last bit
+_TRIES = 48  # of meeting one value of a combination to the last bit
 
 Row = dict[str, float]
 Interval = tuple[float, float]
@@ -144,6 +144,8 @@ class _Maker:
         wanted.sort(key=lambda entry: not entry[0].parts, reverse=True)
         row = self.draw()
         target = self.variables[clause.variable]
+        for part in target.parts:  # small summands: no digits are lost in their sum
+            row[part.input] = part.centre + self.chance.uniform(-0.5, 0.5) / part.weight
         for _ in range(_ROUNDS if any(v.parts for v, _ in wanted) else 1):
             moved = [self._move(row, variable, inside) for variable, inside in wanted]
             self._move(row, target, (value, value))
@@ -183,16 +185,10 @@ class _Maker:
         if not variable.parts:
             row[variable.name] = goal
             return True
-        # The step of least length, with each input measured in its own range.
-        pull = [p.weight * self._width(p.input) ** 2 for p in variable.parts]
-        total = sum(p.weight * g for p, g in zip(variable.parts, pull, strict=True))
-        for part, gain in zip(variable.parts, pull, strict=True):
-            row[part.input] += (goal - value) * gain / total
+        share = (goal - value) / len(variable.parts)  # every summand moves alike
+        for part in variable.parts:
+            row[part.input] += share / part.weight
         return True
-
-    def _width(self, name: str) -> float:
-        low, high = self.ranges[name]
-        return min(max(high - low, 1e-100), 1e100)
 
     def _hit(self, row: Row, variable: Variable, value: float) -> None:
         """Set the finest of a variable's inputs so that it has a value exactly.
@@ -203,25 +199,27 @@ class _Maker:
         if not variable.parts:
             row[variable.name] = value
             return
-        finest = min(
-            variable.parts,
-            key=lambda p: (
-                abs(p.weight) * math.ulp(max(abs(row[p.input]), abs(p.centre)))
-            ),
-        )
-        best, nearest = math.inf, row[finest.input]
-        for _ in range(_TRIES):
+        steps = {
+            p.input: abs(p.weight) * math.ulp(max(abs(row[p.input]), abs(p.centre)))
+            for p in variable.parts
+        }
+        weights = {p.input: p.weight for p in variable.parts}
+        finest = min(steps, key=lambda name: steps[name])
+        best, nearest = math.inf, dict(row)
+        for attempt in range(_TRIES):
             gap = value - axis_values((variable,), row)[variable.name]
             if abs(gap) < best:
-                best, nearest = abs(gap), row[finest.input]
+                best, nearest = abs(gap), dict(row)
             if not abs(gap) > 0:
                 break
-            step = gap / finest.weight
-            here = row[finest.input]
+            # Mostly the finest input in its own steps; at times another, which
+            # shifts the lattice of sums that the finest can reach.
+            name = finest if attempt % 3 else self.chance.choice(list(steps))
+            here, step = row[name], gap / weights[name]
             if here + step == here:
-                step = math.copysign(math.ulp(here), step)
-            row[finest.input] = here + step
-        row[finest.input] = nearest
+                step = math.copysign(math.ulp(here) * self.chance.randint(1, 5), step)
+            row[name] = here + step
+        row.update(nearest)
 
 
 def _ranges(rules: RuleBase) -> dict[str, Interval]:
