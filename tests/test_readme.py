@@ -1,0 +1,231 @@
+"""The README keeps its promises: its commands, its examples, its tables, its map.
+
+`python tests/test_readme.py` rewrites what the README shows: the output of its
+examples, the table of formats and runtimes, the picture. Review the difference.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import importlib
+import io
+import os
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+README = ROOT / "README.md"
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
+FORMATS = re.compile(r"(?<=<!-- formats -->\n\n).*?(?=\n<!-- end -->)", re.DOTALL)
+PROGRAM = f"{sys.executable} -m fuzzytree"
+CHANGING = (
+    # Times, speeds and hashes depend on the machine and on versions.
+    (re.compile(r"\d[\d., ]*(?=\s*(?:ns|us|µs|ms|s)\b)"), "0 "),
+    (re.compile(r"\b[0-9a-f]{12,64}\b"), "0"),
+    (re.compile(r"[-─ ]{3,}"), "  "),
+)
+
+
+def test_the_first_two_commands_are_the_ones_that_ci_runs() -> None:
+    first, second = [text for kind, text in _blocks() if kind == "sh"][:2]
+    assert first.count("\n") == second.count("\n") == 1
+    shown = subprocess.run(
+        [str(ROOT / ".ci" / "run"), "commands"],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    assert shown == first + second
+    script = (ROOT / ".ci" / "run").read_text("utf-8")
+    assert 'bash -c "$main"' in script
+    assert 'bash -c "$tests"' in script
+
+
+@pytest.mark.heavy
+def test_the_first_command_works_in_a_fresh_copy(tmp_path: Path) -> None:
+    first = next(text for kind, text in _blocks() if kind == "sh")
+    copy = tmp_path / "fuzzytree"
+    ignored = shutil.ignore_patterns(
+        ".git", ".venv", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info",
+        "build", "dist", "out",
+    )  # fmt: skip
+    shutil.copytree(ROOT, copy, symlinks=True, ignore=ignored)
+    done = subprocess.run(
+        ["bash", "-c", first],
+        cwd=copy, capture_output=True, text=True, timeout=900, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (copy / "out" / "wine-rules.yaml").is_file()
+    assert (copy / "out" / "wine-rules.onnx").is_file()
+    assert "IF " in done.stdout
+
+
+def test_every_example_prints_what_the_readme_shows(tmp_path: Path) -> None:
+    text = README.read_text("utf-8")
+    assert _masked(_rewritten_examples(text, tmp_path)) == _masked(text)
+
+
+def test_the_table_of_formats_is_the_one_of_the_code() -> None:
+    shown = FORMATS.search(README.read_text("utf-8"))
+    assert shown is not None
+    assert shown.group(0) == _formats()
+
+
+def test_the_map_names_every_module() -> None:
+    map_ = README.read_text("utf-8").split("## Code map", 1)[1].split("\n## ", 1)[0]
+    named = re.findall(r"^\s*([\w/]+(?:\.py|/))  ", map_, re.MULTILINE)
+    found = [
+        path.name if path.is_file() else f"{path.name}/"
+        for path in (ROOT / "fuzzytree").iterdir()
+        if path.suffix == ".py" or (path.is_dir() and path.name != "__pycache__")
+    ]
+    hidden = {"__init__.py", "__main__.py"}
+    assert sorted(named) == sorted(set(found) - hidden)
+
+
+def test_every_link_of_the_readme_and_the_docs_leads_to_a_file() -> None:
+    pages = [README, *sorted((ROOT / "docs").rglob("*.md"))]
+    for page in pages:
+        for target in re.findall(
+            r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text("utf-8")
+        ):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_the_picture_is_the_one_that_its_script_draws() -> None:
+    drawn = _script("picture.py")["drawn"]()
+    assert (ROOT / "docs" / "wine.svg").read_text("utf-8") == drawn
+
+
+def test_the_wine_table_holds_the_numbers_of_scikit_learn() -> None:
+    from sklearn.datasets import load_wine
+
+    wine = load_wine()
+    with (ROOT / "examples" / "wine" / "wine.csv").open(encoding="utf-8") as file:
+        head, *rows = csv.reader(file)
+    grapes = ["barolo", "grignolino", "barbera"]
+    assert len(head) == 14
+    assert [[float(cell) for cell in row[:-1]] for row in rows] == wine.data.tolist()
+    assert [grapes.index(row[-1]) for row in rows] == wine.target.tolist()
+
+
+def _blocks() -> list[tuple[str, str]]:
+    return FENCE.findall(README.read_text("utf-8"))
+
+
+def _masked(text: str) -> str:
+    for pattern, replacement in CHANGING:
+        text = pattern.sub(replacement, text)
+    return text
+
+
+def _rewritten_examples(text: str, folder: Path) -> str:
+    """Return the README with its examples run again in a folder, in their order."""
+    (folder / "examples").symlink_to(ROOT / "examples")
+    (folder / "out").mkdir()
+    pieces: list[str] = []
+    end = 0
+    output: str | None = None
+    for match in FENCE.finditer(text):
+        kind, body = match.groups()
+        if kind == "console":
+            body = "".join(_answered(body, folder))
+        elif kind == "text" and output is not None:
+            body = output
+        pieces += [text[end : match.start()], f"```{kind}\n{body}```\n"]
+        end = match.end()
+        output = _printed(body, folder) if kind == "python" else None
+    return "".join([*pieces, text[end:]])
+
+
+def _answered(session: str, folder: Path) -> Iterator[str]:
+    """Run each `$ fuzzytree ...` line of a session and yield it with its answer."""
+    paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "COLUMNS": "88",
+    }
+    for line in session.splitlines():
+        if not line.startswith("$ "):
+            continue
+        command = re.sub(r"(?<![\w./-])fuzzytree(?= )", lambda _: PROGRAM, line[2:])
+        done = subprocess.run(
+            command, shell=True, cwd=folder, env=environment, check=True, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        yield f"{line}\n{done.stdout}"
+
+
+def _printed(code: str, folder: Path) -> str:
+    printed = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
+        exec(compile(code, str(README), "exec"), {"__name__": "readme"})
+    return printed.getvalue()
+
+
+def _formats() -> str:
+    """Return the tables of formats and runtimes as the README shows them."""
+    from fuzzytree.exporters import all_formats
+    from fuzzytree.runtimes import all_runtimes
+
+    lines = [
+        "| format | suffix | reads | writes | extra | cannot |",
+        "|---|---|---|---|---|---|",
+    ]
+    for one in all_formats():
+        carried = " and ".join(one.carries)
+        cells = (
+            one.name,
+            ", ".join(f"`{suffix}`" for suffix in one.suffixes),
+            carried if one.read else "",
+            carried,
+            one.extra or "",
+            "; ".join(one.cannot),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        "| runtime | runs | numbers | agreement with the reference | extra | cannot |",
+        "|---|---|---|---|---|---|",
+    ]
+    for runtime in all_runtimes():
+        promise = "equal bits" if runtime.bound is None else "within a derived bound"
+        if runtime.bound is None and runtime.dtype != "float64":
+            promise = f"equal bits with native {runtime.dtype}"
+        cells = (
+            runtime.name,
+            " and ".join(runtime.runs),
+            runtime.dtype,
+            promise,
+            runtime.extra or "",
+            "; ".join(runtime.cannot),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _script(name: str) -> dict[str, Callable[[], str]]:
+    return runpy.run_path(str(ROOT / "examples" / name), run_name="readme")
+
+
+def _rewrite() -> None:
+    import tempfile
+
+    (ROOT / "docs" / "wine.svg").write_text(_script("picture.py")["drawn"](), "utf-8")
+    text = README.read_text("utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        text = _rewritten_examples(text, Path(folder))
+    README.write_text(FORMATS.sub(lambda _: _formats(), text), "utf-8")
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    importlib.invalidate_caches()
+    _rewrite()
