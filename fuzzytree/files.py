@@ -1,0 +1,111 @@
+"""Whole files, read within bounds and written so that the old file survives."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import stat
+from collections.abc import Generator
+from pathlib import Path
+from typing import BinaryIO
+
+from fuzzytree.errors import ReadError, WriteError
+
+LIMIT = 256 * 2**20
+"""The most bytes that a model file may have, unless told otherwise."""
+
+PathLike = str | os.PathLike[str]
+
+
+def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
+    """Return the content of a file, unless it is larger than the limit.
+
+    Args:
+        path: The file.
+        limit: In bytes.
+
+    Raises:
+        ReadError: If the file is not there, cannot be read or is too large.
+    """
+    name = os.fspath(path)
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(limit + 1)
+    except (OSError, ValueError) as error:
+        raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
+    if len(content) > limit:
+        raise ReadError(f"{name}: is larger than {limit} bytes, too large for a model")
+    return content
+
+
+def write_atomically(path: PathLike, content: bytes) -> None:
+    """Write a file whole, or leave what stood there as it was.
+
+    The content goes to a new file in the same folder, is flushed to the disk and then
+    takes the old file's place and mode. A link is followed: its target is replaced.
+    A device or a pipe is written to directly.
+
+    Raises:
+        WriteError: If it cannot be written; nothing is left behind.
+    """
+    with open_atomically(path) as file:
+        file.write(content)
+
+
+@contextlib.contextmanager
+def open_atomically(path: PathLike) -> Generator[BinaryIO]:
+    """Open a file that appears under its name only when the block has ended well.
+
+    Raises:
+        WriteError: If it cannot be written; nothing is left behind.
+    """
+    name = os.fspath(path)
+    try:
+        target = Path(os.path.realpath(path))
+        mode = _mode(target)
+        if mode is None or stat.S_ISREG(mode):
+            with _replacing(target, mode) as file:
+                yield file
+        elif stat.S_ISDIR(mode):
+            raise IsADirectoryError(None, "it is a folder")
+        else:
+            with target.open("wb") as device:
+                yield device
+    except WriteError:
+        raise
+    except OSError as error:
+        raise WriteError(f"{name}: cannot be written: {reason(error)}") from error
+
+
+@contextlib.contextmanager
+def _replacing(target: Path, mode: int | None) -> Generator[BinaryIO]:
+    if mode is not None and not os.access(target, os.W_OK):
+        raise PermissionError(None, "it is write-protected")
+    temporary = target.with_name(f".{target.name[:80]}.{secrets.token_hex(8)}.part")
+    # Created with 0o666, so that the kernel applies the user's mask.
+    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        with open(handle, "wb") as file:
+            if mode is not None:
+                temporary.chmod(stat.S_IMODE(mode))
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _mode(path: Path) -> int | None:
+    try:
+        return path.stat().st_mode
+    except FileNotFoundError:
+        return None
+
+
+def reason(error: OSError | ValueError) -> str:
+    """Return why a file could not be used, without the path and the error number."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return text[0].lower() + text[1:]

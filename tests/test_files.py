@@ -1,0 +1,161 @@
+"""Files are read within bounds, and the old file survives a failed writing."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from fuzzytree import files
+from fuzzytree.errors import ReadError, WriteError
+from fuzzytree.files import open_atomically, read_bounded, write_atomically
+
+
+def test_a_file_is_read_whole(tmp_path: Path) -> None:
+    path = tmp_path / "grip.yaml"
+    path.write_bytes(b"12345")
+    assert read_bounded(path, 5) == b"12345"
+
+
+def test_a_file_larger_than_the_limit_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "grip.yaml"
+    path.write_bytes(b"12345")
+    with pytest.raises(ReadError) as caught:
+        read_bounded(path, 4)
+    assert str(caught.value) == f"{path}: is larger than 4 bytes, too large for a model"
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("absent.yaml", "no such file or directory"),
+        ("folder", "is a directory"),
+        ("nul\0", "embedded null byte"),
+    ],
+)
+def test_a_file_that_cannot_be_read_says_why(
+    tmp_path: Path, name: str, why: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    path = str(tmp_path / name)
+    with pytest.raises(ReadError) as caught:
+        read_bounded(path)
+    assert str(caught.value) == f"{path}: cannot be read: {why}"
+
+
+def test_writing_replaces_the_content_and_keeps_the_mode(tmp_path: Path) -> None:
+    path = tmp_path / "grip.yaml"
+    path.write_bytes(b"old")
+    path.chmod(0o640)
+    write_atomically(path, b"new")
+    assert path.read_bytes() == b"new"
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+    assert os.listdir(tmp_path) == ["grip.yaml"]
+
+
+def test_a_new_file_obeys_the_users_mask(tmp_path: Path) -> None:
+    path = tmp_path / "grip.yaml"
+    before = os.umask(0o027)
+    try:
+        write_atomically(path, b"new")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+def test_a_link_stays_a_link_and_its_target_is_replaced(tmp_path: Path) -> None:
+    target = tmp_path / "real" / "grip.yaml"
+    target.parent.mkdir()
+    target.write_bytes(b"old")
+    link = tmp_path / "link.yaml"
+    link.symlink_to(target)
+    write_atomically(link, b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+def test_a_full_disk_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "grip.yaml"
+    path.write_bytes(b"old")
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files.os, "fsync", full)
+    with pytest.raises(WriteError) as caught:
+        write_atomically(path, b"new")
+    assert str(caught.value) == f"{path}: cannot be written: no space left on device"
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["grip.yaml"]
+
+
+def test_a_full_device_is_reported() -> None:
+    with pytest.raises(WriteError) as caught:
+        write_atomically("/dev/full", b"new")
+    assert str(caught.value) == "/dev/full: cannot be written: no space left on device"
+
+
+def test_a_read_only_folder_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "grip.yaml"
+    path.write_bytes(b"old")
+
+    def refuse(*_: object) -> int:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(files.os, "open", refuse)
+    with pytest.raises(WriteError) as caught:
+        write_atomically(path, b"new")
+    assert str(caught.value) == f"{path}: cannot be written: read-only file system"
+    assert path.read_bytes() == b"old"
+
+
+def test_a_write_protected_file_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "grip.yaml"
+    path.write_bytes(b"old")
+    path.chmod(0o444)
+    if os.access(path, os.W_OK):  # the superuser may write everything
+        monkeypatch.setattr(files.os, "access", lambda *_: False)
+    with pytest.raises(WriteError) as caught:
+        write_atomically(path, b"new")
+    assert str(caught.value) == f"{path}: cannot be written: it is write-protected"
+    assert path.read_bytes() == b"old"
+
+
+def test_a_folder_is_no_place_to_write_to(tmp_path: Path) -> None:
+    with pytest.raises(WriteError) as caught:
+        write_atomically(tmp_path, b"new")
+    assert str(caught.value) == f"{tmp_path}: cannot be written: it is a folder"
+
+
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
+    path = tmp_path / "absent" / "grip.yaml"
+    with pytest.raises(WriteError) as caught:
+        write_atomically(path, b"new")
+    assert str(caught.value) == f"{path}: cannot be written: no such file or directory"
+
+
+def test_an_interrupted_writer_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "out.csv"
+    path.write_bytes(b"old")
+    with pytest.raises(KeyboardInterrupt), open_atomically(path) as file:
+        file.write(b"half")
+        raise KeyboardInterrupt
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["out.csv"]
+
+
+def test_an_error_of_the_block_itself_is_not_renamed(tmp_path: Path) -> None:
+    with (
+        pytest.raises(ReadError, match="the table"),
+        open_atomically(tmp_path / "out.csv"),
+    ):
+        raise ReadError("the table")
+    assert os.listdir(tmp_path) == []
