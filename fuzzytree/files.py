@@ -86,7 +86,7 @@ def _replacing(target: Path, mode: int | None) -> Generator[BinaryIO]:
     # Created with 0o666, so that the kernel applies the user's mask.
     handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
-        with open(handle, "wb") as file:
+        with os.fdopen(handle, "wb") as file:
             if mode is not None:
                 temporary.chmod(stat.S_IMODE(mode))
             yield file

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree import files
 from fuzzytree.errors import ReadError, WriteError
 from fuzzytree.files import open_atomically, read_bounded, write_atomically
 
@@ -52,7 +51,7 @@ def test_writing_replaces_the_content_and_keeps_the_mode(tmp_path: Path) -> None
     write_atomically(path, b"new")
     assert path.read_bytes() == b"new"
     assert stat.S_IMODE(path.stat().st_mode) == 0o640
-    assert os.listdir(tmp_path) == ["grip.yaml"]
+    assert _names(tmp_path) == ["grip.yaml"]
 
 
 def test_a_new_file_obeys_the_users_mask(tmp_path: Path) -> None:
@@ -85,12 +84,12 @@ def test_a_full_disk_leaves_the_old_file(
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(files.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(WriteError) as caught:
         write_atomically(path, b"new")
     assert str(caught.value) == f"{path}: cannot be written: no space left on device"
     assert path.read_bytes() == b"old"
-    assert os.listdir(tmp_path) == ["grip.yaml"]
+    assert _names(tmp_path) == ["grip.yaml"]
 
 
 def test_a_full_device_is_reported() -> None:
@@ -108,7 +107,7 @@ def test_a_read_only_folder_leaves_the_old_file(
     def refuse(*_: object) -> int:
         raise OSError(30, "Read-only file system")
 
-    monkeypatch.setattr(files.os, "open", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(WriteError) as caught:
         write_atomically(path, b"new")
     assert str(caught.value) == f"{path}: cannot be written: read-only file system"
@@ -122,7 +121,7 @@ def test_a_write_protected_file_is_not_replaced(
     path.write_bytes(b"old")
     path.chmod(0o444)
     if os.access(path, os.W_OK):  # the superuser may write everything
-        monkeypatch.setattr(files.os, "access", lambda *_: False)
+        monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(WriteError) as caught:
         write_atomically(path, b"new")
     assert str(caught.value) == f"{path}: cannot be written: it is write-protected"
@@ -145,11 +144,10 @@ def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
 def test_an_interrupted_writer_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "out.csv"
     path.write_bytes(b"old")
-    with pytest.raises(KeyboardInterrupt), open_atomically(path) as file:
-        file.write(b"half")
-        raise KeyboardInterrupt
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted(path)
     assert path.read_bytes() == b"old"
-    assert os.listdir(tmp_path) == ["out.csv"]
+    assert _names(tmp_path) == ["out.csv"]
 
 
 def test_an_error_of_the_block_itself_is_not_renamed(tmp_path: Path) -> None:
@@ -158,4 +156,14 @@ def test_an_error_of_the_block_itself_is_not_renamed(tmp_path: Path) -> None:
         open_atomically(tmp_path / "out.csv"),
     ):
         raise ReadError("the table")
-    assert os.listdir(tmp_path) == []
+    assert _names(tmp_path) == []
+
+
+def _interrupted(path: Path) -> None:
+    with open_atomically(path) as file:
+        file.write(b"half")
+        raise KeyboardInterrupt
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
