@@ -106,6 +106,7 @@ class Runtime(msgspec.Struct, frozen=True):
         cannot: What it cannot do, a sentence each.
         extra: The optional packages it needs, if any.
         modules: The modules that must be importable.
+        is_slow: Whether rows cost so much that a check gives it only a share of them.
     """
 
     name: str
@@ -116,3 +117,4 @@ class Runtime(msgspec.Struct, frozen=True):
     cannot: tuple[str, ...] = ()
     extra: str | None = None
     modules: tuple[str, ...] = ()
+    is_slow: bool = False

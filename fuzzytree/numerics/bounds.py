@@ -1,9 +1,9 @@
 """How far float32 can take a degree, a strength or an axis from its double.
 
-Every bound is a priori: it follows from the coefficients, the widths and the largest
-values, by the usual model of rounding, fl(a op b) = (a op b)(1 + e) with |e| <= u and
-u = 2**-24 for float32. Terms of order u**2 and the doubles' own rounding (2**-53) are
-covered by the factor `_SECOND_ORDER`.
+Every bound is a priori: it follows from the coefficients, the widths and the values, by
+the usual model of rounding, fl(a op b) = (a op b)(1 + e) with |e| <= u and u = 2**-24
+for float32. Terms of order u**2 and the doubles' own rounding (2**-53) are covered by
+the factor `_SECOND_ORDER`.
 
 The use of such a bound: where the margin between the two strongest classes exceeds
 twice the bound of a strength, both number types decide alike.
@@ -11,21 +11,41 @@ twice the bound of a strength, both number types decide alike.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from fuzzytree.contracts import Dtype
 from fuzzytree.rulebase import LR, Band, Flank, RuleBase, Shape, Side, Variable
 
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
 UNIT = 2.0**-24
 """The unit roundoff of float32."""
+
+FLOAT32_MAX = 3.4028234663852886e38
+"""The largest float32."""
 
 _SECOND_ORDER = 1.0 + 2.0**-10
 
 
-def strength_bound(
-    rules: RuleBase, dtype: Dtype, largest: Mapping[str, float]
-) -> tuple[float, str]:
-    """Return the largest difference of any strength from its double, and its origin.
+class DegreeBound(NamedTuple):
+    """The largest error of a degree: `fixed + per_unit * (error of the value)`.
+
+    Attributes:
+        fixed: What the shape's own arithmetic costs.
+        per_unit: What an error of the value costs, per unit of the variable.
+    """
+
+    fixed: float
+    per_unit: float
+
+
+def strength_bounds(
+    rules: RuleBase, dtype: Dtype, values: FloatArray
+) -> tuple[FloatArray, str]:
+    """Return the largest difference of any strength from its double, for each row.
 
     Min passes the largest error of a degree on; a product at most adds the errors of
     its factors, and a rounding for each multiplication.
@@ -33,107 +53,110 @@ def strength_bound(
     Args:
         rules: The rule base.
         dtype: The type in which degrees and strengths are computed.
-        largest: The largest absolute value of each input among the rows in question;
-            only the all-float32 type depends on it.
+        values: Shape (inputs, rows).
 
     Returns:
-        The bound, at most 1, and a sentence that says where it comes from.
+        The bounds, each at most 1, and a sentence that says where they come from. The
+        bound is 1 where a value is beyond the type's range.
     """
+    rows = values.shape[1]
+    worst = np.zeros(rows)
     if dtype == "float64":
-        return 0.0, "the same operations in the same type"
-    variables = {v.name: v for v in rules.variables}
-    slack = {
-        name: _axis_slack(variable, largest) if dtype == "float32" else 0.0
-        for name, variable in variables.items()
-    }
-    degree = {
-        (v.name, t.name): degree_bound(t.shape, dtype, slack[v.name])
-        for v in rules.variables
-        for t in v.terms
-    }
-    worst = 0.0
-    for rule in rules.rules:
-        errors = [
-            max(degree[clause.variable, term] for term in clause.terms)
-            + (UNIT if clause.negated else 0.0)
-            for clause in rule.when
-        ]
-        if rules.semantics.conjunction == "product":
-            worst = max(worst, sum(errors) + UNIT * max(len(errors) - 1, 0))
-        else:
-            worst = max(worst, max(errors, default=0.0))
-    how = "largest" if rules.semantics.conjunction == "min" else "summed"
-    return min(worst * _SECOND_ORDER, 1.0), f"{how} error bound of the terms in {dtype}"
+        return worst, "the same operations in the same type"
+    for variable in rules.variables:
+        if variable.terms:
+            bounds = [degree_bound(term.shape, dtype) for term in variable.terms]
+            fixed = max(bound.fixed for bound in bounds)
+            per_unit = max(bound.per_unit for bound in bounds)
+            slack = (
+                axis_errors(variable, rules.inputs, values) if variable.parts else 0.0
+            )
+            with np.errstate(over="ignore"):
+                worst = np.maximum(worst, fixed + per_unit * slack)
+    if any(clause.negated for rule in rules.rules for clause in rule.when):
+        worst = worst + UNIT
+    longest = max(len(rule.when) for rule in rules.rules)
+    how = "largest"
+    if rules.semantics.conjunction == "product":
+        worst = longest * (worst + UNIT)
+        how = f"{longest} times the largest"
+    worst = np.minimum(worst * _SECOND_ORDER, 1.0)
+    if dtype == "float32":
+        worst[~(np.abs(values) <= FLOAT32_MAX).all(axis=0)] = 1.0
+    return worst, f"{how} derived error of a degree in {dtype}"
 
 
-def degree_bound(shape: Shape, dtype: Dtype, slack: float = 0.0) -> float:
+def axis_errors(
+    variable: Variable, inputs: tuple[str, ...], values: FloatArray
+) -> FloatArray:
+    """Return how far each value of a variable in float32 can be from its double.
+
+    An input is rounded once. A combination rounds inputs, centres, differences,
+    products and sums: at most (number of parts + 3) roundings of each summand.
+
+    Args:
+        variable: An input or a combination.
+        inputs: The names of the rows of `values`.
+        values: Shape (inputs, rows).
+    """
+    absolute = dict(zip(inputs, np.abs(values), strict=True))
+    unit = UNIT * _SECOND_ORDER
+    total: FloatArray = np.zeros(values.shape[1])
+    if not variable.parts:
+        total += unit * absolute[variable.name]
+    with np.errstate(over="ignore"):
+        for part in variable.parts:
+            size = absolute[part.input] + abs(part.centre)
+            total += unit * (len(variable.parts) + 3) * abs(part.weight) * size
+    return total
+
+
+def degree_bound(shape: Shape, dtype: Dtype) -> DegreeBound:
     """Return the largest difference of a degree from its double.
 
     Args:
         shape: The shape.
         dtype: `mixed` rounds the position on a flank; `float32` also rounds the value,
-            the shape's numbers and their difference.
-        slack: The absolute error of the value itself, in the variable's unit.
+            the shape's numbers and their difference. A degree that steps can be wrong
+            by 1 in float32, for a value may round across the step.
     """
     if dtype == "float64":
-        return 0.0
+        return DegreeBound(0.0, 0.0)
     match shape:
-        case Band(left=left, right=right):
+        case Band(low=low, high=high, left=left, right=right):
             flanks = [flank for flank in (left, right) if flank is not None]
-            if dtype == "float32" and not flanks:
-                return 1.0  # a step: a value that rounds across its edge
-            errors = [_flank_bound(flank, dtype, slack) for flank in flanks]
-            steps = (shape.low is not None and left is None) or (
-                shape.high is not None and right is None
-            )
-            if dtype == "float32" and steps:
-                return 1.0
-            return min(max(errors, default=0.0), 1.0)
+            bounds = [_flank_bound(flank, dtype) for flank in flanks]
+            edges = (low is not None) + (high is not None)
+            if dtype == "float32" and edges > len(flanks):
+                bounds.append(DegreeBound(1.0, 0.0))
         case LR(mean=mean, left=below, right=above):
-            error = max(_side_bound(s, mean, dtype, slack) for s in (below, above))
-            return min(error, 1.0)
-
-
-def axis_bound(variable: Variable, largest: Mapping[str, float]) -> float:
-    """Return how far a variable's value in float32 can be from its double.
-
-    An input is rounded once. A combination rounds inputs, centres, differences,
-    products and sums: at most (number of parts + 3) roundings of each summand.
-    """
-    return _axis_slack(variable, largest) * _SECOND_ORDER
-
-
-def _axis_slack(variable: Variable, largest: Mapping[str, float]) -> float:
-    if not variable.parts:
-        return UNIT * largest.get(variable.name, 0.0)
-    steps = len(variable.parts) + 3
-    return sum(
-        UNIT * steps * abs(p.weight) * (largest.get(p.input, 0.0) + abs(p.centre))
-        for p in variable.parts
+            bounds = [_side_bound(side, mean, dtype) for side in (below, above)]
+    return DegreeBound(
+        min(max((bound.fixed for bound in bounds), default=0.0), 1.0),
+        max((bound.per_unit for bound in bounds), default=0.0),
     )
 
 
-def _flank_bound(flank: Flank, dtype: Dtype, slack: float) -> float:
+def _flank_bound(flank: Flank, dtype: Dtype) -> DegreeBound:
     size = sum(map(abs, flank.curve))
     slope = sum(power * abs(c) for power, c in enumerate(flank.curve, 1))
-    position = UNIT
-    jump = 0.0
-    if dtype == "float32":
-        span = abs(flank.start - flank.end)
-        reach = max(abs(flank.start), abs(flank.end))
-        position = 4 * UNIT + (slack + 3 * UNIT * reach) / span
-        jump = abs(1.0 - sum(flank.curve))  # a value may round across the edge
     rounding = UNIT * (size * (2 * len(flank.curve) + 2) + 1.0)
-    return slope * position + rounding + jump
+    if dtype == "mixed":
+        return DegreeBound(slope * UNIT + rounding, 0.0)
+    span = abs(flank.start - flank.end)
+    reach = max(abs(flank.start), abs(flank.end))
+    position = 4 * UNIT + 4 * UNIT * reach / span
+    jump = abs(1.0 - sum(flank.curve))  # a value may round across the edge
+    return DegreeBound(slope * position + rounding + jump, slope / span)
 
 
-def _side_bound(side: Side, mean: float, dtype: Dtype, slack: float) -> float:
+def _side_bound(side: Side, mean: float, dtype: Dtype) -> DegreeBound:
     size = sum(map(abs, side.curve))
     bend = sum(2 * power * abs(c) for power, c in enumerate(side.curve))
     slope = size + bend + 4.0 / (side.reach - 1.0)
-    position = UNIT * side.reach
-    if dtype == "float32":
-        largest = abs(mean) + side.reach * side.spread
-        position = 5 * UNIT * side.reach + (slack + 3 * UNIT * largest) / side.spread
     rounding = UNIT * (size * (2 * len(side.curve) + 2) + 12.0)
-    return slope * position + rounding
+    if dtype == "mixed":
+        return DegreeBound(slope * UNIT * side.reach + rounding, 0.0)
+    reach = abs(mean) + side.reach * side.spread
+    position = 5 * UNIT * side.reach + 4 * UNIT * reach / side.spread
+    return DegreeBound(slope * position + rounding, slope / side.spread)

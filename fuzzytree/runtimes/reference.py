@@ -36,4 +36,4 @@ def load(model: Model) -> Run:
     return run
 
 
-RUNTIMES = (Runtime("reference", ("tree", "rules"), load),)
+RUNTIMES = (Runtime("reference", ("tree", "rules"), load, is_slow=True),)

@@ -1,0 +1,246 @@
+"""Hold the answers of one carrier against those of another, row by row."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.agreement import Comparison, Verdict
+from fuzzytree.contracts import Model, Outcome
+from fuzzytree.reference import Status
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, IntArray
+
+BoolArray = npt.NDArray[np.bool_]
+
+_TOLD = 5  # differing rows told for each comparison
+
+
+class Rows(msgspec.Struct, frozen=True):
+    """The rows that carriers answer: probes first, then the user's data.
+
+    Attributes:
+        inputs: The names of the inputs.
+        values: Shape (inputs, rows).
+        numbers: The number of each row in the whole, from 0.
+        probes: How many rows of the whole are probes.
+    """
+
+    inputs: tuple[str, ...]
+    values: FloatArray
+    numbers: IntArray
+    probes: int
+
+    def every(self, step: int) -> Rows:
+        """Return each step-th row."""
+        return Rows(
+            self.inputs, self.values[:, ::step], self.numbers[::step], self.probes
+        )
+
+    def name(self, row: int) -> str:
+        """Return what people call a row: `probe 3`, or `row 3` of the data."""
+        number = int(self.numbers[row])
+        if number < self.probes:
+            return f"probe {number + 1}"
+        return f"row {number - self.probes + 1}"
+
+
+class Answers(msgspec.Struct, frozen=True):
+    """What a carrier answered to some rows.
+
+    Attributes:
+        title: What to call the carrier.
+        model: What it executed.
+        outcome: Its answers, one for each of the rows.
+    """
+
+    title: str
+    model: Model
+    outcome: Outcome
+
+    def every(self, step: int) -> Answers:
+        """Return each step-th answer."""
+        all_of = self.outcome
+        strengths = all_of.strengths
+        return Answers(
+            self.title,
+            self.model,
+            Outcome(
+                all_of.rule[::step],
+                all_of.status[::step],
+                None if strengths is None else strengths[:, ::step],
+            ),
+        )
+
+
+def compare_bits(found: Answers, expected: Answers, rows: Rows) -> Comparison:
+    """Demand equal rule numbers, statuses and strengths (where both have them)."""
+    gap = strength_gap(found.outcome, expected.outcome)
+    return _compared(found, expected, rows, _unequal(found, expected) | (gap > 0), gap)
+
+
+def compare_within(
+    found: Answers, expected: Answers, rows: Rows, *, allowed: FloatArray, origin: str
+) -> Comparison:
+    """Allow a difference of strengths, and what must follow from it, and no more.
+
+    A class may differ only where the two strongest classes are at most twice the
+    allowed difference apart.
+
+    Args:
+        found: The answers of the carrier examined.
+        expected: The answers of the carrier it is held against.
+        rows: The rows.
+        allowed: The largest difference of a strength, for each row. The result tells
+            the one of the row that comes closest to it or exceeds it most.
+        origin: Where the allowed differences come from.
+    """
+    gap = strength_gap(found.outcome, expected.outcome)
+    flips = labels(found) != labels(expected)
+    margin = margins(expected)
+    close = np.zeros_like(flips) if margin is None else margin <= 2 * allowed
+    wrong = (gap > allowed) | (flips & ~close)
+    worst = int(np.argmax(gap / np.maximum(allowed, 1e-300))) if gap.size else 0
+    limit = float(allowed[worst]) if gap.size else 0.0
+    return _compared(found, expected, rows, wrong, gap, limit, origin)
+
+
+def compare_answers(
+    found: Answers, expected: Answers, rows: Rows, *, by_design: bool = False
+) -> Comparison:
+    """Compare classes and missing rows alone.
+
+    Args:
+        found: The answers of the carrier examined.
+        expected: The answers of the carrier it is held against.
+        rows: The rows.
+        by_design: Whether the two are different functions, so that a difference is
+            told but no fault.
+    """
+    flips = labels(found) != labels(expected)
+    gap = np.zeros(flips.shape)
+    verdict: Verdict | None = "differs by design" if by_design and flips.any() else None
+    return _compared(
+        found, expected, rows, flips, gap, origin="equal classes", verdict=verdict
+    )
+
+
+def compare_excused(
+    found: Answers, expected: Answers, rows: Rows, *, excused: BoolArray, origin: str
+) -> Comparison:
+    """Demand equal answers in every row that is not excused."""
+    wrong = _unequal(found, expected) & ~excused
+    return _compared(found, expected, rows, wrong, np.zeros(wrong.shape), 0.0, origin)
+
+
+def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
+    """Return the largest difference of a strength in each row; NaN equals NaN.
+
+    Zeros where one of the two tells no strengths; infinite where one has a rule more.
+    """
+    one, two = found.strengths, expected.strengths
+    if one is None or two is None:
+        return np.zeros(found.rule.shape)
+    if one.shape != two.shape:
+        return np.full(found.rule.shape, np.inf)
+    gap = np.abs(one - two)
+    gap[np.isnan(one) & np.isnan(two)] = 0.0
+    gap[np.isnan(gap)] = np.inf
+    largest: FloatArray = gap.max(axis=0, initial=0.0)
+    return largest
+
+
+def labels(answers: Answers) -> IntArray:
+    """Return the class number of each answer; -1 for no class."""
+    model, outcome = answers.model, answers.outcome
+    classes = {label: number for number, label in enumerate(model.classes)}
+    if isinstance(model, RuleBase):
+        ends = [rule.then for rule in model.rules]
+    else:
+        ends = [leaf.label for leaf in model.leaves]
+    table = np.array([-1, *(classes[label] for label in ends)], np.int64)
+    found = table[outcome.rule]
+    for status, answer in (
+        (Status.UNCOVERED, model.semantics.uncovered),
+        (Status.MISSING, model.semantics.missing),
+    ):
+        found[outcome.status == status] = -1 if answer is None else classes[answer]
+    return found
+
+
+def margins(answers: Answers) -> FloatArray | None:
+    """Return how far the strongest class is ahead of the next, in each row."""
+    model, strengths = answers.model, answers.outcome.strengths
+    if strengths is None or isinstance(model, FuzzyTree):
+        return None
+    owners = np.array([model.classes.index(rule.then) for rule in model.rules])
+    best = np.zeros((len(model.classes) + 1, strengths.shape[1]))
+    for number in range(len(model.classes)):
+        best[number] = strengths[owners == number].max(axis=0, initial=0.0)
+    top = np.sort(best, axis=0)
+    apart: FloatArray = np.nan_to_num(top[-1] - top[-2], nan=0.0)
+    return apart
+
+
+def _unequal(found: Answers, expected: Answers) -> BoolArray:
+    one, two = found.outcome, expected.outcome
+    unequal: BoolArray = (one.rule != two.rule) | (one.status != two.status)
+    return unequal
+
+
+def _compared(
+    found: Answers,
+    expected: Answers,
+    rows: Rows,
+    wrong: BoolArray,
+    gap: FloatArray,
+    allowed: float = 0.0,
+    origin: str = "equal bits",
+    verdict: Verdict | None = None,
+) -> Comparison:
+    flips = labels(found) != labels(expected)
+    margin = margins(expected)
+    told = np.flatnonzero(wrong)
+    told = told[np.argsort(-gap[told], kind="stable")][:_TOLD]
+    return Comparison(
+        found.title,
+        expected.title,
+        "rows",
+        int(wrong.size),
+        verdict or ("DISAGREES" if wrong.any() else "agrees"),
+        differing=int(wrong.sum()),
+        largest_difference=float(gap.max(initial=0.0)),
+        allowed=allowed,
+        origin=origin,
+        flips=int(flips.sum()),
+        largest_flip_margin=(
+            float(margin[flips].max()) if margin is not None and flips.any() else None
+        ),
+        detail=tuple(_row_text(found, expected, rows, row) for row in told.tolist()),
+    )
+
+
+def _row_text(found: Answers, expected: Answers, rows: Rows, row: int) -> str:
+    values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
+    shown = ", ".join(f"{name} {value!r}" for name, value in values)
+    return (
+        f"{rows.name(row)}: {shown}: {expected.title} answers "
+        f"{_answer_text(expected, row)}, {found.title} {_answer_text(found, row)}"
+    )
+
+
+def _answer_text(answers: Answers, row: int) -> str:
+    outcome = answers.outcome
+    rule, status = int(outcome.rule[row]), Status(int(outcome.status[row]))
+    number = int(labels(answers)[row])
+    label = answers.model.classes[number] if number >= 0 else "no class"
+    text = f"{label} (rule {rule})" if rule else label
+    if outcome.strengths is not None and rule:
+        text += f" with {float(outcome.strengths[rule - 1, row])!r}"
+    return text if status is Status.DECIDED else f"{text} ({status.name.lower()})"
