@@ -1,0 +1,354 @@
+"""ONNX: a tree or a rule base as a graph that any ONNX runtime executes.
+
+A tree gives the graph that follows its path, a rule base the graph that fires all its
+rules. See `docs/onnx.md` for the graphs, their cost and the versions that run them.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, get_args
+
+from fuzzytree.contracts import Dtype, Format, Loss, Model, Written
+from fuzzytree.errors import LossError, MissingExtraError
+from fuzzytree.rulebase import fingerprint
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import onnx
+
+    from fuzzytree.exporters.onnx_axes import Axes
+    from fuzzytree.exporters.onnx_graph import Sheet
+
+FORMAT_VERSION = "1"
+"""Of the meaning of inputs, outputs and metadata."""
+
+Output = Literal["label", "rule", "strengths", "status"]
+Signature = Literal["needed", "all"]
+
+OPSETS = range(12, 27)
+"""The operator sets that can be asked for; 12 is the first whose ArgMax defines ties."""
+
+IRS = range(4, 14)
+"""The file versions that can be asked for; constants need no input from 4 on."""
+
+READABLE_OPSET = 13
+READABLE_IR = 8
+
+OLDEST: Mapping[str, str] = {
+    "rules": "1.15.0",
+    "plain tree": "1.15.0",
+    "readable rules": "1.15.0",
+    "tree": "1.21.0",
+}
+"""The oldest onnxruntime that was seen to give equal answers; 1.15 is the oldest there
+is for Python 3.11, and `TreeEnsemble` came with 1.21."""
+
+_MOST_ROWS_TO_VERIFY = 24
+
+
+def write(
+    model: Model,
+    /,
+    *,
+    allow_loss: bool = False,
+    dtype: Dtype = "float64",
+    opset: int = 17,
+    ir: int = 8,
+    signature: Signature = "needed",
+    outputs: Sequence[Output] = ("label", "rule"),
+    readable: bool = False,
+    plain: bool = False,
+    verify: bool = True,
+) -> Written:
+    """Write a tree as the graph of its path, a rule base as the graph of its rules.
+
+    The input is `inputs`, of shape (rows, columns), double (float32 for `float32`).
+    The outputs, each with one entry per row: `label`, the class or "" for none;
+    `rule`, the number of the winning rule or leaf from 1, or 0; `status`, a
+    `fuzzytree.reference.Status`; `strengths`, of shape (rows, rules), NaN where a
+    value is missing. The same model and options give the same bytes.
+
+    Args:
+        model: A tree or a rule base.
+        allow_loss: Whether to write what float32 cannot hold as near as it can.
+        dtype: The number type; `mixed` compares and divides in double and does the
+            rest in float32. A tree has comparisons only: `mixed` is `float64` for it.
+        opset: The version of the operators, 12 to 26.
+        ir: The version of the file, 4 to 13.
+        signature: `needed` for the model's inputs as columns, `all` for all columns
+            of the training table, of which the others are ignored.
+        outputs: Which outputs, in this order.
+        readable: Whether degrees and the winner are functions of the domain
+            `fuzzytree`, for people who look into the file (rules only).
+        plain: Whether a tree does without the operators of ai.onnx.ml.
+        verify: Whether to load the file in onnxruntime and to compare its answers.
+
+    Returns:
+        The file and what was lost.
+
+    Raises:
+        LossError: If float32 cannot hold a number of the model, unless allowed; or if
+            the installed onnxruntime does not load the file.
+        DisagreementError: If the file, run in onnxruntime, gives another answer.
+        MissingExtraError: If onnx is not installed, or onnxruntime to verify with.
+        ValueError: If an option is not one of those above.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> written = write(random_tree(1), outputs=("label", "status"))
+        >>> len(written.content) < 2000
+        True
+    """
+    _check_options(model, dtype, opset, ir, signature, outputs)
+    _check_variants(model, opset, ir, readable=readable, plain=plain)
+    _require("onnx", "writing onnx needs")
+    if verify:
+        _require("onnxruntime", "verifying a written onnx file needs")
+    from fuzzytree.exporters.onnx_numbers import losses
+
+    lost = losses(model, dtype)
+    if lost and not allow_loss:
+        raise LossError(_loss_text(model, dtype, lost))
+    made = _model_proto(
+        model, dtype, opset, ir, signature, outputs, readable=readable, plain=plain
+    )
+    content: bytes = made.SerializeToString(deterministic=True)
+    if verify:
+        from fuzzytree.exporters.onnx_proof import prove
+
+        is_exact = dtype == "float64" or (dtype == "mixed" and _is_tree(model))
+        columns = _columns(model, signature)
+        prove(content, model, columns, is_exact=is_exact, limit=_MOST_ROWS_TO_VERIFY)
+    return Written(content, lost)
+
+
+def _is_tree(model: Model) -> bool:
+    return isinstance(model, FuzzyTree)
+
+
+def _check_options(
+    model: Model,
+    dtype: Dtype,
+    opset: int,
+    ir: int,
+    signature: Signature,
+    outputs: Sequence[Output],
+) -> None:
+    for name, value, choices in (
+        ("dtype", dtype, get_args(Dtype)),
+        ("signature", signature, get_args(Signature)),
+        *(("outputs", output, get_args(Output)) for output in outputs),
+    ):
+        if value not in choices:
+            raise ValueError(f"{name}: there is {', '.join(choices)}, not {value!r}")
+    if not outputs or len(set(outputs)) != len(outputs):
+        raise ValueError(f"outputs: name each once, at least one, not {outputs!r}")
+    if opset not in OPSETS:
+        raise ValueError(_range_text("opset", OPSETS, opset))
+    if ir not in IRS:
+        raise ValueError(_range_text("ir", IRS, ir))
+    if signature == "all" and not model.columns:
+        raise ValueError(
+            f"{model.name!r} does not know the columns of its training table, "
+            "so its signature can only be 'needed'"
+        )
+
+
+def _check_variants(
+    model: Model, opset: int, ir: int, *, readable: bool, plain: bool
+) -> None:
+    if plain and not _is_tree(model):
+        raise ValueError("plain is for trees: rules never need ai.onnx.ml")
+    if readable and _is_tree(model):
+        raise ValueError("readable is for rules: a tree's graph has no functions")
+    if readable and (opset < READABLE_OPSET or ir < READABLE_IR):
+        raise ValueError(
+            f"readable needs opset {READABLE_OPSET} and ir {READABLE_IR} or later, "
+            f"not opset {opset} and ir {ir}"
+        )
+
+
+def _range_text(what: str, known: range, value: int) -> str:
+    return f"{what}: onnx files are written for {known[0]} to {known[-1]}, not {value}"
+
+
+def _require(package: str, purpose: str) -> None:
+    if importlib.util.find_spec(package) is None:
+        raise MissingExtraError(
+            f"{purpose} the extra 'onnx': pip install 'fuzzytree-toolkit[onnx]'"
+        )
+
+
+def _loss_text(model: Model, dtype: Dtype, lost: Sequence[Loss]) -> str:
+    lines = [f"{loss.where}: {loss.what}" for loss in lost]
+    more = [f"and {len(lines) - 10} more"] if len(lines) > 10 else []
+    head = f"cannot write {model.name} as onnx {dtype}: "
+    hint = "pass allow_loss=True to write it as stated, or choose dtype 'float64'"
+    return head + "\n  ".join([*lines[:10], *more, hint])
+
+
+def _columns(model: Model, signature: Signature) -> tuple[str, ...]:
+    return model.columns if signature == "all" else model.inputs
+
+
+def _model_proto(
+    model: Model,
+    dtype: Dtype,
+    opset: int,
+    ir: int,
+    signature: Signature,
+    outputs: Sequence[Output],
+    *,
+    readable: bool,
+    plain: bool,
+) -> onnx.ModelProto:
+    import numpy as np
+    from onnx import TensorProto, helper
+
+    from fuzzytree.exporters.onnx_graph import DOMAIN, TREES, Sheet
+    from fuzzytree.exporters.onnx_numbers import NUMBERS
+
+    numbers = NUMBERS[dtype]
+    sheet = Sheet(opset, is_readable=readable)
+    columns = _columns(model, signature)
+    axis = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.axis))
+    degree = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
+    kinds: dict[Output, tuple[int, list[str | int]]] = {
+        "label": (TensorProto.STRING, ["rows"]),
+        "rule": (TensorProto.INT64, ["rows"]),
+        "status": (TensorProto.INT64, ["rows"]),
+        "strengths": (degree, ["rows", _rule_count(model)]),
+    }
+    _fill(sheet, model, dtype, columns, outputs, plain=plain)
+    graph = helper.make_graph(
+        sheet.nodes,
+        "rules" if not _is_tree(model) else "tree",
+        [helper.make_tensor_value_info("inputs", axis, ["rows", len(columns)])],
+        [helper.make_tensor_value_info(name, *kinds[name]) for name in outputs],
+        sheet.tensors,
+    )
+    imports = [helper.make_opsetid("", opset)]
+    if any(node.domain == TREES for node in sheet.nodes):
+        imports.append(helper.make_opsetid(TREES, 5))
+    if sheet.functions:
+        imports.append(helper.make_opsetid(DOMAIN, 1))
+    made = helper.make_model(
+        graph,
+        opset_imports=imports,
+        ir_version=ir,
+        functions=list(sheet.functions.values()),
+        producer_name="fuzzytree",
+        producer_version=_version(),
+        doc_string=_in_words(model, dtype),
+    )
+    facts = _facts(model, dtype, columns, outputs)
+    for key, value in facts.items():
+        made.metadata_props.add(key=key, value=value)
+    return made
+
+
+def _fill(
+    sheet: Sheet,
+    model: Model,
+    dtype: Dtype,
+    columns: Sequence[str],
+    outputs: Sequence[Output],
+    *,
+    plain: bool,
+) -> None:
+    """Add all nodes of a graph to a sheet."""
+    from fuzzytree.exporters import onnx_outputs
+    from fuzzytree.exporters.onnx_numbers import NUMBERS
+
+    numbers = NUMBERS[dtype]
+    if isinstance(model, FuzzyTree):
+        from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
+
+        is_plain = plain or needs_plain(model)
+        frame = tree_graph(sheet, model, numbers, columns, is_plain=is_plain)
+        onnx_outputs.add_tree_outputs(sheet, model, frame, outputs)
+    else:
+        from fuzzytree.exporters.onnx_rules import rules_graph
+
+        frame, strengths = rules_graph(sheet, model, numbers, columns)
+        onnx_outputs.add_rule_outputs(sheet, model, frame, strengths, outputs, numbers)
+
+
+def _rule_count(model: Model) -> int:
+    return len(model.leaves if isinstance(model, FuzzyTree) else model.rules)
+
+
+def _facts(
+    model: Model, dtype: Dtype, columns: Sequence[str], outputs: Sequence[Output]
+) -> dict[str, str]:
+    """Return the metadata: plain words where possible, JSON for lists and records."""
+    semantics = model.semantics
+    units = {v.name: v.unit for v in model.variables if not v.parts}
+    kind = "descent" if isinstance(model, FuzzyTree) else model.kind or "rules"
+    texts = {
+        "format": FORMAT_VERSION,
+        "version": _version(),
+        "name": model.name,
+        "carrier": "tree" if _is_tree(model) else "rules",
+        "kind": kind,
+        "dtype": dtype,
+        "fingerprint": fingerprint(model),
+    }
+    records: dict[str, object] = {
+        "columns": list(columns),
+        "inputs": list(model.inputs),
+        "units": [units.get(name, "") for name in columns],
+        "classes": list(model.classes),
+        "rules": _rule_count(model),
+        "outputs": list(outputs),
+        "semantics": {
+            "conjunction": semantics.conjunction,
+            "uncovered": semantics.uncovered,
+            "missing": semantics.missing,
+        },
+    }
+    facts = {key: json.dumps(value, ensure_ascii=False) for key, value in records.items()}
+    return {f"fuzzytree.{key}": value for key, value in (texts | facts).items()}
+
+
+def _in_words(model: Model, dtype: Dtype) -> str:
+    missing = model.semantics.missing
+    answer = "no class" if missing is None else repr(missing)
+    if isinstance(model, FuzzyTree):
+        what = (
+            f"The fuzzy decision tree {model.name!r} with {len(model.leaves)} leaves: "
+            "one path is followed, a value equal to a cut goes to the left."
+        )
+    else:
+        uncovered = model.semantics.uncovered
+        other = "no class" if uncovered is None else repr(uncovered)
+        what = (
+            f"The fuzzy rule base {model.name!r} with {len(model.rules)} rules: AND is "
+            f"{model.semantics.conjunction}, the first of the strongest rules decides, "
+            f"and where none fires the answer is {other}."
+        )
+    return f"{what} Missing and infinite values give {answer}. Numbers: {dtype}."
+
+
+def _version() -> str:
+    try:
+        return importlib.metadata.version("fuzzytree-toolkit")
+    except importlib.metadata.PackageNotFoundError:
+        return "uninstalled"
+
+
+FORMAT = Format(
+    name="onnx",
+    suffixes=(".onnx",),
+    carries=("tree", "rules"),
+    write=write,
+    cannot=(
+        "an onnx file runs, but is not read back as a tree or rule base",
+        "a tree's terms and fitted sets are left out: its path needs the cuts alone",
+    ),
+    extra="onnx",
+)

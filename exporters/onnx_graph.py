@@ -1,0 +1,179 @@
+"""A graph on its way to an ONNX file: nodes and constants in the order of their making.
+
+Nothing in it depends on a hash, a clock or a default of the onnx package, so that the
+same calls give the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+import onnx
+from onnx import helper, numpy_helper
+
+DOMAIN = "fuzzytree"
+"""The domain of our own functions, in readable files."""
+
+TREES = "ai.onnx.ml"
+"""The domain of `TreeEnsemble`."""
+
+Constant = npt.NDArray[np.generic]
+Body = Callable[["Sheet", Sequence[str], str], str]
+
+
+class Attribute(Protocol):
+    """Whatever `onnx.helper.make_attribute` accepts."""
+
+
+class Sheet:
+    """Nodes, constants and functions, collected; every result is known by its name.
+
+    Attributes:
+        opset: The version of the operators.
+        is_readable: Whether `block` makes functions or writes their nodes in place.
+        nodes: The nodes so far.
+        tensors: The constants so far, equal ones once.
+        functions: The functions so far, by name.
+    """
+
+    def __init__(
+        self, opset: int, *, is_readable: bool = False, in_function: bool = False
+    ) -> None:
+        self.opset = opset
+        self.is_readable = is_readable
+        self.nodes: list[onnx.NodeProto] = []
+        self.tensors: list[onnx.TensorProto] = []
+        self.functions: dict[str, onnx.FunctionProto] = {}
+        self._in_function = in_function
+        self._known: dict[tuple[str, tuple[int, ...], bytes], str] = {}
+        self._taken: dict[str, int] = {}
+
+    def node(
+        self,
+        op: str,
+        *inputs: str,
+        named: str = "",
+        domain: str = "",
+        **attributes: Attribute,
+    ) -> str:
+        """Add a node with one result and return the result's name.
+
+        Args:
+            op: The operator.
+            inputs: The names of its inputs.
+            named: The name of the result; made from the operator unless given.
+            domain: The operator's domain.
+            attributes: The operator's own settings.
+        """
+        result = named or self._fresh(op.lower())
+        made = helper.make_node(op, inputs, [result], domain=domain, **attributes)
+        self.nodes.append(made)
+        return result
+
+    def constant(self, value: Constant, hint: str) -> str:
+        """Return the name of a constant, made the first time that it is asked for."""
+        key = (value.dtype.str, value.shape, value.tobytes())
+        if key not in self._known:
+            name = self._fresh(hint)
+            tensor = numpy_helper.from_array(np.ascontiguousarray(value), name)
+            tensor = tensor if value.shape else numpy_helper.from_array(value, name)
+            if self._in_function:
+                self.node("Constant", named=name, value=tensor)
+            else:
+                self.tensors.append(tensor)
+            self._known[key] = name
+        return self._known[key]
+
+    def texts(self, values: Sequence[str], hint: str) -> str:
+        """Return the name of a new constant list of texts."""
+        name = self._fresh(hint)
+        encoded = [value.encode() for value in values]
+        self.tensors.append(
+            helper.make_tensor(name, onnx.TensorProto.STRING, [len(values)], encoded)
+        )
+        return name
+
+    def numbers(self, values: Sequence[int], hint: str) -> str:
+        """Return the name of a constant list of whole numbers."""
+        return self.constant(np.array(values, np.int64), hint)
+
+    def block(
+        self, name: str, body: Body, inputs: Mapping[str, str], *, named: str = ""
+    ) -> str:
+        """Add what a body makes of its inputs: in place, or as a call of a function.
+
+        Args:
+            name: The function's name; one name must always mean the same body.
+            body: Adds nodes to the sheet that it is given, from the names of its
+                inputs to a result of the given name, and returns that name.
+            inputs: For each parameter of the function, the name of its argument.
+            named: The name of the result; made unless given.
+        """
+        if not self.is_readable:
+            return body(self, list(inputs.values()), named)
+        if name not in self.functions:
+            inner = Sheet(self.opset, in_function=True)
+            result = body(inner, list(inputs), "result")
+            self.functions[name] = helper.make_function(
+                DOMAIN,
+                name,
+                list(inputs),
+                [result],
+                inner.nodes,
+                [helper.make_opsetid("", self.opset)],
+            )
+        return self.node(name, *inputs.values(), named=named, domain=DOMAIN)
+
+    def take(self, source: str, rows: Sequence[int]) -> str:
+        """Return the named rows of a block."""
+        return self.node("Gather", source, self.numbers(rows, "rows"), axis=0)
+
+    def total(self, source: str, *, axis: int, keepdims: int) -> str:
+        """Return the sum along an axis, in the form that the opset knows."""
+        if self.opset >= 13:
+            axes = self.numbers([axis], "axes")
+            return self.node("ReduceSum", source, axes, keepdims=keepdims)
+        return self.node("ReduceSum", source, axes=[axis], keepdims=keepdims)
+
+    def _fresh(self, hint: str) -> str:
+        number = self._taken[hint] = self._taken.get(hint, 0) + 1
+        return hint if number == 1 else f"{hint}_{number}"
+
+
+class Table:
+    """Rows of degrees, collected block by block and known by their number."""
+
+    def __init__(self, sheet: Sheet) -> None:
+        self._sheet = sheet
+        self._blocks: list[tuple[str, int, int]] = []
+        self._joined: tuple[int, str] = (0, "")
+        self.count = 0
+
+    def append(self, block: str, count: int) -> int:
+        """Add a block of `count` rows and return the number of its first row."""
+        first = self.count
+        self._blocks.append((block, first, count))
+        self.count += count
+        return first
+
+    def take(self, rows: Sequence[int]) -> str:
+        """Return a block of these rows, without a node where it stands already."""
+        for block, first, count in self._blocks:
+            if all(first <= row < first + count for row in rows):
+                local = [row - first for row in rows]
+                if local == list(range(count)):
+                    return block
+                return self._sheet.take(block, local)
+        if list(rows) == list(range(self.count)):
+            return self._all()
+        return self._sheet.take(self._all(), rows)
+
+    def _all(self) -> str:
+        """Return all rows as one block."""
+        if self._joined[0] != len(self._blocks):
+            names = [block for block, _, _ in self._blocks]
+            self._joined = (len(names), self._sheet.node("Concat", *names, axis=0))
+        return self._joined[1]

@@ -1,0 +1,406 @@
+"""A rule base as a graph of wide operations, features first.
+
+The operations on a number are those of `fuzzytree.reference`, in the same order, so
+that strengths have the same bits as its own. What is rearranged changes no bit:
+
+- A band is one or two *edges*. `x <= low` is `x < next(low)`, and a right edge is a
+  left edge of `-x`: negated operands give negated differences, and equal quotients.
+- At any x at most one edge of a band is below 1, so the smallest edge is the degree.
+- An LR set is two *slopes*, or one of `|x - m|` if both sides are the same.
+- Shorter curves are filled up with zeros at the high end: `0 * q + c` is `c`.
+- Max and min may repeat operands; a product takes them in their stored order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+from onnx import helper
+
+from fuzzytree.exporters.onnx_axes import Axes, axes, column, scalar
+from fuzzytree.exporters.onnx_graph import Sheet, Table
+from fuzzytree.exporters.onnx_numbers import Numbers, rounded
+from fuzzytree.rulebase import LR, Clause, Flank, RuleBase, Shape, Side
+
+Key = tuple[str, str]  # variable and term
+Curve = tuple[float, ...]
+Sequences = list[tuple[int, ...]]
+
+
+class Edge(msgspec.Struct, frozen=True):
+    """One end of a band: below it the degree is that of the flank, otherwise 1.
+
+    Attributes:
+        variable: Whose value is looked at.
+        sign: 1 for a left end; -1 for a right one, which lies left of it in `-x`.
+        bound: The band's `low` or `high`.
+        flank: The degree beyond the bound; None is 0.
+    """
+
+    variable: str
+    sign: int
+    bound: float
+    flank: Flank | None
+
+
+class Slope(msgspec.Struct, frozen=True):
+    """One side of an LR set; with sign 0 both sides, which are the same."""
+
+    variable: str
+    sign: int
+    mean: float
+    side: Side
+
+
+Part = Edge | Slope
+
+
+def rules_graph(
+    sheet: Sheet, rules: RuleBase, numbers: Numbers, columns: Sequence[str]
+) -> tuple[Axes, str]:
+    """Add a rule base up to the strengths of no rule and of every rule.
+
+    Row 0 of the strengths is 0, or 2 where a value is missing, and row k is rule k: so
+    the position of the first largest is the number of the winning rule, or 0.
+
+    Args:
+        sheet: Where the nodes go.
+        rules: What is written.
+        numbers: The types to compute in.
+        columns: What the columns of `inputs` are, in order.
+
+    Returns:
+        The values of the variables, and the strengths, of shape (1 + rules, rows).
+    """
+    frame = axes(sheet, rules, numbers, columns)
+    nothing, missing = (scalar(sheet, value, numbers.degree) for value in (0.0, 2.0))
+    none = sheet.node("Where", frame.is_known, nothing, missing)
+    table = Table(sheet)
+    if frame.block:
+        sequences = _degrees(sheet, table, rules, numbers, frame)
+    else:
+        one = scalar(sheet, 1.0, numbers.degree)
+        table.append(sheet.node("Add", none, one), 1)
+        sequences = [(0,) for _ in rules.rules]
+    is_product = rules.semantics.conjunction == "product"
+    return frame, _strengths(sheet, table, sequences, none, is_product=is_product)
+
+
+def _parts(variable: str, shape: Shape) -> list[Part]:
+    """Return the edges or slopes whose smallest degree is that of a shape."""
+    if isinstance(shape, LR):
+        mean, left, right = shape.mean, shape.left, shape.right
+        if left == right:
+            return [Slope(variable, 0, mean, left)]
+        return [Slope(variable, -1, mean, left), Slope(variable, 1, mean, right)]
+    edges: list[Part] = []
+    if shape.low is not None:
+        edges.append(Edge(variable, 1, shape.low, shape.left))
+    if shape.high is not None:
+        edges.append(Edge(variable, -1, shape.high, shape.right))
+    return edges
+
+
+def _degrees(
+    sheet: Sheet, table: Table, rules: RuleBase, numbers: Numbers, frame: Axes
+) -> Sequences:
+    """Add the degrees of all clauses; return the rows that make up each rule."""
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    clauses = list(dict.fromkeys(clause for rule in rules.rules for clause in rule.when))
+    used = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    parts = {key: _parts(key[0], shapes[key]) for key in used}
+    # A term without ends is always 1: so is its clause, and its negation always 0.
+    constant = {c for c in clauses if any(not parts[c.variable, t] for t in c.terms)}
+    true = {clause for clause in constant if not clause.negated}
+    kept = [[c for c in rule.when if c not in true] for rule in rules.rules]
+    live = [clause for clause in clauses if clause not in constant]
+
+    some = rules.variables[0].name
+    always, never = Edge(some, -1, math.inf, None), Edge(some, 1, math.inf, None)
+    wanted = dict.fromkeys(
+        part for c in live for term in c.terms for part in parts[c.variable, term]
+    )
+    if not all(kept):
+        wanted[always] = None
+    if constant - true:
+        wanted[never] = None
+    row = _primitives(sheet, table, list(wanted), numbers, frame)
+    of_clause = _clauses(sheet, table, live, parts, row, numbers)
+    of_clause |= {clause: row[never] for clause in constant - true}
+    return [tuple(of_clause[c] for c in when) or (row[always],) for when in kept]
+
+
+def _primitives(
+    sheet: Sheet, table: Table, parts: Sequence[Part], numbers: Numbers, frame: Axes
+) -> dict[Part, int]:
+    """Add one block of edges and one of slopes; return the row of each."""
+    zero = scalar(sheet, 0.0, numbers.axis)
+    guarded = sheet.node("Where", frame.is_known, frame.block, zero)
+    signed, count = Table(sheet), len(frame.order)
+    signed.append(guarded, count)
+    if any(part.sign < 0 for part in parts):
+        signed.append(sheet.node("Neg", guarded), count)
+
+    def values(parts: Sequence[Part]) -> str:
+        return signed.take(
+            [frame.order[p.variable] + (count if p.sign < 0 else 0) for p in parts]
+        )
+
+    row: dict[Part, int] = {}
+    edges = [part for part in parts if isinstance(part, Edge)]
+    slopes = [part for part in parts if isinstance(part, Slope)]
+    slopes.sort(key=lambda slope: abs(slope.sign))  # |x - m| first
+    if edges:
+        block = _edges(sheet, values(edges), edges, numbers)
+        first = table.append(block, len(edges))
+        row |= {edge: first + number for number, edge in enumerate(edges)}
+    if slopes:
+        block = _slopes(sheet, values(slopes), slopes, numbers)
+        first = table.append(block, len(slopes))
+        row |= {slope: first + number for number, slope in enumerate(slopes)}
+    return row
+
+
+def _edges(sheet: Sheet, values: str, edges: Sequence[Edge], numbers: Numbers) -> str:
+    """Add the degrees of edges, given their values, as one block."""
+    bounds = rounded([edge.sign * edge.bound for edge in edges], numbers.axis)
+    is_left = np.array([edge.sign > 0 for edge in edges])
+    bounds = np.where(is_left, np.nextafter(bounds, numbers.axis(np.inf)), bounds)
+    beyond = sheet.node("Less", values, column(sheet, bounds, "bounds"))
+    one = scalar(sheet, 1.0, numbers.degree)
+    flanks = [(edge.sign, edge.flank) for edge in edges]
+    if all(flank is None for _, flank in flanks):
+        return sheet.node("Where", beyond, scalar(sheet, 0.0, numbers.degree), one)
+    ends = rounded([s * f.end if f else 0.0 for s, f in flanks], numbers.axis)
+    widths = rounded(
+        [s * (f.start - f.end) if f else 1.0 for s, f in flanks],
+        numbers.axis,
+        is_divisor=True,
+    )
+    distance = sheet.node("Sub", values, column(sheet, ends, "ends"))
+    position = sheet.node("Div", distance, column(sheet, widths, "widths"))
+    curves = [flank.curve if flank else (0.0,) for _, flank in flanks]
+    coefficients = _coefficients(sheet, curves, numbers)
+
+    def body(inner: Sheet, inputs: Sequence[str], named: str) -> str:
+        beyond, position, *curve = inputs
+        zero, one, below_one = (
+            scalar(inner, value, numbers.degree)
+            for value in (0.0, 1.0, numbers.below_one)
+        )
+        position = inner.node("Clip", position, zero, one)
+        degree = position
+        if curve:
+            degree = inner.node("Mul", _horner(inner, curve, position), position)
+        degree = inner.node("Clip", degree, zero, below_one)
+        return inner.node("Where", beyond, degree, one, named=named)
+
+    given = {"beyond": beyond, "position": _cast(sheet, position, numbers)}
+    if any(curve != (1.0,) for curve in curves):  # 1 * q is q
+        given |= coefficients
+    return sheet.block(f"Edges{len(given) - 2}", body, given)
+
+
+def _slopes(sheet: Sheet, values: str, slopes: Sequence[Slope], numbers: Numbers) -> str:
+    """Add the degrees of slopes, given their values, as one block."""
+    means = [-s.mean if s.sign < 0 else s.mean for s in slopes]
+    middle = column(sheet, rounded(means, numbers.axis), "means")
+    distance = sheet.node("Sub", values, middle)
+    both = sum(1 for slope in slopes if slope.sign == 0)
+    if both == len(slopes):
+        distance = sheet.node("Abs", distance)
+    elif both:
+        split = Table(sheet)
+        split.append(distance, len(slopes))
+        absolute = sheet.node("Abs", split.take(range(both)))
+        others = split.take(range(both, len(slopes)))
+        distance = sheet.node("Concat", absolute, others, axis=0)
+    sides = [slope.side for slope in slopes]
+    spreads = rounded([s.spread for s in sides], numbers.axis, is_divisor=True)
+    u = sheet.node("Div", distance, column(sheet, spreads, "spreads"))
+    reaches = rounded([side.reach for side in sides], numbers.degree)
+    rooms = [side.reach - 1.0 for side in sides]
+    room = rounded(rooms, numbers.degree, is_divisor=True)
+    given = {
+        "u": _cast(sheet, u, numbers),
+        "reach": column(sheet, reaches, "reaches"),
+        "room": column(sheet, room, "rooms"),
+    }
+    given |= _coefficients(sheet, [side.curve for side in sides], numbers)
+
+    def body(inner: Sheet, inputs: Sequence[str], named: str) -> str:
+        return _slope_body(inner, inputs, named, numbers)
+
+    return sheet.block(f"Slopes{len(given) - 3}", body, given)
+
+
+def _slope_body(
+    sheet: Sheet, inputs: Sequence[str], named: str, numbers: Numbers
+) -> str:
+    u, reach, room, *curve = inputs
+    zero, one = (scalar(sheet, value, numbers.degree) for value in (0.0, 1.0))
+    u = sheet.node("Min", sheet.node("Max", u, zero), reach)
+    t = sheet.node("Min", u, one)
+    fall = curve[0]
+    if len(curve) > 1:
+        two = scalar(sheet, 2.0, numbers.degree)
+        v = sheet.node("Sub", sheet.node("Mul", two, t), one)
+        fall = _horner(sheet, curve, v)
+    body = sheet.node("Sub", one, sheet.node("Mul", t, fall))
+    body = sheet.node("Clip", body, zero, one)
+    w = sheet.node("Div", sheet.node("Sub", reach, u), room)
+    w = sheet.node("Clip", w, zero, one)
+    square = sheet.node("Mul", w, w)
+    return sheet.node("Mul", body, sheet.node("Mul", square, square), named=named)
+
+
+def _cast(sheet: Sheet, value: str, numbers: Numbers) -> str:
+    if not numbers.is_mixed:
+        return value
+    kind = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
+    return sheet.node("Cast", value, to=kind)
+
+
+def _coefficients(
+    sheet: Sheet, curves: Sequence[Curve], numbers: Numbers
+) -> dict[str, str]:
+    """Return the columns of c0, c1, ... of all curves, of the longest's length."""
+    columns: dict[str, str] = {}
+    for power in range(max(map(len, curves))):
+        values = [curve[power] if power < len(curve) else 0.0 for curve in curves]
+        name = f"c{power}"
+        columns[name] = column(sheet, rounded(values, numbers.degree), name)
+    return columns
+
+
+def _horner(sheet: Sheet, curve: Sequence[str], x: str) -> str:
+    *lower, total = curve
+    for coefficient in reversed(lower):
+        total = sheet.node("Add", sheet.node("Mul", total, x), coefficient)
+    return total
+
+
+def _clauses(
+    sheet: Sheet,
+    table: Table,
+    clauses: Sequence[Clause],
+    parts: dict[Key, list[Part]],
+    row: dict[Part, int],
+    numbers: Numbers,
+) -> dict[Clause, int]:
+    """Add terms of two parts, OR and negation where there are any."""
+    terms = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    of_term = {key: row[parts[key][0]] for key in terms}
+    double = [key for key in terms if len(parts[key]) == 2]
+    if double:
+        left, right = (table.take([row[parts[k][i]] for k in double]) for i in (0, 1))
+        first = table.append(sheet.node("Min", left, right), len(double))
+        of_term |= {key: first + number for number, key in enumerate(double)}
+    lists = {c: [of_term[c.variable, term] for term in c.terms] for c in clauses}
+    of_clause = _largest(sheet, table, lists)
+    negated = [clause for clause in clauses if clause.negated]
+    if negated:
+        degrees = table.take([of_clause[clause] for clause in negated])
+        one = scalar(sheet, 1.0, numbers.degree)
+        first = table.append(sheet.node("Sub", one, degrees), len(negated))
+        of_clause |= {clause: first + number for number, clause in enumerate(negated)}
+    return of_clause
+
+
+def _largest(
+    sheet: Sheet, table: Table, lists: dict[Clause, list[int]]
+) -> dict[Clause, int]:
+    """Add the maxima of lists of rows, halving all lists at once until one is left."""
+    while active := {c: rows for c, rows in lists.items() if len(rows) > 1}:
+        left = [row for rows in active.values() for row in rows[::2]]
+        right = [
+            rows[min(position + 1, len(rows) - 1)]
+            for rows in active.values()
+            for position in range(0, len(rows), 2)
+        ]
+        block = sheet.node("Max", table.take(left), table.take(right))
+        first = table.append(block, len(left))
+        lists = dict(lists)
+        for clause, rows in active.items():
+            half = (len(rows) + 1) // 2
+            lists[clause] = list(range(first, first + half))
+            first += half
+    return {clause: rows[0] for clause, rows in lists.items()}
+
+
+def _strengths(
+    sheet: Sheet, table: Table, sequences: Sequences, none: str, *, is_product: bool
+) -> str:
+    """Add the strengths of the rules, below the row of no rule, the cheaper way."""
+    levels = _levels(sequences)
+    longest = len(levels)
+    padded = not is_product or len({len(rows) for rows in sequences}) == 1
+    # In passes over one row of a block; a node costs about as much as five of them.
+    by_slots = len(sequences) * 2 * longest + 5 * (longest + 2)
+    by_prefix = sum(3 * len(level) for level in levels[1:]) + 15 * longest
+    by_prefix += 2 * len(sequences) + 10
+    if padded and by_slots <= by_prefix:
+        return _by_slots(sheet, table, sequences, none, is_product=is_product)
+    return _by_prefix(sheet, table, sequences, none, is_product=is_product)
+
+
+def _levels(sequences: Sequences) -> list[dict[tuple[int, ...], int]]:
+    """Return the distinct beginnings of each length, numbered."""
+    levels: list[dict[tuple[int, ...], int]] = []
+    for length in range(1, max(map(len, sequences)) + 1):
+        starts = dict.fromkeys(s[:length] for s in sequences if len(s) >= length)
+        levels.append({start: number for number, start in enumerate(starts)})
+    return levels
+
+
+def _and(sheet: Sheet, operands: Sequence[str], *, is_product: bool) -> str:
+    """Add the minimum of blocks, or their product from left to right."""
+    first, *others = operands
+    if not others:
+        return first
+    if not is_product:
+        return sheet.node("Min", *operands)
+    for other in others:
+        first = sheet.node("Mul", first, other)
+    return first
+
+
+def _by_slots(
+    sheet: Sheet, table: Table, sequences: Sequences, none: str, *, is_product: bool
+) -> str:
+    """Gather the k-th clauses of all rules at once; a short rule repeats its first."""
+    longest = max(map(len, sequences))
+    slots = [
+        table.take([rows[k] if k < len(rows) else rows[0] for rows in sequences])
+        for k in range(longest)
+    ]
+    strengths = _and(sheet, slots, is_product=is_product)
+    return sheet.node("Concat", none, strengths, axis=0)
+
+
+def _by_prefix(
+    sheet: Sheet, table: Table, sequences: Sequences, none: str, *, is_product: bool
+) -> str:
+    """Compute each common beginning of rules once, one length after another."""
+    levels = _levels(sequences)
+    ends = Table(sheet)
+    ends.append(none, 1)
+    finished = {len(rows) for rows in sequences}
+    place: dict[tuple[int, ...], int] = {}
+    block = ""
+    for length, level in enumerate(levels, 1):
+        clauses = table.take([start[-1] for start in level])
+        if length > 1:
+            shorter = Table(sheet)
+            shorter.append(block, len(levels[length - 2]))
+            known = shorter.take([levels[length - 2][start[:-1]] for start in level])
+            block = _and(sheet, [known, clauses], is_product=is_product)
+        else:
+            block = clauses
+        if length in finished:
+            first = ends.append(block, len(level))
+            place |= {start: first + number for start, number in level.items()}
+    return ends.take([0, *(place[rows] for rows in sequences)])

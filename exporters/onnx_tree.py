@@ -1,0 +1,219 @@
+"""A tree as a graph that follows one path, as `descent` does.
+
+Every cut becomes one question `x <= cut`; the cuts of a node form a balanced cascade.
+`TreeEnsemble` of ai.onnx.ml 5 holds them in double, with the leaf's number as value;
+the plain form walks all rows one level at a time with ordinary operators.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+import onnx
+from onnx import numpy_helper
+
+from fuzzytree.exporters.onnx_axes import Axes, axes
+from fuzzytree.exporters.onnx_graph import TREES, Constant, Sheet
+from fuzzytree.exporters.onnx_numbers import Numbers, rounded
+from fuzzytree.tree import FuzzyTree, Node
+
+_MOST_QUESTIONS = 1_000_000
+_MOST_LEAVES = 2**24  # as float32 counts
+
+
+class Question(msgspec.Struct, frozen=True):
+    """`variable <= cut`: on to the left if so, else to the right.
+
+    A way on is the position of a question, or minus the number of a leaf.
+    """
+
+    variable: str
+    cut: float
+    left: int
+    right: int
+
+
+def tree_graph(
+    sheet: Sheet,
+    tree: FuzzyTree,
+    numbers: Numbers,
+    columns: Sequence[str],
+    *,
+    is_plain: bool,
+) -> Axes:
+    """Add a tree up to `rule`: the leaf's number, or 0 where a value is missing.
+
+    Returns:
+        The values of the variables, with a flat guard.
+    """
+    frame = axes(sheet, tree, numbers, columns, is_flat=True)
+    questions = questions_of(tree)
+    if not questions:
+        leaf = sheet.constant(np.array(1, np.int64), "leaf")
+    elif is_plain:
+        leaf = _walk(sheet, questions, frame, numbers, start=_root(tree))
+    else:
+        direct = not any(variable.parts for variable in tree.variables)
+        place = {name: columns.index(name) for name in tree.inputs}
+        values = "inputs"
+        if not direct:
+            place, values = frame.order, sheet.node("Transpose", frame.block, perm=[1, 0])
+        leaf = _ensemble(sheet, questions, values, place, numbers, start=_root(tree))
+    zero = sheet.constant(np.array(0, np.int64), "nothing")
+    sheet.node("Where", frame.is_known, leaf, zero, named="rule")
+    return frame
+
+
+def needs_plain(tree: FuzzyTree) -> bool:
+    """Return whether a tree is beyond `TreeEnsemble`, which cannot share subtrees."""
+    sizes: dict[int, int] = {}
+    for number in range(len(tree.nodes), 0, -1):
+        node = tree.nodes[number - 1]
+        below = [sizes.get(node.branches[owner].node or 0, 0) for owner in node.owners]
+        sizes[number] = len(node.cuts) + sum(below)
+    return sizes.get(1, 0) > _MOST_QUESTIONS or len(tree.leaves) > _MOST_LEAVES
+
+
+def _root(tree: FuzzyTree) -> int:
+    return len(tree.nodes[0].cuts) // 2
+
+
+def questions_of(tree: FuzzyTree) -> list[Question]:
+    """Return the cuts of all nodes in order, each with its two ways on.
+
+    A node is entered at its middle cut.
+    """
+    first = [0]
+    for node in tree.nodes:
+        first.append(first[-1] + len(node.cuts))
+
+    def way(node: Node, interval: int) -> int:
+        branch = node.branches[node.owners[interval]]
+        if branch.node is None:
+            return -(branch.leaf or 0)
+        return first[branch.node - 1] + len(tree.nodes[branch.node - 1].cuts) // 2
+
+    questions: list[Question] = []
+    for start, node in zip(first, tree.nodes, strict=False):
+        ways: dict[int, tuple[int, int]] = {}
+        todo = [(0, len(node.cuts))]
+        while todo:
+            low, high = todo.pop()
+            middle = (low + high) // 2
+            left, right = (low, middle), (middle + 1, high)
+            ways[middle] = (
+                start + sum(left) // 2 if left[0] < left[1] else way(node, middle),
+                start + sum(right) // 2 if right[0] < right[1] else way(node, high),
+            )
+            todo += [span for span in (left, right) if span[0] < span[1]]
+        questions += [
+            Question(node.variable, cut, *ways[i]) for i, cut in enumerate(node.cuts)
+        ]
+    return questions
+
+
+def _ensemble(
+    sheet: Sheet,
+    questions: Sequence[Question],
+    values: str,
+    place: dict[str, int],
+    numbers: Numbers,
+    *,
+    start: int,
+) -> str:
+    """Add one `TreeEnsemble`; a subtree with two ways to it stands in it twice."""
+    order: list[int] = []
+    ways: list[tuple[int, int]] = []
+    leaves: list[int] = []
+    todo: list[tuple[int, int, bool]] = [(start, -1, False)]
+    targets: dict[tuple[int, bool], tuple[int, int]] = {}
+    while todo:
+        way, parent, is_left = todo.pop()
+        if way < 0:
+            targets[parent, is_left] = (len(leaves), 1)
+            leaves.append(-way)
+            continue
+        targets[parent, is_left] = (len(order), 0)
+        number = len(order)
+        order.append(way)
+        todo.append((questions[way].left, number, True))
+        todo.append((questions[way].right, number, False))
+    left = [targets[number, True] for number in range(len(order))]
+    right = [targets[number, False] for number in range(len(order))]
+    asked = [questions[position] for position in order]
+    cuts = rounded([question.cut for question in asked], numbers.axis)
+    leaf = sheet.node(
+        "TreeEnsemble",
+        values,
+        domain=TREES,
+        n_targets=1,
+        aggregate_function=1,
+        post_transform=0,
+        tree_roots=[0],
+        nodes_featureids=[place[question.variable] for question in asked],
+        nodes_modes=_tensor(np.zeros(len(asked), np.uint8)),
+        nodes_splits=_tensor(cuts),
+        nodes_truenodeids=[node for node, _ in left],
+        nodes_trueleafs=[is_leaf for _, is_leaf in left],
+        nodes_falsenodeids=[node for node, _ in right],
+        nodes_falseleafs=[is_leaf for _, is_leaf in right],
+        leaf_targetids=[0] * len(leaves),
+        leaf_weights=_tensor(np.array(leaves, numbers.axis)),
+    )
+    whole = sheet.node("Cast", leaf, to=onnx.TensorProto.INT64)
+    return sheet.node("Reshape", whole, sheet.numbers([-1], "flat"))
+
+
+def _tensor(values: Constant) -> onnx.TensorProto:
+    return numpy_helper.from_array(values)
+
+
+def _walk(
+    sheet: Sheet,
+    questions: Sequence[Question],
+    frame: Axes,
+    numbers: Numbers,
+    *,
+    start: int,
+) -> str:
+    """Add one step for each level; a row that has reached its leaf stays there."""
+    count = len(questions)
+    leaves = 1 + max(-way for q in questions for way in (q.left, q.right))
+
+    def state(way: int) -> int:
+        return way if way >= 0 else count - way
+
+    own = range(count, count + leaves)
+    places = [frame.order[q.variable] for q in questions] + [0] * leaves
+    cuts = rounded([q.cut for q in questions] + [0.0] * leaves, numbers.axis)
+    place = sheet.numbers(places, "variables")
+    cut = sheet.constant(cuts, "cuts")
+    left = sheet.numbers([*(state(q.left) for q in questions), *own], "left")
+    right = sheet.numbers([*(state(q.right) for q in questions), *own], "right")
+    value = sheet.take(frame.block, [places[start]])
+    here = sheet.node("Less", sheet.constant(cuts[[start]], "cut"), value)
+    there = [sheet.numbers([state(w)], "way") for w in _ways(questions[start])]
+    here = sheet.node("Where", here, there[1], there[0])
+    for _ in range(_depth(questions, start) - 1):
+        asked = sheet.node("Gather", place, here, axis=0)
+        value = sheet.node("GatherElements", frame.block, asked, axis=0)
+        is_right = sheet.node("Less", sheet.node("Gather", cut, here, axis=0), value)
+        onward = [sheet.node("Gather", way, here, axis=0) for way in (right, left)]
+        here = sheet.node("Where", is_right, *onward)
+    flat = sheet.node("Reshape", here, sheet.numbers([-1], "flat"))
+    return sheet.node("Sub", flat, sheet.constant(np.array(count), "questions"))
+
+
+def _ways(question: Question) -> tuple[int, int]:
+    return question.left, question.right
+
+
+def _depth(questions: Sequence[Question], start: int) -> int:
+    """Return how many questions the longest path asks."""
+    level, depth = {start}, 0
+    while level:
+        depth += 1
+        level = {w for p in level for w in _ways(questions[p]) if w >= 0}
+    return depth
