@@ -1,0 +1,395 @@
+"""Rows come in from anything, and nothing about them is guessed."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from fuzzytree import tables
+from fuzzytree.errors import TableError
+from fuzzytree.tables import Table, batches, class_names, read_table
+
+GRASPS = "force,slip,grip\n1.5,0,soft\n2.5,1,firm\n3.5,0,firm\n"
+COLUMNS = {
+    "force": [1.5, 2.5, 3.5],
+    "slip": [0, 1, 0],
+    "grip": ["soft", "firm", "firm"],
+}
+STRUCTURED = np.array(
+    [(1.5, 0, "soft"), (2.5, 1, "firm"), (3.5, 0, "firm")],
+    dtype=[("force", "f8"), ("slip", "i4"), ("grip", "U8")],
+)
+
+
+def _csv(text: str) -> io.BytesIO:
+    return io.BytesIO(text.encode())
+
+
+def _read(text: str, target: str = "grip", ignore: tuple[str, ...] = ()) -> Table:
+    return read_table(_csv(text), target=target, ignore=ignore, name="grasps.csv")
+
+
+def _error(text: str, target: str = "grip") -> str:
+    with pytest.raises(TableError) as caught:
+        _read(text, target)
+    return str(caught.value)
+
+
+def _values(
+    source: object,
+    inputs: list[str],
+    *,
+    columns: list[str] | None = None,
+    trained: tuple[str, ...] = (),
+) -> list[list[float]]:
+    found = batches(source, inputs, name="grasps.csv", columns=columns, trained=trained)
+    values: list[list[float]] = np.hstack([batch.values for batch in found]).tolist()
+    return values
+
+
+def _batch_error(
+    source: object,
+    inputs: list[str],
+    *,
+    columns: list[str] | None = None,
+    trained: tuple[str, ...] = (),
+) -> str:
+    with pytest.raises(TableError) as caught:
+        _values(source, inputs, columns=columns, trained=trained)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        _csv(GRASPS),
+        io.BufferedReader(io.BytesIO(GRASPS.encode())),
+        io.StringIO(GRASPS),
+        pd.DataFrame(COLUMNS),
+        pl.DataFrame(COLUMNS),
+        pl.DataFrame(COLUMNS).lazy(),
+        pa.table(COLUMNS),
+        STRUCTURED,
+    ],
+    ids=lambda source: type(source).__name__,
+)
+def test_every_kind_of_table_gives_the_same_rows(source: object) -> None:
+    table = read_table(source, target="grip")
+    assert table.columns == ("force", "slip")
+    assert table.values.tolist() == [[1.5, 2.5, 3.5], [0.0, 1.0, 0.0]]
+    assert table.classes == ("firm", "soft")
+    assert table.codes.tolist() == [1, 0, 0]
+
+
+def test_a_parquet_file_and_stream_give_the_rows_of_the_table(tmp_path: Path) -> None:
+    path = tmp_path / "grasps.parquet"
+    pq.write_table(pa.table(COLUMNS), path)
+    for source in (path, str(path), io.BytesIO(path.read_bytes())):
+        table = read_table(source, target="grip")
+        assert table.values.tolist() == [[1.5, 2.5, 3.5], [0.0, 1.0, 0.0]]
+
+
+def test_a_parquet_file_without_rows_has_columns(tmp_path: Path) -> None:
+    path = tmp_path / "grasps.parquet"
+    pq.write_table(pa.table({"force": pa.array([], pa.float64())}), path)
+    assert _values(path, ["force"]) == [[]]
+
+
+def test_a_broken_parquet_file_is_one_sentence(tmp_path: Path) -> None:
+    assert _batch_error(io.BytesIO(b"PAR1 and no more"), ["a"]).startswith(
+        "grasps.csv: broken Parquet: "
+    )
+
+
+def test_an_array_is_taken_without_a_copy() -> None:
+    array = np.array([[1.0, 2.0], [3.0, 4.0]])
+    table = read_table(array, target=[0, 1])
+    assert np.shares_memory(table.values, array)
+    assert table.columns == ("x1", "x2")
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_view_of_an_array_keeps_its_own_order(order: str) -> None:
+    array = np.array([[1.0, 2.0], [3.0, 4.0]], order=order)[::-1, ::-1]  # type: ignore[call-overload]
+    assert _values(array, ["x2", "x1"]) == [[3.0, 1.0], [4.0, 2.0]]
+
+
+def test_an_array_can_be_given_names() -> None:
+    array = np.array([[1, 2], [3, 4]])
+    assert _values(array, ["b"], columns=["a", "b"]) == [[2.0, 4.0]]
+
+
+def test_an_array_with_too_few_names_is_refused() -> None:
+    message = _batch_error(np.zeros((2, 3)), ["a"], columns=["a", "b"])
+    assert message == "grasps.csv has 3 columns and 2 names"
+
+
+def test_an_array_of_one_dimension_is_refused() -> None:
+    message = _batch_error(np.zeros(3), ["x1"])
+    assert message == "grasps.csv has shape (3,), not (rows, columns)"
+
+
+def test_an_unnamed_array_as_wide_as_the_training_table_has_its_names() -> None:
+    array = np.array([[1.0, 2.0]])
+    assert _values(array, ["slip"], trained=("force", "slip")) == [[2.0]]
+
+
+def test_an_unnamed_array_of_another_width_is_refused() -> None:
+    message = _batch_error(np.zeros((2, 3)), ["slip"], trained=("force", "slip"))
+    assert message == (
+        "grasps.csv has 3 columns without names, and the model was learnt from 2: "
+        "force, slip"
+    )
+
+
+def test_what_is_no_table_is_refused() -> None:
+    with pytest.raises(TypeError) as caught:
+        read_table(3, target="grip")
+    assert str(caught.value) == (
+        "int is no table: pass a path, a pandas, polars or arrow table, "
+        "or a numpy array"
+    )
+
+
+def test_columns_are_found_by_name_in_any_order_and_others_are_counted() -> None:
+    [batch] = batches(_csv("c,b,a\n3,2,1\n"), ["a", "c"])
+    assert batch.values.tolist() == [[1.0], [3.0]]
+    assert batch.extras == 1
+
+
+def test_all_missing_columns_are_named_at_once() -> None:
+    assert _batch_error(_csv("force,slipp\n1,2\n"), ["force", "slip"]) == (
+        "grasps.csv has no column 'slip', which the model needs; "
+        "it has force, slipp (did you mean 'slipp'?)"
+    )
+    assert _batch_error(_csv("a\n1\n"), ["force", "a", "slip"]) == (
+        "grasps.csv has no columns 'force', 'slip', which the model needs; it has a"
+    )
+
+
+def test_a_file_is_read_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tables, "PIECE", 2)
+    found = list(batches(_csv("a\n1\n2\n3\n4\n5\n"), ["a"]))
+    assert [batch.values.tolist() for batch in found] == [[[1, 2]], [[3, 4]], [[5]]]
+
+
+def test_a_file_without_rows_gives_one_empty_piece() -> None:
+    assert _values(_csv("a,b\n"), ["b"]) == [[]]
+
+
+def test_names_may_be_quoted_and_a_byte_order_mark_is_no_name() -> None:
+    table = _read('\ufeff"force, N","sl""ip",grip\n1,2,soft\n')
+    assert table.columns == ("force, N", 'sl"ip')
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_the_delimiter_is_found_in_the_first_line(mark: str) -> None:
+    table = _read(GRASPS.replace(",", mark))
+    assert table.columns == ("force", "slip")
+
+
+def test_a_quoted_delimiter_does_not_count() -> None:
+    assert _read('"a;b",grip\n1,soft\n').columns == ("a;b",)
+
+
+def test_two_possible_delimiters_are_refused_unless_one_is_given() -> None:
+    assert _error("a;b,grip\n1,soft\n") == (
+        "grasps.csv:1: both ',' and ';' stand between names; say which one is the "
+        "delimiter (--delimiter)"
+    )
+    table = read_table(_csv("a;b,grip\n1,soft\n"), target="grip", delimiter=",")
+    assert table.columns == ("a;b",)
+
+
+def test_a_decimal_comma_is_refused_with_a_hint() -> None:
+    assert _error("force;grip\n1,5;soft\n") == (
+        "grasps.csv:2: column 'force' holds text where a number is needed: '1,5' "
+        "(numbers are written with a decimal point)\n"
+        "  leave columns out with --ignore force"
+    )
+
+
+def test_every_column_with_text_is_named_with_its_first_row() -> None:
+    assert _error("force,surface type,grip\n1,wet,soft\n?,dry,firm\n?,3,firm\n") == (
+        "grasps.csv:3: column 'force' holds text where a number is needed: "
+        "'?' (and 1 more)\n"
+        "grasps.csv:2: column 'surface type' holds text where a number is needed: "
+        "'wet' (and 1 more)\n"
+        "  leave columns out with --ignore force --ignore 'surface type'"
+    )
+
+
+def test_lines_are_counted_as_an_editor_counts_them() -> None:
+    text = 'force,note,grip\n1,"two\nlines",soft\n\n\nx,a,soft\n'
+    with pytest.raises(TableError, match=r"^grasps\.csv:6: column 'force'"):
+        _read(text, ignore=("note",))
+
+
+def test_text_in_a_table_in_memory_is_named_by_its_row() -> None:
+    message = _batch_error(pd.DataFrame({"a": [1.0, "x"]}), ["a"])
+    assert message == (
+        "grasps.csv, row 2: column 'a' holds text where a number is needed: 'x'"
+    )
+
+
+@pytest.mark.parametrize("cell", ["1_000", "١٢", "0x10", "1e", "1 000", "--1", "True"])
+def test_what_only_looks_like_a_number_is_text(cell: str) -> None:
+    assert f"'{cell}'" in _batch_error(_csv(f"a,b\n{cell},1\n"), ["a"])
+
+
+@pytest.mark.parametrize("cell", ["", "NA", "nan", "NaN", "N/A", "null", "None", "  "])
+def test_missing_cells_become_nan_and_are_counted(cell: str) -> None:
+    [batch] = batches(_csv(f"a,b\n{cell},1\n2,3\n"), ["a", "b"])
+    assert math.isnan(batch.values[0, 0])
+    assert batch.missing == 1
+
+
+def test_missing_values_of_tables_in_memory_are_nan() -> None:
+    for frame in (
+        pd.DataFrame({"a": pd.array([1, None], dtype="Int64")}),
+        pd.DataFrame({"a": pd.array([True, None], dtype="boolean")}),
+        pl.DataFrame({"a": [1, None]}),
+        pl.DataFrame({"a": [True, None]}),
+    ):
+        [batch] = batches(frame, ["a"])
+        assert batch.values[0, 0] == 1.0
+        assert batch.missing == 1
+
+
+def test_infinity_is_a_number() -> None:
+    text = _csv("a\ninf\n-inf\nInfinity\n")
+    assert _values(text, ["a"]) == [[math.inf, -math.inf, math.inf]]
+
+
+def test_numbers_are_read_to_the_last_digit() -> None:
+    numbers = [0.1, 1e-308, 5e-324, 1.7976931348623157e308, 2 / 3]
+    text = _csv("a\n" + "\n".join(map(repr, numbers)))
+    assert _values(text, ["a"]) == [numbers]
+
+
+def test_truth_values_become_zero_and_one() -> None:
+    frame = pl.DataFrame({"a": [True, False], "grip": ["x", "y"]})
+    assert read_table(frame, target="grip").values.tolist() == [[1.0, 0.0]]
+
+
+def test_classes_that_look_like_words_or_numbers_stay_the_text_they_are() -> None:
+    names = ["01", "1", "1.0", "no", "off", "null", "NA", "1e-05", "~", " x", "12:30"]
+    table = _read("a,grip\n" + "".join(f"{k},{n}\n" for k, n in enumerate(names)))
+    assert sorted(table.classes) == sorted(names)
+
+
+@pytest.mark.parametrize(
+    ("labels", "expected"),
+    [
+        ([1, 2, 10], ["1", "2", "10"]),
+        ([1.0, 2.0, math.nan], ["1", "2", None]),
+        ([1.5, 2.0], ["1.5", "2.0"]),
+        ([True, False], ["True", "False"]),
+        (["a", None, ""], ["a", None, None]),
+        (pd.Series(["x", None], dtype="category").tolist(), ["x", None]),
+        (np.array([3, 1], np.int8), ["3", "1"]),
+        (np.array(["b", "a"]), ["b", "a"]),
+        ([math.inf, 1.0], ["inf", "1"]),
+    ],
+)
+def test_classes_of_every_type_become_text(
+    labels: list[object], expected: list[str | None]
+) -> None:
+    assert class_names([labels]) == expected
+
+
+def test_categories_with_gaps_are_missing_classes() -> None:
+    column = pa.array(["x", None]).dictionary_encode()
+    table = read_table(pa.table({"a": [1, 2], "grip": column}), target="grip")
+    assert table.classes == ("x",)
+    assert table.unlabelled == 1
+
+
+def test_whole_numbers_are_classes_in_the_order_of_size() -> None:
+    table = _read("a,grip\n1,10\n2,9\n3,x\n4,-1\n")
+    assert table.classes == ("-1", "9", "10", "x")
+
+
+def test_rows_without_a_class_are_left_out_and_counted() -> None:
+    table = _read("a,grip\n1,\n2,soft\nNA,soft\n")
+    assert table.unlabelled == 1
+    assert table.missing == 1
+    assert table.codes.tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "grasps.csv is empty: it needs a line with column names"),
+        ("a,grip\n", "grasps.csv has no rows"),
+        ("a,grip\n1,\n", "grasps.csv has no row with a class"),
+        ("grip\nsoft\n", "grasps.csv has no column to learn from"),
+        ("a,,grip\n1,2,x\n", "grasps.csv: column 2 has no name"),
+        (
+            "a,b,a,grip\n1,2,3,x\n",
+            "grasps.csv: column 'a' stands there more than once",
+        ),
+        (
+            "a,b\n1,2\n",
+            "grasps.csv has no column 'grip'; it has a, b",
+        ),
+        (
+            "a,grip\n1,x\n1,2,3\n",
+            "grasps.csv:3: 3 cells, and line 1 names 2 columns",
+        ),
+        (
+            'a,grip\n1,"x\n',
+            "grasps.csv:2: broken CSV: unexpected end of data",
+        ),
+    ],
+)
+def test_a_table_that_does_not_fit_is_one_sentence(text: str, message: str) -> None:
+    assert _error(text) == message
+
+
+def test_a_file_that_is_not_utf8_is_one_sentence() -> None:
+    with pytest.raises(TableError) as caught:
+        read_table(io.BytesIO(b"a,grip\n1,\xe9\n"), target="grip", name="grasps.csv")
+    assert str(caught.value) == "grasps.csv: is no UTF-8 text; save it as UTF-8"
+
+
+def test_repeated_columns_of_tables_in_memory_are_refused() -> None:
+    frame = pd.DataFrame([[1, 2]], columns=["a", "a"])
+    message = _batch_error(frame, ["a"])
+    assert message == "grasps.csv: column 'a' stands there more than once"
+
+
+def test_an_absent_file_is_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "absent.csv"
+    with pytest.raises(TableError) as caught:
+        read_table(path, target="grip")
+    message = f"{path}: cannot be read: no such file or directory"
+    assert str(caught.value) == message
+
+
+def test_classes_beside_the_table_must_be_as_many_as_its_rows() -> None:
+    with pytest.raises(TableError) as caught:
+        read_table(np.zeros((3, 1)), target=[1, 2])
+    message = "the array has 3 rows, and there are 2 classes for them"
+    assert str(caught.value) == message
+
+
+def test_an_ignored_column_must_be_there() -> None:
+    with pytest.raises(TableError) as caught:
+        _read(GRASPS, ignore=("colour",))
+    message = "grasps.csv has no column 'colour'; it has force, slip, grip"
+    assert str(caught.value) == message
+
+
+def test_a_stream_stays_open() -> None:
+    stream = io.BufferedReader(io.BytesIO(GRASPS.encode()))
+    read_table(stream, target="grip")
+    assert not stream.closed
