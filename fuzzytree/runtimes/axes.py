@@ -1,0 +1,137 @@
+"""The values of a model's variables for many rows: inputs and combinations.
+
+A combination is a chain of single operations in the stored order of its parts, each
+rounded once. All combinations advance together, one part at a time, so that the
+operations are few and wide; the longer ones stand first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fuzzytree.rulebase import Part, Variable
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray, IntArray
+
+    Single = np.dtype[np.float64] | np.dtype[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The parts at one position of all combinations that are long enough."""
+
+    inputs: IntArray
+    weights: npt.NDArray[np.floating[Any]]
+    centres: npt.NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """How to compute the value of every variable of a model.
+
+    Attributes:
+        line: The line of each variable, by name: inputs first, in their order.
+        inputs: How many inputs there are.
+        steps: The parts of the combinations, position by position.
+        chains: The combinations again, for a single row: (line, weight, centre) of
+            each part.
+        dtype: In what the chain is computed.
+    """
+
+    line: dict[str, int]
+    inputs: int
+    steps: tuple[Step, ...]
+    chains: tuple[tuple[tuple[int, float, float], ...], ...]
+    dtype: type[np.float64] | type[np.float32]
+
+    @property
+    def count(self) -> int:
+        """The number of variables."""
+        return len(self.line)
+
+
+def plan_axes(
+    variables: Sequence[Variable],
+    dtype: type[np.float64] | type[np.float32] = np.float64,
+) -> Axes:
+    """Return how to compute the variables of a model."""
+    inputs = [v.name for v in variables if not v.parts]
+    mixed = [v for v in variables if v.parts]
+    mixed.sort(key=lambda v: -len(v.parts))
+    line = {name: i for i, name in enumerate([*inputs, *(v.name for v in mixed)])}
+    longest = len(mixed[0].parts) if mixed else 0
+    steps = tuple(
+        _step([v.parts[p] for v in mixed if len(v.parts) > p], line, dtype)
+        for p in range(longest)
+    )
+    chains = tuple(
+        tuple((line[part.input], part.weight, part.centre) for part in v.parts)
+        for v in mixed
+    )
+    return Axes(line, len(inputs), steps, chains, dtype)
+
+
+def _step(
+    parts: Sequence[Part],
+    line: dict[str, int],
+    dtype: type[np.float64] | type[np.float32],
+) -> Step:
+    return Step(
+        np.array([line[part.input] for part in parts], np.int64),
+        np.array([[part.weight] for part in parts], dtype),
+        np.array([[part.centre] for part in parts], dtype),
+    )
+
+
+def axis_lines(axes: Axes, values: FloatArray) -> npt.NDArray[np.floating[Any]]:
+    """Return the value of every variable, of shape (variables, rows).
+
+    Args:
+        axes: The plan.
+        values: Doubles of shape (inputs, rows); returned as they are if the plan has
+            no combinations and computes in doubles.
+    """
+    base = values.astype(axes.dtype, copy=False)
+    if not axes.steps:
+        return base
+    lines = np.empty((axes.count, values.shape[1]), axes.dtype)
+    lines[: axes.inputs] = base
+    chains = lines[axes.inputs :]
+    for position, step in enumerate(axes.steps):
+        term = base[step.inputs]
+        term -= step.centres
+        term *= step.weights
+        if position == 0:
+            chains[:] = term
+        else:
+            chains[: len(term)] += term
+    return lines
+
+
+def axis_row(axes: Axes, row: list[float]) -> list[float]:
+    """Return the value of every variable for a single row, in double."""
+    values = row.copy()
+    for (line, weight, centre), *others in axes.chains:
+        total = weight * (row[line] - centre)
+        for line, weight, centre in others:
+            total = total + weight * (row[line] - centre)
+        values.append(total)
+    return values
+
+
+def missing_rows(lines: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.bool_] | None:
+    """Return which rows hold a value that is not finite; None if no row does.
+
+    The sum is a fast first look: it is finite only if every summand is.
+    """
+    if np.isfinite(lines.sum()):
+        return None
+    missing: npt.NDArray[np.bool_] = ~np.isfinite(lines).all(axis=0)
+    return missing if missing.any() else None

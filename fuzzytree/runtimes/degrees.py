@@ -1,0 +1,267 @@
+"""Degrees of terms for many rows: few wide operations on blocks that fit the cache.
+
+The operations on one number, and their order, are those of `fuzzytree.reference`.
+What is rearranged changes no bit:
+
+- A band is one or two *edges*; at any value at most one of them is below 1, so the
+  smaller is the band's degree. An LR set is two *slopes* in the same way, or one
+  slope of |x - m| if its sides are equal.
+- `max(min(p, CAP), core)` with a core of 0 or 1 is both `min(max(p, 0), CAP)` off the
+  plateau and 1 on it.
+- (-d) / s is d / (-s); x - x and similar signs of zero are compared equal.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fuzzytree.contracts import Dtype
+from fuzzytree.rulebase import LR, Flank, Shape, Side
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import IntArray
+
+    Reals = npt.NDArray[np.floating[Any]]
+    Real = type[np.float64] | type[np.float32]
+
+BLOCK = 1 << 15
+"""Numbers in a block: with its scratch it fits into a second-level cache."""
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The types of one evaluation.
+
+    Attributes:
+        axis: Of values, differences and divisions.
+        degree: Of everything after the division.
+    """
+
+    axis: Real
+    degree: Real
+
+    @property
+    def cap(self) -> Reals:
+        """The largest number below 1 of the degrees' type."""
+        return np.nextafter(self.degree(1), self.degree(0))
+
+
+NUMBERS: dict[Dtype, Numbers] = {
+    "float64": Numbers(np.float64, np.float64),
+    "mixed": Numbers(np.float64, np.float32),
+    "float32": Numbers(np.float32, np.float32),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """One end of a band on one variable; `flank` None is a step."""
+
+    line: int
+    bound: float
+    is_right: bool
+    flank: Flank | None
+
+
+@dataclass(frozen=True, slots=True)
+class Slope:
+    """One side of an LR set; `sign` 0 is both sides at once, which are equal."""
+
+    line: int
+    mean: float
+    sign: int
+    side: Side
+
+
+Atom = Edge | Slope
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Atoms of one kind and one length of curve.
+
+    Attributes:
+        lines: The line of each atom's variable among the axes.
+        run: Computes degrees of shape (atoms, rows) from the values, in place, with
+            scratch of the same shape.
+    """
+
+    lines: IntArray
+    run: Callable[[Reals, Reals, Reals], None]
+
+
+def atoms_of(line: int, shape: Shape) -> tuple[Atom, ...]:
+    """Return the atoms whose smallest degree is that of a shape; none if it is 1."""
+    if isinstance(shape, LR):
+        mean, left, right = shape.mean, shape.left, shape.right
+        if left == right:
+            return (Slope(line, mean, 0, left),)
+        return Slope(line, mean, -1, left), Slope(line, mean, 1, right)
+    found: list[Atom] = []
+    if shape.low is not None:
+        found.append(Edge(line, shape.low, False, shape.left))
+    if shape.high is not None:
+        found.append(Edge(line, shape.high, True, shape.right))
+    return tuple(found)
+
+
+def plan_blocks(
+    atoms: Sequence[Atom], numbers: Numbers, rows: int
+) -> tuple[list[Atom], tuple[Block, ...]]:
+    """Return atoms in the order in which blocks compute them, and the blocks.
+
+    Args:
+        atoms: Distinct atoms.
+        numbers: The types.
+        rows: How many rows a chunk has.
+    """
+    ordered = sorted(atoms, key=_kind)
+    blocks: list[Block] = []
+    size = max(BLOCK // rows, 1)
+    for (kind, _), group in itertools.groupby(ordered, key=_kind):
+        members = list(group)
+        for start in range(0, len(members), size):
+            part = members[start : start + size]
+            lines = np.array([atom.line for atom in part], np.int64)
+            if kind <= 1:
+                edges = [atom for atom in part if isinstance(atom, Edge)]
+                made = _steps(edges, numbers) if kind == 0 else _flanks(edges, numbers)
+            else:
+                slopes = [atom for atom in part if isinstance(atom, Slope)]
+                made = _slopes(slopes, numbers)
+            blocks.append(Block(lines, made))
+    return ordered, tuple(blocks)
+
+
+def _kind(atom: Atom) -> tuple[int, int]:
+    match atom:
+        case Edge(flank=None):
+            return 0, 0
+        case Edge(flank=flank):
+            return 1, 0 if flank.curve == (1.0,) else len(flank.curve)
+        case Slope(sign=0):
+            return 2, len(atom.side.curve)
+        case Slope():
+            return 3, len(atom.side.curve)
+
+
+def _column(values: Sequence[float], kind: Real) -> Reals:
+    """Return one number for each atom, to nearest and never infinite."""
+    largest = np.finfo(kind).max
+    exact = np.array(values, np.float64).reshape(-1, 1)
+    return np.clip(exact, -float(largest), float(largest)).astype(kind)
+
+
+def _curve(curves: Sequence[tuple[float, ...]], kind: Real) -> list[Reals]:
+    """Return one column for each coefficient, the lowest first."""
+    return [_column(line, kind) for line in zip(*curves, strict=True)]
+
+
+def _core(edges: Sequence[Edge], numbers: Numbers) -> Callable[[Reals], Reals]:
+    """Return what finds where edges are on the plateau: x > low, or x <= high."""
+    bound = _column([edge.bound for edge in edges], numbers.axis)
+    is_right = np.array([[edge.is_right] for edge in edges])
+
+    def core(x: Reals) -> Reals:
+        inside = np.greater(x, bound)
+        np.not_equal(inside, is_right, out=inside)
+        return inside.astype(numbers.degree)
+
+    return core
+
+
+def _steps(
+    edges: Sequence[Edge], numbers: Numbers
+) -> Callable[[Reals, Reals, Reals], None]:
+    core = _core(edges, numbers)
+
+    def run(x: Reals, out: Reals, _: Reals) -> None:
+        out[:] = core(x)
+
+    return run
+
+
+def _flanks(
+    edges: Sequence[Edge], numbers: Numbers
+) -> Callable[[Reals, Reals, Reals], None]:
+    core = _core(edges, numbers)
+    flanks = [edge.flank for edge in edges if edge.flank is not None]
+    end = _column([flank.end for flank in flanks], numbers.axis)
+    span = _column([flank.start - flank.end for flank in flanks], numbers.axis)
+    curve = _curve([flank.curve for flank in flanks], numbers.degree)
+    is_line = all(flank.curve == (1.0,) for flank in flanks)
+    zero, one, cap = numbers.degree(0), numbers.degree(1), numbers.cap
+
+    def run(x: Reals, out: Reals, q: Reals) -> None:
+        inside = core(x)
+        x -= end
+        x /= span
+        q[:] = x
+        np.maximum(q, zero, out=q)
+        np.minimum(q, one, out=q)
+        if is_line:
+            out[:] = q
+        else:
+            _horner(curve, q, out)
+            out *= q
+        np.minimum(out, cap, out=out)
+        np.maximum(out, inside, out=out)
+
+    return run
+
+
+def _horner(curve: Sequence[Reals], x: Reals, out: Reals) -> None:
+    """Put c0 + x (c1 + x (c2 + ...)) into `out`, from the inside out."""
+    if len(curve) == 1:
+        out[:] = curve[0]
+        return
+    np.multiply(curve[-1], x, out=out)
+    for coefficient in curve[-2:0:-1]:
+        out += coefficient
+        out *= x
+    out += curve[0]
+
+
+def _slopes(
+    slopes: Sequence[Slope], numbers: Numbers
+) -> Callable[[Reals, Reals, Reals], None]:
+    """Return what computes sides of LR sets (paper, 2.2.2, with a tail)."""
+    is_both = slopes[0].sign == 0
+    kind, one, zero, two = numbers.degree, *map(numbers.degree, (1, 0, 2))
+    mean = _column([slope.mean for slope in slopes], numbers.axis)
+    spread = _column([(s.sign or 1) * s.side.spread for s in slopes], numbers.axis)
+    reach = _column([slope.side.reach for slope in slopes], kind)
+    length = _column([slope.side.reach - 1.0 for slope in slopes], kind)
+    curve = _curve([slope.side.curve for slope in slopes], kind)
+
+    def run(x: Reals, out: Reals, u: Reals) -> None:
+        x -= mean
+        if is_both:
+            np.abs(x, out=x)
+        x /= spread
+        u[:] = x
+        np.maximum(u, zero, out=u)
+        np.minimum(u, reach, out=u)
+        t = np.minimum(u, one)
+        v = np.multiply(t, two)
+        v -= one
+        _horner(curve, v, out)
+        out *= t
+        np.subtract(one, out, out=out)
+        np.maximum(out, zero, out=out)
+        np.minimum(out, one, out=out)
+        np.subtract(reach, u, out=u)
+        u /= length
+        np.minimum(u, one, out=u)
+        u *= u
+        u *= u
+        out *= u
+
+    return run

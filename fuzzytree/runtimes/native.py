@@ -1,0 +1,65 @@
+"""The runtimes that need numpy and nothing else, in three number types."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from fuzzytree.contracts import Dtype, Model, Run, Runtime
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.onnx_numbers import losses
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes.best_first import search
+from fuzzytree.runtimes.native_rules import fire
+from fuzzytree.runtimes.native_tree import follow
+
+
+def load(model: Model, dtype: Dtype = "float64") -> Run:
+    """Return a function that answers many rows at once.
+
+    Args:
+        model: A tree is answered by descent, a rule base by firing every rule.
+        dtype: The number type.
+
+    Raises:
+        LossError: If the type cannot hold the model.
+    """
+    lost = losses(model, dtype)
+    if lost:
+        found = "; ".join(f"{loss.where}: {loss.what}" for loss in lost[:3])
+        more = f"; and {len(lost) - 3} more" if len(lost) > 3 else ""
+        raise LossError(f"cannot run {model.name} in {dtype}: {found}{more}")
+    if isinstance(model, RuleBase):
+        return fire(model, dtype)
+    return follow(model, dtype)
+
+
+def load_best_first(model: Model) -> Run:
+    """Return a function that answers a rule base by searching it as a tree.
+
+    Raises:
+        LossError: If the model is no rule base.
+    """
+    if not isinstance(model, RuleBase):
+        raise LossError(
+            f"cannot run {model.name} as best-first: it searches rule bases, "
+            "and a tree is descended without a search"
+        )
+    return search(model)
+
+
+_FLOAT32 = "numbers beyond float32, and different numbers that become one in it"
+
+RUNTIMES = (
+    Runtime("native", ("tree", "rules"), load),
+    Runtime(
+        "native mixed", ("tree", "rules"), partial(load, dtype="mixed"), dtype="mixed"
+    ),
+    Runtime(
+        "native float32",
+        ("tree", "rules"),
+        partial(load, dtype="float32"),
+        dtype="float32",
+        cannot=(_FLOAT32,),
+    ),
+    Runtime("best-first", ("rules",), load_best_first, cannot=("strengths of rules",)),
+)

@@ -1,0 +1,307 @@
+"""Firing all rules of a rule base on many rows, in numpy.
+
+Rows come features first and go through in chunks. Each distinct edge and slope is
+computed once (`degrees.py`), each distinct clause once, and rules that begin with the
+same clauses share the strength of what they have in common.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fuzzytree.contracts import Dtype, Outcome, Run
+from fuzzytree.rulebase import Clause, RuleBase
+from fuzzytree.runtimes.axes import Axes, axis_lines, missing_rows, plan_axes
+from fuzzytree.runtimes.degrees import (
+    NUMBERS,
+    Atom,
+    Block,
+    Numbers,
+    atoms_of,
+    plan_blocks,
+)
+from fuzzytree.runtimes.rows import checked, winners
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray, IntArray
+
+    Reals = npt.NDArray[np.floating[Any]]
+
+_SMALLEST_CHUNK, _LARGEST_CHUNK = 256, 1 << 14
+_WORKING_SET = 1 << 19  # numbers: what a chunk's degrees and strengths may take
+_WIDE = 8  # terms of a clause from which each clause is reduced by itself
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """Prefixes of one length: the shorter prefix and the last clause of each."""
+
+    parents: IntArray
+    clauses: IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Prefixes:
+    """The beginnings of all rules, each once, shorter ones first.
+
+    Attributes:
+        levels: The prefixes of one clause, of two, ...; number 0 is the empty one.
+        rules: The number of the prefix that is the whole of each rule.
+    """
+
+    levels: tuple[Level, ...]
+    rules: IntArray
+
+    @property
+    def count(self) -> int:
+        """The number of prefixes, the empty one included."""
+        return 1 + sum(len(level.parents) for level in self.levels)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Clauses with equally many terms: the line of each term, position by position."""
+
+    terms: IntArray
+    first: int
+
+
+@dataclass(frozen=True, slots=True)
+class Degrees:
+    """How to compute the degrees of all clauses, a line each.
+
+    Lines 0 to `terms` are terms, two-sided ones first; then clauses that join several
+    terms; then clauses that are negated.
+    """
+
+    blocks: tuple[Block, ...]
+    atoms: int
+    left: IntArray
+    right: IntArray
+    choices: tuple[Choice, ...]
+    negated: IntArray
+    line: dict[Clause, int]
+    count: int
+    numbers: Numbers
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A rule base, ready to be fired."""
+
+    axes: Axes
+    degrees: Degrees
+    prefixes: Prefixes
+    is_product: bool
+    rows: int
+
+
+def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
+    """Return a function that fires every rule on every row.
+
+    Args:
+        rules: The rule base.
+        dtype: The number type, as in `fuzzytree.contracts`.
+
+    Returns:
+        A function from values of shape (inputs, rows) to an outcome with strengths.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(0))
+        >>> fire(rules)(np.zeros((len(rules.inputs), 2))).strengths.shape
+        (7, 2)
+    """
+    plan = plan_rules(rules, dtype)
+
+    def run(values: FloatArray) -> Outcome:
+        array = checked(values, rules.inputs)
+        count = array.shape[1]
+        strengths = np.empty((len(rules.rules), count), np.float64)
+        found = np.empty((2, count), np.int64)
+        with np.errstate(all="ignore"):
+            for start in range(0, count, plan.rows):
+                part = slice(start, start + plan.rows)
+                lines = axis_lines(plan.axes, array[:, part])
+                missing = missing_rows(lines)
+                fired = strengths_of(plan, lines)
+                if missing is None:
+                    missing = np.zeros(fired.shape[1], np.bool_)
+                else:
+                    fired[:, missing] = 0
+                strengths[:, part] = fired
+                found[:, part] = winners(fired, missing)
+                strengths[:, part][:, missing] = np.nan
+        return Outcome(found[0], found[1], strengths)
+
+    return run
+
+
+def plan_rules(rules: RuleBase, dtype: Dtype = "float64") -> Plan:
+    """Return what firing a rule base needs, computed once."""
+    numbers = NUMBERS[dtype]
+    axes = plan_axes(rules.variables, numbers.axis)
+    clauses = list(
+        dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
+    )
+    size = len(clauses) + len(rules.rules)
+    rows = min(max(_WORKING_SET // size, _SMALLEST_CHUNK), _LARGEST_CHUNK)
+    degrees = plan_degrees(rules, clauses, axes.line, numbers, rows)
+    return Plan(
+        axes,
+        degrees,
+        _plan_prefixes(rules, degrees.line),
+        rules.semantics.conjunction == "product",
+        rows,
+    )
+
+
+def plan_degrees(
+    rules: RuleBase,
+    clauses: Sequence[Clause],
+    at_line: Mapping[str, int],
+    numbers: Numbers,
+    rows: int,
+) -> Degrees:
+    """Return how to compute the degrees of some clauses.
+
+    Args:
+        rules: Where the clauses' terms are defined.
+        clauses: Distinct clauses.
+        at_line: The line of each variable's values.
+        numbers: The types.
+        rows: How many rows go through together.
+    """
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    atoms = {key: atoms_of(at_line[key[0]], shapes[key]) for key in keys}
+    wanted = dict.fromkeys(atom for key in keys for atom in atoms[key])
+    ordered, blocks = plan_blocks(list(wanted), numbers, rows)
+    place: dict[Atom, int] = {atom: i for i, atom in enumerate(ordered)}
+    sides = {
+        key: [place[atom] for atom in atoms[key]] or [len(ordered)] for key in keys
+    }
+    terms = sorted(keys, key=lambda key: -len(sides[key]))
+    at = {key: line for line, key in enumerate(terms)}
+    line, choices = _plan_choices(clauses, at)
+    count = len(terms) + sum(len(choice.terms) for choice in choices)
+    negated = [clause for clause in clauses if clause.negated]
+    below = [line[Clause(c.variable, c.terms)] for c in negated]
+    line |= {clause: count + position for position, clause in enumerate(negated)}
+    return Degrees(
+        blocks,
+        len(ordered),
+        np.array([sides[key][0] for key in terms], np.int64),
+        np.array([sides[key][1] for key in terms if len(sides[key]) == 2], np.int64),
+        choices,
+        np.array(below, np.int64),
+        line,
+        count + len(negated),
+        numbers,
+    )
+
+
+def _plan_choices(
+    clauses: Sequence[Clause], at: dict[tuple[str, str], int]
+) -> tuple[dict[Clause, int], tuple[Choice, ...]]:
+    """Return the line of each clause without its negation, and how terms are joined."""
+    plain = dict.fromkeys(Clause(c.variable, c.terms) for c in clauses)
+    line = {c: at[c.variable, c.terms[0]] for c in plain if len(c.terms) == 1}
+    joined: dict[int, list[Clause]] = {}
+    for clause in plain:
+        if clause not in line:
+            joined.setdefault(len(clause.terms), []).append(clause)
+    choices: list[Choice] = []
+    first = len(at)
+    for group in joined.values():
+        lines = [[at[c.variable, term] for term in c.terms] for c in group]
+        choices.append(Choice(np.array(lines, np.int64), first))
+        line |= {clause: first + position for position, clause in enumerate(group)}
+        first += len(group)
+    return line, tuple(choices)
+
+
+def _plan_prefixes(rules: RuleBase, line: dict[Clause, int]) -> Prefixes:
+    """Return the distinct beginnings of the rules, level by level."""
+    current: list[tuple[Clause, ...]] = [rule.when for rule in rules.rules]
+    number = [0] * len(current)
+    levels: list[Level] = []
+    used = 1
+    for depth in range(max(map(len, current))):
+        known: dict[tuple[int, int], int] = {}
+        for rule, when in enumerate(current):
+            if depth < len(when):
+                key = (number[rule], line[when[depth]])
+                number[rule] = known.setdefault(key, used + len(known))
+        used += len(known)
+        pairs = np.array(list(known), np.int64)
+        levels.append(Level(pairs[:, 0].copy(), pairs[:, 1].copy()))
+    return Prefixes(tuple(levels), np.array(number, np.int64))
+
+
+def strengths_of(plan: Plan, lines: Reals) -> Reals:
+    """Return the strength of every rule, of shape (rules, rows)."""
+    degrees = clause_degrees(plan.degrees, lines)
+    prefixes = plan.prefixes
+    strengths = np.empty((prefixes.count, lines.shape[1]), degrees.dtype)
+    strengths[0] = 1
+    combine = np.multiply if plan.is_product else np.minimum
+    start = 1
+    for depth, level in enumerate(prefixes.levels):
+        part = strengths[start : start + len(level.parents)]
+        degrees.take(level.clauses, axis=0, out=part, mode="clip")
+        if depth:
+            before = strengths[:start].take(level.parents, axis=0)
+            combine(before, part, out=part)
+        start += len(part)
+    return strengths.take(prefixes.rules, axis=0)
+
+
+def clause_degrees(degrees: Degrees, lines: Reals) -> Reals:
+    """Return the degree of every clause, a line each (see `Degrees`)."""
+    rows = lines.shape[1]
+    atoms = _atom_degrees(degrees, lines)
+    found = np.empty((degrees.count, rows), degrees.numbers.degree)
+    terms, both = len(degrees.left), len(degrees.right)
+    atoms.take(degrees.left, axis=0, out=found[:terms], mode="clip")
+    if both:
+        np.minimum(found[:both], atoms.take(degrees.right, axis=0), out=found[:both])
+    for choice in degrees.choices:
+        out = found[choice.first : choice.first + len(choice.terms)]
+        _join(found[:terms], choice.terms, out)
+    if len(degrees.negated):
+        start = degrees.count - len(degrees.negated)
+        plain = found[:start].take(degrees.negated, axis=0)
+        np.subtract(degrees.numbers.degree(1), plain, out=found[start:])
+    return found
+
+
+def _atom_degrees(degrees: Degrees, lines: Reals) -> Reals:
+    """Return the degree of every edge and slope, and a last line of ones."""
+    rows = lines.shape[1]
+    atoms = np.empty((degrees.atoms + 1, rows), degrees.numbers.degree)
+    atoms[-1] = 1
+    start = 0
+    for block in degrees.blocks:
+        out = atoms[start : start + len(block.lines)]
+        block.run(lines.take(block.lines, axis=0), out, np.empty_like(out))
+        start += len(out)
+    return atoms
+
+
+def _join(terms: Reals, lines: IntArray, out: Reals) -> None:
+    """Put the largest degree of each clause's terms into its line."""
+    if lines.shape[1] >= _WIDE:
+        for clause, line in zip(lines, out, strict=True):
+            np.maximum.reduce(terms.take(clause, axis=0), axis=0, out=line)
+        return
+    terms.take(lines[:, 0], axis=0, out=out, mode="clip")
+    for position in range(1, lines.shape[1]):
+        np.maximum(out, terms.take(lines[:, position], axis=0), out=out)
