@@ -1,0 +1,116 @@
+"""From a table to a proved model, in one run on the wine table.
+
+Learn a fuzzy tree, print it and its rules, write YAML and ONNX files, run them, check
+that all of them are one model, and compare speeds. Files go to the folder `out/`.
+"""
+
+from __future__ import annotations
+
+import sys
+
+if sys.version_info < (3, 11):  # noqa: UP036 - someone will try an older one
+    sys.exit(
+        "fuzzytree needs Python 3.11 or newer, and this is "
+        f"{sys.version_info[0]}.{sys.version_info[1]}"
+    )
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import fuzzytree as ft
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.tables import batches, read_table
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, Model, Run
+
+ROOT = Path(__file__).resolve().parent.parent
+TABLE = ROOT / "examples" / "wine" / "wine.csv"
+OUT = ROOT / "out"
+BATCH = 10_000
+RUNTIMES = ("reference", "native", "onnxruntime float64")
+
+
+def main() -> None:
+    """Take the tour."""
+    wine = read_table(TABLE, target="cultivar")
+    rows = wine.values.shape[1]
+
+    head(f"Learn: {rows} wines, {len(wine.columns)} measurements, three grapes")
+    tree = ft.learn(TABLE, target="cultivar", name="wine")
+    rules = ft.rules_from_tree(tree)
+    print(f"{tree}\n\nThe same as rules:\n{rules}")
+
+    head("Write: YAML to read, ONNX to run")
+    OUT.mkdir(exist_ok=True)
+    for model, stem in ((tree, "wine-tree"), (rules, "wine-rules")):
+        for suffix in (".yaml", ".onnx"):
+            path = OUT / f"{stem}{suffix}"
+            ft.save(model, path)
+            print(f"out/{path.name:<16}{path.stat().st_size:>7} bytes")
+
+    head("Run: the rules from their file, on the wines they were learnt from")
+    answers = ft.run(ft.load(OUT / "wine-rules.yaml"), TABLE)
+    right = int((answers.codes == wine.codes).sum())
+    print(f"{answers}\n{right} of {rows} are the grape that stands in the table")
+
+    head("Check: are tree, rules, files and runtimes one model?")
+    files = [OUT / f"{stem}.onnx" for stem in ("wine-tree", "wine-rules")]
+    agreement = ft.check(tree, OUT / "wine-rules.yaml", *files, data=TABLE)
+    print(agreement)
+    agreement.raise_if_not_ok()
+
+    head(f"Compare: microseconds for one row, and for each of {BATCH} at once")
+    values = next(batches(TABLE, tree.inputs)).values
+    for line in speeds(tree, rules, values):
+        print(line)
+
+    head("What this says")
+    asked = ", ".join(tree.inputs)
+    print(
+        f"The tree asks {len(tree.inputs)} of {len(wine.columns)} measurements "
+        f"({asked})\nand needs {len(tree.leaves)} rules. The rules answer like the "
+        "tree on every input, and the files\nlike the rules, bit by bit: read "
+        "out/wine-rules.yaml, run out/wine-rules.onnx, and\nknow that they are the "
+        "same model. One path of the tree is quicker than all rules;\nthe rules "
+        "also say how close a decision was."
+    )
+
+
+def head(text: str) -> None:
+    """Print a heading."""
+    print(f"\n{text}\n{'-' * len(text)}")
+
+
+def speeds(tree: Model, rules: Model, values: FloatArray) -> Iterator[str]:
+    """Yield a small table of run times; the best of several rounds each."""
+    many = np.tile(values, -(-BATCH // values.shape[1]))[:, :BATCH]
+    yield f"{'runtime':<22}{'tree: one':>11}{'each':>9}{'rules: one':>13}{'each':>9}"
+    for name in RUNTIMES:
+        shown = f"{name:<22}"
+        for model, width in ((tree, 11), (rules, 13)):
+            run = find_runtime(name).load(model)
+            batch = values if name == "reference" else many
+            one = fastest(run, values[:, :1])
+            each = fastest(run, batch) / batch.shape[1]
+            shown += f"{one:>{width}.1f}{each:>9.3f}"
+        yield shown
+
+
+def fastest(run: Run, values: FloatArray) -> float:
+    """Return the microseconds of the fastest of many runs within a fifth of a second."""
+    best = float("inf")
+    end = time.perf_counter() + 0.2
+    while time.perf_counter() < end:
+        start = time.perf_counter()
+        run(values)
+        best = min(best, time.perf_counter() - start)
+    return best * 1e6
+
+
+if __name__ == "__main__":
+    main()
