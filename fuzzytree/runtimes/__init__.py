@@ -24,10 +24,7 @@ TABLE = (
 
 def all_runtimes() -> tuple[Runtime, ...]:
     """Return every runtime of the table, installed or not, in its order."""
-    found: list[Runtime] = []
-    for module in TABLE:
-        found.extend(importlib.import_module(module).RUNTIMES)
-    return tuple(found)
+    return tuple(runtime for module in TABLE for runtime in _runtimes_of(module))
 
 
 def find_runtime(name: str) -> Runtime:
@@ -36,12 +33,19 @@ def find_runtime(name: str) -> Runtime:
     Raises:
         ValueError: If there is none; the message lists all of them.
     """
-    known = {runtime.name: runtime for runtime in all_runtimes()}
-    if name not in known:
-        raise ValueError(f"no runtime {name!r}; there is {', '.join(known)}")
-    return known[name]
+    for module in TABLE:
+        for runtime in _runtimes_of(module):
+            if runtime.name == name:
+                return runtime
+    known = ", ".join(runtime.name for runtime in all_runtimes())
+    raise ValueError(f"no runtime {name!r}; there is {known}")
 
 
 def is_installed(runtime: Runtime) -> bool:
     """Return whether every module that a runtime needs can be imported."""
     return all(importlib.util.find_spec(name) for name in runtime.modules)
+
+
+def _runtimes_of(module: str) -> tuple[Runtime, ...]:
+    found: tuple[Runtime, ...] = importlib.import_module(module).RUNTIMES
+    return found
