@@ -68,11 +68,11 @@ def strength_bounds(
             bounds = [degree_bound(term.shape, dtype) for term in variable.terms]
             fixed = max(bound.fixed for bound in bounds)
             per_unit = max(bound.per_unit for bound in bounds)
-            slack = (
-                axis_errors(variable, rules.inputs, values) if variable.parts else 0.0
-            )
-            with np.errstate(over="ignore"):
-                worst = np.maximum(worst, fixed + per_unit * slack)
+            worst = np.maximum(worst, fixed)
+            if per_unit and variable.parts:
+                slack = axis_errors(variable, rules.inputs, values)
+                with np.errstate(over="ignore"):
+                    worst = np.maximum(worst, fixed + per_unit * slack)
     if any(clause.negated for rule in rules.rules for clause in rule.when):
         worst = worst + UNIT
     longest = max(len(rule.when) for rule in rules.rules)
