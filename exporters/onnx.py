@@ -20,7 +20,6 @@ from fuzzytree.tree import FuzzyTree
 if TYPE_CHECKING:
     import onnx
 
-    from fuzzytree.exporters.onnx_axes import Axes
     from fuzzytree.exporters.onnx_graph import Sheet
 
 FORMAT_VERSION = "1"
@@ -30,7 +29,7 @@ Output = Literal["label", "rule", "strengths", "status"]
 Signature = Literal["needed", "all"]
 
 OPSETS = range(12, 27)
-"""The operator sets that can be asked for; 12 is the first whose ArgMax defines ties."""
+"""The operator sets that can be asked for: in 12, ArgMax began to define ties."""
 
 IRS = range(4, 14)
 """The file versions that can be asked for; constants need no input from 4 on."""
@@ -270,7 +269,7 @@ def _fill(
 
         is_plain = plain or needs_plain(model)
         frame = tree_graph(sheet, model, numbers, columns, is_plain=is_plain)
-        onnx_outputs.add_tree_outputs(sheet, model, frame, outputs)
+        onnx_outputs.add_tree_outputs(sheet, model, frame, outputs, numbers)
     else:
         from fuzzytree.exporters.onnx_rules import rules_graph
 
@@ -311,7 +310,9 @@ def _facts(
             "missing": semantics.missing,
         },
     }
-    facts = {key: json.dumps(value, ensure_ascii=False) for key, value in records.items()}
+    facts = {
+        key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
+    }
     return {f"fuzzytree.{key}": value for key, value in (texts | facts).items()}
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import msgspec
 import numpy as np
+from onnx import numpy_helper
 
 from fuzzytree.contracts import Model
 from fuzzytree.exporters.onnx_graph import Sheet
@@ -19,13 +20,13 @@ class Axes(msgspec.Struct, frozen=True):
     Attributes:
         block: Their name, of shape (variables, rows); empty if there is no variable.
         order: The row of each variable in the block.
-        is_known: Whether all values of a row are finite: bool, of shape (1, rows), or
-            (rows,) if asked for flat.
+        guard: 0 where all values of a row are finite, otherwise NaN; of shape
+            (1, rows), or (rows,) if asked for flat.
     """
 
     block: str
     order: dict[str, int]
-    is_known: str
+    guard: str
 
 
 def axes(
@@ -46,7 +47,7 @@ def axes(
         is_flat: Whether the guard has one axis only.
     """
     if not model.variables:
-        return Axes("", {}, _always(sheet, is_flat=is_flat))
+        return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=is_flat))
     block = sheet.node("Transpose", "inputs", perm=[1, 0])
     if tuple(columns) != model.inputs:
         block = sheet.take(block, [columns.index(name) for name in model.inputs])
@@ -62,8 +63,12 @@ def axes(
     zeros = sheet.node("Mul", block, scalar(sheet, 0.0, numbers.axis))
     if len(order) > 1 or is_flat:
         zeros = sheet.total(zeros, axis=0, keepdims=0 if is_flat else 1)
-    is_known = sheet.node("Equal", zeros, scalar(sheet, 0.0, numbers.axis))
-    return Axes(block, order, is_known)
+    return Axes(block, order, zeros)
+
+
+def is_known(sheet: Sheet, frame: Axes, numbers: Numbers) -> str:
+    """Return whether all values of a row are finite, in the guard's shape."""
+    return sheet.node("Equal", frame.guard, scalar(sheet, 0.0, numbers.axis))
 
 
 def scalar(sheet: Sheet, value: float, kind: type[Real]) -> str:
@@ -76,13 +81,13 @@ def column(sheet: Sheet, values: RealArray, hint: str) -> str:
     return sheet.constant(values.reshape(-1, 1), hint)
 
 
-def _always(sheet: Sheet, *, is_flat: bool) -> str:
-    """Return True for each row, where no variable could be missing."""
+def _no_guard(sheet: Sheet, kind: type[Real], *, is_flat: bool) -> str:
+    """Return 0 for each row, where no variable could be missing."""
     size = sheet.take(sheet.node("Shape", "inputs"), [0])
     if not is_flat:
         size = sheet.node("Concat", sheet.numbers([1], "one"), size, axis=0)
-    zeros = sheet.node("ConstantOfShape", size)
-    return sheet.node("Equal", zeros, scalar(sheet, 0.0, np.float32))
+    zero = numpy_helper.from_array(np.zeros(1, kind))
+    return sheet.node("ConstantOfShape", size, value=zero)
 
 
 def _combinations(

@@ -7,7 +7,6 @@ same calls give the same bytes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +23,7 @@ Constant = npt.NDArray[np.generic]
 Body = Callable[["Sheet", Sequence[str], str], str]
 
 
-class Attribute(Protocol):
-    """Whatever `onnx.helper.make_attribute` accepts."""
+Attribute = int | Sequence[int] | onnx.TensorProto
 
 
 class Sheet:
@@ -50,6 +48,7 @@ class Sheet:
         self._in_function = in_function
         self._known: dict[tuple[str, tuple[int, ...], bytes], str] = {}
         self._taken: dict[str, int] = {}
+        self._results: dict[tuple[str, ...], str] = {}
 
     def node(
         self,
@@ -61,6 +60,8 @@ class Sheet:
     ) -> str:
         """Add a node with one result and return the result's name.
 
+        A node without settings that stands there already is not added again.
+
         Args:
             op: The operator.
             inputs: The names of its inputs.
@@ -68,8 +69,15 @@ class Sheet:
             domain: The operator's domain.
             attributes: The operator's own settings.
         """
+        key = (op, *inputs)
+        if key in self._results and not (named or attributes):
+            return self._results[key]
         result = named or self._fresh(op.lower())
-        made = helper.make_node(op, inputs, [result], domain=domain, **attributes)
+        if not (named or attributes or domain):
+            self._results[key] = result
+        made = helper.make_node(op, inputs, [result], domain=domain)
+        for name in sorted(attributes):
+            made.attribute.append(helper.make_attribute(name, attributes[name]))
         self.nodes.append(made)
         return result
 
@@ -90,10 +98,13 @@ class Sheet:
     def texts(self, values: Sequence[str], hint: str) -> str:
         """Return the name of a new constant list of texts."""
         name = self._fresh(hint)
-        encoded = [value.encode() for value in values]
-        self.tensors.append(
-            helper.make_tensor(name, onnx.TensorProto.STRING, [len(values)], encoded)
+        made = onnx.TensorProto(
+            name=name,
+            data_type=onnx.TensorProto.STRING,
+            dims=[len(values)],
+            string_data=[value.encode() for value in values],
         )
+        self.tensors.append(made)
         return name
 
     def numbers(self, values: Sequence[int], hint: str) -> str:

@@ -128,9 +128,7 @@ def _flank_losses(where: str, name: str, flank: Flank) -> Iterator[Loss]:
     yield from _zero_losses(where, f"{name} flank's width", span)
 
 
-def _number_losses(
-    where: str, numbers: Sequence[tuple[str, float]]
-) -> Iterator[Loss]:
+def _number_losses(where: str, numbers: Sequence[tuple[str, float]]) -> Iterator[Loss]:
     for what, value in numbers:
         if abs(value) > LARGEST:
             end = LARGEST if value > 0 else -LARGEST

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fuzzytree.exporters.onnx_axes import Axes, scalar
+from fuzzytree.exporters.onnx_axes import Axes, is_known, scalar
 from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers
 from fuzzytree.reference import Status
@@ -15,7 +15,11 @@ from fuzzytree.tree import FuzzyTree
 
 
 def add_tree_outputs(
-    sheet: Sheet, tree: FuzzyTree, frame: Axes, outputs: Sequence[str]
+    sheet: Sheet,
+    tree: FuzzyTree,
+    frame: Axes,
+    outputs: Sequence[str],
+    numbers: Numbers,
 ) -> None:
     """Add the outputs of a tree whose leaf numbers are named `rule`."""
     labels = [leaf.label for leaf in tree.leaves]
@@ -24,7 +28,8 @@ def add_tree_outputs(
         sheet.node("Gather", table, "rule", axis=0, named="label")
     if "status" in outputs:
         decided, missing = (_whole(sheet, s) for s in (Status.DECIDED, Status.MISSING))
-        sheet.node("Where", frame.is_known, decided, missing, named="status")
+        known = is_known(sheet, frame, numbers)
+        sheet.node("Where", known, decided, missing, named="status")
 
 
 def add_rule_outputs(
@@ -38,14 +43,14 @@ def add_rule_outputs(
     """Add the outputs of a rule base, given the strengths of no rule and of all."""
     winner = sheet.block("Winner", _winner, {"strengths": strengths}, named="rule")
     if "label" in outputs:
-        _add_label(sheet, rules, frame, winner)
+        _add_label(sheet, rules, frame, winner, numbers)
     if "status" in outputs:
-        _add_status(sheet, frame, strengths, winner)
+        _add_status(sheet, frame, strengths, winner, numbers)
     if "strengths" in outputs:
         ends = [sheet.numbers([end], "end") for end in (1, 1 + len(rules.rules))]
         real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
         unknown = scalar(sheet, np.nan, numbers.degree)
-        real = sheet.node("Where", frame.is_known, real, unknown)
+        real = sheet.node("Where", is_known(sheet, frame, numbers), real, unknown)
         sheet.node("Transpose", real, perm=[1, 0], named="strengths")
 
 
@@ -55,19 +60,23 @@ def _winner(sheet: Sheet, inputs: Sequence[str], named: str) -> str:
     )
 
 
-def _add_label(sheet: Sheet, rules: RuleBase, frame: Axes, winner: str) -> None:
+def _add_label(
+    sheet: Sheet, rules: RuleBase, frame: Axes, winner: str, numbers: Numbers
+) -> None:
     semantics = rules.semantics
     labels = [semantics.uncovered or "", *(rule.then for rule in rules.rules)]
     position = winner
     if semantics.missing != semantics.uncovered:
         missing = _whole(sheet, len(labels))
         labels.append(semantics.missing or "")
-        position = sheet.node("Where", _flat(sheet, frame), winner, missing)
+        position = sheet.node("Where", _flat(sheet, frame, numbers), winner, missing)
     table = sheet.texts(labels, "labels")
     sheet.node("Gather", table, position, axis=0, named="label")
 
 
-def _add_status(sheet: Sheet, frame: Axes, strengths: str, winner: str) -> None:
+def _add_status(
+    sheet: Sheet, frame: Axes, strengths: str, winner: str, numbers: Numbers
+) -> None:
     """Compare the first with the last of the strongest; no rule is number 0."""
     last = sheet.node("ArgMax", strengths, axis=0, keepdims=0, select_last_index=1)
     decided, tie, uncovered, missing = (_whole(sheet, status) for status in Status)
@@ -75,11 +84,12 @@ def _add_status(sheet: Sheet, frame: Axes, strengths: str, winner: str) -> None:
     status = sheet.node("Where", is_one, decided, tie)
     is_none = sheet.node("Equal", winner, _whole(sheet, 0))
     status = sheet.node("Where", is_none, uncovered, status)
-    sheet.node("Where", _flat(sheet, frame), status, missing, named="status")
+    sheet.node("Where", _flat(sheet, frame, numbers), status, missing, named="status")
 
 
-def _flat(sheet: Sheet, frame: Axes) -> str:
-    return sheet.node("Reshape", frame.is_known, sheet.numbers([-1], "flat"))
+def _flat(sheet: Sheet, frame: Axes, numbers: Numbers) -> str:
+    known = is_known(sheet, frame, numbers)
+    return sheet.node("Reshape", known, sheet.numbers([-1], "flat"))
 
 
 def _whole(sheet: Sheet, value: int) -> str:

@@ -11,7 +11,7 @@ import onnxruntime
 from fuzzytree.contracts import Model
 from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_session
-from fuzzytree.reference import Answer, descend, evaluate
+from fuzzytree.reference import descend, evaluate
 from fuzzytree.rulebase import LR, Band, RuleBase, Term
 
 _MOST_CLAUSES = 50_000  # what the reference does in well under a second
@@ -76,7 +76,7 @@ def sample_rows(model: Model, limit: int) -> Iterator[dict[str, float]]:
             for position, (name, values) in enumerate(points.items())
         }
     if points:
-        yield {name: math.nan for name in points}
+        yield dict.fromkeys(points, math.nan)
 
 
 def _landmarks(terms: Sequence[Term]) -> set[float]:
@@ -92,8 +92,10 @@ def _landmarks(terms: Sequence[Term]) -> set[float]:
 
 
 def _compare(model: Model, row: dict[str, float], given: dict[str, object]) -> None:
-    answer: Answer
-    answer = evaluate(model, row) if isinstance(model, RuleBase) else descend(model, row)
+    if isinstance(model, RuleBase):
+        answer = evaluate(model, row)
+    else:
+        answer = descend(model, row)
     expected: dict[str, object] = {
         "rule": answer.rule,
         "label": answer.label or "",

@@ -20,9 +20,9 @@ import msgspec
 import numpy as np
 from onnx import helper
 
-from fuzzytree.exporters.onnx_axes import Axes, axes, column, scalar
+from fuzzytree.exporters.onnx_axes import Axes, axes, column, is_known, scalar
 from fuzzytree.exporters.onnx_graph import Sheet, Table
-from fuzzytree.exporters.onnx_numbers import Numbers, rounded
+from fuzzytree.exporters.onnx_numbers import Numbers, RealArray, rounded
 from fuzzytree.rulebase import LR, Clause, Flank, RuleBase, Shape, Side
 
 Key = tuple[str, str]  # variable and term
@@ -57,14 +57,23 @@ class Slope(msgspec.Struct, frozen=True):
 
 Part = Edge | Slope
 
+GUARD = ""
+"""In place of a variable: 0, or NaN in a row with a missing value."""
+
+NOTHING = Edge(GUARD, 1, 1.0, None)
+"""No rule: degree 0, or 1 where a value is missing: before all rules, as the first."""
+
+ALWAYS = Edge(GUARD, 1, -math.inf, None)
+"""Degree 1."""
+
 
 def rules_graph(
     sheet: Sheet, rules: RuleBase, numbers: Numbers, columns: Sequence[str]
 ) -> tuple[Axes, str]:
     """Add a rule base up to the strengths of no rule and of every rule.
 
-    Row 0 of the strengths is 0, or 2 where a value is missing, and row k is rule k: so
-    the position of the first largest is the number of the winning rule, or 0.
+    Row 0 of the strengths is `NOTHING` and row k is rule k: the position of the first
+    largest is the number of the winning rule, or 0.
 
     Args:
         sheet: Where the nodes go.
@@ -76,17 +85,10 @@ def rules_graph(
         The values of the variables, and the strengths, of shape (1 + rules, rows).
     """
     frame = axes(sheet, rules, numbers, columns)
-    nothing, missing = (scalar(sheet, value, numbers.degree) for value in (0.0, 2.0))
-    none = sheet.node("Where", frame.is_known, nothing, missing)
     table = Table(sheet)
-    if frame.block:
-        sequences = _degrees(sheet, table, rules, numbers, frame)
-    else:
-        one = scalar(sheet, 1.0, numbers.degree)
-        table.append(sheet.node("Add", none, one), 1)
-        sequences = [(0,) for _ in rules.rules]
+    sequences = _degrees(sheet, table, rules, numbers, frame)
     is_product = rules.semantics.conjunction == "product"
-    return frame, _strengths(sheet, table, sequences, none, is_product=is_product)
+    return frame, _strengths(sheet, table, sequences, is_product=is_product)
 
 
 def _parts(variable: str, shape: Shape) -> list[Part]:
@@ -107,69 +109,70 @@ def _parts(variable: str, shape: Shape) -> list[Part]:
 def _degrees(
     sheet: Sheet, table: Table, rules: RuleBase, numbers: Numbers, frame: Axes
 ) -> Sequences:
-    """Add the degrees of all clauses; return the rows that make up each rule."""
+    """Add the degrees of all clauses.
+
+    Returns:
+        The rows whose AND is the strength of no rule, of the first rule, and so on.
+    """
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
-    clauses = list(dict.fromkeys(clause for rule in rules.rules for clause in rule.when))
+    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
     used = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
     parts = {key: _parts(key[0], shapes[key]) for key in used}
     # A term without ends is always 1: so is its clause, and its negation always 0.
     constant = {c for c in clauses if any(not parts[c.variable, t] for t in c.terms)}
     true = {clause for clause in constant if not clause.negated}
     kept = [[c for c in rule.when if c not in true] for rule in rules.rules]
-    live = [clause for clause in clauses if clause not in constant]
-
-    some = rules.variables[0].name
-    always, never = Edge(some, -1, math.inf, None), Edge(some, 1, math.inf, None)
-    wanted = dict.fromkeys(
-        part for c in live for term in c.terms for part in parts[c.variable, term]
+    live = [[c for c in when if c not in constant] for when in kept]
+    wanted = {NOTHING: None} if all(kept) else {NOTHING: None, ALWAYS: None}
+    found: dict[Part, None] = dict.fromkeys(
+        part
+        for when in live
+        for clause in when
+        for term in clause.terms
+        for part in parts[clause.variable, term]
     )
-    if not all(kept):
-        wanted[always] = None
-    if constant - true:
-        wanted[never] = None
-    row = _primitives(sheet, table, list(wanted), numbers, frame)
-    of_clause = _clauses(sheet, table, live, parts, row, numbers)
-    of_clause |= {clause: row[never] for clause in constant - true}
-    return [tuple(of_clause[c] for c in when) or (row[always],) for when in kept]
+    row = _primitives(sheet, table, [*wanted, *found], numbers, frame)
+    rows_of = _clauses(sheet, table, live, parts, row, numbers)
+    rows_of |= dict.fromkeys(constant - true, (row[NOTHING],))
+    always = (row[ALWAYS],) if ALWAYS in row else ()
+    sequences = [tuple(r for c in when for r in rows_of[c]) for when in kept]
+    return [(row[NOTHING],), *(rows or always for rows in sequences)]
 
 
 def _primitives(
     sheet: Sheet, table: Table, parts: Sequence[Part], numbers: Numbers, frame: Axes
 ) -> dict[Part, int]:
-    """Add one block of edges and one of slopes; return the row of each."""
-    zero = scalar(sheet, 0.0, numbers.axis)
-    guarded = sheet.node("Where", frame.is_known, frame.block, zero)
-    signed, count = Table(sheet), len(frame.order)
-    signed.append(guarded, count)
-    if any(part.sign < 0 for part in parts):
-        signed.append(sheet.node("Neg", guarded), count)
-
-    def values(parts: Sequence[Part]) -> str:
-        return signed.take(
-            [frame.order[p.variable] + (count if p.sign < 0 else 0) for p in parts]
-        )
-
-    row: dict[Part, int] = {}
+    """Add one block of edges and one of slopes; return the row of each part."""
     edges = [part for part in parts if isinstance(part, Edge)]
     slopes = [part for part in parts if isinstance(part, Slope)]
     slopes.sort(key=lambda slope: abs(slope.sign))  # |x - m| first
-    if edges:
-        block = _edges(sheet, values(edges), edges, numbers)
-        first = table.append(block, len(edges))
-        row |= {edge: first + number for number, edge in enumerate(edges)}
+    block = frame.block
+    if slopes:  # an edge of NaN is 1, but a slope of NaN is NaN
+        zero = scalar(sheet, 0.0, numbers.axis)
+        known = is_known(sheet, frame, numbers)
+        block = sheet.node("Where", known, block, zero)
+    values, place = Table(sheet), {(GUARD, 1): 0}
+    values.append(frame.guard, 1)
+    for sign in (1, -1):
+        if any(part.sign in (sign, sign - 1) and part.variable for part in parts):
+            signed = block if sign > 0 else sheet.node("Neg", block)
+            first = values.append(signed, len(frame.order))
+            place |= {(name, sign): first + i for name, i in frame.order.items()}
+    row: dict[Part, int] = {}
+    taken = values.take([place[edge.variable, edge.sign] for edge in edges])
+    first = table.append(_edges(sheet, taken, edges, numbers), len(edges))
+    row |= {edge: first + number for number, edge in enumerate(edges)}
     if slopes:
-        block = _slopes(sheet, values(slopes), slopes, numbers)
-        first = table.append(block, len(slopes))
+        taken = values.take([place[s.variable, s.sign or 1] for s in slopes])
+        first = table.append(_slopes(sheet, taken, slopes, numbers), len(slopes))
         row |= {slope: first + number for number, slope in enumerate(slopes)}
     return row
 
 
 def _edges(sheet: Sheet, values: str, edges: Sequence[Edge], numbers: Numbers) -> str:
     """Add the degrees of edges, given their values, as one block."""
-    bounds = rounded([edge.sign * edge.bound for edge in edges], numbers.axis)
-    is_left = np.array([edge.sign > 0 for edge in edges])
-    bounds = np.where(is_left, np.nextafter(bounds, numbers.axis(np.inf)), bounds)
-    beyond = sheet.node("Less", values, column(sheet, bounds, "bounds"))
+    bounds = column(sheet, _bounds(edges, numbers), "bounds")
+    beyond = sheet.node("Less", values, bounds)
     one = scalar(sheet, 1.0, numbers.degree)
     flanks = [(edge.sign, edge.flank) for edge in edges]
     if all(flank is None for _, flank in flanks):
@@ -204,7 +207,18 @@ def _edges(sheet: Sheet, values: str, edges: Sequence[Edge], numbers: Numbers) -
     return sheet.block(f"Edges{len(given) - 2}", body, given)
 
 
-def _slopes(sheet: Sheet, values: str, slopes: Sequence[Slope], numbers: Numbers) -> str:
+def _bounds(edges: Sequence[Edge], numbers: Numbers) -> RealArray:
+    """Return for each edge the smallest value, times its sign, at which it is 1."""
+    bounds = rounded([edge.sign * edge.bound for edge in edges], numbers.axis)
+    is_left = np.array([edge.sign > 0 for edge in edges])
+    bounds = np.where(is_left, np.nextafter(bounds, numbers.axis(np.inf)), bounds)
+    is_always = np.array([edge == ALWAYS for edge in edges])
+    return np.where(is_always, numbers.axis(-np.inf), bounds)
+
+
+def _slopes(
+    sheet: Sheet, values: str, slopes: Sequence[Slope], numbers: Numbers
+) -> str:
     """Add the degrees of slopes, given their values, as one block."""
     means = [-s.mean if s.sign < 0 else s.mean for s in slopes]
     middle = column(sheet, rounded(means, numbers.axis), "means")
@@ -286,20 +300,38 @@ def _horner(sheet: Sheet, curve: Sequence[str], x: str) -> str:
 def _clauses(
     sheet: Sheet,
     table: Table,
-    clauses: Sequence[Clause],
+    rules: Sequence[Sequence[Clause]],
     parts: dict[Key, list[Part]],
     row: dict[Part, int],
     numbers: Numbers,
-) -> dict[Clause, int]:
-    """Add terms of two parts, OR and negation where there are any."""
+) -> dict[Clause, tuple[int, ...]]:
+    """Add terms of two parts, OR and negation where there are any.
+
+    Returns:
+        The rows whose AND is the degree of each clause: two if its only term has two
+        parts and it costs less to let the rules take both.
+    """
+    clauses = dict.fromkeys(clause for when in rules for clause in when)
     terms = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
     of_term = {key: row[parts[key][0]] for key in terms}
-    double = [key for key in terms if len(parts[key]) == 2]
+    pairs = {
+        c: (row[found[0]], row[found[1]])
+        for c in clauses
+        if len(c.terms) == 1 and not c.negated
+        for found in [parts[c.variable, c.terms[0]]]
+        if len(found) == 2
+    }
+    flat = [[part for c in when for part in pairs.get(c, (c,))] for when in rules]
+    if _cost(flat) > _cost(rules) + 3 * len(pairs) + table.count + 20:
+        pairs = {}
+    single = [clause for clause in clauses if clause not in pairs]
+    joined = dict.fromkeys((c.variable, term) for c in single for term in c.terms)
+    double = [key for key in joined if len(parts[key]) == 2]
     if double:
         left, right = (table.take([row[parts[k][i]] for k in double]) for i in (0, 1))
         first = table.append(sheet.node("Min", left, right), len(double))
         of_term |= {key: first + number for number, key in enumerate(double)}
-    lists = {c: [of_term[c.variable, term] for term in c.terms] for c in clauses}
+    lists = {c: [of_term[c.variable, term] for term in c.terms] for c in single}
     of_clause = _largest(sheet, table, lists)
     negated = [clause for clause in clauses if clause.negated]
     if negated:
@@ -307,100 +339,105 @@ def _clauses(
         one = scalar(sheet, 1.0, numbers.degree)
         first = table.append(sheet.node("Sub", one, degrees), len(negated))
         of_clause |= {clause: first + number for number, clause in enumerate(negated)}
-    return of_clause
+    return pairs | {clause: (found,) for clause, found in of_clause.items()}
 
 
 def _largest(
     sheet: Sheet, table: Table, lists: dict[Clause, list[int]]
 ) -> dict[Clause, int]:
     """Add the maxima of lists of rows, halving all lists at once until one is left."""
-    while active := {c: rows for c, rows in lists.items() if len(rows) > 1}:
-        left = [row for rows in active.values() for row in rows[::2]]
-        right = [
-            rows[min(position + 1, len(rows) - 1)]
-            for rows in active.values()
-            for position in range(0, len(rows), 2)
-        ]
+    lists = dict(lists)
+    while active := [clause for clause, rows in lists.items() if len(rows) > 1]:
+        left = [row for clause in active for row in lists[clause][::2]]
+        right: list[int] = []
+        for clause in active:
+            rows = lists[clause]
+            right += rows[1::2] + rows[-1:] * (len(rows) % 2)
         block = sheet.node("Max", table.take(left), table.take(right))
         first = table.append(block, len(left))
-        lists = dict(lists)
-        for clause, rows in active.items():
-            half = (len(rows) + 1) // 2
+        for clause in active:
+            half = (len(lists[clause]) + 1) // 2
             lists[clause] = list(range(first, first + half))
             first += half
     return {clause: rows[0] for clause, rows in lists.items()}
 
 
-def _strengths(
-    sheet: Sheet, table: Table, sequences: Sequences, none: str, *, is_product: bool
-) -> str:
-    """Add the strengths of the rules, below the row of no rule, the cheaper way."""
-    levels = _levels(sequences)
-    longest = len(levels)
-    padded = not is_product or len({len(rows) for rows in sequences}) == 1
-    # In passes over one row of a block; a node costs about as much as five of them.
-    by_slots = len(sequences) * 2 * longest + 5 * (longest + 2)
-    by_prefix = sum(3 * len(level) for level in levels[1:]) + 15 * longest
-    by_prefix += 2 * len(sequences) + 10
-    if padded and by_slots <= by_prefix:
-        return _by_slots(sheet, table, sequences, none, is_product=is_product)
-    return _by_prefix(sheet, table, sequences, none, is_product=is_product)
-
-
-def _levels(sequences: Sequences) -> list[dict[tuple[int, ...], int]]:
+def _levels(sequences: Sequence[Sequence[object]]) -> list[dict[object, int]]:
     """Return the distinct beginnings of each length, numbered."""
-    levels: list[dict[tuple[int, ...], int]] = []
-    for length in range(1, max(map(len, sequences)) + 1):
-        starts = dict.fromkeys(s[:length] for s in sequences if len(s) >= length)
+    levels: list[dict[object, int]] = []
+    for length in range(1, max(map(len, sequences), default=0) + 1):
+        starts = dict.fromkeys(tuple(s[:length]) for s in sequences if len(s) >= length)
         levels.append({start: number for number, start in enumerate(starts)})
     return levels
 
 
+def _slot_cost(sequences: Sequence[Sequence[object]]) -> int:
+    """Return the passes over one row of a block; a node counts as five of them."""
+    longest = max(map(len, sequences), default=0)
+    return 2 * len(sequences) * longest + 5 * longest
+
+
+def _prefix_cost(sequences: Sequence[Sequence[object]]) -> int:
+    levels = _levels(sequences)
+    steps = sum(3 * len(level) for level in levels[1:])
+    return steps + 15 * len(levels) + 2 * len(sequences)
+
+
+def _cost(sequences: Sequence[Sequence[object]]) -> int:
+    return min(_slot_cost(sequences), _prefix_cost(sequences))
+
+
+def _strengths(
+    sheet: Sheet, table: Table, sequences: Sequences, *, is_product: bool
+) -> str:
+    """Add the AND of each sequence of rows, in the cheaper of two ways."""
+    lengths = {len(rows) for rows in sequences[1:]}
+    can_repeat = not is_product or len(lengths) == 1  # NOTHING is 0 or 1
+    if can_repeat and _slot_cost(sequences) <= _prefix_cost(sequences):
+        return _by_slots(sheet, table, sequences, is_product=is_product)
+    return _by_prefix(sheet, table, sequences, is_product=is_product)
+
+
 def _and(sheet: Sheet, operands: Sequence[str], *, is_product: bool) -> str:
     """Add the minimum of blocks, or their product from left to right."""
-    first, *others = operands
-    if not others:
-        return first
-    if not is_product:
+    if len(operands) > 1 and not is_product:
         return sheet.node("Min", *operands)
-    for other in others:
-        first = sheet.node("Mul", first, other)
-    return first
+    total = operands[0]
+    for other in operands[1:]:
+        total = sheet.node("Mul", total, other)
+    return total
 
 
 def _by_slots(
-    sheet: Sheet, table: Table, sequences: Sequences, none: str, *, is_product: bool
+    sheet: Sheet, table: Table, sequences: Sequences, *, is_product: bool
 ) -> str:
-    """Gather the k-th clauses of all rules at once; a short rule repeats its first."""
-    longest = max(map(len, sequences))
+    """Take the k-th rows of all sequences at once; a short one repeats its first."""
     slots = [
         table.take([rows[k] if k < len(rows) else rows[0] for rows in sequences])
-        for k in range(longest)
+        for k in range(max(map(len, sequences)))
     ]
-    strengths = _and(sheet, slots, is_product=is_product)
-    return sheet.node("Concat", none, strengths, axis=0)
+    return _and(sheet, slots, is_product=is_product)
 
 
 def _by_prefix(
-    sheet: Sheet, table: Table, sequences: Sequences, none: str, *, is_product: bool
+    sheet: Sheet, table: Table, sequences: Sequences, *, is_product: bool
 ) -> str:
-    """Compute each common beginning of rules once, one length after another."""
+    """Compute each common beginning of sequences once, one length after another."""
     levels = _levels(sequences)
-    ends = Table(sheet)
-    ends.append(none, 1)
-    finished = {len(rows) for rows in sequences}
-    place: dict[tuple[int, ...], int] = {}
+    lengths = {len(rows) for rows in sequences}
+    ends, place = Table(sheet), dict[object, int]()
     block = ""
     for length, level in enumerate(levels, 1):
-        clauses = table.take([start[-1] for start in level])
+        starts = [rows[:length] for rows in sequences if len(rows) >= length]
+        starts = list(dict.fromkeys(starts))
+        longer = table.take([start[-1] for start in starts])
         if length > 1:
-            shorter = Table(sheet)
-            shorter.append(block, len(levels[length - 2]))
-            known = shorter.take([levels[length - 2][start[:-1]] for start in level])
-            block = _and(sheet, [known, clauses], is_product=is_product)
-        else:
-            block = clauses
-        if length in finished:
+            known, numbers = Table(sheet), levels[length - 2]
+            known.append(block, len(numbers))
+            before = known.take([numbers[start[:-1]] for start in starts])
+            longer = _and(sheet, [before, longer], is_product=is_product)
+        block = longer
+        if length in lengths:
             first = ends.append(block, len(level))
             place |= {start: first + number for start, number in level.items()}
-    return ends.take([0, *(place[rows] for rows in sequences)])
+    return ends.take([place[rows] for rows in sequences])

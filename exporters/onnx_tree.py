@@ -14,7 +14,7 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
-from fuzzytree.exporters.onnx_axes import Axes, axes
+from fuzzytree.exporters.onnx_axes import Axes, axes, is_known
 from fuzzytree.exporters.onnx_graph import TREES, Constant, Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers, rounded
 from fuzzytree.tree import FuzzyTree, Node
@@ -59,10 +59,14 @@ def tree_graph(
         place = {name: columns.index(name) for name in tree.inputs}
         values = "inputs"
         if not direct:
-            place, values = frame.order, sheet.node("Transpose", frame.block, perm=[1, 0])
+            place, values = (
+                frame.order,
+                sheet.node("Transpose", frame.block, perm=[1, 0]),
+            )
         leaf = _ensemble(sheet, questions, values, place, numbers, start=_root(tree))
     zero = sheet.constant(np.array(0, np.int64), "nothing")
-    sheet.node("Where", frame.is_known, leaf, zero, named="rule")
+    known = is_known(sheet, frame, numbers)
+    sheet.node("Where", known, leaf, zero, named="rule")
     return frame
 
 
@@ -125,7 +129,6 @@ def _ensemble(
 ) -> str:
     """Add one `TreeEnsemble`; a subtree with two ways to it stands in it twice."""
     order: list[int] = []
-    ways: list[tuple[int, int]] = []
     leaves: list[int] = []
     todo: list[tuple[int, int, bool]] = [(start, -1, False)]
     targets: dict[tuple[int, bool], tuple[int, int]] = {}
