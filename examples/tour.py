@@ -102,7 +102,7 @@ def speeds(tree: Model, rules: Model, values: FloatArray) -> Iterator[str]:
 
 
 def fastest(run: Run, values: FloatArray) -> float:
-    """Return the microseconds of the fastest of many runs within a fifth of a second."""
+    """Return the microseconds of the fastest run within a fifth of a second."""
     best = float("inf")
     end = time.perf_counter() + 0.2
     while time.perf_counter() < end:

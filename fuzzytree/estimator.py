@@ -1,0 +1,199 @@
+"""The learner as a scikit-learn classifier; the only module that imports it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.base import BaseEstimator, ClassifierMixin
+from sklearn.utils.multiclass import check_classification_targets
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from fuzzytree.learning import LearningReport, Settings, learn_arrays
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import Status
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import Carrier, FloatArray, IntArray, Outcome, Run
+
+LabelArray = npt.NDArray[np.generic]
+
+_validated: Callable[..., Any] = validate_data
+"""scikit-learn's check of X and y; what it takes and returns has no types there."""
+
+
+class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # both are untyped
+    """Learn a fuzzy decision tree and answer by it.
+
+    Class k of the tree is named `str(classes_[k])`; its columns are those of the
+    table it was fitted on, or `x1`, `x2`, ... Missing values are refused, as
+    scikit-learn expects of a classifier without the tag `allow_nan`; `ft.learn` drops
+    and counts such rows instead. Sample weights are not supported.
+
+    Args:
+        mode: `default`, or `paper` for the paper's algorithm to the letter.
+
+    Attributes:
+        tree_: The tree, as every other part of fuzzytree takes it.
+        report_: What learning repaired and counted.
+        classes_: The labels, sorted.
+        n_features_in_: The number of columns seen in `fit`.
+        feature_names_in_: Their names, if the table had any.
+
+    Example:
+        >>> import numpy as np
+        >>> values = np.array([[1.0], [1.5], [2.0], [7.0], [7.5], [8.0]])
+        >>> model = FuzzyTreeClassifier().fit(values, [0, 0, 0, 1, 1, 1])
+        >>> model.predict([[1.2], [7.2]]).tolist()
+        [0, 1]
+    """
+
+    tree_: FuzzyTree
+    report_: LearningReport
+    classes_: LabelArray
+    n_features_in_: int
+    feature_names_in_: npt.NDArray[np.object_]
+    _run: Callable[[Carrier], Run]
+
+    def __init__(
+        self,
+        *,
+        mode: Literal["default", "paper"] = "default",
+    ) -> None:
+        self.mode = mode
+
+    def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> Self:
+        """Learn a tree.
+
+        Args:
+            X: Finite numbers, shape (rows, columns).
+            y: A label for each row; at least two different ones.
+
+        Returns:
+            The classifier itself.
+
+        Raises:
+            ValueError: If the table has one row, one class or no varying column, or
+                a setting is out of its range.
+        """
+        values, labels = _validated(self, X, y, dtype=np.float64)
+        check_classification_targets(labels)
+        if len(values) == 1:
+            raise ValueError("cannot learn from one sample (n_samples = 1)")
+        self.classes_, codes = np.unique(labels, return_inverse=True)
+        learnt = learn_arrays(
+            values,
+            codes,
+            columns=self._columns(),
+            classes=[str(label) for label in self.classes_],
+            settings=self._settings(),
+        )
+        self.tree_, self.report_ = learnt.tree, learnt.report
+        self._run = _prepared(self.tree_)
+        return self
+
+    def predict(self, X: npt.ArrayLike) -> LabelArray:
+        """Return the label of each row, by descending the tree.
+
+        Raises:
+            ValueError: If X does not fit the table of `fit`, or a value is so large
+                that a combination of columns overflows.
+        """
+        rules = self.apply(X)
+        return self.classes_[self._class_of_rule()[rules - 1]]
+
+    def apply(self, X: npt.ArrayLike) -> IntArray:
+        """Return the number of the leaf of each row: the rule that answers, from 1.
+
+        Raises:
+            ValueError: As `predict`.
+        """
+        return self._answers(self._values(X), "tree").rule
+
+    def predict_proba(self, X: npt.ArrayLike) -> FloatArray:
+        """Return how strongly the relative rules speak for each class, summing to 1.
+
+        A class has the strength of its strongest rule; the strengths of a row are
+        divided by their sum. They order the classes and say how close a decision is;
+        they are not frequencies. The largest belongs to the class of `predict`.
+
+        Returns:
+            Shape (rows, classes), in the order of `classes_`.
+
+        Raises:
+            ValueError: As `predict`.
+        """
+        outcome = self._answers(self._values(X), "rules")
+        owner = self._class_of_rule()
+        strengths = outcome.strengths
+        assert strengths is not None  # asked of a rule base, native returns them
+        strongest = np.zeros((len(self.classes_), strengths.shape[1]))
+        np.maximum.at(strongest, owner, strengths)
+        shares = strongest / strongest.sum(axis=0)
+        # The winner alone has strength 1; division may round a near one up to it.
+        rows = np.arange(shares.shape[1])
+        winner = owner[outcome.rule - 1]
+        highest = shares[winner, rows]
+        shares = np.minimum(shares, np.nextafter(highest, 0.0))
+        shares[winner, rows] = highest
+        return np.ascontiguousarray(shares.T)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what is prepared from the tree."""
+        state: Any = super().__getstate__()
+        return {name: value for name, value in state.items() if name != "_run"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Prepare the tree again."""
+        super().__setstate__(state)
+        if "tree_" in state:
+            self._run = _prepared(self.tree_)
+
+    def _settings(self) -> Settings:
+        return Settings(mode=self.mode)
+
+    def _columns(self) -> list[str]:
+        names = getattr(self, "feature_names_in_", None)
+        if names is None:
+            return [f"x{number}" for number in range(1, self.n_features_in_ + 1)]
+        return [str(name) for name in names]
+
+    def _values(self, X: npt.ArrayLike) -> FloatArray:
+        """Return the columns that the tree needs, shape (inputs, rows)."""
+        check_is_fitted(self)
+        values: FloatArray = _validated(self, X, reset=False, dtype=np.float64)
+        position = {name: k for k, name in enumerate(self._columns())}
+        return values.T[[position[name] for name in self.tree_.inputs]]
+
+    def _answers(self, values: FloatArray, carrier: Carrier) -> Outcome:
+        outcome = self._run(carrier)(values)
+        overflown = np.flatnonzero(outcome.status == Status.MISSING)
+        if len(overflown):
+            raise ValueError(
+                f"row {overflown[0]}: its values are so large that a combination "
+                f"of columns overflows ({len(overflown)} such rows)"
+            )
+        return outcome
+
+    def _class_of_rule(self) -> IntArray:
+        number = {name: k for k, name in enumerate(self.tree_.classes)}
+        return np.array([number[leaf.label] for leaf in self.tree_.leaves], np.int64)
+
+
+def _prepared(tree: FuzzyTree) -> Callable[[Carrier], Run]:
+    """Return a function that gives the native runtime's run of the tree or its rules.
+
+    Each is prepared when it is first asked for.
+    """
+
+    @functools.cache
+    def run(carrier: Carrier) -> Run:
+        model = tree if carrier == "tree" else rules_from_tree(tree)
+        return find_runtime("native").load(model)
+
+    return run

@@ -1,0 +1,149 @@
+"""The classifier keeps scikit-learn's contract and answers like its tree."""
+
+from __future__ import annotations
+
+import pickle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+from sklearn.datasets import load_iris, load_wine
+from sklearn.model_selection import GridSearchCV, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from fuzzytree.estimator import FuzzyTreeClassifier
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import descend, evaluate
+from fuzzytree.rulebase import Band, Flank, Part, Term, Variable
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, IntArray
+
+IRIS, SPECIES = load_iris(return_X_y=True)
+WINE = load_wine(as_frame=True)
+
+
+@parametrize_with_checks([FuzzyTreeClassifier(), FuzzyTreeClassifier(mode="paper")])  # type: ignore[untyped-decorator]
+def test_scikit_learn_finds_nothing_wrong(estimator: Any, check: Any) -> None:
+    check(estimator)
+
+
+def test_predict_descends_the_tree() -> None:
+    model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
+    rows = WINE.data.to_dict("records")
+    answers = [descend(model.tree_, row) for row in rows]
+    assert model.predict(WINE.data).tolist() == [int(a.label or -1) for a in answers]
+    assert model.apply(WINE.data).tolist() == [answer.rule for answer in answers]
+
+
+def test_the_probabilities_are_the_strengths_of_the_strongest_rules() -> None:
+    model = FuzzyTreeClassifier().fit(IRIS, SPECIES)
+    rules = rules_from_tree(model.tree_)
+    found = model.predict_proba(IRIS[50:60])
+    for row, shares in zip(IRIS[50:60], found, strict=True):
+        strengths = evaluate(
+            rules, dict(zip(["x1", "x2", "x3", "x4"], row, strict=True))
+        ).strengths
+        strongest = [
+            max(s for s, r in zip(strengths, rules.rules, strict=True) if r.then == c)
+            for c in rules.classes
+        ]
+        expected = np.array(strongest) / sum(strongest)
+        assert np.abs(shares - expected).max() <= 2e-16
+
+
+def test_the_largest_probability_belongs_to_the_prediction_on_every_edge() -> None:
+    model = FuzzyTreeClassifier().fit(IRIS, SPECIES)
+    cuts = [cut for node in model.tree_.nodes for cut in node.cuts]
+    edges = sorted({near for c in cuts for near in (c, np.nextafter(c, 99.0))})
+    rows = np.array([[e] * 4 for e in edges] + [list(row) for row in IRIS])
+    shares = model.predict_proba(rows)
+    assert (shares.argmax(axis=1) == model.predict(rows)).all()
+    assert ((shares == shares.max(axis=1, keepdims=True)).sum(axis=1) == 1).all()
+
+
+@pytest.mark.parametrize(
+    "labels",
+    [
+        np.array(["no", "1e-05", "off"]),
+        np.array([True, False, True]),
+        np.array([-1.0, 2.0, 1e6]),
+        np.array(["é", "a b", "x: y"], dtype=object),
+    ],
+    ids=["words", "booleans", "numbers", "objects"],
+)
+def test_labels_of_any_kind_come_back_as_they_were(labels: np.ndarray) -> None:
+    model = FuzzyTreeClassifier().fit(IRIS, labels[SPECIES])
+    predicted = model.predict(IRIS)
+    assert predicted.dtype == labels.dtype
+    assert (predicted == labels[SPECIES]).mean() > 0.9
+
+
+def test_the_names_of_a_table_are_those_of_the_tree() -> None:
+    model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
+    assert model.tree_.columns == tuple(WINE.data.columns)
+    assert set(model.tree_.inputs) <= set(WINE.data.columns)
+
+
+def test_clones_and_pickles_learn_and_answer_alike() -> None:
+    model = FuzzyTreeClassifier(mode="paper").fit(IRIS, SPECIES)
+    again = clone(model).fit(IRIS, SPECIES)
+    loaded = pickle.loads(pickle.dumps(model))
+    assert model.tree_ == again.tree_ == loaded.tree_
+    assert (loaded.predict_proba(IRIS) == model.predict_proba(IRIS)).all()
+
+
+def test_a_pipeline_and_a_grid_search_take_it() -> None:
+    pipeline = make_pipeline(StandardScaler(), FuzzyTreeClassifier())
+    assert cross_val_score(pipeline, IRIS, SPECIES, cv=5).mean() > 0.93
+    grid = {"mode": ["default", "paper"]}
+    search = GridSearchCV(FuzzyTreeClassifier(), grid, cv=3).fit(IRIS, SPECIES)
+    assert search.best_score_ > 0.93
+
+
+@pytest.mark.parametrize(
+    ("values", "labels", "message"),
+    [
+        (IRIS[:1], SPECIES[:1], "cannot learn from one sample (n_samples = 1)"),
+        (IRIS[:9], SPECIES[:9], "cannot learn from one class: every row is '0'"),
+    ],
+    ids=["one row", "one class"],
+)
+def test_a_table_that_teaches_nothing_is_refused(
+    values: FloatArray, labels: IntArray, message: str
+) -> None:
+    with pytest.raises(ValueError, match="cannot learn") as caught:
+        FuzzyTreeClassifier().fit(values, labels)
+    assert str(caught.value) == message
+
+
+def test_a_row_that_overflows_a_combination_is_named() -> None:
+    model = FuzzyTreeClassifier().fit(IRIS[:, :2], SPECIES > 0)
+    low = Term("low", Band(high=0.0, right=Flank(0.0, 1.0)))
+    high = Term("high", Band(low=0.0, left=Flank(0.0, -1.0)))
+    twice = Variable("twice", (low, high), parts=(Part("x1", 2.0),))
+    ways = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
+    model.tree_ = FuzzyTree(
+        "tree", ("False", "True"), (Variable("x1"), twice),
+        (Node("twice", (0.0,), (0, 1), ways),), (Leaf("False"), Leaf("True")),
+    )  # fmt: skip
+    model = pickle.loads(pickle.dumps(model))
+    rows = np.array([[-1.0, 0.0], [1.7e308, 0.0]])
+    assert model.predict(rows[:1]).tolist() == [False]
+    with pytest.raises(ValueError, match="overflows") as caught:
+        model.predict(rows)
+    assert str(caught.value) == (
+        "row 1: its values are so large that a combination of columns overflows "
+        "(1 such rows)"
+    )
+
+
+def test_missing_values_are_refused() -> None:
+    model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
+    with pytest.raises(ValueError, match="Input X contains NaN"):
+        model.predict(pd.DataFrame([[np.nan] * 13], columns=WINE.data.columns))
