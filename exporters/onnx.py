@@ -107,7 +107,7 @@ def write(
     _require("onnx", "writing onnx needs")
     if verify:
         _require("onnxruntime", "verifying a written onnx file needs")
-    from fuzzytree.exporters.onnx_numbers import losses
+    from fuzzytree.exporters.onnx_numbers import NUMBERS, losses
 
     lost = losses(model, dtype)
     if lost and not allow_loss:
@@ -120,8 +120,15 @@ def write(
         from fuzzytree.exporters.onnx_proof import prove
 
         is_exact = dtype == "float64" or (dtype == "mixed" and _is_tree(model))
-        columns = _columns(model, signature)
-        prove(content, model, columns, is_exact=is_exact, limit=_MOST_ROWS_TO_VERIFY)
+        prove(
+            content,
+            model,
+            _columns(model, signature),
+            outputs,
+            kind=NUMBERS[dtype].axis,
+            is_exact=is_exact,
+            limit=_MOST_ROWS_TO_VERIFY,
+        )
     return Written(content, lost)
 
 

@@ -10,6 +10,7 @@ import onnxruntime
 
 from fuzzytree.contracts import Model
 from fuzzytree.errors import DisagreementError, LossError
+from fuzzytree.exporters.onnx_numbers import Real
 from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_session
 from fuzzytree.reference import descend, evaluate
 from fuzzytree.rulebase import LR, Band, RuleBase, Term
@@ -21,7 +22,9 @@ def prove(
     content: bytes,
     model: Model,
     columns: Sequence[str],
+    names: Sequence[str],
     *,
+    kind: type[Real],
     is_exact: bool,
     limit: int,
 ) -> None:
@@ -31,6 +34,8 @@ def prove(
         content: The file.
         model: What it should mean.
         columns: The columns of its input.
+        names: Its outputs.
+        kind: The type of its input.
         is_exact: Whether answers must be those of the reference; otherwise only rows
             with a missing value are compared, and that there is an answer to all.
         limit: The largest number of rows.
@@ -42,12 +47,9 @@ def prove(
     rows = list(sample_rows(model, limit))
     try:
         session = open_session(content)
-        kind = session.get_inputs()[0].type
-        dtype = np.float32 if kind == "tensor(float)" else np.float64
         table = [[row.get(name, 0.0) for name in columns] for row in rows]
-        values = np.array(table, dtype).reshape(len(rows), len(columns))
-        names = [output.name for output in session.get_outputs()]
-        found = dict(zip(names, session.run(names, {"inputs": values}), strict=True))
+        values = np.array(table, kind).reshape(len(rows), len(columns))
+        found = session(names, values)
     except RUNTIME_ERRORS as error:
         raise LossError(
             f"cannot write {model.name} as onnx: onnxruntime "

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
 import onnxruntime
-from onnxruntime.capi import onnxruntime_pybind11_state as state
+
+_STATE = importlib.import_module("onnxruntime.capi.onnxruntime_pybind11_state")
 
 RUNTIME_ERRORS: tuple[type[Exception], ...] = tuple(
-    getattr(state, name)
+    getattr(_STATE, name)
     for name in (
         "EPFail",
         "EngineError",
@@ -24,7 +30,12 @@ RUNTIME_ERRORS: tuple[type[Exception], ...] = tuple(
 _SILENT = 4
 
 
-def open_session(content: bytes) -> onnxruntime.InferenceSession:
+Array = npt.NDArray[np.generic]
+Session = Callable[[Sequence[str], Array], dict[str, Array]]
+"""Answers the named outputs to `inputs`; raises one of `RUNTIME_ERRORS`."""
+
+
+def open_session(content: bytes) -> Session:
     """Return a session that writes nothing to stderr and starts no thread.
 
     Raises:
@@ -34,16 +45,17 @@ def open_session(content: bytes) -> onnxruntime.InferenceSession:
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.log_severity_level = _SILENT
-    return onnxruntime.InferenceSession(
+    session = onnxruntime.InferenceSession(
         content, options, providers=["CPUExecutionProvider"]
     )
+    quiet = onnxruntime.RunOptions()
+    quiet.log_severity_level = _SILENT
 
+    def run(names: Sequence[str], inputs: Array) -> dict[str, Array]:
+        found = session.run(list(names), {"inputs": inputs}, quiet)
+        return {name: np.asarray(f) for name, f in zip(names, found, strict=True)}
 
-def quiet_run() -> onnxruntime.RunOptions:
-    """Return options under which a failed run writes nothing to stderr."""
-    options = onnxruntime.RunOptions()
-    options.log_severity_level = _SILENT
-    return options
+    return run
 
 
 def first_line(error: Exception) -> str:

@@ -1,0 +1,356 @@
+"""onnxruntime: models through the graphs that `fuzzytree.exporters.onnx` writes.
+
+`open_onnx` runs such a file with nothing else at hand. One thread, rows in chunks that
+fit the cache, nothing on stderr.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from fuzzytree.contracts import Carrier, Dtype, Model, Outcome, Run, Runtime
+from fuzzytree.errors import LossError, MissingExtraError, ReadError
+from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
+from fuzzytree.rulebase import Semantics
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+    import onnx
+
+    from fuzzytree.contracts import FloatArray
+    from fuzzytree.exporters.onnx_session import Session
+
+    Outputs = dict[str, npt.NDArray[np.generic]]
+
+_LARGEST_FILE = 128 * 2**20
+_STANDARD_DOMAINS = ("", "ai.onnx", "ai.onnx.ml")
+_CACHE_BYTES = 2**18
+
+Labels = tuple[str | None, ...]
+
+
+class Facts(msgspec.Struct, frozen=True):
+    """What an ONNX file of ours says about itself.
+
+    Attributes:
+        name: Of the model.
+        carrier: Whether its graph follows a tree's path or fires rules.
+        kind: `descent`, `relative`, `raw`, or `rules` for rules from no tree.
+        dtype: The number type.
+        fingerprint: Of the model that was written (`fuzzytree.rulebase.fingerprint`).
+        version: Of the fuzzytree that wrote it.
+        columns: The columns of the graph's input.
+        inputs: Those of them that matter.
+        units: The unit of each column, "" if unknown.
+        classes: The possible answers.
+        rules: The number of rules or leaves.
+        outputs: Of the graph, in its order.
+        semantics: What an answer depends on beside rules or tree.
+    """
+
+    name: str
+    carrier: Carrier
+    kind: str
+    dtype: Dtype
+    fingerprint: str
+    version: str
+    columns: tuple[str, ...]
+    inputs: tuple[str, ...]
+    units: tuple[str, ...]
+    classes: tuple[str, ...]
+    rules: int
+    outputs: tuple[Output, ...]
+    semantics: Semantics
+
+
+class OnnxModel(Facts, frozen=True):
+    """An ONNX file, ready to run: what it says about itself, and its answers.
+
+    Attributes:
+        run: Answers to values of shape (inputs, rows), in the order of `inputs`.
+            A file without the output `status` does not tell ties, nor an overflow
+            from an uncovered row.
+        labels: The file's own labels for the same values, None for "no class"; None
+            in place of the function if the file has no output `label`.
+    """
+
+    run: Run
+    labels: Callable[[FloatArray], Labels] | None
+
+
+def open_onnx(content: bytes, name: str) -> OnnxModel:
+    """Open an ONNX file that `fuzzytree.exporters.onnx` wrote.
+
+    Args:
+        content: The file.
+        name: Of the file, for messages.
+
+    Returns:
+        What it says about itself, and how to run it.
+
+    Raises:
+        ReadError: If it is not such a file, or onnxruntime does not load it.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> content = write(random_tree(1)).content
+        >>> open_onnx(content, "random.onnx").kind
+        'descent'
+    """
+    _require_packages("reading")
+    if len(content) > _LARGEST_FILE:
+        raise ReadError(
+            f"{name}: the file has {len(content) >> 20} MiB, "
+            f"and {_LARGEST_FILE >> 20} are the most that is read"
+        )
+    proto = _parsed(content, name)
+    facts = _facts(proto, name)
+    for danger in _dangers(proto):
+        raise ReadError(f"{name}: {danger}")
+    _check_signature(proto, facts, name)
+    from fuzzytree.exporters.onnx_session import (
+        RUNTIME_ERRORS,
+        first_line,
+        open_session,
+    )
+
+    try:
+        session = open_session(content)
+    except RUNTIME_ERRORS as error:
+        text = f"{name}: onnxruntime does not load it: {first_line(error)}"
+        raise ReadError(text) from error
+    has_labels = "label" in facts.outputs
+    return OnnxModel(
+        **msgspec.structs.asdict(facts),
+        run=functools.partial(_run, session, facts),
+        labels=functools.partial(_labels, session, facts) if has_labels else None,
+    )
+
+
+def load(
+    model: Model, *, dtype: Dtype, readable: bool = False, plain: bool = False
+) -> Run:
+    """Write a model as ONNX, in memory, and return what runs it.
+
+    Raises:
+        LossError: If the number type cannot hold the model.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+    """
+    _require_packages("running")
+    from fuzzytree.exporters.onnx_session import open_session
+
+    outputs: tuple[Output, ...] = ("rule", "status", "strengths")
+    if isinstance(model, FuzzyTree):
+        outputs = outputs[:2]
+    content = write(
+        model,
+        dtype=dtype,
+        outputs=outputs,
+        readable=readable,
+        plain=plain,
+        verify=False,
+    ).content
+    facts = _facts(_parsed(content, model.name), model.name)
+    return functools.partial(_run, open_session(content), facts)
+
+
+def _require_packages(doing: str) -> None:
+    import importlib.util
+
+    for package in ("onnx", "onnxruntime"):
+        if importlib.util.find_spec(package) is None:
+            raise MissingExtraError(
+                f"{doing} onnx files needs the extra 'onnx': "
+                "pip install 'fuzzytree-toolkit[onnx]'"
+            )
+
+
+def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:
+    import numpy as np
+
+    from fuzzytree.runtimes.rows import checked
+
+    values = checked(values, facts.inputs)
+    count = values.shape[1]
+    has_strengths = "strengths" in facts.outputs
+    outcome = Outcome(
+        rule=np.empty(count, np.int64),
+        status=np.empty(count, np.int64),
+        strengths=np.empty((facts.rules, count)) if has_strengths else None,
+    )
+    names = [name for name in facts.outputs if name != "label"]
+    for start, found in _chunks(session, facts, values, names):
+        part = slice(start, start + len(found["rule"]))
+        outcome.rule[part] = found["rule"]
+        if "status" in found:
+            outcome.status[part] = found["status"]
+        if outcome.strengths is not None:
+            outcome.strengths[:, part] = found["strengths"].T
+    if "status" not in names:
+        is_missing = ~np.isfinite(values).all(axis=0)
+        none = np.where(is_missing, 3, 2)
+        outcome.status[:] = np.where(outcome.rule > 0, 0, none)
+    return outcome
+
+
+def _labels(session: Session, facts: Facts, values: FloatArray) -> Labels:
+    from fuzzytree.runtimes.rows import checked
+
+    values = checked(values, facts.inputs)
+    return tuple(
+        label or None
+        for _, found in _chunks(session, facts, values, ["label"])
+        for label in found["label"].tolist()
+    )
+
+
+def _chunks(
+    session: Session,
+    facts: Facts,
+    values: FloatArray,
+    names: Sequence[str],
+) -> Iterator[tuple[int, Outputs]]:
+    """Yield the outputs, by name, of some rows at a time, with the first row."""
+    import numpy as np
+
+    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line
+
+    dtype = np.dtype(np.float32 if facts.dtype == "float32" else np.float64)
+    degree = 8 if facts.dtype == "float64" else 4
+    rows = max(128, min(2**13, _CACHE_BYTES // (degree * facts.rules)))
+    rows = 2**16 if facts.carrier == "tree" else rows
+    places = [facts.columns.index(name) for name in facts.inputs]
+    for start in range(0, max(values.shape[1], 1), rows):
+        part = values[:, start : start + rows]
+        table = np.zeros((part.shape[1], len(facts.columns)), dtype)
+        with np.errstate(over="ignore"):  # beyond float32 is missing in float32
+            table[:, places] = part.T
+        try:
+            found = session(names, table)
+        except RUNTIME_ERRORS as error:
+            text = f"onnxruntime cannot run {facts.name}: {first_line(error)}"
+            raise LossError(text) from error
+        yield start, found
+
+
+def _parsed(content: bytes, name: str) -> onnx.ModelProto:
+    import onnx
+    from google.protobuf.message import (  # type: ignore[import-untyped] # has none
+        DecodeError,
+    )
+
+    try:
+        return onnx.load_from_string(content)
+    except DecodeError as error:
+        text = f"{name}: this is no ONNX file, or only a part of one"
+        raise ReadError(text) from error
+
+
+def _facts(proto: onnx.ModelProto, name: str) -> Facts:
+    """Return the metadata, which must be complete and of a known version."""
+    prefix = "fuzzytree."
+    texts = {
+        entry.key.removeprefix(prefix): entry.value
+        for entry in proto.metadata_props
+        if entry.key.startswith(prefix)
+    }
+    version = texts.get("format")
+    if version is None:
+        raise ReadError(
+            f"{name}: this ONNX file is not one of fuzzytree: "
+            "its metadata has no 'fuzzytree.format'"
+        )
+    if version != FORMAT_VERSION:
+        raise ReadError(
+            f"{name}: the file has format {version!r}, and this fuzzytree "
+            f"reads format {FORMAT_VERSION!r}; a newer one may help"
+        )
+    records = ("columns", "inputs", "units", "classes", "rules", "outputs", "semantics")
+    try:
+        known = {k: json.loads(v) if k in records else v for k, v in texts.items()}
+        facts = msgspec.convert(known, Facts)
+    except (json.JSONDecodeError, msgspec.ValidationError) as error:
+        raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
+    if not set(facts.inputs) <= set(facts.columns) or facts.rules < 1:
+        raise ReadError(f"{name}: the file's metadata contradicts itself")
+    return facts
+
+
+def _dangers(proto: onnx.ModelProto) -> Iterator[str]:
+    """Yield why a file should not be run: parts elsewhere, operators of others."""
+    own = {(function.domain, function.name) for function in proto.functions}
+    bodies = [proto.graph.node, *(function.node for function in proto.functions)]
+    tensors = list(proto.graph.initializer)
+    if proto.graph.sparse_initializer or proto.training_info:
+        yield "it holds more than the graph of a fuzzytree model"
+    for nodes in bodies:
+        for node in nodes:
+            if node.domain not in _STANDARD_DOMAINS and (
+                (node.domain, node.op_type) not in own
+            ):
+                yield f"operator {node.op_type!r} of {node.domain!r} is not ONNX's own"
+            for attribute in node.attribute:
+                tensors += [attribute.t, *attribute.tensors]
+                if attribute.HasField("g") or attribute.graphs:
+                    yield f"operator {node.op_type!r} holds a graph of its own"
+    for tensor in tensors:
+        if tensor.external_data or tensor.data_location:
+            yield f"constant {tensor.name!r} lies in another file"
+
+
+def _check_signature(proto: onnx.ModelProto, facts: Facts, name: str) -> None:
+    """Compare the inputs and outputs that the graph has with the metadata."""
+    outputs = tuple(output.name for output in proto.graph.output)
+    inputs = [entry.name for entry in proto.graph.input]
+    shape = proto.graph.input[0].type.tensor_type.shape if inputs else None
+    width = shape.dim[1].dim_value if shape and len(shape.dim) == 2 else None
+    if inputs != ["inputs"] or width != len(facts.columns) or outputs != facts.outputs:
+        raise ReadError(
+            f"{name}: the graph's inputs and outputs are not those of its metadata"
+        )
+    if "rule" not in outputs:
+        raise ReadError(
+            f"{name}: the file has no output 'rule', so it cannot be run here; "
+            "write it with the outputs label and rule"
+        )
+
+
+def _runtime(
+    name: str,
+    runs: tuple[Carrier, ...],
+    dtype: Dtype,
+    *cannot: str,
+    readable: bool = False,
+    plain: bool = False,
+) -> Runtime:
+    return Runtime(
+        name=f"onnxruntime {name}",
+        runs=runs,
+        load=functools.partial(load, dtype=dtype, readable=readable, plain=plain),
+        dtype=dtype,
+        cannot=cannot,
+        extra="onnx",
+        modules=("onnx", "onnxruntime"),
+    )
+
+
+_SINGLE = (
+    "cuts and bounds are rounded to float32: a value next to one may change sides",
+    "a value beyond float32 counts as missing",
+)
+
+RUNTIMES = (
+    _runtime("float64", ("tree", "rules"), "float64"),
+    _runtime("mixed", ("tree", "rules"), "mixed"),
+    _runtime("float32", ("tree", "rules"), "float32", *_SINGLE),
+    _runtime("readable", ("rules",), "float64", readable=True),
+    _runtime("plain", ("tree",), "float64", plain=True),
+)
