@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     Bytes = npt.NDArray[np.uint8]
 
 _SMALL = 24  # questions up to which all of them are asked of all rows
-_SHARE = 0.08  # of the leaves: what a question at the top must decide to pay
+_SHARE = 0.06  # of the leaves: what a question at the top must decide to pay
 _MOST_EXITS = 255
 _LIVE = 0.7  # share of rows still walking below which the others leave
-CHUNK = 1 << 14
+CHUNK = 1 << 15
 """Rows that go through together: their values and answers stay in the cache."""
 
 
@@ -51,35 +51,39 @@ class Split:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """Questions as parallel lists; the two answers to one stand side by side.
+    """Questions and leaves at numbered places, breadth-first, a list for each field.
 
     Attributes:
-        line: The line of the variable; 0 at a leaf.
+        line: The line of the variable; any at a leaf.
         cut: Asked is `x > cut`; infinity at a leaf.
-        child: Where the answer no leads; yes leads one further. A leaf leads to
-            itself.
-        leaf: The number of the leaf, or 0 for a question.
-        weight: How many leaves lie below.
+        child: The place that no leads to; yes leads to the one after it. A leaf leads
+            to itself.
+        leaf: The number of the leaf, or 0 at a question.
+        sure: How many questions nearly every row meets after those of the top.
     """
 
     line: IntArray
     cut: Reals
     child: IntArray
     leaf: IntArray
-    weight: IntArray
+    sure: int
 
 
 @dataclass(frozen=True, slots=True)
 class Ask:
     """One question of the top: `x > cut`, and what its answers give.
 
-    An answer is a number of a byte, or None: a result on the stack (of `yes` on top).
+    Attributes:
+        line: The line of its variable.
+        cut: Of no dimension, as the others: numpy takes such arrays fastest.
+        no: A byte, or None: the last result on the stack but for that of `yes`.
+        yes: A byte, or None: the last result on the stack.
     """
 
     line: int
-    cut: np.floating[Any]
-    no: int | None
-    yes: int | None
+    cut: Reals
+    no: Bytes | None
+    yes: Bytes | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +93,10 @@ class Descent:
     Attributes:
         splits: The nodes, for a single row; the first is the root, none if there is
             one leaf only.
-        walk: The questions.
+        walk: All questions.
         top: The questions asked of all rows, in the order of evaluation.
-        exits: Where each answer of the top leads: positions in `walk`.
+        exits: Where each answer of the top leads: places; leaves if it is the whole.
+        is_whole: Whether the top asks every question.
     """
 
     splits: tuple[Split, ...]
@@ -110,16 +115,26 @@ def plan_descent(
         splits: The nodes, a parent before its children; none for a single leaf.
         kind: The type of values and cuts, to which cuts are rounded.
     """
-    walk = _plan_walk(splits, kind)
-    top, exits = _plan_top(walk)
-    return Descent(
-        tuple(splits), walk, top, np.array(exits, np.int64), bool(walk.leaf[exits].all())
+    draft = _plan_walk(splits)
+    top, exits = _plan_top(draft, kind)
+    is_whole = all(draft.leaf[place] for place in exits)
+    walk = Walk(
+        np.array(draft.line, np.int64),
+        np.array(draft.cut, kind),
+        np.array(draft.child, np.int64),
+        np.array(draft.leaf, np.int64),
+        _sure_rounds(draft, exits),
     )
+    ends = [draft.leaf[place] for place in exits] if is_whole else exits
+    return Descent(tuple(splits), walk, top, np.array(ends, np.int64), is_whole)
 
 
 @dataclass(slots=True)
 class _Draft:
-    """The lists of a `Walk` while they grow."""
+    """The places of a walk, a list for each field, while they grow.
+
+    The weight of a place is the number of leaves below it.
+    """
 
     line: list[int]
     cut: list[float]
@@ -141,9 +156,7 @@ class _Draft:
         self.child[place], self.weight[place] = self.child[source], self.weight[source]
 
 
-def _plan_walk(
-    splits: Sequence[Split], kind: type[np.float64] | type[np.float32]
-) -> Walk:
+def _plan_walk(splits: Sequence[Split]) -> _Draft:
     """Lay the questions out breadth-first, so that early rounds touch few lines."""
     weights = _leaves_below(splits)
     draft = _Draft([], [], [], [], [])
@@ -176,13 +189,7 @@ def _plan_walk(
         todo.append((draft.add(), number, middle + 1, last))
     if not splits:
         draft.leaf[0] = 1
-    return Walk(
-        np.array(draft.line, np.int64),
-        np.array(draft.cut, kind),
-        np.array(draft.child, np.int64),
-        np.array(draft.leaf, np.int64),
-        np.array(draft.weight, np.int64),
-    )
+    return draft
 
 
 def _leaves_below(splits: Sequence[Split]) -> list[int]:
@@ -193,72 +200,104 @@ def _leaves_below(splits: Sequence[Split]) -> list[int]:
     return weights
 
 
-def _plan_top(walk: Walk) -> tuple[tuple[Ask, ...], list[int]]:
+def _plan_top(
+    draft: _Draft, kind: type[np.float64] | type[np.float32]
+) -> tuple[tuple[Ask, ...], list[int]]:
     """Choose the questions that most leaves lie below; return them and their exits."""
-    count = int(np.count_nonzero(walk.leaf == 0))
-    least = 0.0 if count <= _SMALL else _SHARE * float(walk.weight[0])
-    inner: set[int] = set()
-    heap = [(-int(walk.weight[0]), 0)]
-    while heap and len(inner) < _MOST_EXITS - 1:
+    count = draft.leaf.count(0)
+    least = 0.0 if count <= _SMALL else _SHARE * draft.weight[0]
+    chosen: set[int] = set()
+    heap = [(-draft.weight[0], 0)]
+    while heap and len(chosen) < _MOST_EXITS - 1:
         weight, place = heapq.heappop(heap)
         if -weight < least:
             break
-        if walk.leaf[place]:
+        if draft.leaf[place] or place in chosen:
             continue
-        inner.add(place)
-        child = int(walk.child[place])
-        for below in (child, child + 1):
-            heapq.heappush(heap, (-int(walk.weight[below]), below))
-    return _order_top(walk, inner)
+        chosen.add(place)
+        for below in (draft.child[place], draft.child[place] + 1):
+            heapq.heappush(heap, (-draft.weight[below], below))
+    return _order_top(draft, chosen, kind)
 
 
-def _order_top(walk: Walk, inner: set[int]) -> tuple[tuple[Ask, ...], list[int]]:
+def _order_top(
+    draft: _Draft, chosen: set[int], kind: type[np.float64] | type[np.float32]
+) -> tuple[tuple[Ask, ...], list[int]]:
     """Put the chosen questions in an order in which answers come before their use."""
     asks: list[Ask] = []
+    code: dict[int, int] = {}  # of each exit
+    given: dict[int, Bytes] = {}  # an answer that is an exit, until it is used
+    visits = min(2 * len(chosen), _MOST_EXITS - 1)  # shared places are asked again
     todo: list[tuple[int, bool]] = [(0, False)]
-    code: dict[int, int] = {}
-    given: dict[int, int] = {}  # an answer that is a constant, until it is used
-    visits = min(2 * len(inner), _MOST_EXITS - 1)  # shared places are asked again
     while todo:
         place, is_done = todo.pop()
-        child = int(walk.child[place])
+        child = draft.child[place]
         if is_done:
-            asks.append(
-                Ask(
-                    int(walk.line[place]),
-                    walk.cut[place],
-                    given.pop(child, None),
-                    given.pop(child + 1, None),
-                )
-            )
-        elif place not in inner or not visits:
-            given[place] = code.setdefault(place, len(code))
+            cut = np.array(draft.cut[place], kind)
+            no, yes = given.pop(child, None), given.pop(child + 1, None)
+            asks.append(Ask(draft.line[place], cut, no, yes))
+        elif place not in chosen or not visits:
+            number = code.setdefault(place, len(code))
+            given[place] = np.array(number, np.uint8)
         else:
             visits -= 1
             todo += [(place, True), (child + 1, False), (child, False)]
-    return tuple(asks), list(code) or [0]
+    return tuple(asks), list(code)
 
 
-def descend_rows(descent: Descent, lines: Reals, out: IntArray) -> None:
-    """Write the number of each row's leaf.
+def _sure_rounds(draft: _Draft, exits: Sequence[int]) -> int:
+    """Return after how many rounds the first tenth of the leaves is reached."""
+    early, rounds = 0, 0
+    here = list(exits)
+    while True:
+        early += sum(1 for place in here if draft.leaf[place])
+        if early > 0.1 * draft.weight[0]:
+            return rounds
+        asked = [draft.child[place] for place in here if not draft.leaf[place]]
+        here = [place for child in asked for place in (child, child + 1)]
+        rounds += 1
+
+
+class Desk:
+    """Room for the walk of a chunk: fresh memory costs more than the work done in it.
+
+    It belongs to one call, and is written over by every chunk.
+    """
+
+    def __init__(self, rows: int, kind: type[np.float64] | type[np.float32]) -> None:
+        self.order = np.arange(rows)
+        self.rows = np.empty((3, rows), np.int64)
+        self.here = np.empty((3, rows), np.int64)
+        self.where = np.empty(rows, np.int64)
+        self.value = np.empty(rows, kind)
+        self.cut = np.empty(rows, kind)
+        self.yes = np.empty(rows, np.bool_)
+
+
+def descend_rows(
+    descent: Descent, lines: Reals, start: int, out: IntArray, desk: Desk
+) -> None:
+    """Write the number of the leaf of some rows.
 
     Args:
         descent: The tree.
-        lines: Values of shape (variables, rows); at most `CHUNK` rows or so. Where a
-            value is NaN, the leaf is any.
-        out: One number for each row.
+        lines: Values of shape (variables, rows), contiguous.
+        start: The first row to answer.
+        out: A number for each row from there on; best not more than `CHUNK` of them.
+            Where a value is NaN, the leaf is any.
+        desk: Room for as many rows, of the type of the values.
     """
-    walk = descent.walk
     if not descent.top:
-        out[:] = walk.leaf[0]
+        out[:] = 1
         return
-    code = _ask_top(descent.top, lines)
+    code = _ask_top(descent.top, lines[:, start : start + len(out)])
     if descent.is_whole:
-        walk.leaf[descent.exits].take(code, out=out, mode="clip")
+        descent.exits.take(code, out=out, mode="clip")
         return
-    places = descent.exits.take(code)
-    _walk_on(walk, lines, places)
-    walk.leaf.take(places, out=out, mode="clip")
+    here = desk.here[0, : len(out)]
+    descent.exits.take(code, out=here, mode="clip")
+    _walk_on(descent.walk, lines, start, here, desk)
+    descent.walk.leaf.take(here, out=out, mode="clip")
 
 
 def _ask_top(top: Sequence[Ask], lines: Reals) -> Bytes:
@@ -269,58 +308,75 @@ def _ask_top(top: Sequence[Ask], lines: Reals) -> Bytes:
     stack: list[Bytes] = []
     spare: list[Bytes] = []
     for ask in top:
-        np.greater(lines[ask.line], ask.cut, out=answer)
+        np.greater(lines[ask.line], ask.cut, answer)
         if ask.no is not None and ask.yes is not None:
             out = spare.pop() if spare else np.empty(rows, np.uint8)
-            np.multiply(bit, np.uint8(ask.no ^ ask.yes), out=out)
-            np.bitwise_xor(out, np.uint8(ask.no), out=out)
-        elif ask.no is None and ask.yes is None:
-            yes, out = stack.pop(), stack.pop()
-            np.bitwise_xor(yes, out, out=yes)
-            np.multiply(yes, bit, out=yes)
-            np.bitwise_xor(out, yes, out=out)
-            spare.append(yes)
-        else:
+            np.multiply(bit, ask.no ^ ask.yes, out)
+            if ask.no:
+                np.bitwise_xor(out, ask.no, out)
+        elif ask.no is not None:
             out = stack.pop()
-            _mix(out, bit, answer, ask)
+            np.bitwise_xor(out, ask.no, out)
+            np.multiply(out, bit, out)
+            np.bitwise_xor(out, ask.no, out)
+        elif ask.yes is not None:
+            out = stack.pop()
+            np.logical_not(answer, answer)
+            np.bitwise_xor(out, ask.yes, out)
+            np.multiply(out, bit, out)
+            np.bitwise_xor(out, ask.yes, out)
+        else:
+            yes, out = stack.pop(), stack.pop()
+            np.bitwise_xor(yes, out, yes)
+            np.multiply(yes, bit, yes)
+            np.bitwise_xor(out, yes, out)
+            spare.append(yes)
         stack.append(out)
     return stack[0]
 
 
-def _mix(out: Bytes, bit: Bytes, answer: npt.NDArray[np.bool_], ask: Ask) -> None:
-    """Put a constant where one answer was given, and keep `out` where the other."""
-    constant = np.uint8((ask.yes or 0) if ask.no is None else ask.no)
-    np.bitwise_xor(out, constant, out=out)
-    if ask.no is None:
-        np.logical_not(answer, out=answer)
-    np.multiply(out, bit, out=out)
-    np.bitwise_xor(out, constant, out=out)
-
-
-def _walk_on(walk: Walk, lines: Reals, places: IntArray) -> None:
-    """Move every place to its leaf, a question a round."""
-    flat = lines.ravel()  # no copy: lines are contiguous
+def _walk_on(
+    walk: Walk, lines: Reals, start: int, places: IntArray, desk: Desk
+) -> None:
+    """Move every place to the leaf below it."""
+    here, order = places, desk.order[: len(places)]
+    rows = np.add(order, start, desk.rows[0, : len(places)])
     offsets = walk.line * lines.shape[1]
-    rows = np.arange(len(places))
-    here = places
-    is_part = False
+    flat = lines.reshape(-1)
+
+    def step(rows: IntArray, here: IntArray) -> npt.NDArray[np.bool_]:
+        """Answer one question for each row and move on; return who moved."""
+        count = len(here)
+        where, yes = desk.where[:count], desk.yes[:count]
+        value, cut = desk.value[:count], desk.cut[:count]
+        offsets.take(here, out=where, mode="clip")
+        np.add(where, rows, where)
+        flat.take(where, out=value, mode="clip")
+        walk.cut.take(here, out=cut, mode="clip")
+        np.greater(value, cut, yes)
+        walk.child.take(here, out=where, mode="clip")
+        np.add(where, yes, where)
+        np.not_equal(where, here, yes)
+        here[:] = where
+        return yes
+
+    for _ in range(walk.sure):
+        step(rows, here)
+    spare = 1
     while True:
-        where = offsets.take(here)
-        where += rows
-        yes = flat.take(where) > walk.cut.take(here)
-        new = walk.child.take(here, mode="clip")
-        new += yes
-        moved = new != here
+        moved = step(rows, here)
         live = int(np.count_nonzero(moved))
-        here = new
-        if live == 0:
-            break
-        if live < _LIVE * len(here):
+        if here is not places and live < _LIVE * len(here):
+            np.subtract(rows, start, rows)
             places[rows] = here
+            np.add(rows, start, rows)
+        if live == 0:
+            return
+        if live < _LIVE * len(here):
             keep = np.flatnonzero(moved)
-            rows, here = rows.take(keep), here.take(keep)
-            is_part = True
-    places[rows if is_part else slice(None)] = here
+            rows = rows.take(keep, out=desk.rows[spare, :live], mode="clip")
+            here = here.take(keep, out=desk.here[spare, :live], mode="clip")
+            spare = 3 - spare
 
 
 def descend_row(splits: Sequence[Split], row: Sequence[float]) -> int:

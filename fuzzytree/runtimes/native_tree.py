@@ -19,6 +19,7 @@ from fuzzytree.runtimes.degrees import NUMBERS
 from fuzzytree.runtimes.descent import (
     CHUNK,
     Descent,
+    Desk,
     Split,
     descend_row,
     descend_rows,
@@ -55,6 +56,8 @@ def follow(tree: FuzzyTree, dtype: Dtype = "float64") -> Run:
 def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
     """Return a function that descends planned splits on planned axes."""
 
+    is_plain = not axes.steps and axes.dtype is np.float64
+
     def run(values: FloatArray) -> Outcome:
         array = checked(values, inputs)
         count = array.shape[1]
@@ -63,11 +66,16 @@ def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
             return _one(descent.splits, row)
         rule = np.empty(count, np.int64)
         status = np.zeros(count, np.int64)
+        desk = Desk(min(count, CHUNK), axes.dtype)
         with np.errstate(all="ignore"):
             for start in range(0, count, CHUNK):
                 part = slice(start, start + CHUNK)
-                lines = axis_lines(axes, array[:, part])
-                descend_rows(descent, lines, rule[part])
+                if is_plain and array.flags.c_contiguous:
+                    descend_rows(descent, array, start, rule[part], desk)
+                    lines = array[:, part]
+                else:
+                    lines = np.ascontiguousarray(axis_lines(axes, array[:, part]))
+                    descend_rows(descent, lines, 0, rule[part], desk)
                 missing = missing_rows(lines)
                 if missing is not None:
                     rule[part][missing] = 0

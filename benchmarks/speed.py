@@ -1,0 +1,342 @@
+"""How fast each runtime answers, as ratios to scikit-learn in one run.
+
+    python benchmarks/speed.py [--quick] [--leaves 7 1000] [--only descent rules]
+
+A decision tree of scikit-learn is grown on synthetic data and carried over to a
+FuzzyTree with the same cuts, so that both answer the same question. All candidates are
+timed in turn, again and again, and the fastest time of each counts. Two kinds of data:
+few classes, and a class for each leaf, as a fuzzy tree has one pattern for each leaf.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import os
+import platform
+import time
+from collections.abc import Callable, Iterable, Mapping
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.tree import DecisionTreeClassifier
+
+from fuzzytree.contracts import Run
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.rulebase import LR, Band, Flank, RuleBase, Side, Term, Variable
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.native import load, load_best_first
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets
+
+Floats = npt.NDArray[np.float64]
+Candidates = Mapping[str, Callable[[], object]]
+
+FEATURES = 11
+COLUMNS = tuple(f"x{number}" for number in range(FEATURES))
+
+
+def main() -> None:
+    """Print the tables that the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer rows and rounds")
+    parser.add_argument("--leaves", type=int, nargs="+", default=[7, 1000])
+    parser.add_argument("--only", nargs="+", default=["descent", "rules"])
+    options = parser.parse_args()
+    print(_machine())
+    rounds = 3 if options.quick else 7
+    if "descent" in options.only:
+        for leaves in options.leaves:
+            for is_many in (False, True):
+                _descent(leaves, is_many=is_many, rounds=rounds, quick=options.quick)
+    if "rules" in options.only:
+        for count in (7, 100, 1000):
+            for kind in ("relative", "raw"):
+                _rules(count, raw=kind == "raw", rounds=rounds)
+    print(f"load average at the end: {_load()}")
+
+
+def _machine() -> str:
+    names = ("numpy", "scikit-learn", "onnx", "onnxruntime", "skl2onnx")
+    versions = [f"{name} {_version(name)}" for name in names]
+    return (
+        f"Python {platform.python_version()}, {', '.join(versions)}\n"
+        f"{os.cpu_count()} cores, {platform.machine()}, one thread; "
+        f"load average at the start: {_load()}"
+    )
+
+
+def _version(name: str) -> str:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return "absent"
+
+
+def _load() -> str:
+    return " ".join(f"{value:.2f}" for value in os.getloadavg())
+
+
+def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
+    grown = _grow(leaves, is_many=is_many)
+    tree = tree_of(grown)
+    run = load(tree)
+    kind = "a class for each leaf" if is_many else "7 classes"
+    print(
+        f"\n## descent, {len(tree.leaves)} leaves, depth {grown.get_depth()}, {kind}: "
+        "ratio to scikit-learn's predict on float32"
+    )
+    for count in (1, 100_000) if quick else (1, 100_000, 1_000_000):
+        if is_many and leaves > 100 and count > 100_000:
+            continue  # predict would need rows x classes doubles
+        single = np.random.default_rng(1).normal(size=(count, FEATURES))
+        single = single.astype(np.float32)
+        double = single.astype(np.float64)
+        values = np.ascontiguousarray(double[:, _needed(tree)].T)
+        _compare_answers(run, values, grown, single)
+        candidates: dict[str, Callable[[], object]] = {
+            "scikit-learn predict float32": lambda x=single: grown.predict(x),
+            "scikit-learn predict float64": lambda x=double: grown.predict(x),
+            "scikit-learn tree_.apply": lambda x=single: grown.tree_.apply(x),
+            "native descent": lambda x=values: run(x),
+            "native descent, rows first": lambda x=values.T.copy().T: run(x),
+            "floor: sum of the columns": lambda x=values: x.sum(),
+        }
+        if count == 1:
+            candidates["generated Python"] = _generated(tree, values)
+        if not (is_many and leaves > 100):
+            candidates["skl2onnx in onnxruntime"] = _skl2onnx(grown, single)
+        candidates.update(_onnx("tree", tree, values))
+        _table(candidates, count, rounds if count > 1 else 200)
+
+
+def _rules(count: int, *, raw: bool, rounds: int) -> None:
+    tree = tree_of(_grow(count, is_many=False))
+    rules = rules_from_tree(tree, "raw" if raw else "relative")
+    run, best = load(rules), load_best_first(rules)
+    print(
+        f"\n## rules, {count} {rules.kind}, min: ratio to firing all rules "
+        "in the native runtime"
+    )
+    for rows in (1, max(2_000_000 // count, 2_000)):
+        values = np.random.default_rng(1).normal(size=(len(rules.inputs), rows))
+        fired, found = run(values), best(values)
+        assert np.array_equal(fired.rule, found.rule)
+        assert np.array_equal(fired.status, found.status)
+        candidates: dict[str, Callable[[], object]] = {
+            "native float64": lambda x=values: run(x),
+            "best-first": lambda x=values: best(x),
+            "floor: sum of the columns": lambda x=values: x.sum(),
+        }
+        for dtype in ("mixed", "float32"):
+            other = load(rules, "mixed" if dtype == "mixed" else "float32")
+            candidates[f"native {dtype}"] = lambda x=values, run=other: run(x)
+        candidates.update(_onnx("rules", rules, values))
+        _table(candidates, rows, rounds if rows > 1 else 50)
+    few = values[:, :200].copy()
+    slow = find_runtime("reference").load(rules)
+    _table({"native float64": lambda: run(few), "reference": lambda: slow(few)}, 200, 2)
+    many = np.random.default_rng(2).normal(size=(len(rules.inputs), 100_000))
+    part = many[:, : values.shape[1]].copy()
+    ours = _fastest({"native": lambda: run(part), "best": lambda: best(many)}, rounds)
+    ratio = (ours["native"] / part.shape[1]) / (ours["best"] / many.shape[1])
+    print(f"best-first on 100,000 rows is {ratio:.1f} times as fast a row as firing")
+
+
+def _table(candidates: Candidates, rows: int, rounds: int) -> None:
+    times = _fastest(candidates, rounds)
+    first = next(iter(times.values()))
+    print(f"\n{'rows ' + format(rows, ','):34} {'ratio':>9} {'ns a row':>12}")
+    for name, seconds in times.items():
+        print(f"{name:34} {seconds / first:9.4f} {seconds / rows * 1e9:12.1f}")
+
+
+def _fastest(candidates: Candidates, rounds: int) -> dict[str, float]:
+    """Return the fastest of interleaved rounds, in seconds."""
+    best = dict.fromkeys(candidates, float("inf"))
+    for _ in range(rounds + 1):
+        for name, run in candidates.items():
+            start = time.perf_counter()
+            run()
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best
+
+
+def _grow(leaves: int, *, is_many: bool) -> DecisionTreeClassifier:
+    """Return a tree of scikit-learn with so many leaves, on seeded data."""
+    chance = np.random.default_rng(0)
+    values = chance.normal(size=(100_000, FEATURES)).astype(np.float32)
+    scores = values @ chance.normal(size=(FEATURES, 7))
+    labels = (scores + 0.5 * chance.normal(size=scores.shape)).argmax(axis=1)
+    grown = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0)
+    grown.fit(values, labels)
+    if not is_many:
+        return grown
+    kinds = grown.apply(values)
+    return DecisionTreeClassifier(random_state=0).fit(values, kinds)
+
+
+def _needed(tree: FuzzyTree) -> list[int]:
+    return [COLUMNS.index(name) for name in tree.inputs]
+
+
+def _compare_answers(
+    run: Run, values: Floats, grown: DecisionTreeClassifier, single: npt.NDArray[np.float32]
+) -> None:
+    places = grown.apply(single[:20_000])
+    numbers = run(values[:, :20_000]).rule
+    order = [place for place in _walk(grown) if grown.tree_.feature[place] < 0]
+    assert np.array_equal(places, np.array(order)[numbers - 1]), "answers differ"
+
+
+def _walk(grown: DecisionTreeClassifier) -> Iterable[int]:
+    """Yield the nodes of a scikit-learn tree depth-first, left before right."""
+    todo = [0]
+    while todo:
+        place = todo.pop()
+        yield place
+        if grown.tree_.feature[place] >= 0:
+            todo += [grown.tree_.children_right[place], grown.tree_.children_left[place]]
+
+
+def tree_of(grown: DecisionTreeClassifier) -> FuzzyTree:
+    """Return a fuzzy tree with the cuts of a tree of scikit-learn.
+
+    Flanks are one unit wide; each leaf has a set on each variable, around the mean of
+    its cell.
+    """
+    inner = [p for p in _walk(grown) if grown.tree_.feature[p] >= 0]
+    leaves = [p for p in _walk(grown) if grown.tree_.feature[p] < 0]
+    node_of = {place: number for number, place in enumerate(inner, 1)}
+    leaf_of = {place: number for number, place in enumerate(leaves, 1)}
+    below = _below(grown, leaf_of)
+    terms: dict[str, dict[str, Term]] = {}
+    nodes: list[Node] = []
+    for place in inner:
+        name = COLUMNS[grown.tree_.feature[place]]
+        cut = float(grown.tree_.threshold[place])
+        low, high = f"below {cut!r}", f"above {cut!r}"
+        known = terms.setdefault(name, {})
+        known[low] = Term(low, Band(high=cut, right=Flank(cut, cut + 1.0)))
+        known[high] = Term(high, Band(low=cut, left=Flank(cut, cut - 1.0)))
+        children = (grown.tree_.children_left[place], grown.tree_.children_right[place])
+        branches = tuple(
+            Branch(
+                (term,),
+                tuple(f"pattern {leaf}" for leaf in below[child]),
+                node_of.get(child),
+                leaf_of.get(child),
+            )
+            for term, child in zip((low, high), children, strict=True)
+        )
+        nodes.append(Node(name, (cut,), (0, 1), branches))
+    used = [name for name in COLUMNS if name in terms]
+    labels = grown.classes_[grown.tree_.value[:, 0, :].argmax(axis=1)]
+    return FuzzyTree(
+        "benchmark",
+        tuple(str(label) for label in grown.classes_),
+        tuple(Variable(name, tuple(terms[name].values())) for name in used),
+        tuple(nodes),
+        tuple(Leaf(str(labels[p]), f"pattern {leaf_of[p]}") for p in leaves),
+        tuple(Sets(name, _sets(grown, name, leaf_of)) for name in used),
+        columns=COLUMNS,
+    )
+
+
+def _below(
+    grown: DecisionTreeClassifier, leaf_of: Mapping[int, int]
+) -> dict[int, list[int]]:
+    below: dict[int, list[int]] = {}
+    for place in reversed(list(_walk(grown))):
+        if place in leaf_of:
+            below[place] = [leaf_of[place]]
+        else:
+            left, right = grown.tree_.children_left, grown.tree_.children_right
+            below[place] = below[left[place]] + below[right[place]]
+    return below
+
+
+def _sets(
+    grown: DecisionTreeClassifier, name: str, leaf_of: Mapping[int, int]
+) -> tuple[Term, ...]:
+    """Return the set of each leaf on a variable, as wide as its cell."""
+    cells: dict[int, tuple[float, float]] = {0: (-3.0, 3.0)}
+    found: dict[int, Term] = {}
+    for place in _walk(grown):
+        low, high = cells[place]
+        if place in leaf_of:
+            side = Side((high - low) / 2.0, (0.6, 0.1))
+            label = f"pattern {leaf_of[place]}"
+            found[leaf_of[place]] = Term(label, LR((low + high) / 2.0, side, side))
+            continue
+        left, right = grown.tree_.children_left[place], grown.tree_.children_right[place]
+        cut = float(grown.tree_.threshold[place])
+        is_asked = COLUMNS[grown.tree_.feature[place]] == name
+        cells[left] = (low, min(high, cut)) if is_asked else (low, high)
+        cells[right] = (max(low, cut), high) if is_asked else (low, high)
+    return tuple(found[number] for number in sorted(found))
+
+
+def _skl2onnx(
+    grown: DecisionTreeClassifier, single: npt.NDArray[np.float32]
+) -> Callable[[], object]:
+    import onnxruntime
+    from skl2onnx import to_onnx
+
+    model = to_onnx(grown, single[:1], options={"zipmap": False})
+    session = onnxruntime.InferenceSession(
+        model.SerializeToString(), _options(), providers=["CPUExecutionProvider"]
+    )
+    return lambda: session.run(["label"], {"X": single})
+
+
+def _options() -> object:
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    return options
+
+
+def _onnx(
+    what: str, model: FuzzyTree | RuleBase, values: Floats
+) -> Candidates:
+    """Return our own graphs in onnxruntime, and the floor of a session call."""
+    found: dict[str, Callable[[], object]] = {}
+    for dtype in ("float64", "mixed", "float32"):
+        runtime = find_runtime(f"onnxruntime {dtype}")
+        if what in runtime.runs:
+            run = runtime.load(model)
+            found[f"our {what} in {runtime.name}"] = lambda run=run: run(values)
+    found["floor: an empty session call"] = _empty_call(values)
+    return found
+
+
+def _empty_call(values: Floats) -> Callable[[], object]:
+    import onnxruntime
+    from onnx import TensorProto, helper
+
+    node = helper.make_node("Identity", ["x"], ["y"])
+    shapes = [
+        helper.make_tensor_value_info(name, TensorProto.DOUBLE, [None, None])
+        for name in ("x", "y")
+    ]
+    graph = helper.make_graph([node], "empty", shapes[:1], shapes[1:])
+    model = helper.make_model(
+        graph, ir_version=8, opset_imports=[helper.make_opsetid("", 17)]
+    )
+    session = onnxruntime.InferenceSession(
+        model.SerializeToString(), _options(), providers=["CPUExecutionProvider"]
+    )
+    rows = np.ascontiguousarray(values[:, :1])
+    return lambda: session.run(None, {"x": rows})
+
+
+def _generated(tree: FuzzyTree, values: Floats) -> Callable[[], object]:
+    run = find_runtime("python").load(tree)
+    return lambda: run(values)
+
+
+if __name__ == "__main__":
+    main()
