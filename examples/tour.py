@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import fuzzytree as ft
+from fuzzytree.report.text import agreement_lines, tree_lines
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.tables import batches, read_table
 
@@ -43,7 +44,8 @@ def main() -> None:
     head(f"Learn: {rows} wines, {len(wine.columns)} measurements, three grapes")
     tree = ft.learn(TABLE, target="cultivar", name="wine")
     rules = ft.rules_from_tree(tree)
-    print(f"{tree}\n\nThe same as rules:\n{rules}")
+    print("\n".join(tree_lines(tree)))
+    print(f"\nThe same as rules:\n{rules}")
 
     head("Write: YAML to read, ONNX to run")
     OUT.mkdir(exist_ok=True)
@@ -61,7 +63,7 @@ def main() -> None:
     head("Check: are tree, rules, files and runtimes one model?")
     files = [OUT / f"{stem}.onnx" for stem in ("wine-tree", "wine-rules")]
     agreement = ft.check(tree, OUT / "wine-rules.yaml", *files, data=TABLE)
-    print(agreement)
+    print("\n".join(agreement_lines(agreement)))
     agreement.raise_if_not_ok()
 
     head(f"Compare: microseconds for one row, and for each of {BATCH} at once")

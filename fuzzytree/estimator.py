@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import Carrier, FloatArray, IntArray, Outcome, Run
 
 LabelArray = npt.NDArray[np.generic]
+PatternsPerClass = int | Literal["auto"] | Mapping[str, int] | None
+Choice = Literal["alpha", "l_max", "shrinkage", "entry"]
 
 _validated: Callable[..., Any] = validate_data
 """scikit-learn's check of X and y; what it takes and returns has no types there."""
@@ -37,6 +39,18 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm to the letter.
+        alpha: Weight of the difference of means in the distance of two patterns.
+        l_max: How wide a margin must be before one column is trusted.
+        points: n of the paper's 2n + 1 points on a fuzzy set, 1 to 8.
+        separate_sides: Whether a set's two sides are fitted apart.
+        patterns_per_class: How many shapes a class has: a number, a number for each
+            class by its name in the tree, or `auto` for inner validation.
+        shrinkage: How far the off-diagonal of a scatter is shrunk, in [0, 1).
+        entry: How much one more column must help a combination.
+        costs: The cost of a column, by its name in the tree; 1 unless given.
+        choices: What inner validation may choose beside `patterns_per_class`.
+        seed: Moves the folds of inner validation. The same seed and table give the
+            same tree. `fuzzytree.learning.Settings` says more about each.
 
     Attributes:
         tree_: The tree, as every other part of fuzzytree takes it.
@@ -64,8 +78,28 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         self,
         *,
         mode: Literal["default", "paper"] = "default",
+        alpha: float = 0.9,
+        l_max: float | None = None,
+        points: int = 3,
+        separate_sides: bool = False,
+        patterns_per_class: PatternsPerClass = None,
+        shrinkage: float = 1e-3,
+        entry: float = 2.0,
+        costs: Mapping[str, float] | None = None,
+        choices: Sequence[Choice] = (),
+        seed: int = 0,
     ) -> None:
         self.mode = mode
+        self.alpha = alpha
+        self.l_max = l_max
+        self.points = points
+        self.separate_sides = separate_sides
+        self.patterns_per_class = patterns_per_class
+        self.shrinkage = shrinkage
+        self.entry = entry
+        self.costs = costs
+        self.choices = choices
+        self.seed = seed
 
     def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> Self:
         """Learn a tree.
@@ -155,7 +189,19 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             self._run = _prepared(self.tree_)
 
     def _settings(self) -> Settings:
-        return Settings(mode=self.mode)
+        return Settings(
+            mode=self.mode,
+            alpha=self.alpha,
+            l_max=self.l_max,
+            points=self.points,
+            separate_sides=self.separate_sides,
+            patterns_per_class=self.patterns_per_class,
+            shrinkage=self.shrinkage,
+            entry=self.entry,
+            costs=self.costs or {},
+            choices=tuple(self.choices),
+            seed=self.seed,
+        )
 
     def _columns(self) -> list[str]:
         names = getattr(self, "feature_names_in_", None)
