@@ -1,0 +1,321 @@
+"""YAML to a rule base or a tree; see `docs/yaml-format.md` for the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Final, TypeVar
+
+from fuzzytree.contracts import Model
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.readers import layout, values
+from fuzzytree.readers.binding import Entries, bind, entries, not_a_list, record
+from fuzzytree.readers.layout import RuleBaseFile, TreeFile
+from fuzzytree.readers.nodes import (
+    Found,
+    ListNode,
+    MappingNode,
+    Node,
+    Scalar,
+    compose,
+    report,
+)
+from fuzzytree.readers.references import (
+    clauses_of_nodes,
+    clauses_of_rules,
+    is_flood,
+    unknown_classes,
+    unknown_inputs,
+    unknown_terms,
+)
+from fuzzytree.readers.rules import read_rules
+from fuzzytree.readers.sentences import vocabulary_of
+from fuzzytree.rulebase import (
+    Band,
+    Mistake,
+    Path,
+    RuleBase,
+    Term,
+    Variable,
+    naming_mistakes,
+    variable_mistakes,
+)
+from fuzzytree.tree import FuzzyTree
+
+_KEYS: Final = {
+    # What a field of the model is called in the file, where the words differ.
+    "when": ("if",),
+    "parts": ("sum of",),
+    "low": ("range",),
+    "high": ("range",),
+    "label": ("class",),
+    "variable": ("ask", "variable"),
+    "terms": ("is", "is not", "terms"),
+    "owners": ("interval owners",),
+}
+R = TypeVar("R", bound=layout.Record)
+
+
+def read(content: bytes, name: str) -> Model:
+    """Return the rule base or tree of a YAML file.
+
+    Args:
+        content: The file.
+        name: What messages call it.
+
+    Raises:
+        ReadError: If the file is no model; it lists all mistakes with their places.
+
+    Example:
+        >>> from fuzzytree.exporters.yaml import write
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1)
+        >>> read(write(tree).content, "tree.yaml") == tree
+        True
+    """
+    root, found = compose(content, name)
+    if not isinstance(root, MappingNode):
+        text = "a model must be a mapping that begins with 'format: fuzzytree/1'"
+        raise report(name, [*found, (root.line, root.column, text)])
+    try:
+        _check_format(root)
+        model = _READERS[_kind(root)](root, found)
+    except _UnreadableError as error:
+        raise report(name, [*found, *error.found]) from error.__cause__
+    if found or model is None:
+        raise report(name, found)
+    return model
+
+
+class _UnreadableError(Exception):
+    """What stops a file from being read at all."""
+
+    def __init__(self, *found: Found) -> None:
+        self.found = found
+        super().__init__()
+
+
+def _value_of(node: Node, key: str) -> Node | None:
+    for one, value in node.pairs if isinstance(node, MappingNode) else ():
+        if isinstance(one, Scalar) and one.text == key:
+            return value
+    return None
+
+
+def _check_format(root: MappingNode) -> None:
+    node = _value_of(root, "format")
+    if node is None:
+        text = "no 'format: fuzzytree/1' says what this file is"
+        raise _UnreadableError((root.line, root.column, text))
+    given = node.text if isinstance(node, Scalar) else ""
+    if given == layout.FORMAT:
+        return
+    text = f"'format' must be {layout.FORMAT!r}"
+    if re.fullmatch(r"fuzzytree/[1-9][0-9]{0,8}", given):
+        text = (
+            f"a file of format {given!r} needs a newer fuzzytree, one that reads "
+            f"{given!r}; this one reads {layout.FORMAT!r}"
+        )
+    raise _UnreadableError((node.line, node.column, text))
+
+
+def _kind(root: MappingNode) -> str:
+    node = _value_of(root, "kind")
+    if isinstance(node, Scalar) and node.text in _READERS:
+        return node.text
+    place = node or root
+    text = "'kind' must be 'rule base' or 'tree'"
+    raise _UnreadableError((place.line, place.column, text))
+
+
+def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
+    kept = entries(root, RuleBaseFile, found)
+    head = record(kept, layout.RuleBaseHead, found)
+    semantics = _one(kept, "semantics", layout.RuleSemantics, found)
+    bound = _many(kept, "rules", layout.RuleOfModel, found)
+    known = _variables(kept, found)
+    if head is None or bound is None or known is None:
+        return None
+    variables, broken = known
+    vocabulary = vocabulary_of(variables)
+    mistakes: list[Mistake] = []
+    rules = read_rules(bound, head.classes[0], vocabulary, mistakes)
+    found += _located(root, mistakes)
+    unknown = [
+        *unknown_inputs(variables),
+        *unknown_classes(rules, head.classes),
+        *unknown_terms(clauses_of_rules(rules), vocabulary),
+    ]
+    if is_flood(unknown, vocabulary, head.classes):
+        found += _located(root, unknown)
+        return None
+    try:
+        return RuleBase(
+            name=head.name,
+            classes=head.classes,
+            variables=variables,
+            rules=rules,
+            semantics=values.semantics(semantics),
+            kind=head.terms,
+            columns=head.columns,
+        )
+    except InvalidModelError as error:
+        found += _located(root, error.mistakes, broken)
+        return None
+
+
+def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
+    kept = entries(root, TreeFile, found)
+    head = record(kept, layout.TreeHead, found)
+    semantics = _one(kept, "semantics", layout.TreeSemantics, found)
+    questions = _many(kept, "nodes", layout.Question, found)
+    ends = _many(kept, "leaves", layout.End, found)
+    groups = _many(kept, "sets", layout.FittedSets, found)
+    known = _variables(kept, found)
+    if questions is not None and ends is not None:
+        found += _located(root, [*_number_mistakes(questions, ends)])
+    if head is None or known is None:
+        return None
+    variables, broken = known
+    nodes, leaves, sets = _whole(questions), _whole(ends), _whole(groups)
+    given = tuple(values.node(node) for node in nodes or ())
+    vocabulary = vocabulary_of(variables)
+    unknown = [
+        *unknown_inputs(variables),
+        *unknown_terms(clauses_of_nodes(given), vocabulary),
+    ]
+    if is_flood(unknown, vocabulary, head.classes):
+        found += _located(root, unknown)
+        return None
+    meant = values.semantics(semantics)
+    if nodes is None or leaves is None or sets is None:
+        mistakes = [
+            *naming_mistakes(head.name, head.classes, meant),
+            *variable_mistakes(variables, head.columns),
+        ]
+        found += _located(root, mistakes, broken)
+        return None
+    try:
+        return FuzzyTree(
+            name=head.name,
+            classes=head.classes,
+            variables=variables,
+            nodes=given,
+            leaves=tuple(map(values.leaf, leaves)),
+            sets=tuple(map(values.sets, sets)),
+            semantics=meant,
+            columns=head.columns,
+        )
+    except InvalidModelError as error:
+        found += _located(root, error.mistakes, broken)
+        return None
+
+
+_READERS: Final[Mapping[str, Callable[[MappingNode, list[Found]], Model | None]]] = {
+    "rule base": _rule_base,
+    "tree": _tree,
+}
+
+
+def _one(kept: Entries, key: str, kind: type[R], found: list[Found]) -> R | None:
+    return bind(kept[key], kind, found) if key in kept else None
+
+
+def _many(
+    kept: Entries, key: str, kind: type[R], found: list[Found]
+) -> list[R | None] | None:
+    """Return the items of a list, None for a broken one; None if it is no list."""
+    node = kept.get(key)
+    if node is None:
+        return None if key in ("rules", "leaves") else []
+    if not isinstance(node, ListNode):
+        not_a_list(node, key, found)
+        return None
+    return [bind(item, kind, found) for item in node.items]
+
+
+def _whole(items: list[R | None] | None) -> list[R] | None:
+    """Return the items if none is broken."""
+    kept = [item for item in items or () if item is not None]
+    return None if items is None or len(kept) < len(items) else kept
+
+
+def _variables(
+    kept: Entries, found: list[Found]
+) -> tuple[tuple[Variable, ...], set[int]] | None:
+    """Return the variables and which are broken; None if names cannot be known.
+
+    In the place of a broken variable stands one of its name and its terms' names, so
+    that what speaks of it can be checked.
+    """
+    bound = _many(kept, "variables", layout.VariableOfModel, found)
+    if bound is None:
+        return None
+    variables: list[Variable] = []
+    broken: set[int] = set()
+    for position, one in enumerate(bound):
+        if one is not None:
+            variables.append(values.variable(one))
+            continue
+        names = _names(kept["variables"], position)
+        if names is None:
+            return None
+        broken.add(position)
+        terms = tuple(Term(name, Band()) for name in names[1:])
+        variables.append(Variable(names[0], terms))
+    return tuple(variables), broken
+
+
+def _names(variables: Node, position: int) -> list[str] | None:
+    """Return the name of a variable and of its terms, as far as they can be read."""
+    node = variables.items[position] if isinstance(variables, ListNode) else variables
+    name = _value_of(node, "name")
+    terms = _value_of(node, "terms")
+    items = terms.items if isinstance(terms, ListNode) else ()
+    named = [name, *(_value_of(term, "name") for term in items)]
+    texts = [one.text for one in named if isinstance(one, Scalar)]
+    return texts if len(texts) == len(named) else None
+
+
+def _number_mistakes(
+    questions: list[layout.Question | None], ends: list[layout.End | None]
+) -> Iterator[Mistake]:
+    """Compare the numbers that stand in nodes and leaves with their places."""
+    for place, node in enumerate(questions, 1):
+        if node is not None and node.node != place:
+            text = f"this is node {place} of the list, not node {node.node}"
+            yield ("nodes", place - 1, "node"), text
+    for place, leaf in enumerate(ends, 1):
+        if leaf is not None and leaf.leaf != place:
+            text = f"this is leaf {place} of the list, not leaf {leaf.leaf}"
+            yield ("leaves", place - 1, "leaf"), text
+
+
+def _located(
+    root: Node, mistakes: Iterable[Mistake], broken: Iterable[int] = ()
+) -> Iterator[Found]:
+    """Yield mistakes with their places, but not those in broken variables."""
+    left_out = {("variables", position) for position in broken}
+    for path, text in mistakes:
+        if path[:2] not in left_out:
+            node = _find(root, path)
+            yield node.line, node.column, text
+
+
+def _find(node: Node, path: Path) -> Node:
+    """Return the deepest node on a path of the model that is in the file."""
+    for step in path:
+        inner = _child(node, step)
+        if inner is None:
+            break
+        node = inner
+    return node
+
+
+def _child(node: Node, step: str | int) -> Node | None:
+    if isinstance(step, int):
+        items = node.items if isinstance(node, ListNode) else ()
+        return items[step] if step < len(items) else None
+    keys = (*_KEYS.get(step, ()), step)
+    found = (_value_of(node, key) for key in keys)
+    return next((one for one in found if one is not None), None)

@@ -1,0 +1,136 @@
+"""The JSON Schemas of our YAML files, from the records that the reader uses.
+
+`python -m fuzzytree.schemas.generation` rewrites the files beside this module.
+"""
+
+from __future__ import annotations
+
+import inspect as python
+import json
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from msgspec import inspect
+
+from fuzzytree.readers.layout import Record, RuleBaseFile, TreeFile
+
+FILES: Final[Mapping[str, type[Record]]] = MappingProxyType(
+    {"rulebase.schema.json": RuleBaseFile, "tree.schema.json": TreeFile}
+)
+"""Each file's name and the record that it describes."""
+
+Json = dict[str, "Json"] | list["Json"] | str | float | int | bool | None
+Definitions = dict[str, Json]
+
+
+def generate(name: str) -> bytes:
+    """Return the JSON Schema (draft 2020-12) of a name in `FILES`.
+
+    Example:
+        >>> json.loads(generate("tree.schema.json"))["title"]
+        'A fuzzy decision tree of fuzzytree.'
+    """
+    kind = FILES[name]
+    definitions: Definitions = {}
+    _define(kind, definitions)
+    whole = definitions.pop(kind.__name__)
+    head: Definitions = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": python.cleandoc(kind.__doc__ or "").partition("\n")[0],
+    }
+    if isinstance(whole, dict):
+        del whole["description"]
+        head |= whole
+    head["$defs"] = {key: definitions[key] for key in sorted(definitions)}
+    return (json.dumps(head, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def write_all(folder: Path) -> None:
+    """Write every schema into a folder."""
+    for name in FILES:
+        (folder / name).write_bytes(generate(name))
+
+
+def _define(kind: type[Record], definitions: Definitions) -> None:
+    """Add the definition of a record, and of the records in it."""
+    if kind.__name__ in definitions:
+        return
+    definitions[kind.__name__] = None  # a record in itself would be met again
+    info = inspect.type_info(kind)
+    fields = info.fields if isinstance(info, inspect.StructType) else ()
+    properties: Definitions = {}
+    for field in fields:
+        one = _schema(field.type, definitions)
+        if isinstance(field.default, str | float | int):
+            one["default"] = field.default
+        properties[field.encode_name] = one
+    definition: Definitions = {
+        "description": python.cleandoc(kind.__doc__ or ""),
+        "type": "object",
+        "properties": properties,
+        "required": [field.encode_name for field in fields if field.required],
+        "additionalProperties": False,
+    }
+    if kind.forms:
+        definition["anyOf"] = [*_forms(kind, list(properties))]
+    definitions[kind.__name__] = definition
+
+
+def _forms(kind: type[Record], keys: list[str]) -> list[Json]:
+    """Return what each form needs and forbids."""
+    choosable = {key for form in kind.forms for key in (*form.needs, *form.may)}
+    free = [key for key in keys if key not in choosable]
+    return [
+        {
+            "required": [*form.needs],
+            "propertyNames": {"enum": [*free, *form.needs, *form.may]},
+        }
+        for form in kind.forms
+    ]
+
+
+def _schema(kind: inspect.Type, definitions: Definitions) -> Definitions:
+    match kind:
+        case inspect.Metadata():
+            extra: Definitions = {**(kind.extra_json_schema or {})}
+            return _schema(kind.type, definitions) | extra
+        case inspect.UnionType():
+            kinds = [one for one in kind.types if not isinstance(one, inspect.NoneType)]
+            found: list[Json] = [_schema(one, definitions) for one in kinds]
+            return (
+                _schema(kinds[0], definitions) if len(kinds) == 1 else {"anyOf": found}
+            )
+        case inspect.StructType():
+            if issubclass(kind.cls, Record):
+                _define(kind.cls, definitions)
+            return {"$ref": f"#/$defs/{kind.cls.__name__}"}
+        case inspect.VarTupleType():
+            item = _schema(kind.item_type, definitions)
+            sizes = {"minItems": kind.min_length, "maxItems": kind.max_length}
+            return {"type": "array", "items": item, **_given(sizes)}
+        case inspect.StrType():
+            sizes = {"minLength": kind.min_length, "maxLength": kind.max_length}
+            pattern: Definitions = {"pattern": kind.pattern} if kind.pattern else {}
+            return {"type": "string", **_given(sizes), **pattern}
+        case inspect.IntType():
+            return {
+                "type": "integer",
+                **_given({"minimum": kind.ge, "maximum": kind.le}),
+            }
+        case inspect.FloatType():
+            return {"type": "number"}
+        case inspect.LiteralType():
+            return {"enum": [*kind.values]}
+        case _:
+            raise TypeError(f"no rule for {kind}")
+
+
+def _given(limits: Mapping[str, int | None]) -> Definitions:
+    return {key: limit for key, limit in limits.items() if limit is not None}
+
+
+if __name__ == "__main__":
+    write_all(Path(str(files("fuzzytree.schemas"))))
