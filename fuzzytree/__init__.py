@@ -1,1 +1,81 @@
-"""Learn fuzzy decision trees, read them as rules, run them anywhere, and prove it."""
+"""Learn fuzzy decision trees, read them as rules, run them anywhere, prove them equal.
+
+Nothing heavy is loaded before it is used: each name below comes from the module that
+stands beside it when it is first asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fuzzytree.agreement import Agreement
+    from fuzzytree.answers import Answers
+    from fuzzytree.errors import FuzzyTreeError
+    from fuzzytree.estimator import FuzzyTreeClassifier
+    from fuzzytree.lowering import rules_from_tree
+    from fuzzytree.rulebase import RuleBase
+    from fuzzytree.tree import FuzzyTree
+    from fuzzytree.verbs import check, export, learn, load, run, save
+
+    __version__: str
+
+__all__ = [
+    "Agreement",
+    "Answers",
+    "FuzzyTree",
+    "FuzzyTreeClassifier",
+    "FuzzyTreeError",
+    "RuleBase",
+    "__version__",
+    "check",
+    "export",
+    "learn",
+    "load",
+    "rules_from_tree",
+    "run",
+    "save",
+]
+
+_HOMES = {
+    "Agreement": "fuzzytree.agreement",
+    "Answers": "fuzzytree.answers",
+    "FuzzyTree": "fuzzytree.tree",
+    "FuzzyTreeClassifier": "fuzzytree.estimator",
+    "FuzzyTreeError": "fuzzytree.errors",
+    "RuleBase": "fuzzytree.rulebase",
+    "check": "fuzzytree.verbs",
+    "export": "fuzzytree.verbs",
+    "learn": "fuzzytree.verbs",
+    "load": "fuzzytree.verbs",
+    "rules_from_tree": "fuzzytree.lowering",
+    "run": "fuzzytree.verbs",
+    "save": "fuzzytree.verbs",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name from its module, once."""
+    if name == "__version__":
+        value: object = _version()
+    elif name in _HOMES:
+        value = getattr(importlib.import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module 'fuzzytree' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return sorted(__all__)
+
+
+def _version() -> str:
+    import importlib.metadata
+
+    try:
+        return importlib.metadata.version("fuzzytree-toolkit")
+    except importlib.metadata.PackageNotFoundError:
+        return "uninstalled"

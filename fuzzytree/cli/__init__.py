@@ -1,1 +1,120 @@
-"""The command line, one module per verb."""
+"""The command line: one module per verb, loaded when its verb is asked for.
+
+Data goes to stdout and talk to stderr. Exit codes: 0 fine; 1 it ran and found
+something; 2 it could not run; 130 interrupted; 141 nobody reads the output any more.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+import click
+
+from fuzzytree.cli.talk import say
+from fuzzytree.errors import FuzzyTreeError
+
+VERBS = ("learn", "show", "export", "run", "check", "formats", "doctor")
+"""Each verb is the `command` of the module `fuzzytree.cli.VERB`."""
+
+
+class Verbs(click.Group):
+    """A group that imports a verb's module when the verb is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order in which one needs them."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a verb, or None if there is none of that name."""
+        if cmd_name not in VERBS:
+            return None
+        module = importlib.import_module(f"fuzzytree.cli.{cmd_name}")
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the verb, or say which one it might have been."""
+        name = args[0]
+        if name not in VERBS and not name.startswith("-"):
+            close = difflib.get_close_matches(name, VERBS, n=1)
+            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            raise click.UsageError(
+                f"no verb {name!r}; there is {', '.join(VERBS)}{hint}", ctx
+            )
+        return super().resolve_command(ctx, args)
+
+
+def _show_version(ctx: click.Context, _: click.Parameter, is_asked: bool) -> None:
+    if is_asked:
+        import fuzzytree
+
+        click.echo(f"fuzzytree {fuzzytree.__version__}")
+        ctx.exit()
+
+
+@click.group(
+    "fuzzytree",
+    cls=Verbs,
+    subcommand_metavar="VERB [ARGUMENTS]...",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 96},
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help="Show the version.",
+)
+def program() -> None:
+    """Learn a fuzzy decision tree, read it as rules, run it anywhere, check it."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        arguments: The words after the program's name; those of the process if None.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        with program.make_context("fuzzytree", words) as context:
+            code = program.invoke(context)
+        sys.stdout.flush()
+    except click.exceptions.Exit as found:
+        return found.exit_code
+    except click.ClickException as error:
+        say(_usage_text(error))
+        return 2
+    except BrokenPipeError:
+        _forget_stdout()
+        return 141
+    except (FuzzyTreeError, OSError) as error:
+        say(str(error))
+        return 2
+    except (KeyboardInterrupt, click.Abort):
+        say("interrupted; files are as they were")
+        return 130
+    return code if isinstance(code, int) else 0
+
+
+def _usage_text(error: click.ClickException) -> str:
+    message = error.format_message().strip()
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        return message
+    message = message[:1].lower() + message[1:].removesuffix(".")
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    hint = f"\n  {context.command_path} --help tells more" if context else ""
+    return message + hint
+
+
+def _forget_stdout() -> None:
+    """Keep Python from flushing to a pipe that nobody reads, which would complain."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())

@@ -1,0 +1,7 @@
+"""`python -m fuzzytree` is the command line."""
+
+import sys
+
+from fuzzytree.cli import main
+
+sys.exit(main())

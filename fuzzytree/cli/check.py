@@ -1,0 +1,81 @@
+"""`fuzzytree check`: is everything that was made of a model still that model?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    json_option,
+    quiet_option,
+    say,
+    standard_input,
+)
+from fuzzytree.errors import FuzzyTreeError
+
+
+@click.command("check", short_help="Compare a model with all that is made of it.")
+@click.argument("model", metavar="MODEL")
+@click.argument("files", metavar="[FILES]...", nargs=-1)
+@click.option("--data", metavar="TABLE", help="Rows of your own, beside the probes.")
+@click.option(
+    "--runtime",
+    "runtimes",
+    metavar="NAME",
+    multiple=True,
+    help="Run these only; all that are installed if none.",
+)
+@click.option(
+    "--limit",
+    type=click.IntRange(min=1),
+    default=20_000,
+    show_default=True,
+    help="The most probes.",
+)
+@click.option("--rows", "is_full", is_flag=True, help="Tell rows that may differ, too.")
+@json_option
+@quiet_option
+def command(
+    model: str,
+    files: Sequence[str],
+    data: str | None,
+    runtimes: Sequence[str],
+    limit: int,
+    is_full: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Compare MODEL, a YAML file, with FILES made of it, in every runtime.
+
+    The tree, its rules, each runtime and each file answer the same rows. Exit 1 if
+    two of them disagree.
+    """
+    from fuzzytree import verbs
+    from fuzzytree.report import text
+
+    try:
+        found = verbs.check(
+            model,
+            *files,
+            data=standard_input() if data == "-" else data,
+            runtimes=runtimes or None,
+            limit=limit,
+        )
+    except ValueError as error:
+        if isinstance(error, FuzzyTreeError):
+            raise
+        raise click.UsageError(str(error)) from error
+    if as_json:
+        answer(found.to_json())
+    elif not quiet:
+        answer("\n".join(text.agreement_lines(found, is_full=is_full)))
+    wrong = sum(c.verdict == "DISAGREES" for c in found.comparisons)
+    count = text.counted(len(found.comparisons), "comparison")
+    if wrong:
+        verb = "disagrees" if wrong == 1 else "disagree"
+        say(f"{wrong} of {count} {verb}")
+        return 1
+    say(f"{count}, and none disagrees", quiet=quiet)
+    return 0

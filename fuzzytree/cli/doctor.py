@@ -1,0 +1,102 @@
+"""`fuzzytree doctor`: what is installed, and whether it works."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import platform
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import click
+
+import fuzzytree
+from fuzzytree.cli.talk import answer, answer_json, json_option
+from fuzzytree.errors import FuzzyTreeError
+
+CORE = ("numpy", "msgspec", "PyYAML", "click", "rich", "narwhals")
+
+EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "onnx": {"onnx": "onnx", "onnxruntime": "onnxruntime"},
+        "sklearn": {"scikit-learn": "sklearn"},
+        "skfuzzy": {
+            "scikit-fuzzy": "skfuzzy",
+            "scipy": "scipy",
+            "networkx": "networkx",
+        },
+        "parquet": {"pyarrow": "pyarrow"},
+    }
+)
+"""The packages of each extra and their modules; a test compares it with the project."""
+
+
+def missing_extras() -> set[str]:
+    """Return the extras of which a package is not installed."""
+    return {
+        extra
+        for extra, packages in EXTRAS.items()
+        if not all(importlib.util.find_spec(module) for module in packages.values())
+    }
+
+
+@click.command("doctor", short_help="Tell what is installed and whether it works.")
+@json_option
+def command(as_json: bool) -> int:
+    """Tell versions and extras, and learn, write, read and run a small model."""
+    from fuzzytree.report import text
+
+    packages = [*CORE, *(name for extra in EXTRAS.values() for name in extra)]
+    versions = {
+        "fuzzytree": fuzzytree.__version__,
+        "python": platform.python_version(),
+        **{name: _version(name) for name in packages},
+    }
+    missing = sorted(missing_extras())
+    faults = self_test("onnx" not in missing)
+    if as_json:
+        answer_json({"versions": versions, "missing": missing, "faults": faults})
+        return 1 if faults else 0
+    answer("\n".join(text.aligned(versions.items())))
+    for extra in missing:
+        answer(
+            f"extra {extra!r} is not installed: "
+            f"pip install 'fuzzytree-toolkit[{extra}]'"
+        )
+    for fault in faults:
+        answer(f"self-test: {fault}")
+    if not faults:
+        answer("self-test: learning, writing, reading and running agree")
+    return 1 if faults else 0
+
+
+def _version(name: str) -> str:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def self_test(has_onnx: bool) -> list[str]:
+    """Take a small table through learning, YAML, native and, if there, ONNX."""
+    import numpy as np
+
+    from fuzzytree import verbs
+    from fuzzytree.exporters import find_format
+
+    table = np.array([[k, k % 3] for k in range(12)], np.float64)
+    classes = ["low"] * 6 + ["high"] * 6
+    try:
+        tree = verbs.learn(table, target=classes)
+        read = find_format("yaml").read
+        content = verbs.export(tree, "yaml").content
+        again = read(content, "self-test") if read else tree
+        found = verbs.run(again, table).classes
+        faults = [] if again == tree else ["YAML does not give the tree back"]
+        faults += [] if found == classes else ["the tree answers other classes"]
+        if has_onnx:
+            onnx = verbs.run(verbs.export(tree, "onnx").content, table).classes
+            faults += [] if onnx == found else ["ONNX answers other classes"]
+    except FuzzyTreeError as error:
+        return [str(error)]
+    return faults

@@ -1,0 +1,141 @@
+"""`fuzzytree export`: a model in another format."""
+
+from __future__ import annotations
+
+import hashlib
+
+import click
+
+from fuzzytree.cli.carriers import (
+    as_option,
+    carried,
+    conjunction_option,
+    terms_option,
+    wanted_format,
+)
+from fuzzytree.cli.talk import (
+    answer_bytes,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    say_rows,
+)
+from fuzzytree.contracts import Carrier, Written
+from fuzzytree.errors import FuzzyTreeError, LossError
+from fuzzytree.files import write_atomically
+from fuzzytree.rulebase import Conjunction, Kind
+
+
+@click.command("export", short_help="Write a model in another format.")
+@click.argument("model", metavar="MODEL")
+@click.option("-o", "--output", required=True, metavar="FILE", help="`-` is stdout.")
+@click.option("--to", metavar="FORMAT", help="The format, if not FILE's suffix says.")
+@as_option
+@terms_option
+@conjunction_option
+@click.option(
+    "--dtype",
+    type=click.Choice(["float64", "mixed", "float32"]),
+    help="onnx: the number type of the degrees.",
+)
+@click.option("--opset", type=int, help="onnx: the version of the operators.")
+@click.option("--ir", type=int, help="onnx: the version of the file.")
+@click.option(
+    "--signature",
+    type=click.Choice(["needed", "all"]),
+    help="onnx: the columns that are inputs.",
+)
+@click.option(
+    "--outputs",
+    metavar="NAMES",
+    help="onnx: some of label,rule,status,strengths, with commas.",
+)
+@click.option("--readable", is_flag=True, help="onnx: with functions of our own.")
+@click.option("--plain", is_flag=True, help="onnx: a tree without ai.onnx.ml.")
+@click.option(
+    "--allow-loss", is_flag=True, help="Write what is lost as near as it can."
+)
+@json_option
+@quiet_option
+def command(
+    model: str,
+    output: str,
+    to: str | None,
+    carrier: Carrier | None,
+    kind: Kind | None,
+    conjunction: Conjunction | None,
+    dtype: str | None,
+    opset: int | None,
+    ir: int | None,
+    signature: str | None,
+    outputs: str | None,
+    readable: bool,
+    plain: bool,
+    allow_loss: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Write a model in another format, which FILE's suffix names.
+
+    What the format cannot hold is listed, and nothing is written unless allowed.
+    """
+    from fuzzytree import verbs
+
+    given = {
+        "dtype": dtype,
+        "opset": opset,
+        "ir": ir,
+        "signature": signature,
+        "outputs": outputs.split(",") if outputs else None,
+        "readable": readable or None,
+        "plain": plain or None,
+    }
+    options = {name: value for name, value in given.items() if value is not None}
+    form = wanted_format(output, to)
+    found = carried(
+        verbs.load(model),
+        carrier=carrier,
+        kind=kind,
+        conjunction=conjunction,
+        form=form,
+    )
+    try:
+        written = verbs.export(found, form.name, allow_loss=allow_loss, **options)
+    except LossError as error:
+        text = str(error).replace("allow_loss=True", "--allow-loss")
+        raise LossError(text) from error
+    except ValueError as error:
+        if isinstance(error, FuzzyTreeError):
+            raise
+        raise click.UsageError(str(error)) from error
+    if output == "-":
+        answer_bytes(written.content)
+    else:
+        write_atomically(output, written.content)
+    _tell(written, form.name, model, output, as_json=as_json, quiet=quiet)
+
+
+def _tell(
+    written: Written, to: str, model: str, output: str, *, as_json: bool, quiet: bool
+) -> None:
+    digest = hashlib.sha256(written.content).hexdigest()
+    size = len(written.content)
+    for loss in written.losses:
+        bound = "" if loss.bound is None else f" (largest error {loss.bound:.2g})"
+        say(f"lost    {loss.where}: {loss.what}{bound}", quiet=quiet)
+    say_rows(
+        ("wrote", output, f"{to}, {size} bytes, sha256 {digest}"),
+        ("next", f"fuzzytree check {model} {output}", ""),
+        quiet=quiet or output == "-",
+    )
+    if as_json and output != "-":
+        answer_json(
+            {
+                "file": output,
+                "format": to,
+                "bytes": size,
+                "sha256": digest,
+                "losses": written.losses,
+            }
+        )

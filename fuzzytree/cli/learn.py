@@ -1,0 +1,293 @@
+"""`fuzzytree learn`: from a table to a file with a tree or its rules."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import click
+
+from fuzzytree.cli.carriers import (
+    as_option,
+    carried,
+    conjunction_option,
+    terms_option,
+    wanted_format,
+)
+from fuzzytree.cli.talk import (
+    answer_bytes,
+    answer_json,
+    delimiter_option,
+    json_option,
+    progress_bar,
+    quiet_option,
+    say_rows,
+    standard_input,
+)
+from fuzzytree.contracts import Carrier
+from fuzzytree.files import write_atomically
+from fuzzytree.rulebase import Conjunction, Kind
+
+if TYPE_CHECKING:
+    from fuzzytree.holdout import Accuracy
+    from fuzzytree.learning import Learnt, Settings
+    from fuzzytree.tables import Table
+
+
+_SETTINGS = (
+    click.option(
+        "--mode",
+        type=click.Choice(["default", "paper"]),
+        default="default",
+        show_default=True,
+        help="`paper` is the paper's learner to the letter.",
+    ),
+    click.option(
+        "--alpha", type=float, help="Weight of means in the distance, 0 to 1."
+    ),
+    click.option("--l-max", type=float, help="The paper's L_MAX."),
+    click.option("--points", type=int, help="n of the 2n + 1 points on a set, 1 to 8."),
+    click.option(
+        "--separate-sides", is_flag=True, default=None, help="Fit L and R apart."
+    ),
+    click.option(
+        "--patterns",
+        "patterns_per_class",
+        metavar="NUMBER|auto",
+        help="Patterns for each class; auto chooses class by class.",
+    ),
+    click.option("--shrinkage", type=float, help="Of off-diagonal scatter, 0 to 1."),
+    click.option("--entry", type=float, help="What a further input must gain."),
+    click.option(
+        "--cost",
+        "costs",
+        metavar="COLUMN=COST",
+        multiple=True,
+        help="What a column costs to compute (repeat).",
+    ),
+    click.option(
+        "--validate",
+        "choices",
+        type=click.Choice(["alpha", "l_max", "shrinkage", "entry"]),
+        multiple=True,
+        help="Choose this by inner validation (repeat).",
+    ),
+    click.option(
+        "--rows-per-class", type=int, help="Kept for clusters and validation."
+    ),
+    click.option(
+        "--seed", type=int, default=0, show_default=True, help="Of all folds."
+    ),
+    click.option(
+        "--keep-reversals",
+        is_flag=True,
+        default=None,
+        help="Give far tails back to a wide set.",
+    ),
+    click.option(
+        "--missing",
+        type=click.Choice(["drop", "refuse"]),
+        help="Rows with missing values.",
+    ),
+)
+"""An option for each field of `fuzzytree.learning.Settings`."""
+
+
+def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
+    for option in reversed(_SETTINGS):
+        function = option(function)
+    return function
+
+
+@click.command("learn", short_help="Learn a tree from a table.")
+@click.argument("table", metavar="TABLE")
+@click.option("--target", required=True, metavar="COLUMN", help="The classes.")
+@click.option("-o", "--output", required=True, metavar="FILE", help="`-` is stdout.")
+@click.option("--name", metavar="TEXT", help="Of the tree; TABLE's unless given.")
+@click.option(
+    "--ignore", metavar="COLUMN", multiple=True, help="Leave a column out (repeat)."
+)
+@click.option(
+    "--unit",
+    "units",
+    metavar="COLUMN=UNIT",
+    multiple=True,
+    help="The unit of a column (repeat).",
+)
+@as_option
+@terms_option
+@conjunction_option
+@click.option("--no-test", is_flag=True, help="Learn only, without the folds.")
+@delimiter_option
+@json_option
+@quiet_option
+@_with_settings
+def command(
+    table: str,
+    target: str,
+    output: str,
+    name: str | None,
+    ignore: Sequence[str],
+    units: Sequence[str],
+    carrier: Carrier | None,
+    kind: Kind | None,
+    conjunction: Conjunction | None,
+    no_test: bool,
+    delimiter: str | None,
+    as_json: bool,
+    quiet: bool,
+    **chosen: object,
+) -> None:
+    """Learn a fuzzy tree from TABLE and write it to FILE.
+
+    TABLE is CSV or Parquet, or `-` for standard input. The accuracy that is told is
+    that of trees learnt without the rows that they are tested on.
+    """
+    from fuzzytree import verbs
+    from fuzzytree.holdout import accuracy
+    from fuzzytree.tables import read_table
+
+    form = wanted_format(output, None)
+    settings = _settings(chosen)
+    found = read_table(
+        standard_input() if table == "-" else table,
+        target=target,
+        ignore=ignore,
+        delimiter=delimiter,
+        name="standard input" if table == "-" else None,
+    )
+    quiet = quiet or output == "-"
+    width = max(map(len, (found.name, output, "accuracy")))
+    say_rows(("read", found.name, _read_text(found)), width=width, quiet=quiet)
+    begin = time.perf_counter()
+    with progress_bar(quiet=quiet) as tell:
+        learnt = verbs.learn_table(
+            found,
+            name=name or ("tree" if table == "-" else Path(table).stem),
+            units=dict(_pairs("--unit", units)),
+            settings=settings,
+            progress=tell,
+        )
+        took = time.perf_counter() - begin
+        model = carried(
+            learnt.tree, carrier=carrier, kind=kind, conjunction=conjunction, form=form
+        )
+        say_rows(*_learnt_rows(learnt, took), width=width, quiet=quiet)
+        tested = (
+            None
+            if no_test
+            else accuracy(found, settings, seed=settings.seed, progress=tell)
+        )
+    say_rows(
+        ("tested", "accuracy", _tested_text(tested)),
+        width=width,
+        quiet=quiet or no_test,
+    )
+    content = verbs.export(model, form.name).content
+    if output == "-":
+        answer_bytes(content)
+        return
+    write_atomically(output, content)
+    data = "" if table == "-" else f" --data {table}"
+    say_rows(
+        ("wrote", output, f"next: fuzzytree check {output}{data}"),
+        width=width,
+        quiet=quiet,
+    )
+    if as_json:
+        answer_json(_facts(found, learnt, tested, output))
+
+
+def _settings(chosen: Mapping[str, object]) -> Settings:
+    """Return the settings of the options that were given."""
+    from fuzzytree.learning import Settings
+
+    given = {name: value for name, value in chosen.items() if value is not None}
+    given["costs"] = {
+        column: _parsed("--cost", column, text, float)
+        for column, text in _pairs("--cost", cast("Sequence[str]", chosen["costs"]))
+    }
+    patterns = given.get("patterns_per_class")
+    if isinstance(patterns, str) and patterns != "auto":
+        number = _parsed("--patterns", "NUMBER|auto", patterns, int)
+        given["patterns_per_class"] = number
+    try:
+        return Settings(**given)  # type: ignore[arg-type] # options have its types
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:
+    pairs: list[tuple[str, str]] = []
+    for text in texts:
+        column, equals, value = text.rpartition("=")
+        if not (column and equals):
+            raise click.UsageError(f"{option} {text!r}: is not COLUMN=...")
+        pairs.append((column, value))
+    return pairs
+
+
+def _parsed(
+    option: str, name: str, text: str, kind: Callable[[str], int | float]
+) -> int | float:
+    try:
+        return kind(text)
+    except ValueError as error:
+        raise click.UsageError(f"{option} {name}: {text!r} is no number") from error
+
+
+def _facts(
+    table: Table, learnt: Learnt, tested: Accuracy | None, output: str
+) -> dict[str, object]:
+    import msgspec
+
+    from fuzzytree.rulebase import fingerprint
+
+    return {
+        "file": output,
+        "fingerprint": fingerprint(learnt.tree),
+        "rows": len(table.codes),
+        "columns": table.columns,
+        "classes": table.classes,
+        "missing_cells": table.missing,
+        "rows_without_class": table.unlabelled,
+        "inputs": learnt.tree.inputs,
+        "leaves": len(learnt.tree.leaves),
+        "accuracy": None if tested is None else tested.mean,
+        "folds": None if tested is None else tested.folds,
+        "report": msgspec.to_builtins(learnt.report),
+    }
+
+
+def _read_text(table: Table) -> str:
+    from fuzzytree.report.text import counted
+
+    text = (
+        f"{counted(len(table.codes), 'row')}, {counted(len(table.columns), 'column')}, "
+        f"{counted(len(table.classes), 'class', 'classes')}"
+    )
+    odd = [
+        f"{table.missing} missing cells" if table.missing else "",
+        f"{table.unlabelled} rows without a class left out" if table.unlabelled else "",
+    ]
+    shown = ", ".join(filter(None, odd))
+    return f"{text} ({shown})" if shown else text
+
+
+def _tested_text(found: Accuracy | None) -> str:
+    if found is None:
+        return "too few rows for a test"
+    span = f"{min(found.folds):.3f} to {max(found.folds):.3f}"
+    part = f" on {found.rows} of {found.of} rows" if found.rows < found.of else ""
+    return f"{found.mean:.3f} ({len(found.folds)} folds{part}: {span})"
+
+
+def _learnt_rows(learnt: Learnt, seconds: float) -> list[tuple[str, str, str]]:
+    from fuzzytree.report.text import counted, depth
+
+    tree = learnt.tree
+    size = f"depth {depth(tree)}, {len(tree.inputs)} of {len(tree.columns)} columns"
+    leaves = counted(len(tree.leaves), "leaf", "leaves")
+    return [("learnt", leaves, f"{size}, {seconds:.2f} s")]

@@ -1,0 +1,233 @@
+"""`fuzzytree run`: the answers to the rows of a table, piece by piece."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import itertools
+import json
+import sys
+from collections.abc import Callable, Generator, Sequence
+from typing import TYPE_CHECKING, BinaryIO, TextIO
+
+import click
+
+from fuzzytree.cli.talk import (
+    delimiter_option,
+    quiet_option,
+    say_rows,
+    standard_input,
+)
+from fuzzytree.errors import FuzzyTreeError, TableError
+from fuzzytree.files import open_atomically
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.answers import Answers, By
+    from fuzzytree.contracts import Model
+    from fuzzytree.runtimes.onnxruntime import OnnxModel
+    from fuzzytree.tables import Batch
+
+Columns = dict[str, Sequence[object]]
+
+
+@click.command("run", short_help="Answer the rows of a table.")
+@click.argument("model", metavar="MODEL")
+@click.argument("table", metavar="TABLE")
+@click.option(
+    "-o", "--output", default="-", metavar="FILE", help="CSV; stdout if none."
+)
+@click.option(
+    "--strengths",
+    type=click.Choice(["class", "rule"]),
+    help="Add a column of strengths for each class or rule.",
+)
+@click.option("--why", is_flag=True, help="Add the rule that won, with its degrees.")
+@click.option(
+    "--keep", is_flag=True, help="Add the columns of TABLE, before the others."
+)
+@click.option(
+    "--runtime", metavar="NAME", help="What executes the model; native if none."
+)
+@delimiter_option
+@click.option("--json", "as_json", is_flag=True, help="Write JSON lines, not CSV.")
+@quiet_option
+def command(
+    model: str,
+    table: str,
+    output: str,
+    strengths: By | None,
+    why: bool,
+    keep: bool,
+    runtime: str | None,
+    delimiter: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Answer the rows of TABLE: a class, a rule number and a status for each.
+
+    MODEL is a YAML or ONNX file; TABLE is CSV or Parquet, or `-` for standard input.
+    Columns are found by name. Rule numbers count from 1; 0 is no rule.
+    """
+    from fuzzytree import verbs
+
+    found = verbs.opened(model)
+    reason = _reasons(model, found) if why else None
+    if strengths and isinstance(found, FuzzyTree):
+        found = rules_from_tree(found)
+    try:
+        answer = verbs.answering(found, runtime, with_strengths=strengths is not None)
+    except ValueError as error:
+        if isinstance(error, FuzzyTreeError):
+            raise
+        raise click.UsageError(str(error)) from error
+    source = standard_input() if table == "-" else table
+    name = "standard input" if table == "-" else table
+    tally = _Tally(_tells_ties(found))
+    with _opened(output) as stream:
+        batches = answer(source, delimiter=delimiter, name=name)
+        write = _json_writer(stream) if as_json else _csv_writer(stream)
+        for batch, answers in batches:
+            columns = _kept(batch) if keep else {}
+            _add(columns, _answered(answers, strengths, model), name)
+            if reason:
+                _add(columns, {"why": reason(batch, answers)}, name)
+            write(columns)
+            tally.add(batch, answers)
+    tally.tell(output, quiet=quiet)
+
+
+def _answered(answers: Answers, strengths: By | None, model: str) -> Columns:
+    try:
+        return answers.columns(strengths)
+    except ValueError as error:
+        raise click.UsageError(
+            f"--strengths {strengths}: {model} does not tell them; "
+            "export it with --outputs label,rule,status,strengths, "
+            "or run the YAML file"
+        ) from error
+
+
+def _kept(batch: Batch) -> Columns:
+    cells = batch.piece.cells
+    return {
+        name: column.tolist() if hasattr(column, "tolist") else column
+        for name, column in zip(batch.piece.columns, cells, strict=True)
+    }
+
+
+def _add(columns: Columns, more: Columns, name: str) -> None:
+    twice = [column for column in more if column in columns]
+    if twice:
+        raise TableError(
+            f"{name} has a column {twice[0]!r} of its own; leave out --keep, "
+            "or rename the column"
+        )
+    columns.update(more)
+
+
+def _tells_ties(model: Model | OnnxModel) -> bool:
+    if isinstance(model, FuzzyTree | RuleBase):
+        return True
+    return "status" in model.outputs
+
+
+def _reasons(
+    path: str, model: Model | OnnxModel
+) -> Callable[[Batch, Answers], list[str]]:
+    from fuzzytree.answers import reasons
+
+    if isinstance(model, FuzzyTree):
+        rules = rules_from_tree(model)
+    elif isinstance(model, RuleBase):
+        rules = model
+    else:
+        raise click.UsageError(
+            f"--why: {path} does not hold the rules in words; run the YAML file"
+        )
+    return lambda batch, answers: reasons(rules, batch.values, answers)
+
+
+@contextlib.contextmanager
+def _opened(output: str) -> Generator[TextIO]:
+    """Open the output as text; a file appears only when all rows are answered."""
+    if output == "-":
+        sys.stdout.flush()
+        with _as_text(sys.stdout.buffer) as text:
+            yield text
+        return
+    with open_atomically(output) as file, _as_text(file) as text:
+        yield text
+
+
+@contextlib.contextmanager
+def _as_text(file: BinaryIO) -> Generator[TextIO]:
+    text = io.TextIOWrapper(file, "utf-8", newline="")
+    try:
+        yield text
+        text.flush()
+    finally:
+        text.detach()  # it would close a file that is not ours to close
+
+
+def _csv_writer(stream: TextIO) -> Callable[[Columns], None]:
+    writer = csv.writer(stream, lineterminator="\n")
+    headed = itertools.count()
+
+    def write(columns: Columns) -> None:
+        if next(headed) == 0:
+            writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+    return write
+
+
+def _json_writer(stream: TextIO) -> Callable[[Columns], None]:
+    def write(columns: Columns) -> None:
+        for row in zip(*columns.values(), strict=True):
+            facts = dict(zip(columns, row, strict=True))
+            stream.write(json.dumps(facts, ensure_ascii=False) + "\n")
+
+    return write
+
+
+class _Tally:
+    """Counts what was answered, over all pieces."""
+
+    def __init__(self, tells_ties: bool) -> None:
+        self.tells_ties = tells_ties
+        self.rows = self.cells = self.extras = 0
+        self.classes: dict[str, int] = {}
+        self.statuses: dict[int, int] = {}
+
+    def add(self, batch: Batch, answers: Answers) -> None:
+        """Take the answers to a piece."""
+        self.rows += len(answers)
+        self.cells += batch.missing
+        self.extras = batch.extras
+        for name, count in answers.class_counts().items():
+            self.classes[name] = self.classes.get(name, 0) + count
+        for status in range(4):
+            self.statuses[status] = self.statuses.get(status, 0) + answers.count(status)
+
+    def tell(self, output: str, *, quiet: bool) -> None:
+        """Say on stderr what was answered and what was out of the ordinary."""
+        from fuzzytree.report.text import counted
+
+        counts = ", ".join(f"{name} {count}" for name, count in self.classes.items())
+        _, ties, uncovered, missing = (self.statuses.get(k, 0) for k in range(4))
+        tied = f"{ties} decided by the order of the rules"
+        odd = (
+            f"{tied if self.tells_ties else 'ties not told'}, {uncovered} uncovered, "
+            f"{missing} without a needed value"
+        )
+        say_rows(
+            ("answered", counted(self.rows, "row"), counts),
+            ("of them", odd, ""),
+            *([("ignored", counted(self.extras, "column"), "")] if self.extras else []),
+            *([("wrote", output, "")] if output != "-" else []),
+            quiet=quiet,
+        )

@@ -1,0 +1,99 @@
+"""What the verbs say on stderr, and what they answer on stdout."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING, BinaryIO
+
+import click
+import msgspec
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+_PATIENCE_S = 0.5  # before a bar appears
+
+quiet_option = click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print the facts as JSON to stdout."
+)
+delimiter_option = click.option(
+    "--delimiter",
+    metavar="CHARACTER",
+    help="Between the cells of a CSV file, if its first line does not tell.",
+)
+
+
+def say(text: str, *, quiet: bool = False) -> None:
+    """Write a line to stderr."""
+    if not quiet:
+        click.echo(text, err=True)
+
+
+def say_rows(*rows: tuple[str, str, str], width: int = 0, quiet: bool = False) -> None:
+    """Write lines of a verb, a thing and what is known of it, aligned."""
+    width = max([width, *(len(thing) for _, thing, facts in rows if facts)])
+    for verb, thing, facts in rows:
+        say(f"{verb:8} {thing:{width}} {facts}".rstrip(), quiet=quiet)
+
+
+def answer(text: str) -> None:
+    """Write a line to stdout."""
+    click.echo(text)
+
+
+def answer_json(facts: object) -> None:
+    """Write facts to stdout as indented JSON."""
+    raw = msgspec.json.encode(facts)
+    click.echo(msgspec.json.format(raw, indent=2).decode())
+
+
+def answer_bytes(content: bytes) -> None:
+    """Write bytes to stdout."""
+    sys.stdout.flush()
+    sys.stdout.buffer.write(content)
+    sys.stdout.buffer.flush()
+
+
+def standard_input() -> BinaryIO:
+    """Return the stream behind `-`."""
+    return sys.stdin.buffer
+
+
+@contextlib.contextmanager
+def progress_bar(*, quiet: bool = False) -> Generator[Callable[[str, float], None]]:
+    """Give a function that is told what is being done, and how far it is in [0, 1].
+
+    A bar appears on stderr, only on a terminal, and only after half a second.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda _text, _share: None
+        return
+    begin = time.monotonic()
+    bars: list[Progress] = []
+
+    def tell(text: str, share: float) -> None:
+        if not bars:
+            if time.monotonic() - begin < _PATIENCE_S:
+                return
+            bars.append(_new_bar())
+        bars[0].update(bars[0].task_ids[0], description=text, completed=share)
+
+    try:
+        yield tell
+    finally:
+        for bar in bars:
+            bar.stop()
+
+
+def _new_bar() -> Progress:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    bar = Progress(console=Console(stderr=True), transient=True)
+    bar.add_task("", total=1.0)
+    bar.start()
+    return bar

@@ -1,0 +1,488 @@
+"""What one does with fuzzytree, a function for each verb of the command line."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, cast
+
+import msgspec
+import numpy as np
+
+from fuzzytree import checking
+from fuzzytree.agreement import Agreement
+from fuzzytree.answers import Answers, answers_of, joined
+from fuzzytree.contracts import Format, Model, Run, Written
+from fuzzytree.errors import LossError, MissingExtraError, ReadError, TableError
+from fuzzytree.exporters import find_format
+from fuzzytree.files import read_bounded, write_atomically
+from fuzzytree.learning import Learnt, Settings, learn_arrays
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.tables import Batch, Table, batches, read_table
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray
+
+Carried = Model | OnnxModel | bytes | str | os.PathLike[str]
+"""A model, an ONNX file opened or as bytes, or the path of a file of either."""
+
+Option = str | int | float | bool | Sequence[str]
+Progress = Callable[[str, float], None]
+
+_BLOCK = 1 << 16  # rows answered at a time
+
+
+def learn(
+    table: object,
+    *,
+    target: str | Sequence[object] | npt.NDArray[np.generic],
+    name: str | None = None,
+    ignore: Sequence[str] = (),
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    units: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+    mode: Literal["default", "paper"] = "default",
+    alpha: float = 0.9,
+    l_max: float | None = None,
+    points: int = 3,
+    separate_sides: bool = False,
+    patterns_per_class: int | Literal["auto"] | Mapping[str, int] | None = None,
+    shrinkage: float = 1e-3,
+    entry: float = 2.0,
+    costs: Mapping[str, float] | None = None,
+    choices: tuple[Literal["alpha", "l_max", "shrinkage", "entry"], ...] = (),
+    rows_per_class: int = 20_000,
+    seed: int = 0,
+    keep_reversals: bool = False,
+    missing: Literal["drop", "refuse"] = "drop",
+) -> FuzzyTree:
+    """Learn a fuzzy tree from a table with a class for each row.
+
+    Args:
+        table: A path, a pandas, polars or arrow table, or an array of shape
+            (rows, columns).
+        target: The column of the classes, or the classes themselves.
+        name: Of the tree; the file's, or `tree`, unless given.
+        ignore: Columns to leave out.
+        columns: The names of an array's columns; x1, x2, ... unless given.
+        delimiter: Of a CSV file, if its first line does not tell.
+        units: The units of columns, by name.
+        progress: Told what is done and which share of it.
+        mode: This and all below as in `fuzzytree.learning.Settings`.
+        alpha: Weight of the difference of means in the distance.
+        l_max: The paper's L_MAX.
+        points: n of the paper's 2n + 1 points on a fuzzy set.
+        separate_sides: Whether a set's two sides are fitted apart.
+        patterns_per_class: How many patterns a class has.
+        shrinkage: How far the off-diagonal of a scatter is shrunk.
+        entry: How much a further input must help a combination.
+        costs: Cost of a column by name.
+        choices: What inner validation may choose beside the patterns.
+        rows_per_class: How many rows of a class are kept for clusters and validation.
+        seed: Moves the folds of inner validation.
+        keep_reversals: Whether a wide set gets the far tails back.
+        missing: Whether rows with missing values are dropped or refused.
+
+    Raises:
+        TableError: If a column is absent or holds text, or if there are no rows.
+        LearningError: If nothing can be learnt from the table.
+        ValueError: If a setting is out of its range.
+
+    Example:
+        >>> tree = learn(
+        ...     np.array([[1.0], [1.5], [7.0], [7.5]]),
+        ...     target=["soft", "soft", "firm", "firm"],
+        ... )
+        >>> run(tree, np.array([[2.0], [7.0]])).classes
+        ['soft', 'firm']
+    """
+    settings = Settings(
+        mode=mode,
+        alpha=alpha,
+        l_max=l_max,
+        points=points,
+        separate_sides=separate_sides,
+        patterns_per_class=patterns_per_class,
+        shrinkage=shrinkage,
+        entry=entry,
+        costs=costs or {},
+        choices=choices,
+        rows_per_class=rows_per_class,
+        seed=seed,
+        keep_reversals=keep_reversals,
+        missing=missing,
+    )
+    found = read_table(
+        table, target=target, ignore=ignore, columns=columns, delimiter=delimiter
+    )
+    return learn_table(
+        found,
+        name=name or _name_of(table),
+        units=units or {},
+        settings=settings,
+        progress=progress,
+    ).tree
+
+
+def learn_table(
+    table: Table,
+    *,
+    name: str,
+    units: Mapping[str, str],
+    settings: Settings,
+    progress: Progress | None = None,
+) -> Learnt:
+    """Learn from a table that was read, and return the report beside the tree.
+
+    Raises:
+        TableError: If a unit is given for a column that is not there.
+        LearningError: If nothing can be learnt from the table.
+    """
+    absent = [column for column in units if column not in table.columns]
+    if absent:
+        known = ", ".join(table.columns)
+        raise TableError(
+            f"a unit for {absent[0]!r}, which is no column; it has {known}"
+        )
+    learnt = learn_arrays(
+        table.values.T,
+        table.codes,
+        columns=table.columns,
+        classes=table.classes,
+        units=units,
+        settings=settings,
+        progress=progress,
+    )
+    named = msgspec.structs.replace(learnt.tree, name=name)
+    return msgspec.structs.replace(learnt, tree=named)
+
+
+def _name_of(table: object) -> str:
+    if isinstance(table, str | os.PathLike):
+        return Path(table).stem or "tree"
+    return "tree"
+
+
+def load(path: str | os.PathLike[str]) -> Model:
+    """Read a tree or a rule base from a file; the suffix names its format.
+
+    Raises:
+        ReadError: If the file cannot be read, or says something wrong; the message
+            lists all mistakes with their lines.
+    """
+    name = os.fspath(path)
+    form = _format_of(path)
+    if form.read is None:
+        raise ReadError(
+            f"{name}: a file in the format {form.name} is not read back as a model; "
+            "keep the YAML file beside it"
+        )
+    return form.read(read_bounded(path), name)
+
+
+def opened(source: Carried) -> Model | OnnxModel:
+    """Return a model as it is, and whatever a file or bytes hold ready to run.
+
+    Raises:
+        ReadError: If the file cannot be read, or is not ours.
+        MissingExtraError: If it is an ONNX file and onnxruntime is not installed.
+    """
+    match source:
+        case bytes():
+            return open_onnx(source, "the bytes")
+        case str() | os.PathLike():
+            path = cast("str | os.PathLike[str]", source)
+            if Path(path).suffix.lower() == ".onnx":
+                return open_onnx(read_bounded(path), os.fspath(path))
+            return load(path)
+        case _:
+            return source
+
+
+def _format_of(path: str | os.PathLike[str]) -> Format:
+    suffix = Path(path).suffix
+    try:
+        return find_format(suffix.lower())
+    except ValueError as error:
+        shown = f"the suffix {suffix!r}" if suffix else "no suffix"
+        raise ReadError(f"{os.fspath(path)}: has {shown}; {_known(error)}") from error
+
+
+def _known(error: ValueError) -> str:
+    return str(error).rpartition("; ")[2]
+
+
+def export(
+    model: Model, to: str = "yaml", *, allow_loss: bool = False, **options: Option
+) -> Written:
+    """Write a model in a format, as bytes.
+
+    Args:
+        model: A tree or a rule base.
+        to: The name of a format, or a suffix such as `.onnx`.
+        allow_loss: Whether to write what the format cannot hold as near as it can.
+        options: The writer's own options, such as `dtype` for onnx.
+
+    Returns:
+        The content and what was lost.
+
+    Raises:
+        LossError: If something would be lost, unless allowed.
+        MissingExtraError: If a package is missing; the message names the extra.
+        ValueError: If there is no such format or option.
+    """
+    form = find_format(to)
+    carrier = "rules" if isinstance(model, RuleBase) else "tree"
+    if carrier not in form.carries:
+        carried = " or ".join(form.carries)
+        raise LossError(
+            f"cannot write {model.name} as {form.name}: it carries {carried}, "
+            f"and this is a {'rule base' if carrier == 'rules' else 'tree'}"
+        )
+    known = [
+        name
+        for name, parameter in inspect.signature(form.write).parameters.items()
+        if parameter.kind is parameter.KEYWORD_ONLY
+    ]
+    for name in options:
+        if name not in known:
+            raise ValueError(
+                f"{form.name} has no option {name!r}; it has {', '.join(known)}"
+            )
+    # Each writer checks its own options; the protocol knows the common one alone.
+    write = cast("Callable[..., Written]", form.write)
+    return write(model, allow_loss=allow_loss, **options)
+
+
+def save(
+    model: Model,
+    path: str | os.PathLike[str],
+    *,
+    to: str | None = None,
+    allow_loss: bool = False,
+    **options: Option,
+) -> Written:
+    """Write a model to a file whole, or leave what stood there.
+
+    Args:
+        model: A tree or a rule base.
+        path: The file.
+        to: The format; the one of the suffix unless given.
+        allow_loss: As in `export`.
+        options: As in `export`.
+
+    Raises:
+        WriteError: If the file cannot be written.
+        LossError: As `export`.
+        ValueError: As `export`.
+    """
+    written = export(
+        model, to or Path(path).suffix or "yaml", allow_loss=allow_loss, **options
+    )
+    write_atomically(path, written.content)
+    return written
+
+
+def run(
+    model: Carried,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+) -> Answers:
+    """Answer the rows of a table.
+
+    Args:
+        model: The model; see `Carried`.
+        table: A path, a pandas, polars or arrow table, or an array of shape
+            (rows, columns). Columns are found by name.
+        runtime: What executes the model: `native` unless given; an ONNX file is
+            always executed by onnxruntime.
+        columns: The names of an array's columns; unless given those of the table
+            that the model was learnt from.
+        with_strengths: Whether to keep the strengths of a rule base's rules, 8 bytes
+            for each rule and row.
+
+    Raises:
+        TableError: If a column is absent or holds text.
+        MissingExtraError: If the runtime is not installed.
+        LossError: If the runtime cannot carry the model.
+        ValueError: If there is no such runtime.
+    """
+    answer = answering(opened(model), runtime, with_strengths=with_strengths)
+    return joined([found for _, found in answer(table, columns=columns)])
+
+
+class Answering(msgspec.Struct, frozen=True):
+    """A model made ready, which answers tables piece by piece.
+
+    Attributes:
+        model: The model.
+        answer: Answers to values of shape (inputs, rows).
+    """
+
+    model: Model | OnnxModel
+    answer: Callable[[FloatArray], Answers]
+
+    def __call__(
+        self,
+        table: object,
+        *,
+        columns: Sequence[str] | None = None,
+        delimiter: str | None = None,
+        name: str | None = None,
+    ) -> Iterator[tuple[Batch, Answers]]:
+        """Yield the rows of a table in batches, with the answers to them.
+
+        Raises:
+            TableError: If a column is absent or holds text.
+        """
+        for batch in batches(
+            table,
+            self.model.inputs,
+            trained=self.model.columns,
+            columns=columns,
+            delimiter=delimiter,
+            name=name,
+        ):
+            rows = batch.values.shape[1]
+            starts = range(0, max(rows, 1), _BLOCK)
+            found = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
+            yield batch, joined(found)
+
+
+def answering(
+    model: Model | OnnxModel, runtime: str | None = None, *, with_strengths: bool = True
+) -> Answering:
+    """Make a model ready to answer.
+
+    Raises:
+        MissingExtraError: If the runtime is not installed.
+        LossError: If the runtime cannot carry the model.
+        ValueError: If there is no such runtime, or another one for an ONNX file.
+    """
+    if isinstance(model, OnnxModel):
+        return _answering_onnx(model, runtime, with_strengths=with_strengths)
+    execute = _loaded(model, runtime or "native")
+    if isinstance(model, RuleBase):
+        ends = [rule.then for rule in model.rules]
+    else:
+        ends = [leaf.label for leaf in model.leaves]
+
+    def answer(values: FloatArray) -> Answers:
+        return answers_of(
+            execute(np.ascontiguousarray(values)),
+            choices=model.classes,
+            ends=ends,
+            semantics=model.semantics,
+            with_strengths=with_strengths,
+        )
+
+    return Answering(model, answer)
+
+
+def _answering_onnx(
+    model: OnnxModel, runtime: str | None, *, with_strengths: bool
+) -> Answering:
+    if runtime is not None:
+        raise ValueError(
+            f"runtime {runtime!r}: an ONNX file runs in onnxruntime; "
+            "other runtimes need the YAML file"
+        )
+    label = model.labels
+    if label is None:
+        raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
+    position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
+
+    def answer(values: FloatArray) -> Answers:
+        outcome = model.run(values)
+        return Answers(
+            model.classes,
+            np.array([position.get(name, -1) for name in label(values)], np.int64),
+            outcome.rule,
+            outcome.status,
+            strengths=outcome.strengths if with_strengths else None,
+        )
+
+    return Answering(model, answer)
+
+
+def _loaded(model: Model, name: str) -> Run:
+    runtime = find_runtime(name)
+    carrier = "rules" if isinstance(model, RuleBase) else "tree"
+    if carrier not in runtime.runs:
+        raise LossError(
+            f"cannot run {model.name} in {name}: it runs "
+            f"{' or '.join(runtime.runs)}, not a {carrier}"
+        )
+    if not is_installed(runtime):
+        raise MissingExtraError(
+            f"the runtime {name!r} needs the extra {runtime.extra!r}: "
+            f"pip install 'fuzzytree-toolkit[{runtime.extra}]'"
+        )
+    return runtime.load(model)
+
+
+def check(
+    model: Model | str | os.PathLike[str],
+    *others: Carried,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    names: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    limit: int = 20_000,
+) -> Agreement:
+    """Compare a model with everything that is made of it, in every runtime.
+
+    Args:
+        model: A tree or a rule base, or the path of one.
+        others: What was shipped beside it: models, ONNX files opened or as bytes, or
+            paths.
+        data: A table with rows of one's own, beside the probes.
+        columns: The names of an array's columns.
+        names: What to call each of the others; its path unless given.
+        runtimes: The names of the runtimes; all that are installed unless given.
+        limit: The most probes.
+
+    Raises:
+        ReadError: If a file cannot be read.
+        TableError: If a column is absent or holds text.
+        ValueError: If a runtime is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> check(random_tree(1), runtimes=["native"], limit=100).ok
+        True
+    """
+    first = load(model) if isinstance(model, str | os.PathLike) else model
+    titles = [
+        names[k] if k < len(names) else _title(other, k)
+        for k, other in enumerate(others)
+    ]
+    values = None
+    if data is not None:
+        found = batches(data, first.inputs, trained=first.columns, columns=columns)
+        values = np.hstack([batch.values for batch in found])
+    return checking.check(
+        first,
+        *map(opened, others),
+        data=values,
+        names=titles,
+        runtimes=runtimes,
+        limit=limit,
+    )
+
+
+def _title(other: Carried, position: int) -> str:
+    if isinstance(other, str | os.PathLike):
+        return os.fspath(other)
+    return f"file {position + 1}"
