@@ -48,7 +48,9 @@ def prove(
     try:
         session = open_session(content)
         table = [[row.get(name, 0.0) for name in columns] for row in rows]
-        values = np.array(table, kind).reshape(len(rows), len(columns))
+        with np.errstate(over="ignore"):  # beyond float32 is missing in float32
+            values = np.array(table, np.float64).astype(kind)
+        values = values.reshape(len(rows), len(columns))
         found = session(names, values)
     except RUNTIME_ERRORS as error:
         raise LossError(

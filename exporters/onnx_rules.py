@@ -322,7 +322,7 @@ def _clauses(
         if len(found) == 2
     }
     flat = [[part for c in when for part in pairs.get(c, (c,))] for when in rules]
-    if _cost(flat) > _cost(rules) + 3 * len(pairs) + table.count + 20:
+    if _cost(flat) > _cost(rules) + 3 * len(pairs) + 20:
         pairs = {}
     single = [clause for clause in clauses if clause not in pairs]
     joined = dict.fromkeys((c.variable, term) for c in single for term in c.terms)

@@ -1,0 +1,212 @@
+"""How fast the ONNX graphs are, beside the floor of a session call.
+
+Multiway trees of cubic memberships, each node with sets of its own, as in the study
+that set the figures to beat (there without a guard for missing values). All numbers of
+a line come from one process; the columns are interleaved and minima are shown.
+
+    python benchmarks/onnx_speed.py
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import random
+import time
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+import onnxruntime
+from onnx import TensorProto, helper
+
+from fuzzytree.contracts import Dtype
+from fuzzytree.exporters.onnx import write
+from fuzzytree.exporters.onnx_graph import Sheet
+from fuzzytree.exporters.onnx_session import open_session
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.rulebase import Band, Flank, Term, Variable
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+
+COLUMNS = tuple(f"x{number}" for number in range(1, 12))
+TARGETS = {7: (12.1, 38.5), 100: (22.0, 708.0), 1000: (118.0, 10_700.0)}
+"""Microseconds for one row and nanoseconds for a row of a batch: f32 clip slots."""
+
+CHUNKS = (64, 128, 256, 512, 1024, 4096, 16384)
+LARGEST = 2_000_000  # rows times leaves: 30 kB a row at 1000 leaves
+SECONDS = 0.25
+
+
+def multiway_tree(leaves: int, seed: int = 0) -> FuzzyTree:
+    """Return a tree of three to six branches a node, balanced in size, cubic flanks."""
+    chance = random.Random(seed)
+    nodes: list[Node] = []
+    terms: dict[str, list[Term]] = {name: [] for name in COLUMNS}
+    ends: list[Leaf] = []
+
+    def grow(size: int) -> tuple[str, int]:
+        if size == 1:
+            ends.append(Leaf(f"class {len(ends) % 3 + 1}"))
+            return "leaf", len(ends)
+        number = len(nodes)
+        nodes.append(Node(COLUMNS[0], (), (), ()))
+        count = min(size, chance.randint(3, 6))
+        name = chance.choice(COLUMNS)
+        cuts = sorted(chance.gauss(0.0, 1.0) for _ in range(count - 1))
+        names = [f"{number} {position}" for position in range(count)]
+        bounds = zip((None, *cuts), (*cuts, None), strict=True)
+        for text, (low, high) in zip(names, bounds, strict=True):
+            terms[name].append(Term(text, _band(low, high)))
+        share = [size // count + (i < size % count) for i in range(count)]
+        ways = [grow(part) for part in share]
+        branches = tuple(
+            Branch((text,), (), **{kind: way})
+            for text, (kind, way) in zip(names, ways, strict=True)
+        )
+        nodes[number] = Node(name, tuple(cuts), tuple(range(count)), branches)
+        return "node", number + 1
+
+    grow(leaves)
+    variables = tuple(Variable(name, tuple(terms[name])) for name in COLUMNS)
+    classes = ("class 1", "class 2", "class 3")
+    return FuzzyTree(
+        f"multiway {leaves}",
+        classes,
+        variables,
+        tuple(nodes),
+        tuple(ends),
+        columns=COLUMNS,
+    )
+
+
+def _band(low: float | None, high: float | None) -> Band:
+    curve = (0.0, 3.0, -2.0)
+    left = None if low is None else Flank(low, low - 0.5, curve)
+    right = None if high is None else Flank(high, high + 0.5, curve)
+    return Band(low, high, left, right)
+
+
+def fastest(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
+    """Return the shortest time of each call in seconds, taken in turns."""
+    best = dict.fromkeys(calls, float("inf"))
+    for call in calls.values():
+        call()
+    end = time.perf_counter() + SECONDS * len(calls)
+    while time.perf_counter() < end:
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call()
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best
+
+
+def _call(content: bytes, output: str, rows: int, kind: type) -> Callable[[], object]:
+    session = open_session(content)
+    values: npt.NDArray[np.generic]
+    values = np.random.default_rng(0).normal(size=(rows, len(COLUMNS))).astype(kind)
+    return lambda: session([output], values)
+
+
+def floor(rows: int) -> Callable[[], object]:
+    """Return a call of a session that copies its input."""
+    shape: list[str | int | None] = ["rows", len(COLUMNS)]
+    graph = helper.make_graph(
+        [helper.make_node("Identity", ["inputs"], ["same"])],
+        "floor",
+        [helper.make_tensor_value_info("inputs", TensorProto.FLOAT, shape)],
+        [helper.make_tensor_value_info("same", TensorProto.FLOAT, shape)],
+    )
+    made = helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8
+    )
+    return _call(made.SerializeToString(), "same", rows, np.float32)
+
+
+def study_graph(tree: FuzzyTree) -> bytes:
+    """Return the study's own graph for the same memberships: `f32 clip slots [M,N]`.
+
+    Smoothsteps on clipped ramps, one `Gather` for each clause position, `Min`,
+    `ArgMax`; reciprocals, no cap below 1, no guard: faster operations, other bits.
+    """
+    rules = rules_from_tree(tree)
+    sheet = Sheet(17)
+    terms = [(v.name, t.name, t.shape) for v in rules.variables for t in v.terms]
+    number = {(v, t): row for row, (v, t, _) in enumerate(terms)}
+    block = sheet.node("Transpose", "inputs", perm=[1, 0])
+    value = sheet.take(block, [COLUMNS.index(name) for name, _, _ in terms])
+    sides: list[str] = []
+    for side in ("left", "right"):
+        flanks = [getattr(shape, side) for _, _, shape in terms]
+        starts = [flank.end if flank else -1e9 for flank in flanks]
+        rates = [1 / (flank.start - flank.end) if flank else 1.0 for flank in flanks]
+        u = sheet.node("Sub", value, _column(sheet, starts))
+        u = sheet.node("Mul", u, _column(sheet, rates))
+        u = sheet.node("Clip", u, _number(sheet, 0.0), _number(sheet, 1.0))
+        rest = sheet.node("Mul", u, _number(sheet, 2.0))
+        rest = sheet.node("Sub", _number(sheet, 3.0), rest)
+        sides.append(sheet.node("Mul", sheet.node("Mul", u, u), rest))
+    degrees = sheet.node("Min", *sides)
+    paths = [[number[c.variable, c.terms[0]] for c in r.when] for r in rules.rules]
+    slots = [
+        sheet.take(degrees, [path[min(k, len(path) - 1)] for path in paths])
+        for k in range(max(map(len, paths)))
+    ]
+    sheet.node("ArgMax", sheet.node("Min", *slots), named="rule", axis=0, keepdims=0)
+    shape: list[str | int | None] = ["rows", len(COLUMNS)]
+    graph = helper.make_graph(
+        sheet.nodes,
+        "study",
+        [helper.make_tensor_value_info("inputs", TensorProto.FLOAT, shape)],
+        [helper.make_tensor_value_info("rule", TensorProto.INT64, ["rows"])],
+        sheet.tensors,
+    )
+    made = helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8
+    )
+    content: bytes = made.SerializeToString()
+    return content
+
+
+def _column(sheet: Sheet, values: list[float]) -> str:
+    return sheet.constant(np.array(values, np.float32).reshape(-1, 1), "column")
+
+
+def _number(sheet: Sheet, value: float) -> str:
+    return sheet.constant(np.array(value, np.float32), "number")
+
+
+def main() -> None:
+    """Print one table for rules and trees of each size."""
+    load = ", ".join(f"{value:.2f}" for value in os.getloadavg())
+    print(
+        f"onnxruntime {onnxruntime.__version__}, numpy {np.__version__}, "
+        f"Python {platform.python_version()}, load {load}"
+    )
+    print(f"{'':26}{'one row':>9}  {'x floor':>8}  batch, ns a row, by rows a call")
+    print(f"{'':26}{'us':>9}  {'':>8}  " + "".join(f"{rows:>8}" for rows in CHUNKS))
+    for leaves, (one, batch) in TARGETS.items():
+        print(f"{leaves} leaves; to beat in float32: {one} us, {batch} ns a row")
+        tree = multiway_tree(leaves)
+        _line("  study float32", study_graph(tree), "float32", leaves)
+        dtypes: tuple[Dtype, ...] = ("float32", "mixed", "float64")
+        for dtype in dtypes:
+            for what, model in (("rules", rules_from_tree(tree)), ("tree", tree)):
+                made = write(
+                    model, dtype=dtype, signature="all", outputs=("rule",), verify=False
+                )
+                _line(f"  {what} {dtype}", made.content, dtype, leaves)
+
+
+def _line(title: str, content: bytes, dtype: Dtype, leaves: int) -> None:
+    kind = np.float32 if dtype == "float32" else np.float64
+    sizes = [n for n in CHUNKS if n * leaves <= LARGEST]
+    # One row is measured apart: large calls would throw it out of the cache.
+    best = fastest({"floor": floor(1), "1": _call(content, "rule", 1, kind)})
+    one = best["1"]
+    best |= fastest({str(n): _call(content, "rule", n, kind) for n in sizes})
+    batch = "".join(f"{best[str(rows)] / rows * 1e9:>8.0f}" for rows in sizes)
+    print(f"{title:26}{one * 1e6:>9.1f}  {one / best['floor']:>8.1f}  {batch}")
+
+
+if __name__ == "__main__":
+    main()
