@@ -248,7 +248,7 @@ def _model_proto(
         ir_version=ir,
         functions=list(sheet.functions.values()),
         producer_name="fuzzytree",
-        producer_version=_version(),
+        producer_version=version(),
         doc_string=_in_words(model, dtype),
     )
     facts = _facts(model, dtype, columns, outputs)
@@ -297,7 +297,7 @@ def _facts(
     kind = "descent" if isinstance(model, FuzzyTree) else model.kind or "rules"
     texts = {
         "format": FORMAT_VERSION,
-        "version": _version(),
+        "version": version(),
         "name": model.name,
         "carrier": "tree" if _is_tree(model) else "rules",
         "kind": kind,
@@ -342,7 +342,8 @@ def _in_words(model: Model, dtype: Dtype) -> str:
     return f"{what} Missing and infinite values give {answer}. Numbers: {dtype}."
 
 
-def _version() -> str:
+def version() -> str:
+    """Return the version of fuzzytree that is installed, or `uninstalled`."""
     try:
         return importlib.metadata.version("fuzzytree-toolkit")
     except importlib.metadata.PackageNotFoundError:

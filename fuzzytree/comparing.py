@@ -80,7 +80,7 @@ class Answers(msgspec.Struct, frozen=True):
 
 
 def compare_bits(found: Answers, expected: Answers, rows: Rows) -> Comparison:
-    """Demand equal rule numbers, statuses and strengths (where both have them)."""
+    """Demand equal rules, classes, statuses, and strengths where both have them."""
     gap = strength_gap(found.outcome, expected.outcome)
     return _compared(found, expected, rows, _unequal(found, expected) | (gap > 0), gap)
 
@@ -91,7 +91,8 @@ def compare_within(
     """Allow a difference of strengths, and what must follow from it, and no more.
 
     A class may differ only where the two strongest classes are at most twice the
-    allowed difference apart.
+    allowed difference apart. Rows in which 1 is allowed prove nothing and are counted
+    as such.
 
     Args:
         found: The answers of the carrier examined.
@@ -101,13 +102,16 @@ def compare_within(
             the one of the row that comes closest to it or exceeds it most.
         origin: Where the allowed differences come from.
     """
-    gap = strength_gap(found.outcome, expected.outcome)
+    is_bound = allowed < 1.0
+    gap = np.where(is_bound, strength_gap(found.outcome, expected.outcome), 0.0)
     flips = labels(found) != labels(expected)
     margin = margins(expected)
     close = np.zeros_like(flips) if margin is None else margin <= 2 * allowed
-    wrong = (gap > allowed) | (flips & ~close)
+    wrong = is_bound & ((gap > allowed) | (flips & ~close))
     worst = int(np.argmax(gap / np.maximum(allowed, 1e-300))) if gap.size else 0
     limit = float(allowed[worst]) if gap.size else 0.0
+    if not is_bound.all():
+        origin += f"; no bound in {int((~is_bound).sum())} rows"
     return _compared(found, expected, rows, wrong, gap, limit, origin)
 
 
@@ -191,6 +195,7 @@ def margins(answers: Answers) -> FloatArray | None:
 def _unequal(found: Answers, expected: Answers) -> BoolArray:
     one, two = found.outcome, expected.outcome
     unequal: BoolArray = (one.rule != two.rule) | (one.status != two.status)
+    unequal |= labels(found) != labels(expected)
     return unequal
 
 

@@ -79,10 +79,12 @@ class OnnxModel(Facts, frozen=True):
             from an uncovered row.
         labels: The file's own labels for the same values, None for "no class"; None
             in place of the function if the file has no output `label`.
+        content: The file.
     """
 
     run: Run
     labels: Callable[[FloatArray], Labels] | None
+    content: bytes
 
 
 def open_onnx(content: bytes, name: str) -> OnnxModel:
@@ -132,6 +134,7 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
         **msgspec.structs.asdict(facts),
         run=functools.partial(_run, session, facts),
         labels=functools.partial(_labels, session, facts) if has_labels else None,
+        content=content,
     )
 
 
@@ -238,7 +241,29 @@ def _chunks(
         except RUNTIME_ERRORS as error:
             text = f"onnxruntime cannot run {facts.name}: {first_line(error)}"
             raise LossError(text) from error
+        if not _is_answer(facts, found, part.shape[1]):
+            raise LossError(
+                f"{facts.name}: the ONNX file gives answers without meaning"
+            )
         yield start, found
+
+
+def _is_answer(facts: Facts, found: Outputs, rows: int) -> bool:
+    """Say whether outputs have the shapes and numbers that answers have."""
+    import numpy as np
+
+    strengths = found.get("strengths")
+    if strengths is not None and strengths.shape != (rows, facts.rules):
+        return False
+    for name, last in (("rule", facts.rules), ("status", 3)):
+        if name not in found:
+            continue
+        numbers = found[name].astype(np.int64)
+        if numbers.shape != (rows,) or rows == 0:
+            return numbers.shape == (rows,)
+        if numbers.min() < 0 or numbers.max() > last:
+            return False
+    return "label" not in found or found["label"].shape == (rows,)
 
 
 def _parsed(content: bytes, name: str) -> onnx.ModelProto:

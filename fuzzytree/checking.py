@@ -1,0 +1,502 @@
+"""Do all carriers of a model give its answers?
+
+Nothing here believes a carrier: each is loaded and run. Kinds of evidence are kept
+apart: *file* (two contents are equal), *proof* and *all cells* (statements about every
+input), *rows* (probes aimed at every clause, and the user's data: a sample, however
+well aimed) and *calls* (ways of calling that break programs).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree import cells
+from fuzzytree.agreement import Agreement, Basis, Comparison, Count
+from fuzzytree.comparing import (
+    Answers,
+    BoolArray,
+    Rows,
+    compare_answers,
+    compare_bits,
+    compare_excused,
+    compare_within,
+    labels,
+)
+from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
+from fuzzytree.errors import FuzzyTreeError, LossError
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.numerics.bounds import (
+    FLOAT32_MAX,
+    UNIT,
+    axis_errors,
+    strength_bounds,
+)
+from fuzzytree.probing import probes
+from fuzzytree.reference import Status
+from fuzzytree.rulebase import Kind, RuleBase, Variable, fingerprint
+from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+    from fuzzytree.runtimes.onnxruntime import OnnxModel
+
+GRID_LIMIT = 1 << 21
+"""The most points at which all cells are tried one by one; the proof needs no limit."""
+
+_FLOAT32_TREE = "equal answers but within float32 rounding of a cut"
+_SLOW_STEPS = 3_000_000  # degrees that a slow runtime is asked for in one comparison
+_NATIVE: Mapping[Dtype, str] = {
+    "float64": "native",
+    "mixed": "native mixed",
+    "float32": "native float32",
+}
+
+Finding = Comparison | str
+"""A comparison, or a sentence about what was skipped."""
+
+
+def check(
+    model: Model,
+    *others: Model | OnnxModel,
+    data: FloatArray | None = None,
+    names: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    limit: int = 20_000,
+) -> Agreement:
+    """Hold every carrier of a model against the model itself.
+
+    Args:
+        model: A tree or a rule base.
+        others: Carriers that were shipped with it: trees, rule bases, opened ONNX
+            files (`fuzzytree.runtimes.onnxruntime.open_onnx`).
+        data: Rows of one's own, shape (inputs, rows), in the order of `model.inputs`.
+        names: What to call each of the others; `file 1`, `file 2` unless given.
+        runtimes: The names of the runtimes to run; all that are installed if None.
+        limit: The most probes.
+
+    Returns:
+        What was compared, on what, and with which result.
+
+    Raises:
+        ValueError: If `data` is not of shape (inputs, rows), or a runtime is unknown.
+    """
+    rows = _rows(model, data, limit)
+    chosen = all_runtimes() if runtimes is None else tuple(map(find_runtime, runtimes))
+    carriers = _carriers(model, rows)
+    findings: list[Finding] = []
+    if isinstance(model, FuzzyTree):
+        findings += _equivalence(model, carriers, rows)
+    for carrier in carriers:
+        findings += _runtimes(carrier, chosen, rows)
+    for number, other in enumerate(others):
+        title = names[number] if number < len(names) else f"file {number + 1}"
+        findings += _shipped(title, other, model, rows)
+    return Agreement(
+        model.name,
+        fingerprint(model),
+        tuple(f for f in findings if isinstance(f, Comparison)),
+        tuple(map(_count, carriers)),
+        tuple(dict.fromkeys(f for f in findings if isinstance(f, str))),
+        cells.cell_count(model) if isinstance(model, FuzzyTree) else None,
+        rows.probes,
+    )
+
+
+def _rows(model: Model, data: FloatArray | None, limit: int) -> Rows:
+    made = probes(model, limit=limit)
+    width = len(model.inputs)
+    values = np.array([[row[n] for row in made] for n in model.inputs], np.float64)
+    values = values.reshape(width, len(made))
+    if data is not None:
+        if data.ndim != 2 or data.shape[0] != width:
+            raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
+        values = np.concatenate([values, data], axis=1)
+    return Rows(model.inputs, values, np.arange(values.shape[1]), len(made))
+
+
+def _native(title: str, model: Model, rows: Rows) -> Answers:
+    return Answers(title, model, find_runtime("native").load(model)(rows.values))
+
+
+def _carriers(model: Model, rows: Rows) -> tuple[Answers, ...]:
+    """Return what can be made of a model, each with the native runtime's answers."""
+    if isinstance(model, RuleBase):
+        return (_native("rules", model, rows),)
+    made = [
+        _native("tree", model, rows),
+        _native("relative rules", rules_from_tree(model), rows),
+    ]
+    if model.sets:
+        made.append(_native("raw rules", rules_from_tree(model, "raw"), rows))
+    return tuple(made)
+
+
+def _equivalence(
+    tree: FuzzyTree, carriers: Sequence[Answers], rows: Rows
+) -> Iterator[Finding]:
+    """Show that the relative rules are the tree, and how far the raw rules are not."""
+    path, relative, *raw = carriers
+    faults = tuple(cells.node_faults(tree))
+    points = sum(map(len, map(cells.node_points, tree.nodes)))
+    yield _counted("proof", relative.title, path.title, points, faults)
+    size = cells.grid_size(tree)
+    if size <= GRID_LIMIT:
+        yield _all_cells(tree, relative.title, path.title, size)
+    else:
+        yield f"all cells one by one ({size:.3g} points): the proof covers them"
+    yield compare_bits(relative, path, rows)
+    for other in raw:
+        yield compare_answers(other, path, rows, by_design=True)
+
+
+def _all_cells(tree: FuzzyTree, carrier: str, against: str, size: int) -> Comparison:
+    free = cells.free_axes(tree)
+    native = find_runtime("native")
+    descend, fire = native.load(free), native.load(rules_from_tree(free))
+    faults: list[str] = []
+    for points in cells.grid(tree):
+        path, fired = descend(points), fire(points)
+        for row in np.flatnonzero(path.rule != fired.rule).tolist():
+            values = zip(free.inputs, points[:, row].tolist(), strict=True)
+            where = ", ".join(f"{name} {value!r}" for name, value in values)
+            faults.append(f"{where}: leaf {path.rule[row]}, rule {fired.rule[row]}")
+    return _counted("all cells", carrier, against, size, tuple(faults))
+
+
+def _runtimes(
+    carrier: Answers, runtimes: Sequence[Runtime], rows: Rows
+) -> Iterator[Finding]:
+    """Run one carrier in every runtime that can, against the native one."""
+    kind = "rules" if isinstance(carrier.model, RuleBase) else "tree"
+    bases: dict[str, Answers] = {"native": carrier}
+    for runtime in runtimes:
+        if kind not in runtime.runs:
+            continue
+        title = f"{runtime.name}: {carrier.title}"
+        if not is_installed(runtime):
+            yield f"{runtime.name} is not installed (extra {runtime.extra!r})"
+            continue
+        try:
+            run = runtime.load(carrier.model)
+        except LossError as error:
+            yield f"{title}: {error}"
+            continue
+        step = _stride(carrier.model, rows) if runtime.is_slow else 1
+        some = rows.every(step)
+        found = Answers(title, carrier.model, run(some.values))
+        if runtime.name != "native":
+            base = _base(runtime, carrier, bases, rows)
+            yield _held(runtime, found, base.every(step), some)
+        yield _calls(title, run, some)
+
+
+def _base(
+    runtime: Runtime, carrier: Answers, bases: dict[str, Answers], rows: Rows
+) -> Answers:
+    """Return what a runtime is held against: the native one of its number type."""
+    name = _NATIVE[runtime.dtype]
+    is_rules = isinstance(carrier.model, RuleBase)
+    if runtime.bound is not None or runtime.name == name or not is_rules:
+        return carrier
+    if name not in bases:
+        run = find_runtime(name).load(carrier.model)
+        bases[name] = Answers(
+            f"{name}: {carrier.title}", carrier.model, run(rows.values)
+        )
+    return bases[name]
+
+
+def _held(runtime: Runtime, found: Answers, base: Answers, rows: Rows) -> Comparison:
+    """Hold a runtime's answers against its base by the contract that fits."""
+    model = found.model
+    if runtime.bound is not None:
+        bound, origin = runtime.bound(model)
+        allowed = np.full(rows.numbers.shape, bound)
+        return compare_within(found, base, rows, allowed=allowed, origin=origin)
+    if isinstance(model, FuzzyTree):
+        if runtime.dtype == "float32":
+            excused = _rounds_across(model, rows)
+            return compare_excused(
+                found, base, rows, excused=excused, origin=_FLOAT32_TREE
+            )
+    elif runtime.name in _NATIVE.values():
+        allowed, origin = strength_bounds(model, runtime.dtype, rows.values)
+        return compare_within(found, base, rows, allowed=allowed, origin=origin)
+    return compare_bits(found, base, rows)
+
+
+def _rounds_across(tree: FuzzyTree, rows: Rows) -> BoolArray:
+    """Return the rows that float32 may put on the other side of a cut, or overflow."""
+    cuts: dict[str, set[float]] = {}
+    for node in tree.nodes:
+        cuts.setdefault(node.variable, set()).update(node.cuts)
+    near: BoolArray = np.full(rows.numbers.shape, fill_value=False)
+    near |= np.abs(rows.values).max(axis=0, initial=0.0) > FLOAT32_MAX
+    for variable in tree.variables:
+        axis = _axis(variable, rows)
+        slack = axis_errors(variable, rows.inputs, rows.values)
+        for cut in cuts.get(variable.name, ()):
+            reach = slack + 2 * UNIT * abs(cut) + 2.0**-149
+            near |= np.abs(axis - cut) <= reach
+    return near
+
+
+def _axis(variable: Variable, rows: Rows) -> FloatArray:
+    inputs = dict(zip(rows.inputs, rows.values, strict=True))
+    total: FloatArray = np.zeros(rows.values.shape[1])
+    if not variable.parts:
+        total += inputs[variable.name]
+    with np.errstate(invalid="ignore", over="ignore"):
+        for part in variable.parts:
+            total += part.weight * (inputs[part.input] - part.centre)
+    return total
+
+
+def _stride(model: Model, rows: Rows) -> int:
+    """Return which n-th rows a slow runtime gets, so that it ends in seconds."""
+    if isinstance(model, RuleBase):
+        cost = sum(len(c.terms) + 1 for rule in model.rules for c in rule.when)
+    else:
+        cost = len(model.nodes)
+    cost += sum(len(variable.parts) + 1 for variable in model.variables)
+    return -(-len(rows.numbers) // max(_SLOW_STEPS // cost, 50))
+
+
+def _calls(title: str, run: Run, rows: Rows) -> Comparison:
+    """Call a runtime in the ways that break: no row, one, other order, wrong width."""
+    width, total = rows.values.shape
+    sample = np.ascontiguousarray(rows.values[:, :: max(total // 24, 1)])
+    whole = run(sample)
+    faults = [
+        f"a row answered alone differs from the same row in a batch, {rows.name(row)}"
+        for row in range(sample.shape[1])
+        if not _is_same(run(sample[:, row : row + 1]), whole, row)
+    ]
+    if not np.array_equal(run(np.asfortranarray(sample)).rule, whole.rule):
+        faults.append("another memory order changes the answers")
+    empty = run(np.empty((width, 0)))
+    if empty.rule.shape != (0,) or empty.status.shape != (0,):
+        faults.append("no rows do not give empty answers")
+    if not _refuses(run, np.zeros((width + 1, 3))):
+        faults.append(f"{width + 1} inputs are accepted where {width} are right")
+    return _counted("calls", title, "itself", sample.shape[1] + 3, tuple(faults))
+
+
+def _refuses(run: Run, values: FloatArray) -> bool:
+    try:
+        run(values)
+    except (ValueError, FuzzyTreeError):
+        return True
+    return False
+
+
+def _is_same(one: Outcome, whole: Outcome, row: int) -> bool:
+    if one.rule[0] != whole.rule[row] or one.status[0] != whole.status[row]:
+        return False
+    if one.strengths is None or whole.strengths is None:
+        return one.strengths is whole.strengths
+    return np.array_equal(one.strengths[:, 0], whole.strengths[:, row], equal_nan=True)
+
+
+def _shipped(
+    title: str, other: Model | OnnxModel, model: Model, rows: Rows
+) -> Iterator[Finding]:
+    """Compare a file that was shipped beside a model: its content, then its answers."""
+    if isinstance(other, FuzzyTree | RuleBase):
+        yield from _shipped_model(title, other, model, rows)
+    else:
+        yield from _shipped_onnx(title, other, model, rows)
+
+
+def _shipped_model(
+    title: str, other: Model, model: Model, rows: Rows
+) -> Iterator[Finding]:
+    expected = _counterpart(other, model)
+    if expected is not None:
+        fault = first_difference(expected, other)
+        yield _counted("file", title, "the model", 1, (fault,) if fault else ())
+    if other.inputs != model.inputs:
+        fault = f"its inputs are {', '.join(other.inputs)}"
+        yield _counted("file", title, "the model's inputs", 1, (fault,))
+        return
+    found = _native(title, other, rows)
+    base = _native("the model", model if expected is None else expected, rows)
+    is_like = type(base.model) is type(other) and other.classes == model.classes
+    if is_like:
+        yield compare_bits(found, base, rows)
+    elif set(other.classes) == set(model.classes):
+        yield compare_answers(found, base, rows)
+
+
+def _shipped_onnx(
+    title: str, other: OnnxModel, model: Model, rows: Rows
+) -> Iterator[Finding]:
+    """Compare an ONNX file: what it says of itself, its graph, and its answers."""
+    if other.inputs != model.inputs or other.classes != model.classes:
+        fault = (
+            f"it decides for {', '.join(other.classes)} "
+            f"from {', '.join(other.inputs)}, which are not the model's"
+        )
+        yield _counted("file", title, "the model's facts", 1, (fault,))
+        return
+    expected = _onnx_counterpart(other, model)
+    if expected is None:
+        yield f"{title}: a tree cannot be made from rules; its classes are compared"
+    else:
+        right, stated = fingerprint(expected), other.fingerprint
+        fault = f"it states fingerprint {stated[:12]}..., and {right[:12]}... is right"
+        faults = () if stated == right else (fault,)
+        yield _counted("file", title, "the model's fingerprint", 1, faults)
+        yield from _onnx_graph(title, other, expected)
+    try:
+        if expected is not None:
+            yield _onnx_answers(title, other, expected, rows)
+        if other.labels is not None:
+            yield _onnx_labels(title, other, expected or model, rows)
+    except LossError as error:  # the file loads, but onnxruntime cannot run it
+        yield _counted("rows", title, "the model", len(rows.numbers), (str(error),))
+
+
+def _onnx_counterpart(other: OnnxModel, model: Model) -> Model | None:
+    if other.carrier == "tree":
+        return model if isinstance(model, FuzzyTree) else None
+    if isinstance(model, RuleBase):
+        return model
+    kind: Kind = "raw" if other.kind == "raw" and model.sets else "relative"
+    return rules_from_tree(model, kind, conjunction=other.semantics.conjunction)
+
+
+def _onnx_graph(title: str, other: OnnxModel, expected: Model) -> Iterator[Finding]:
+    """Compare the graph with the one that would be written now: a proof if equal."""
+    from fuzzytree.exporters.onnx_compare import graph_difference, version
+
+    fault = graph_difference(other.content, expected)
+    if fault is None or other.version == version():
+        faults = () if fault is None else (fault,)
+        yield _counted("file", title, "a freshly written graph", 1, faults)
+    else:
+        yield f"{title}: another version, {other.version}, wrote it, so only rows tell"
+
+
+def _onnx_answers(
+    title: str, other: OnnxModel, expected: Model, rows: Rows
+) -> Comparison:
+    is_tree = isinstance(expected, FuzzyTree)
+    native = find_runtime("native" if is_tree else _NATIVE[other.dtype])
+    outcome, base = other.run(rows.values), native.load(expected)(rows.values)
+    if "status" not in other.outputs:
+        outcome, base = _without_status(outcome), _without_status(base)
+    found = Answers(title, expected, outcome)
+    answers = Answers("the model", expected, base)
+    if isinstance(expected, FuzzyTree) and other.dtype == "float32":
+        excused = _rounds_across(expected, rows)
+        return compare_excused(
+            found, answers, rows, excused=excused, origin=_FLOAT32_TREE
+        )
+    return compare_bits(found, answers, rows)
+
+
+def _without_status(outcome: Outcome) -> Outcome:
+    """Keep of the statuses what a rule number tells."""
+    status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
+    return msgspec.structs.replace(outcome, status=status.astype(np.int64))
+
+
+def _onnx_labels(
+    title: str, other: OnnxModel, expected: Model, rows: Rows
+) -> Comparison:
+    """Compare the texts that a file answers with the classes of the model."""
+    assert other.labels is not None  # the caller asked
+    is_rules = isinstance(expected, RuleBase)
+    native = find_runtime(_NATIVE[other.dtype] if is_rules else "native")
+    outcome = native.load(expected)(rows.values)
+    numbers = labels(Answers(title, expected, outcome)).tolist()
+    right = [expected.classes[n] if n >= 0 else None for n in numbers]
+    excused = np.zeros(len(right), np.bool_)
+    if isinstance(expected, FuzzyTree) and other.dtype == "float32":
+        excused = _rounds_across(expected, rows)
+    faults = [
+        f"{rows.name(row)}: label {found!r} where {label!r} is right"
+        for row, (found, label) in enumerate(
+            zip(other.labels(rows.values), right, strict=True)
+        )
+        if found != label and not excused[row]
+    ]
+    return _counted("rows", title, "the model's classes", len(right), faults)
+
+
+def _counterpart(other: Model, model: Model) -> Model | None:
+    """Return what a shipped file should hold, made from the model; None: no telling."""
+    if isinstance(other, FuzzyTree):
+        return model if isinstance(model, FuzzyTree) else None
+    if isinstance(model, RuleBase):
+        return model
+    kind = other.kind or "relative"
+    if kind == "raw" and not model.sets:
+        return None
+    return rules_from_tree(model, kind, conjunction=other.semantics.conjunction)
+
+
+def first_difference(expected: msgspec.Struct, found: msgspec.Struct) -> str | None:
+    """Return where two models differ first, and how; None if they are equal.
+
+    Example:
+        >>> from fuzzytree.rulebase import Flank
+        >>> first_difference(Flank(1.0, 2.0), Flank(1.0, 3.0))
+        'end: 3.0 where 2.0 is right'
+    """
+    if expected == found:
+        return None
+    return _differ((), msgspec.to_builtins(expected), msgspec.to_builtins(found))
+
+
+def _differ(path: tuple[str, ...], expected: object, found: object) -> str | None:
+    if isinstance(expected, dict) and isinstance(found, dict):
+        for key in dict.fromkeys([*expected, *found]):
+            text = _differ((*path, str(key)), expected.get(key), found.get(key))
+            if text:
+                return text
+        return None
+    where = ", ".join(path)
+    if isinstance(expected, list | tuple) and isinstance(found, list | tuple):
+        for number, (one, two) in enumerate(zip(expected, found, strict=False), 1):
+            text = _differ((*path[:-1], f"{path[-1]} {number}"), one, two)
+            if text:
+                return text
+        if len(expected) != len(found):
+            return f"{where}: {len(found)} where {len(expected)} are right"
+        return None
+    if expected == found:
+        return None
+    return f"{where}: {found!r} where {expected!r} is right"
+
+
+def _counted(
+    basis: Basis, carrier: str, against: str, rows: int, faults: Sequence[str]
+) -> Comparison:
+    return Comparison(
+        carrier,
+        against,
+        basis,
+        rows,
+        "DISAGREES" if faults else "agrees",
+        differing=len(faults),
+        detail=tuple(faults[:5]),
+    )
+
+
+def _count(carrier: Answers) -> Count:
+    status = carrier.outcome.status
+    return Count(
+        carrier.title,
+        int(status.size),
+        *(
+            int((status == kind).sum())
+            for kind in (Status.TIE, Status.UNCOVERED, Status.MISSING)
+        ),
+    )
