@@ -56,11 +56,9 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         if self.strengths is None or not self.owners:
             return None
         owners = np.array(self.owners)
-        rows = self.strengths.shape[1]
+        nothing = self.strengths[0] * 0.0  # NaN stays NaN
         found = [
-            self.strengths[owners == k].max(axis=0)
-            if k in self.owners
-            else np.zeros(rows)
+            self.strengths[owners == k].max(axis=0) if k in self.owners else nothing
             for k in range(len(self.choices))
         ]
         return np.array(found)

@@ -250,12 +250,13 @@ def export(
     known = [
         name
         for name, parameter in inspect.signature(form.write).parameters.items()
-        if parameter.kind is parameter.KEYWORD_ONLY
+        if parameter.kind is parameter.KEYWORD_ONLY and name != "allow_loss"
     ]
     for name in options:
         if name not in known:
             raise ValueError(
-                f"{form.name} has no option {name!r}; it has {', '.join(known)}"
+                f"{form.name} has no option {name!r}; "
+                f"it has {', '.join(known) or 'none'}"
             )
     # Each writer checks its own options; the protocol knows the common one alone.
     write = cast("Callable[..., Written]", form.write)

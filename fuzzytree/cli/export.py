@@ -113,20 +113,22 @@ def command(
         answer_bytes(written.content)
     else:
         write_atomically(output, written.content)
-    _tell(written, form.name, model, output, as_json=as_json, quiet=quiet)
+    can_check = form.read is not None or form.name == "onnx"
+    after = f"fuzzytree check {model} {output}" if can_check else ""
+    _tell(written, form.name, output, after, as_json=as_json, quiet=quiet)
 
 
 def _tell(
-    written: Written, to: str, model: str, output: str, *, as_json: bool, quiet: bool
+    written: Written, to: str, output: str, after: str, *, as_json: bool, quiet: bool
 ) -> None:
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
     for loss in written.losses:
         bound = "" if loss.bound is None else f" (largest error {loss.bound:.2g})"
-        say(f"lost    {loss.where}: {loss.what}{bound}", quiet=quiet)
+        say(f"lost     {loss.where}: {loss.what}{bound}", quiet=quiet)
     say_rows(
         ("wrote", output, f"{to}, {size} bytes, sha256 {digest}"),
-        ("next", f"fuzzytree check {model} {output}", ""),
+        *([("next", after, "")] if after else []),
         quiet=quiet or output == "-",
     )
     if as_json and output != "-":

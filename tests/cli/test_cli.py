@@ -1,0 +1,142 @@
+"""The command line as a whole: help, mistakes, streams, exit codes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fuzzytree.cli import VERBS, main, run
+from fuzzytree.cli.talk import progress_bar
+from tests.cli.conftest import Call
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+HEAVY = "numpy|onnx|onnxruntime|sklearn|pandas|polars|pyarrow|narwhals|rich|yaml"
+
+
+def _python(*words: str, **more: object) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-W", "error", *words],
+        env=environment, text=True, capture_output=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import fuzzytree; dir(fuzzytree)",
+        "from fuzzytree.cli import main; main(['--help'])",
+        *(f"from fuzzytree.cli import main; main(['{v}', '--help'])" for v in VERBS),
+    ],
+)
+def test_neither_the_import_nor_help_loads_anything_heavy(code: str) -> None:
+    ask = (
+        f"{code}\nimport sys\nheavy = set('{HEAVY}'.split('|')) & set(sys.modules)\n"
+        "sys.exit(' '.join(heavy) or 0)"
+    )
+    done = _python("-c", ask)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_package_runs_as_a_program() -> None:
+    done = _python("-m", "fuzzytree", "--help")
+    assert done.returncode == 0
+    assert done.stdout.startswith("Usage: fuzzytree [OPTIONS] VERB")
+
+
+def test_every_verb_has_help(call: Call) -> None:
+    for verb in VERBS:
+        code, out, err = call(verb, "--help")
+        assert (code, err) == (0, "")
+        assert out.startswith(f"Usage: fuzzytree {verb}")
+
+
+def test_the_version_is_told(call: Call) -> None:
+    code, out, _ = call("--version")
+    assert code == 0
+    assert out.startswith("fuzzytree ")
+
+
+def test_an_unknown_verb_is_a_sentence_with_a_guess(call: Call) -> None:
+    assert call("chekc") == (
+        2,
+        "",
+        "no verb 'chekc'; there is learn, show, export, run, check, formats, doctor "
+        "(did you mean 'check'?)\n"
+        "  fuzzytree --help tells more\n",
+    )
+
+
+def test_an_unknown_option_is_a_sentence_with_a_guess(call: Call) -> None:
+    code, out, err = call("run", "a", "b", "--strenths")
+    assert (code, out) == (2, "")
+    assert err.startswith("no such option '--strenths'")
+    assert "'--strengths'" in err
+    assert err.endswith("\n  fuzzytree run --help tells more\n")
+
+
+def test_a_missing_argument_is_a_sentence(call: Call) -> None:
+    message = "missing argument 'MODEL'\n  fuzzytree run --help tells more\n"
+    assert call("run") == (2, "", message)
+
+
+def test_an_interrupt_ends_with_130(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run.command, "callback", interrupt)
+    message = "interrupted; files are as they were\n"
+    assert call("run", "a", "b") == (130, "", message)
+
+
+def test_a_reader_who_leaves_early_sees_no_traceback(folder: Path) -> None:
+    with (folder / "long.csv").open("w") as file:
+        file.write("force,slip\n" + "1,0\n" * 50_000)
+    command = (
+        f"{sys.executable} -m fuzzytree run grip.yaml long.csv --quiet | head -1; "
+        "exit ${PIPESTATUS[0]}"
+    )
+    done = subprocess.run(
+        ["bash", "-c", command],
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        text=True, capture_output=True, check=False,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("class,rule,status\n", "")
+    assert done.returncode == 141
+
+
+def test_a_bar_appears_only_on_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fuzzytree.cli.talk._PATIENCE_S", 0.0)
+    with progress_bar() as tell:
+        tell("learning", 0.5)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_bar_waits_half_a_second(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with progress_bar() as tell:
+        tell("learning", 0.5)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("fuzzytree.cli.talk._PATIENCE_S", 0.0)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress_bar() as tell:
+        tell("learning", 0.5)
+    assert "learning" in capsys.readouterr().err
+
+
+def test_main_takes_the_words_of_the_process(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", ["fuzzytree", "--version"])
+    assert main() == 0
+    assert capsys.readouterr().out.startswith("fuzzytree ")

@@ -1,0 +1,189 @@
+"""`fuzzytree export` writes other formats and says what it did."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.rulebase import Band, RuleBase, Term, Variable
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+from tests.cli.conftest import Call, grip
+
+HELP = "\n  fuzzytree export --help tells more\n"
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    pass
+
+
+def test_size_and_hash_of_the_file_are_told(call: Call) -> None:
+    code, out, err = call("export", "grip.yaml", "-o", "new.onnx")
+    content = Path("new.onnx").read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    assert (code, out) == (0, "")
+    assert err == (
+        f"wrote    new.onnx onnx, {len(content)} bytes, sha256 {digest}\n"
+        "next     fuzzytree check grip.yaml new.onnx\n"
+    )
+
+
+def test_json_tells_the_same_facts(call: Call) -> None:
+    code, out, err = call("export", "grip.yaml", "-o", "new.onnx", "--json", "--quiet")
+    content = Path("new.onnx").read_bytes()
+    assert (code, err) == (0, "")
+    assert json.loads(out) == {
+        "file": "new.onnx",
+        "format": "onnx",
+        "bytes": len(content),
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "losses": [],
+    }
+
+
+@pytest.mark.parametrize(
+    ("words", "kind", "conjunction"),
+    [
+        (("--as", "rules"), "relative", "min"),
+        (("--terms", "relative"), "relative", "min"),
+        (("--conjunction", "product"), "relative", "product"),
+    ],
+)
+def test_rules_are_made_of_a_tree(
+    call: Call, words: tuple[str, ...], kind: str, conjunction: str
+) -> None:
+    assert call("export", "grip.yaml", "-o", "new.yaml", *words)[0] == 0
+    rules = ft.load("new.yaml")
+    assert isinstance(rules, RuleBase)
+    assert (rules.kind, rules.semantics.conjunction) == (kind, conjunction)
+
+
+def test_a_tree_stays_a_tree_unless_told_otherwise(call: Call) -> None:
+    assert call("export", "grip.yaml", "-o", "new.yaml", "--as", "tree")[0] == 0
+    assert ft.load("new.yaml") == grip()
+
+
+def test_raw_rules_of_a_tree_without_sets_are_refused(call: Call) -> None:
+    assert call("export", "grip.yaml", "-o", "new.yaml", "--terms", "raw") == (
+        2,
+        "",
+        "tree 'grip' carries no fitted sets, so it has no raw rules\n",
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("rules.yaml", "-o", "x.yaml", "--as", "tree"),
+            "--as tree: grip is a rule base, and no tree can be made of it",
+        ),
+        (
+            ("rules.yaml", "-o", "x.yaml", "--terms", "raw"),
+            "--terms raw: grip is a rule base with relative; "
+            "other rules are made from the tree",
+        ),
+        (
+            ("grip.yaml", "-o", "x.yaml", "--as", "tree", "--terms", "raw"),
+            "--terms and --conjunction are for --as rules",
+        ),
+        (
+            ("grip.yaml", "-o", "x.fcl"),
+            "no format '.fcl'; there is yaml, onnx, python; name one of them with --to",
+        ),
+        (
+            ("grip.yaml", "-o", "x.yaml", "--to", "fcl"),
+            "no format 'fcl'; there is yaml, onnx, python",
+        ),
+        (
+            ("grip.yaml", "-o", "x.onnx", "--opset", "3"),
+            "opset: onnx files are written for 12 to 26, not 3",
+        ),
+        (
+            ("grip.yaml", "-o", "x.onnx", "--outputs", "label,colour"),
+            "outputs: there is label, rule, strengths, status, not 'colour'",
+        ),
+        (
+            ("grip.yaml", "-o", "x.yaml", "--dtype", "float32"),
+            "yaml has no option 'dtype'; it has none",
+        ),
+    ],
+)
+def test_what_cannot_be_had_is_one_sentence(
+    call: Call, words: tuple[str, ...], message: str
+) -> None:
+    assert call("export", *words) == (2, "", message + HELP)
+    assert not list(Path.cwd().glob("x.*"))
+
+
+def test_the_onnx_options_reach_the_file(call: Call) -> None:
+    words = ("--dtype", "mixed", "--signature", "all", "--outputs", "label,rule,status")
+    code, _, _ = call(
+        "export", "grip.yaml", "-o", "x.onnx", "--as", "rules", "--readable", *words
+    )
+    facts = json.loads(call("show", "x.onnx", "--json")[1])
+    assert code == 0
+    assert facts["dtype"] == "mixed"
+    assert facts["columns"] == ["slip", "force", "weight"]
+    assert facts["outputs"] == ["label", "rule", "status"]
+
+
+def test_a_file_can_go_to_stdout(call: Call) -> None:
+    code, out, err = call("export", "grip.yaml", "-o", "-", "--to", "yaml")
+    assert (code, err) == (0, "")
+    assert out.encode() == ft.export(grip(), "yaml").content
+
+
+def test_a_loss_is_refused_and_the_option_is_named(call: Call) -> None:
+    ft.save(_narrow(), "narrow.yaml")
+    words = ("export", "narrow.yaml", "-o", "x.onnx", "--dtype", "float32")
+    code, out, err = call(*words)
+    assert (code, out) == (2, "")
+    assert err.startswith("cannot write narrow as onnx float32: ")
+    assert err.endswith(
+        "pass --allow-loss to write it as stated, or choose dtype 'float64'\n"
+    )
+    assert not Path("x.onnx").exists()
+
+
+def test_a_loss_that_is_allowed_is_told(call: Call) -> None:
+    ft.save(_narrow(), "narrow.yaml")
+    words = ("export", "narrow.yaml", "-o", "x.onnx", "--dtype", "float32")
+    code, out, err = call(*words, "--allow-loss", "--json")
+    assert code == 0
+    assert err.startswith("lost     ")
+    assert json.loads(out)["losses"]
+
+
+def _narrow() -> FuzzyTree:
+    """Return a tree with two cuts that are one in float32."""
+    low, high = 2.0, 2.0 + 1e-12
+    terms = (
+        Term("low", Band(high=low)),
+        Term("medium", Band(low, high)),
+        Term("high", Band(low=high)),
+    )
+    ends = tuple(Branch((term.name,), leaf=k) for k, term in enumerate(terms, 1))
+    return FuzzyTree(
+        "narrow",
+        ("a", "b"),
+        (Variable("x", terms),),
+        (Node("x", (low, high), (0, 1, 2), ends),),
+        (Leaf("a"), Leaf("b"), Leaf("a")),
+    )
+
+
+def test_a_write_protected_place_keeps_the_old_file(call: Call) -> None:
+    code, _, err = call("export", "grip.yaml", "-o", "/proc/new.yaml")
+    assert code == 2
+    assert err.startswith("/proc/new.yaml: cannot be written: ")
+
+
+def test_a_full_disk_is_one_sentence(call: Call) -> None:
+    code, _, err = call("export", "grip.yaml", "-o", "/dev/full", "--to", "yaml")
+    assert code == 2
+    assert err == "/dev/full: cannot be written: no space left on device\n"

@@ -1,0 +1,132 @@
+"""`fuzzytree show` draws a tree and tells its rules."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.report.text import model_lines, shape_text
+from fuzzytree.rulebase import LR, Band, Flank, Side, fingerprint
+from fuzzytree.testing import random_tree
+from fuzzytree.tree import FuzzyTree, Leaf
+from tests.cli.conftest import Call, grip
+
+RULES = """\
+1. IF force is low THEN soft  4 rows
+2. IF force is high AND slip is none THEN loose  1 row
+3. IF force is high AND slip is much THEN firm  2 rows
+
+force, in N, 0 to 5
+  low   1 up to 2, falls to 0 at 4
+  high  1 above 2, rises from 0 at 0
+slip
+  none  1 up to 0.5, falls to 0 at 1.5
+  much  1 above 0.5, rises from 0 at -0.5
+"""
+TREE = f"""\
+grip: fuzzy tree, 2 nodes, 3 leaves, depth 2
+inputs   2 of 3 columns: force, slip
+classes  3: firm, loose, soft
+answers  missing value: no class
+
+force?
+├─ low (<= 2): soft  [1]  4 rows
+└─ high (> 2): slip?
+   ├─ none (<= 0.5): loose  [2]  1 row
+   └─ much (> 0.5): firm  [3]  2 rows
+
+{RULES}"""
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    pass
+
+
+def test_a_tree_is_drawn_with_its_rules_and_terms(call: Call) -> None:
+    assert call("show", "grip.yaml") == (0, TREE, "")
+
+
+def test_rules_are_numbered_sentences(call: Call) -> None:
+    head = (
+        "grip: relative rule base, 3 rules\n"
+        "inputs   2 of 3 columns: force, slip\n"
+        "classes  3: firm, loose, soft\n"
+        "answers  missing value: no class; no rule fires: no class; AND is min; "
+        "the first of the strongest wins\n\n"
+    )
+    assert call("show", "rules.yaml") == (0, head + RULES, "")
+
+
+def test_json_tells_the_same_facts(call: Call) -> None:
+    facts = json.loads(call("show", "grip.yaml", "--json")[1])
+    assert facts["carrier"] == "tree"
+    assert facts["fingerprint"] == fingerprint(ft.load("grip.yaml"))
+    assert facts["rules"][0] == {
+        "number": 1,
+        "text": "IF force is low THEN soft",
+        "class": "soft",
+        "rows": 4,
+    }
+    assert facts["model"]["nodes"][0]["cuts"] == [2.0]
+
+
+def test_an_onnx_file_tells_what_it_says_about_itself(call: Call) -> None:
+    code, out, _ = call("show", "grip.onnx")
+    assert code == 0
+    assert out.splitlines()[:5] == [
+        "name         grip",
+        "carrier      tree",
+        "kind         descent",
+        "dtype        float64",
+        f"fingerprint  {fingerprint(grip())}",
+    ]
+    facts = json.loads(call("show", "grip.onnx", "--json")[1])
+    assert facts["classes"] == ["firm", "loose", "soft"]
+
+
+def test_a_tree_of_one_leaf_is_one_line() -> None:
+    tree = FuzzyTree("all", ("soft",), (), (), (Leaf("soft", support=3),))
+    assert list(model_lines(tree))[4:7] == [
+        "",
+        "soft  [1]  3 rows",
+        "",
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_leaf_and_rule_of_a_tree_is_shown(seed: int) -> None:
+    tree = random_tree(seed, leaves=12)
+    shown = "\n".join(model_lines(tree))
+    for number in range(1, 13):
+        assert f"[{number}]" in shown
+        assert f"{number:2}. IF " in shown
+    for kind in ("relative", "raw"):
+        assert list(model_lines(rules_from_tree(tree, kind)))
+
+
+@pytest.mark.parametrize(
+    ("shape", "text"),
+    [
+        (Band(), "1 everywhere"),
+        (Band(low=-1.0, high=1.0), "1 from -1 to 1, 0 beyond -1, 0 beyond 1"),
+        (
+            Band(0.0, 1.0, Flank(0.0, -2.0), Flank(1.0, 3.0)),
+            "1 from 0 to 1, rises from 0 at -2, falls to 0 at 3",
+        ),
+        (
+            LR(1.0, Side(2.0, (0.5,)), Side(2.0, (0.5,))),
+            "1 at 1, spread 2 (0 from 5 spreads)",
+        ),
+        (
+            LR(1.0, Side(2.0, (0.5,)), Side(3.0, (0.5,), reach=4.0)),
+            "1 at 1, spread 2 (0 from 5 spreads) below, 3 (0 from 4 spreads) above",
+        ),
+    ],
+)
+def test_a_curve_is_told_in_words(shape: Band | LR, text: str) -> None:
+    assert shape_text(shape) == text
