@@ -1,0 +1,490 @@
+"""From a sketch over patterns to the frozen tree: sets, bands, names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.patterns import Patterns
+from fuzzytree.learning.shapes import (
+    REACH,
+    SAMPLES,
+    FittedSets,
+    SetRepairs,
+    fitted_flanks,
+    fitted_sets,
+)
+from fuzzytree.learning.sketch import Axis, Sketch, Split
+from fuzzytree.learning.statistics import grouped_moments, window_counts
+from fuzzytree.rulebase import LR, Band, Flank, Part, Side, Term, Variable
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets, interval_names
+
+ZERO_SPREAD_SHARE = 0.1
+"""A set without spread gets this share of the spread within the other patterns."""
+
+_NEAREST = 64
+_ENDED = 0.005
+_SEARCH = 65
+
+
+@dataclass(frozen=True)
+class Names:
+    """How people call the parts of the table.
+
+    Attributes:
+        tree: The tree's name.
+        columns: Of the table.
+        classes: Of the target.
+        units: By column.
+    """
+
+    tree: str
+    columns: Sequence[str]
+    classes: Sequence[str]
+    units: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """A tree and what fitting its sets repaired."""
+
+    tree: FuzzyTree
+    sets: int
+    zero_spreads: int
+    repairs: SetRepairs
+    largest_flank_error: float
+
+
+@dataclass(frozen=True)
+class _AxisSets:
+    """The sets of the patterns that are asked on one axis; `place` finds a pattern."""
+
+    axis: Axis
+    patterns: IntArray
+    place: dict[int, int]
+    fitted: FittedSets
+    zero_spreads: int
+    low: float
+    high: float
+
+
+def assembled(
+    sketch: Sketch,
+    patterns: Patterns,
+    names: Names,
+    *,
+    points: int,
+    separate_sides: bool,
+) -> Assembled:
+    """Return the frozen tree of a sketch."""
+    keys = [_key(split.axis, node) for node, split in enumerate(sketch.splits)]
+    axes = _axis_sets(sketch, keys, patterns, points, separate_sides)
+    flanks, largest = _all_flanks(sketch, keys, axes)
+    called = _axis_names(axes, names)
+    pattern_names = _pattern_names(patterns, names)
+    nodes, terms = _nodes(sketch, keys, called, flanks, pattern_names)
+    inputs = sorted({int(f) for a in axes.values() for f in a.axis.features})
+    variables = [
+        _input(feature, patterns, names, terms.get((feature, -1), ()))
+        for feature in inputs
+    ]
+    for key, found in axes.items():
+        if found.axis.is_combined:
+            variables.append(_combination(called[key], found, names, terms[key]))
+    tree = FuzzyTree(
+        name=names.tree,
+        classes=tuple(names.classes),
+        variables=tuple(variables),
+        nodes=nodes,
+        leaves=_leaves(sketch, patterns, names, pattern_names),
+        sets=tuple(_frozen_sets(called[k], a, pattern_names) for k, a in axes.items()),
+        columns=tuple(names.columns),
+    )
+    return Assembled(
+        tree,
+        sum(len(a.patterns) for a in axes.values()),
+        sum(a.zero_spreads for a in axes.values()),
+        _added([a.fitted.repairs for a in axes.values()]),
+        largest,
+    )
+
+
+_Key = tuple[int, int]
+
+
+def _key(axis: Axis, node: int) -> _Key:
+    """Return what tells axes apart: the feature, or the node of a combination."""
+    return (-1, node) if axis.is_combined else (int(axis.features[0]), -1)
+
+
+def _added(parts: Sequence[SetRepairs]) -> SetRepairs:
+    return SetRepairs(
+        **{
+            name: sum(getattr(part, name) for part in parts)
+            for name in SetRepairs.__dataclass_fields__
+        }
+    )
+
+
+def _axis_sets(
+    sketch: Sketch,
+    keys: Sequence[_Key],
+    patterns: Patterns,
+    points: int,
+    separate_sides: bool,
+) -> dict[_Key, _AxisSets]:
+    """Fit the sets of every pattern on every axis that is asked about it."""
+    asked: dict[_Key, list[IntArray]] = {}
+    axis_of: dict[_Key, Axis] = {}
+    for key, split in zip(keys, sketch.splits, strict=True):
+        asked.setdefault(key, []).extend(split.groups)
+        axis_of[key] = split.axis
+    return {
+        key: _sets_on(
+            axis_of[key],
+            np.unique(np.concatenate(groups)),
+            patterns,
+            points,
+            separate_sides,
+        )
+        for key, groups in asked.items()
+    }
+
+
+def _sets_on(
+    axis: Axis,
+    chosen: IntArray,
+    patterns: Patterns,
+    points: int,
+    separate_sides: bool,
+) -> _AxisSets:
+    members = patterns.members(chosen)
+    values = axis.values(patterns.rows[members])
+    owners = np.searchsorted(chosen, patterns.owners[members])
+    if axis.is_combined:
+        own = grouped_moments(values[:, None], owners, len(chosen))
+        means, spreads = own.means[:, 0], own.spreads[:, 0]
+        low, high = float(values.min()), float(values.max())
+        unit = 1.0
+    else:
+        feature = int(axis.features[0])
+        means = patterns.moments.means[chosen, feature]
+        spreads = patterns.moments.spreads[chosen, feature]
+        low = float(patterns.moments.lows[:, feature].min())
+        high = float(patterns.moments.highs[:, feature].max())
+        unit = float(patterns.scale[feature])
+    is_zero = ~(spreads > 0)
+    floor = np.maximum(ZERO_SPREAD_SHARE * unit, 8 * np.spacing(np.abs(means)))
+    widths = np.where(is_zero, floor, np.maximum(spreads, np.spacing(np.abs(means))))
+    counts = window_counts(values, owners, means, widths, points)
+    fitted = fitted_sets(means, widths, counts, separate_sides=separate_sides)
+    place = {int(p): k for k, p in enumerate(chosen)}
+    return _AxisSets(
+        axis, chosen, place, fitted, int(np.count_nonzero(is_zero)), low, high
+    )
+
+
+@dataclass(frozen=True)
+class _Flanked:
+    """The flanks at the cuts of one node: right[i] starts at cut i, so does left[i]."""
+
+    left: tuple[Flank, ...]
+    right: tuple[Flank, ...]
+
+
+def _all_flanks(
+    sketch: Sketch, keys: Sequence[_Key], axes: dict[_Key, _AxisSets]
+) -> tuple[list[_Flanked], float]:
+    """Fit all flanks of all nodes at once; return them and the largest fit error."""
+    starts: list[float] = []
+    ends: list[float] = []
+    ratios: list[FloatArray] = []
+    for key, split in zip(keys, sketch.splits, strict=True):
+        for cut in range(len(split.cuts)):
+            for sign in (-1, 1):
+                end, ratio = _sampled_ratio(split, axes[key], cut, sign)
+                starts.append(float(split.cuts[cut]))
+                ends.append(end)
+                ratios.append(ratio)
+    if not ratios:
+        return [], 0.0
+    curves, errors = fitted_flanks(np.array(ratios))
+    flanks = [
+        Flank(start, end, tuple(curve), error)
+        for start, end, curve, error in zip(
+            starts, ends, curves.tolist(), errors.tolist(), strict=True
+        )
+    ]
+    result: list[_Flanked] = []
+    position = 0
+    for split in sketch.splits:
+        own = flanks[position : position + 2 * len(split.cuts)]
+        position += len(own)
+        result.append(_Flanked(tuple(own[0::2]), tuple(own[1::2])))
+    return result, float(errors.max())
+
+
+def _sampled_ratio(
+    split: Split, sets: _AxisSets, cut: int, sign: int
+) -> tuple[float, FloatArray]:
+    """Return where a flank ends, and its ratio at 33 points from end to cut.
+
+    The flank with sign 1 leaves the interval below the cut upwards, with sign -1 the
+    interval above it downwards. The ratio is the branch's raw degree divided by the
+    largest degree of its siblings, taken as 1 at the cut, where it must be, and never
+    rising away from it.
+    """
+    start = float(split.cuts[cut])
+    owner = int(split.owners[cut if sign > 0 else cut + 1])
+    mine, others = _contestants(split, sets, owner, start)
+    reach = _flank_reach(split, sets, mine, cut, sign, owner)
+    far = start + sign * reach * np.linspace(0.0, 1.0, _SEARCH)
+    ratio = _ratio(sets, mine, others, far)
+    low = np.flatnonzero(ratio <= max(_ENDED, float(ratio[-1])))
+    last = max(1, int(low[0])) if len(low) else _SEARCH - 1
+    end = float(far[last])
+    if end == start:
+        end = float(np.nextafter(start, sign * np.inf))
+    points = end + (start - end) * np.linspace(0.0, 1.0, SAMPLES)
+    return end, _ratio(sets, mine, others, points[::-1])[::-1]
+
+
+def _ratio(
+    sets: _AxisSets, mine: IntArray, others: IntArray, points: FloatArray
+) -> FloatArray:
+    """Return own degree / largest other degree along points that start at a cut."""
+    own = sets.fitted.degrees(mine, points).max(axis=0)
+    rival = sets.fitted.degrees(others, points).max(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ratio = own / rival
+    ratio = np.where(rival > 0, ratio, np.where(own > 0, 1.0, 0.0))
+    first = float(ratio[0])
+    ratio = ratio / first if 0 < first < 1 else ratio
+    ratio[0] = 1.0
+    return np.minimum.accumulate(np.clip(ratio, 0.0, 1.0))
+
+
+def _contestants(
+    split: Split, sets: _AxisSets, owner: int, start: float
+) -> tuple[IntArray, IntArray]:
+    """Return the places of the owner's sets and of its siblings', the nearest ones."""
+    found: list[IntArray] = []
+    mine = split.groups[owner]
+    siblings = [g for k, g in enumerate(split.groups) if k != owner]
+    for group in (mine, np.concatenate(siblings)):
+        place = np.searchsorted(sets.patterns, group)
+        if len(place) > _NEAREST:
+            away = np.abs(sets.fitted.means[place] - start) / sets.fitted.spreads[place]
+            place = place[np.argsort(away, kind="stable")[:_NEAREST]]
+        found.append(place)
+    return found[0], found[1]
+
+
+def _flank_reach(
+    split: Split, sets: _AxisSets, mine: IntArray, cut: int, sign: int, owner: int
+) -> float:
+    """Return how far a flank may go: to the end of its sets, or of what it left."""
+    start = float(split.cuts[cut])
+    means, spreads = sets.fitted.means[mine], sets.fitted.spreads[mine]
+    reach = float((sign * (means - start) + REACH * spreads).max())
+    step = cut + sign
+    while 0 <= step < len(split.cuts):
+        beyond = step + 1 if sign > 0 else step
+        if split.owners[beyond] == owner:
+            reach = min(reach, sign * (float(split.cuts[step]) - start))
+            break
+        step += sign
+    if not reach > 0:
+        reach = ZERO_SPREAD_SHARE * float(spreads.max())
+    return max(reach, 16 * float(np.spacing(abs(start))))
+
+
+def _axis_names(axes: dict[_Key, _AxisSets], names: Names) -> dict[_Key, str]:
+    """Return the column's name, or `combination 1`, ... for combinations."""
+    called: dict[_Key, str] = {}
+    taken = set(names.columns)
+    number = 0
+    for key, found in axes.items():
+        if not found.axis.is_combined:
+            called[key] = names.columns[key[0]]
+            continue
+        number += 1
+        name = f"combination {number}"
+        while name in taken:
+            name += "'"
+        taken.add(name)
+        called[key] = name
+    return called
+
+
+def _pattern_names(patterns: Patterns, names: Names) -> list[str]:
+    """Return `class`, or `class #1`, `class #2`, ... where it has several patterns."""
+    several = np.bincount(patterns.labels, minlength=len(names.classes)) > 1
+    taken = set(names.classes)
+    result: list[str] = []
+    pairs = zip(patterns.labels.tolist(), patterns.numbers.tolist(), strict=True)
+    for label, number in pairs:
+        name = names.classes[label]
+        if several[label]:
+            name = f"{name} #{number}"
+            while name in taken:
+                name += "'"
+            taken.add(name)
+        result.append(name)
+    return result
+
+
+def _nodes(
+    sketch: Sketch,
+    keys: Sequence[_Key],
+    called: dict[_Key, str],
+    flanks: Sequence[_Flanked],
+    pattern_names: Sequence[str],
+) -> tuple[tuple[Node, ...], dict[_Key, tuple[Term, ...]]]:
+    """Return the nodes, and the relative terms of each axis."""
+    by_axis: dict[_Key, list[int]] = {}
+    for node, key in enumerate(keys):
+        by_axis.setdefault(key, []).append(node)
+    own_terms: dict[int, list[str]] = {}
+    terms: dict[_Key, tuple[Term, ...]] = {}
+    for key, numbers in by_axis.items():
+        cuts = [sketch.splits[node].cuts.tolist() for node in numbers]
+        made: dict[str, Term] = {}
+        for node, wanted in zip(numbers, interval_names(cuts), strict=True):
+            bands = _bands(sketch.splits[node], flanks[node])
+            own_terms[node] = [
+                _place_term(made, name, band)
+                for name, band in zip(wanted, bands, strict=True)
+            ]
+        terms[key] = tuple(made.values())
+    nodes = tuple(
+        _node(sketch, node, called[key], own_terms[node], pattern_names)
+        for node, key in enumerate(keys)
+    )
+    return nodes, terms
+
+
+def _place_term(made: dict[str, Term], name: str, band: Band) -> str:
+    """Add a term, under a name of its own if another one has that name."""
+    number = 1
+    unique = name
+    while unique in made and made[unique].shape != band:
+        number += 1
+        unique = f"{name} ({number})"
+    made[unique] = Term(unique, band)
+    return unique
+
+
+def _bands(split: Split, flanks: _Flanked) -> list[Band]:
+    cuts = split.cuts.tolist()
+    last = len(cuts)
+    return [
+        Band(
+            low=cuts[k - 1] if k > 0 else None,
+            high=cuts[k] if k < last else None,
+            left=flanks.left[k - 1] if k > 0 else None,
+            right=flanks.right[k] if k < last else None,
+        )
+        for k in range(last + 1)
+    ]
+
+
+def _node(
+    sketch: Sketch,
+    node: int,
+    variable: str,
+    terms: Sequence[str],
+    pattern_names: Sequence[str],
+) -> Node:
+    split = sketch.splits[node]
+    owners = [int(owner) for owner in split.owners]
+    branches: list[Branch] = []
+    for branch, child in enumerate(sketch.children[node]):
+        branches.append(
+            Branch(
+                terms=tuple(
+                    t for t, o in zip(terms, owners, strict=True) if o == branch
+                ),
+                sets=tuple(pattern_names[p] for p in np.sort(split.groups[branch])),
+                node=child + 1 if child >= 0 else None,
+                leaf=~child + 1 if child < 0 else None,
+            )
+        )
+    return Node(variable, tuple(split.cuts.tolist()), tuple(owners), tuple(branches))
+
+
+def _input(
+    feature: int, patterns: Patterns, names: Names, terms: tuple[Term, ...]
+) -> Variable:
+    name = names.columns[feature]
+    return Variable(
+        name,
+        terms,
+        names.units.get(name, ""),
+        float(patterns.moments.lows[:, feature].min()),
+        float(patterns.moments.highs[:, feature].max()),
+    )
+
+
+def _combination(
+    name: str, found: _AxisSets, names: Names, terms: tuple[Term, ...]
+) -> Variable:
+    axis = found.axis
+    parts = tuple(
+        Part(names.columns[feature], weight, centre)
+        for feature, weight, centre in zip(
+            axis.features.tolist(),
+            axis.weights.tolist(),
+            axis.centres.tolist(),
+            strict=True,
+        )
+    )
+    return Variable(name, terms, "", found.low, found.high, parts)
+
+
+def _leaves(
+    sketch: Sketch,
+    patterns: Patterns,
+    names: Names,
+    pattern_names: Sequence[str],
+) -> tuple[Leaf, ...]:
+    reached = sketch.descend(patterns.rows)
+    support = np.bincount(
+        reached, weights=patterns.row_weights, minlength=len(sketch.leaves)
+    )
+    return tuple(
+        Leaf(
+            names.classes[label],
+            " or ".join(pattern_names[p] for p in held),
+            round(float(support[leaf])),
+        )
+        for leaf, (held, label) in enumerate(
+            zip(sketch.leaves, sketch.leaf_classes, strict=True)
+        )
+    )
+
+
+def _frozen_sets(name: str, found: _AxisSets, pattern_names: Sequence[str]) -> Sets:
+    fitted = found.fitted
+    terms = tuple(
+        Term(
+            pattern_names[pattern],
+            LR(
+                mean,
+                Side(spread, tuple(left), REACH),
+                Side(spread, tuple(right), REACH),
+            ),
+        )
+        for pattern, mean, spread, left, right in zip(
+            found.patterns.tolist(),
+            fitted.means.tolist(),
+            fitted.spreads.tolist(),
+            fitted.left.tolist(),
+            fitted.right.tolist(),
+            strict=True,
+        )
+    )
+    return Sets(name, terms)

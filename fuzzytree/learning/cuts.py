@@ -1,0 +1,292 @@
+"""Where a decision changes on one axis.
+
+Between groups of patterns a cut stands where the densities of the groups cross: of the
+gaussians with the patterns' means and spreads (`crossing_cuts`), or of the rows
+themselves, smoothed (`smoothed_cuts`). A cut never lies on a value of the table.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
+
+NEGLIGIBLE = 0.01
+"""An outer interval that holds less of each of its patterns is a far reversal."""
+
+_ENVELOPE = 48
+_GRID = 256
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """Cuts on an axis and the owner of each interval.
+
+    Attributes:
+        cuts: Increasing, shape (k,).
+        owners: Shape (k + 1,); neighbours differ.
+        reversals: How many far reversals were left out.
+    """
+
+    cuts: FloatArray
+    owners: IntArray
+    reversals: int = 0
+
+
+def crossing_cuts(
+    means: FloatArray,
+    spreads: FloatArray,
+    groups: IntArray,
+    *,
+    keep_reversals: bool,
+) -> Cuts:
+    """Return where the largest gaussian density passes from group to group.
+
+    Args:
+        means: M of each pattern on the axis.
+        spreads: SD of each pattern; 0 counts as a thousandth of the axis' extent.
+        groups: The group of each pattern, from 0.
+        keep_reversals: Whether far intervals of next to no mass are kept.
+    """
+    extent = float(means.max() / 2 - means.min() / 2) + float(spreads.max())
+    floor = max(1e-3 * extent, 4 * math.ulp(float(np.abs(means).max())))
+    widths = np.maximum(spreads, floor)
+    order = np.argsort(means, kind="stable")
+    means, widths, groups = means[order], widths[order], groups[order]
+    if len(means) > _ENVELOPE:
+        points = _neighbour_crossings(means, widths, groups)
+        borders = np.flatnonzero(np.diff(groups))
+        owners = groups[np.concatenate([[0], borders + 1])]
+        return _merged(points, owners, 0)
+    points = _all_crossings(means, widths, groups)
+    inner = (points[1:] + points[:-1]) / 2
+    reach = 10.0 * widths.max()
+    first, last = (points[0], points[-1]) if len(points) else (means[0], means[-1])
+    probes = np.concatenate([[first - reach], inner, [last + reach]])
+    height = -0.5 * ((probes[:, None] - means) / widths) ** 2 - np.log(widths)
+    owners = groups[height.argmax(axis=1)]
+    cuts = _merged(points, owners, 0)
+    cuts = _with_everybody(cuts, means, widths, groups)
+    if keep_reversals:
+        return cuts
+    return _without_reversals(cuts, means, widths, groups)
+
+
+def _with_everybody(
+    cuts: Cuts, means: FloatArray, widths: FloatArray, groups: IntArray
+) -> Cuts:
+    """Fall back to neighbours in mean order where a group owns no interval."""
+    if len(np.unique(cuts.owners)) == len(np.unique(groups)):
+        return cuts
+    leaders = [np.flatnonzero(groups == g) for g in np.unique(groups)]
+    middle = np.array([means[k].mean() for k in leaders])
+    order = np.argsort(middle, kind="stable")
+    wide = np.array([widths[k].mean() for k in leaders])[order]
+    middle = middle[order]
+    tiny = 4 * np.spacing(np.abs(middle).max()) * np.arange(1, len(middle))
+    points = (middle[:-1] * wide[1:] + middle[1:] * wide[:-1]) / (wide[1:] + wide[:-1])
+    points = np.maximum.accumulate(points) + tiny
+    return Cuts(points, np.unique(groups)[order])
+
+
+def _neighbour_crossings(
+    means: FloatArray, widths: FloatArray, groups: IntArray
+) -> FloatArray:
+    left = np.flatnonzero(np.diff(groups))
+    right = left + 1
+    points = means[left] * widths[right] + means[right] * widths[left]
+    points = points / (widths[left] + widths[right])
+    return np.maximum.accumulate(points)
+
+
+def _all_crossings(
+    means: FloatArray, widths: FloatArray, groups: IntArray
+) -> FloatArray:
+    """Return every point where two densities of different groups are equal."""
+    i, j = np.nonzero(groups[:, None] < groups)
+    a = 0.5 / widths[i] ** 2 - 0.5 / widths[j] ** 2
+    gap = means[j] - means[i]
+    b = gap / widths[j] ** 2
+    c = np.log(widths[i] / widths[j]) - 0.5 * (gap / widths[j]) ** 2
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        root = np.sqrt(b * b - 4 * a * c)
+        q = -0.5 * (b + np.where(b < 0, -root, root))
+        found = np.concatenate([means[i] + q / a, means[i] + c / q])
+    return np.unique(found[np.isfinite(found)])
+
+
+def _merged(points: FloatArray, owners: IntArray, reversals: int) -> Cuts:
+    """Drop cuts within one owner, and cuts that do not increase."""
+    keep = np.flatnonzero(np.diff(owners))
+    return Cuts(points[keep], owners[np.concatenate([[0], keep + 1])], reversals)
+
+
+def _without_reversals(
+    cuts: Cuts, means: FloatArray, widths: FloatArray, groups: IntArray
+) -> Cuts:
+    """Give an outer interval of next to no mass to its inner neighbour."""
+    points, owners, reversals = cuts.cuts, cuts.owners, cuts.reversals
+    for end in (0, -1):
+        while len(points) > 1 and np.count_nonzero(owners == owners[end]) > 1:
+            mine = groups == owners[end]
+            u = (points[end] - means[mine]) / widths[mine]
+            mass = tail(-u if end == 0 else u).max()
+            if mass >= NEGLIGIBLE:
+                break
+            points = np.delete(points, end)
+            owners = np.delete(owners, end)
+            reversals += 1
+    return Cuts(points, owners, reversals)
+
+
+def tail(u: FloatArray) -> FloatArray:
+    """Return the share of a gaussian beyond u spreads, to about 1e-3."""
+    v = np.minimum(np.abs(u), 37.0)
+    upper = 0.5 * np.exp(-v * (0.717 + 0.416 * v))
+    return np.where(u >= 0, upper, 1.0 - upper)
+
+
+def smoothed_cuts(
+    values: FloatArray, is_right: BoolArray, weights: FloatArray, *, two: bool
+) -> Cuts:
+    """Return the cuts that separate two groups of rows with the least error.
+
+    The weights of both groups are counted on a grid and smoothed by a gaussian, so
+    that a cut does not follow single rows.
+
+    Args:
+        values: The rows on the axis.
+        is_right: Which rows belong to group 1; the others belong to group 0.
+        weights: Of the rows.
+        two: Whether two cuts may be placed, the outer group owning both outer
+            intervals; they must save 3 % of the smaller group's weight.
+    """
+    low, high = _robust_range(values, is_right)
+    step = (high - low) / _GRID
+    if not step > 0:
+        middle = float(np.median(values))
+        return Cuts(np.array([middle]), np.array([0, 1]))
+    place = np.clip((values - low) / step, 0, _GRID - 1).astype(np.int64)
+    signed = np.where(is_right, weights, -weights)
+    balance = np.bincount(place, weights=signed, minlength=_GRID)
+    balance = _smoothed(balance, _bandwidth(values, is_right, weights) / step)
+    gain = np.concatenate([[0.0], np.cumsum(balance)])
+    edges = low + step * np.arange(_GRID + 1)
+    rising = _best_place(-gain)
+    falling = _best_place(gain)
+    ahead, behind = gain[-1] - gain[rising], gain[falling]
+    if ahead >= behind:
+        best, position, owners = ahead, rising, [0, 1]
+    else:
+        best, position, owners = behind, falling, [1, 0]
+    single = Cuts(edges[position : position + 1], np.array(owners))
+    if not two:
+        return single
+    smaller = min(weights[is_right].sum(), weights[~is_right].sum())
+    return _two_cuts(gain, edges, best + 0.03 * smaller) or single
+
+
+def _best_place(score: FloatArray) -> int:
+    """Return the middle of the places with the largest score, ends left out."""
+    inner = score[1:-1]
+    best = np.flatnonzero(inner >= inner.max() - 1e-12 * (1 + np.abs(inner).max()))
+    runs = np.split(best, np.flatnonzero(np.diff(best) > 1) + 1)
+    longest = max(runs, key=len)
+    return int(longest[len(longest) // 2]) + 1
+
+
+def _two_cuts(gain: FloatArray, edges: FloatArray, at_least: float) -> Cuts | None:
+    """Return the best inner interval for one group, if it is good enough."""
+    best: Cuts | None = None
+    for sign, owners in ((1.0, [0, 1, 0]), (-1.0, [1, 0, 1])):
+        lows = np.minimum.accumulate(sign * gain)
+        rise = sign * gain - lows
+        stop = int(rise.argmax())
+        start = int(np.argmin(sign * gain[: stop + 1]))
+        outside = 0.0 if sign > 0 else gain[-1]
+        saved = rise[stop] + outside
+        if saved > at_least and 0 < start < stop < len(gain) - 1:
+            at_least = saved
+            best = Cuts(edges[[start, stop]], np.array(owners))
+    return best
+
+
+def _robust_range(values: FloatArray, is_right: BoolArray) -> tuple[float, float]:
+    """Return an extent of both groups that a few outliers do not widen."""
+    lows, highs = [], []
+    for group in (values[is_right], values[~is_right]):
+        if len(group) == 0:
+            continue
+        quarter, half, three = np.quantile(group, [0.25, 0.5, 0.75])
+        reach = 4.0 * max(three - quarter, 1e-6 * abs(half))
+        lows.append(max(float(group.min()), quarter - reach))
+        highs.append(min(float(group.max()), three + reach))
+    low, high = min(lows), max(highs)
+    margin = 1e-3 * (high - low)
+    return float(low - margin), float(high + margin)
+
+
+def _bandwidth(values: FloatArray, is_right: BoolArray, weights: FloatArray) -> float:
+    widths = [
+        1.06 * _robust_spread(group) * len(group) ** -0.2
+        for group in (values[is_right], values[~is_right])
+        if len(group) > 1
+    ]
+    return 0.7 * min(widths, default=0.0)
+
+
+def _robust_spread(group: FloatArray) -> float:
+    quarter, three = np.quantile(group, [0.25, 0.75])
+    spread = float((group / 2).std() * 2)
+    middle = float(three - quarter) / 1.349
+    return min(spread, middle) if middle > 0 else spread
+
+
+def _smoothed(counts: FloatArray, width: float) -> FloatArray:
+    """Return counts convolved with a gaussian of a width in grid steps."""
+    if width < 0.3:
+        return counts
+    reach = min(len(counts) - 1, int(4 * width) + 1)
+    offsets = np.arange(-reach, reach + 1)
+    kernel = np.exp(-0.5 * (offsets / width) ** 2)
+    full = np.convolve(counts, kernel / kernel.sum())
+    inner = full[reach : reach + len(counts)].copy()
+    inner[0] += full[:reach].sum()
+    inner[-1] += full[reach + len(counts) :].sum()
+    return inner
+
+
+def settled_cuts(cuts: FloatArray, values: FloatArray) -> FloatArray:
+    """Return cuts that lie between the values of the table, with few digits.
+
+    A cut keeps the rows that it has on either side; it stays a quarter of the gap
+    away from the values next to it, and takes the shortest decimal number there.
+
+    Args:
+        cuts: Increasing.
+        values: The rows on the axis, in any order.
+    """
+    ordered = np.unique(values)
+    result: list[float] = []
+    for cut in cuts.tolist():
+        k = int(np.searchsorted(ordered, cut, side="right"))
+        if 0 < k < len(ordered):
+            cut = _tidy(cut, float(ordered[k - 1]), float(ordered[k]))
+        result.append(cut)
+    return np.array(result)
+
+
+def _tidy(cut: float, low: float, high: float) -> float:
+    gap = high - low
+    if not math.isfinite(gap):
+        return cut
+    inner_low, inner_high = low + gap / 4, high - gap / 4
+    cut = min(max(cut, inner_low), inner_high)
+    for digits in range(1, 17):
+        shown = float(f"{cut:.{digits}g}")
+        if inner_low <= shown <= inner_high and low <= shown < high:
+            return shown
+    return cut if low <= cut < high else low

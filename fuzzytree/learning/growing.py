@@ -1,0 +1,289 @@
+"""The tree grows from its root: single features, then combinations, one axis a node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
+from fuzzytree.learning.combination import (
+    NodeView,
+    best_bipartition,
+    combined_axis,
+    node_view,
+    selected_features,
+)
+from fuzzytree.learning.cuts import Cuts, crossing_cuts, settled_cuts, smoothed_cuts
+from fuzzytree.learning.induction import Grouping, most_powerful, threshold
+from fuzzytree.learning.patterns import Patterns
+from fuzzytree.learning.sketch import Axis, Sketch, Split, single
+
+_CLEAN = 0.005
+_CLEAN_FACTOR = 8.0
+_NODE_ROWS = 20_000
+_SINGLES = 24
+
+
+@dataclass(frozen=True)
+class GrowthRules:
+    """What decides how a tree grows; fields as in `Settings`.
+
+    Attributes:
+        is_literal: Paper mode.
+        alpha: Weight of the means in the distance.
+        l_max: L_MAX.
+        shrinkage: Of the scatter's off-diagonals.
+        entry: Smallest partial F of a further feature.
+        costs: Per column.
+        keep_reversals: Whether far reversals keep their cut.
+    """
+
+    is_literal: bool
+    alpha: float
+    l_max: float
+    shrinkage: float
+    entry: float
+    costs: FloatArray
+    keep_reversals: bool
+
+
+@dataclass
+class Grown:
+    """A grown tree and what happened on the way.
+
+    Attributes:
+        sketch: The tree.
+        reversals: Far reversals left out.
+        inseparable: Patterns of different classes that share a leaf.
+        levels_raised: How often a level had to be passed over until T fell enough.
+    """
+
+    sketch: Sketch
+    reversals: int = 0
+    inseparable: int = 0
+    levels_raised: int = 0
+
+
+def grow(
+    patterns: Patterns,
+    rules: GrowthRules,
+    progress: Callable[[float], None] | None = None,
+) -> Grown:
+    """Return a tree with at most one leaf per pattern (steps 3 to 7)."""
+    grown = Grown(Sketch())
+    sketch = grown.sketch
+    everything = np.flatnonzero(patterns.weights > 0).astype(np.int64)
+    todo: list[tuple[IntArray, int, int, int]] = [(everything, 0, -1, 0)]
+    settled = 0
+    while todo:
+        chosen, level, parent, branch = todo.pop()
+        found = _divided(patterns, chosen, level, rules, grown)
+        if found is None:
+            place = ~len(sketch.leaves)
+            sketch.leaves.append(chosen)
+            sketch.leaf_classes.append(_leaf_class(patterns, chosen, grown))
+            settled += len(chosen)
+            if progress is not None:
+                progress(settled / len(everything))
+        else:
+            split, level = found
+            place = len(sketch.splits)
+            sketch.splits.append(split)
+            sketch.children.append([0] * len(split.groups))
+            for k in reversed(range(len(split.groups))):
+                todo.append((split.groups[k], level + 1, place, k))
+        if parent >= 0:
+            sketch.children[parent][branch] = place
+    return grown
+
+
+def _leaf_class(patterns: Patterns, chosen: IntArray, grown: Grown) -> int:
+    labels = patterns.labels[chosen]
+    if len(np.unique(labels)) > 1:
+        grown.inseparable += len(chosen)
+    totals = np.bincount(labels, weights=patterns.weights[chosen])
+    return int(totals.argmax())
+
+
+def _divided(
+    patterns: Patterns, chosen: IntArray, level: int, rules: GrowthRules, grown: Grown
+) -> tuple[Split, int] | None:
+    """Return the split of a node and the level at which it was found, or None."""
+    if len(chosen) < 2:
+        return None
+    if rules.is_literal:
+        return _literal_split(patterns, chosen, level, rules, grown)
+    labels = patterns.labels[chosen]
+    if (labels == labels[0]).all():
+        return None
+    clean = _clean_split(patterns, chosen, level, rules, grown)
+    if clean is not None:
+        return clean, level
+    split = _combined_split(patterns, chosen, rules)
+    return None if split is None else (split, level)
+
+
+def _literal_split(
+    patterns: Patterns, chosen: IntArray, level: int, rules: GrowthRules, grown: Grown
+) -> tuple[Split, int] | None:
+    """Split by one feature; while none splits, the level rises and T falls to 0."""
+    means, spreads, costs = _single_features(patterns, chosen, rules)
+    while True:
+        limits = threshold(spreads, rules.l_max, level)
+        found = most_powerful(
+            means, spreads, limits, alpha=rules.alpha, costs=costs, by_margin=False
+        )
+        if found is not None:
+            return _grouped_split(patterns, chosen, found, rules, grown), level
+        if level >= rules.l_max:
+            return None
+        level += 1
+        grown.levels_raised += 1
+
+
+def _clean_split(
+    patterns: Patterns, chosen: IntArray, level: int, rules: GrowthRules, grown: Grown
+) -> Split | None:
+    """Split by one feature whose groups are so far apart that next to no row strays."""
+    if len(chosen) < 3:
+        return None
+    means, spreads, costs = _single_features(patterns, chosen, rules)
+    limits = threshold(spreads, max(rules.l_max, level + _CLEAN_FACTOR), level)
+    found = most_powerful(
+        means, spreads, limits, alpha=1.0, costs=costs, by_margin=True
+    )
+    if found is None:
+        return None
+    split = _grouped_split(patterns, chosen, found, rules, grown)
+    members = _members(patterns, chosen)
+    branch = np.zeros(patterns.size, np.int64)
+    for number, group in enumerate(split.groups):
+        branch[group] = number
+    strays = split.branches(patterns.rows[members]) != branch[patterns.owners[members]]
+    weights = patterns.row_weights[members]
+    return split if weights[strays].sum() <= _CLEAN * weights.sum() else None
+
+
+def _single_features(
+    patterns: Patterns, chosen: IntArray, rules: GrowthRules
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    place = np.ix_(chosen, patterns.usable)
+    moments = patterns.moments
+    return moments.means[place], moments.spreads[place], rules.costs[patterns.usable]
+
+
+def _grouped_split(
+    patterns: Patterns,
+    chosen: IntArray,
+    found: Grouping,
+    rules: GrowthRules,
+    grown: Grown,
+) -> Split:
+    feature = int(patterns.usable[found.feature])
+    group_of = np.zeros(len(chosen), np.int64)
+    for number, group in enumerate(found.groups):
+        group_of[group] = number
+    cuts = crossing_cuts(
+        patterns.moments.means[chosen, feature],
+        patterns.moments.spreads[chosen, feature],
+        group_of,
+        keep_reversals=rules.keep_reversals,
+    )
+    grown.reversals += cuts.reversals
+    groups = tuple(chosen[group] for group in found.groups)
+    return finished_split(patterns, single(feature), cuts, groups)
+
+
+def finished_split(
+    patterns: Patterns, axis: Axis, cuts: Cuts, groups: tuple[IntArray, ...]
+) -> Split:
+    """Return a split whose cuts lie between the rows and increase strictly."""
+    everything = np.concatenate(groups)
+    values = axis.values(patterns.rows[_members(patterns, everything)])
+    points = settled_cuts(cuts.cuts, values)
+    for k in range(1, len(points)):
+        if points[k] <= points[k - 1]:
+            points[k] = np.nextafter(points[k - 1], np.inf)
+    return Split(axis, points, cuts.owners, groups)
+
+
+def _members(patterns: Patterns, chosen: IntArray) -> IntArray:
+    """Return sample rows of some patterns, thinned evenly if they are very many."""
+    members = patterns.members(chosen)
+    return members[:: 1 + len(members) // _NODE_ROWS]
+
+
+def _combined_split(
+    patterns: Patterns, chosen: IntArray, rules: GrowthRules
+) -> Split | None:
+    view = node_view(patterns, chosen, rules.shrinkage)
+    is_right = best_bipartition(view)
+    if is_right.all() or not is_right.any():
+        return None
+    members = _members(patterns, chosen)
+    side = np.zeros(patterns.size, bool)
+    side[chosen] = is_right
+    task = _Task(
+        patterns.rows[members],
+        side[patterns.owners[members]],
+        patterns.row_weights[members],
+    )
+    selected = selected_features(
+        view,
+        is_right,
+        rows=float(len(members)),
+        entry=rules.entry,
+        costs=rules.costs[patterns.combinable],
+    )
+    axis = combined_axis(patterns, view, is_right, selected)
+    cuts, error = _placed(axis, task)
+    for feature in _alternatives(patterns, view, is_right, error, task):
+        other = single(feature)
+        found, lower = _placed(other, task)
+        if lower < error - 0.02 * task.smaller:
+            axis, cuts, error = other, found, lower
+    groups = (chosen[~is_right], chosen[is_right])
+    return finished_split(patterns, axis, cuts, groups)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Rows to be separated."""
+
+    rows: FloatArray
+    is_right: BoolArray
+    weights: FloatArray
+
+    @property
+    def smaller(self) -> float:
+        """Return the weight of the smaller side."""
+        right = float(self.weights[self.is_right].sum())
+        return min(right, float(self.weights.sum()) - right)
+
+
+def _placed(axis: Axis, task: _Task) -> tuple[Cuts, float]:
+    values = axis.values(task.rows)
+    cuts = smoothed_cuts(values, task.is_right, task.weights, two=True)
+    taken = cuts.owners[np.searchsorted(cuts.cuts, values, side="left")]
+    return cuts, float(task.weights[taken != task.is_right].sum())
+
+
+def _alternatives(
+    patterns: Patterns,
+    view: NodeView,
+    is_right: BoolArray,
+    error: float,
+    task: _Task,
+) -> list[int]:
+    """Return single features worth a look where a combination errs much."""
+    if error <= 0.1 * task.smaller:
+        return []
+    features = patterns.combinable
+    if len(features) > _SINGLES:
+        share = view.weights / view.weights.sum()
+        step = np.abs(share[is_right] @ view.means[is_right])
+        power = np.maximum(step, np.abs(share[~is_right] @ view.means[~is_right]))
+        features = features[np.argsort(-power, kind="stable")[:_SINGLES]]
+    return [int(feature) for feature in features]

@@ -1,0 +1,308 @@
+"""From a table to a tree: all at once, or chunk by chunk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.errors import LearningError
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.assembly import Assembled, Names, assembled
+from fuzzytree.learning.findings import LearningReport
+from fuzzytree.learning.growing import Grown
+from fuzzytree.learning.patterns import Patterns
+from fuzzytree.learning.settings import Settings
+from fuzzytree.learning.statistics import Moments, Sample, Statistics
+from fuzzytree.learning.patterns import usable_features
+from fuzzytree.learning.validation import Choice, chosen_tree
+from fuzzytree.tree import FuzzyTree
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What learning gives: the tree, and what was counted on the way."""
+
+    tree: FuzzyTree
+    report: LearningReport
+
+
+def learn_arrays(
+    values: npt.NDArray[np.generic],
+    labels: Sequence[str] | npt.NDArray[np.generic],
+    *,
+    columns: Sequence[str],
+    classes: Sequence[str],
+    units: Mapping[str, str] | None = None,
+    name: str = "tree",
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+) -> Learnt:
+    """Learn a fuzzy decision tree from a table of numbers.
+
+    Args:
+        values: Shape (rows, columns), any real type and memory order; read in blocks.
+        labels: The class of each row: names out of `classes`, or their positions.
+            None, NaN, an empty name or a negative position drops the row.
+        columns: Names of the columns.
+        classes: Names of the classes, in the order of their numbers.
+        units: By column, for people.
+        name: Of the tree.
+        settings: How to learn.
+        progress: Called with what is being done and its share done, 0 to 1.
+
+    Raises:
+        ValueError: If shapes, names and labels do not fit together.
+        LearningError: If nothing can be learnt from the table.
+
+    Example:
+        >>> sizes = np.array([[1.0], [1.5], [2.0], [7.0], [7.5], [8.0]])
+        >>> kinds = ["small"] * 3 + ["big"] * 3
+        >>> found = learn_arrays(sizes, kinds, columns=["cm"], classes=["small", "big"])
+        >>> len(found.tree.leaves)
+        2
+    """
+    learner = Learner(
+        columns=columns,
+        classes=classes,
+        units=units or {},
+        name=name,
+        settings=settings or Settings(),
+    )
+    learner.partial_fit(values, labels, progress=progress)
+    return learner.finish(progress=progress)
+
+
+@dataclass
+class Learner:
+    """Learns from chunks; the tree does not depend on how the table was cut.
+
+    Attributes:
+        columns: Names of the columns.
+        classes: Names of the classes.
+        units: By column.
+        name: Of the tree.
+        settings: How to learn.
+
+    Example:
+        >>> learner = Learner(columns=["cm"], classes=["small", "big"])
+        >>> learner.partial_fit(np.array([[1.0], [1.5], [2.0]]), np.array([0, 0, 0]))
+        >>> learner.partial_fit(np.array([[7.0], [8.0]]), ["big", "big"])
+        >>> len(learner.finish().tree.leaves)
+        2
+    """
+
+    columns: Sequence[str]
+    classes: Sequence[str]
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
+    name: str = "tree"
+    settings: Settings = field(default_factory=Settings)
+    _statistics: Statistics = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the names and start with an empty table."""
+        _check_names(self.columns, self.classes, self.settings)
+        self._statistics = Statistics(
+            len(self.classes), len(self.columns), self.settings.rows_per_class
+        )
+
+    def partial_fit(
+        self,
+        values: npt.NDArray[np.generic],
+        labels: Sequence[str] | npt.NDArray[np.generic],
+        *,
+        progress: Progress | None = None,
+    ) -> None:
+        """Take more rows; arguments as in `learn_arrays`.
+
+        Raises:
+            ValueError: If shapes and labels do not fit.
+            LearningError: If `missing` is `refuse` and a value is missing.
+        """
+        codes = _codes(labels, self.classes)
+        _check_shape(values, codes, len(self.columns))
+        if progress is not None:
+            progress("counting", 0.0)
+        before = self._statistics.dropped
+        self._statistics.update(values, codes)
+        dropped = self._statistics.dropped - before
+        if dropped and self.settings.missing == "refuse":
+            raise LearningError(
+                f"{dropped} of {len(values)} rows hold a missing or infinite value "
+                "or no class\n  choose missing='drop' to leave them out"
+            )
+        if progress is not None:
+            progress("counting", 1.0)
+
+    def merge(self, other: Learner) -> Learner:
+        """Return a learner that has seen both tables, the other one's rows last.
+
+        Its means and spreads equal those of one pass up to rounding.
+
+        Raises:
+            ValueError: If columns, classes or settings differ.
+        """
+        mine = (tuple(self.columns), tuple(self.classes), self.settings)
+        if mine != (tuple(other.columns), tuple(other.classes), other.settings):
+            raise ValueError(
+                "learners with other columns, classes or settings do not merge"
+            )
+        merged = Learner(
+            self.columns, self.classes, self.units, self.name, self.settings
+        )
+        merged._statistics = self._statistics.merge(other._statistics)
+        return merged
+
+    def finish(self, *, progress: Progress | None = None) -> Learnt:
+        """Return the tree of all rows taken so far; more may follow.
+
+        Raises:
+            LearningError: If there is no row, one class, or no column that varies.
+        """
+        moments = self._statistics.moments()
+        _check_table(moments, self._statistics.dropped, self.classes)
+        sample = self._statistics.sample()
+        costs = np.array([self.settings.costs.get(c, 1.0) for c in self.columns])
+        choice = chosen_tree(
+            moments, sample, self.settings, self.classes, costs, progress
+        )
+        names = Names(self.name, self.columns, self.classes, self.units)
+        if progress is not None:
+            progress("fitting sets", 0.0)
+        made = assembled(
+            choice.grown.sketch,
+            choice.patterns,
+            names,
+            points=self.settings.points,
+            separate_sides=self.settings.separate_sides,
+        )
+        if progress is not None:
+            progress("fitting sets", 1.0)
+        return Learnt(made.tree, self._report(moments, sample, choice, made))
+
+    def _report(
+        self, moments: Moments, sample: Sample, choice: Choice, made: Assembled
+    ) -> LearningReport:
+        patterns, grown = choice.patterns, choice.grown
+        usable = set(usable_features(moments).tolist())
+        per_class = np.bincount(patterns.labels, minlength=len(self.classes))
+        return LearningReport(
+            mode=self.settings.mode,
+            rows=int(moments.counts.sum()),
+            rows_dropped=self._statistics.dropped,
+            rows_sampled=len(sample.rows),
+            classes_without_rows=tuple(
+                c for c, n in zip(self.classes, moments.counts, strict=True) if n == 0
+            ),
+            features_ignored=tuple(
+                c for k, c in enumerate(self.columns) if k not in usable
+            ),
+            patterns={
+                c: int(n) for c, n in zip(self.classes, per_class, strict=True) if n
+            },
+            patterns_refused=choice.refused,
+            single_rows=int(np.count_nonzero(patterns.moments.counts == 1)),
+            zero_spreads=made.zero_spreads,
+            leaves=len(made.tree.leaves),
+            features_per_node=_features_per_node(grown),
+            inseparable=grown.inseparable,
+            levels_raised=grown.levels_raised,
+            reversals=grown.reversals,
+            sets=made.sets,
+            off_peak=made.repairs.off_peak,
+            empty_centre=made.repairs.empty_centre,
+            clipped=made.repairs.clipped,
+            lowered=made.repairs.lowered,
+            overshooting=made.repairs.overshooting,
+            rising=made.repairs.rising,
+            largest_flank_error=made.largest_flank_error,
+            chosen=choice.chosen,
+            inner_accuracy=choice.accuracy,
+        )
+
+
+def _features_per_node(grown: Grown) -> tuple[int, ...]:
+    return tuple(len(split.axis.features) for split in grown.sketch.splits)
+
+
+def _check_names(
+    columns: Sequence[str], classes: Sequence[str], settings: Settings
+) -> None:
+    for kind, found in (("column", columns), ("class", classes)):
+        repeated = (
+            sorted({name for name in found if list(found).count(name) > 1})
+            if len(set(found)) < len(found)
+            else []
+        )
+        if repeated:
+            raise ValueError(f"the {kind} {repeated[0]!r} is named twice")
+    for name in settings.costs:
+        if name not in columns:
+            raise ValueError(f"costs: there is no column {name!r}")
+    if isinstance(settings.patterns_per_class, Mapping):
+        for name in settings.patterns_per_class:
+            if name not in classes:
+                raise ValueError(f"patterns_per_class: there is no class {name!r}")
+
+
+def _check_shape(values: npt.NDArray[np.generic], codes: IntArray, width: int) -> None:
+    if values.ndim != 2:
+        raise ValueError(f"values need two dimensions, not {values.ndim}")
+    if values.shape[1] != width:
+        raise ValueError(
+            f"values have {values.shape[1]} columns, but {width} are named"
+        )
+    if len(values) != len(codes):
+        raise ValueError(f"{len(values)} rows, but {len(codes)} labels")
+
+
+def _codes(
+    labels: Sequence[str] | npt.NDArray[np.generic], classes: Sequence[str]
+) -> IntArray:
+    """Return class positions; -1 where a label is missing."""
+    found = np.asarray(labels)
+    if found.dtype.kind in "iub":
+        codes = found.astype(np.int64)
+        if len(codes) and codes.max() >= len(classes):
+            raise ValueError(f"label {codes.max()} has no name among the classes")
+        return np.maximum(codes, -1)
+    if found.dtype.kind == "f":
+        whole: FloatArray = np.where(np.isfinite(found.astype(np.float64)), found, -1.0)
+        if (whole != np.floor(whole)).any() or whole.max(initial=-1) >= len(classes):
+            raise ValueError("labels in numbers are positions of classes, from 0")
+        return np.maximum(whole, -1).astype(np.int64)
+    place = {name: k for k, name in enumerate(classes)}
+    codes = np.empty(len(found), np.int64)
+    for row, label in enumerate(found.tolist()):
+        if label is None or label == "" or label != label:
+            codes[row] = -1
+        elif label in place:
+            codes[row] = place[label]
+        else:
+            raise ValueError(f"row {row + 1}: {label!r} is not among the classes")
+    return codes
+
+
+def _check_table(moments: Moments, dropped: int, classes: Sequence[str]) -> None:
+    rows = int(moments.counts.sum())
+    if rows == 0:
+        if dropped:
+            raise LearningError(
+                f"no row is left: all {dropped} hold a missing or infinite value "
+                "or no class"
+            )
+        raise LearningError("the table has no rows")
+    if rows == 1:
+        raise LearningError("the table has one row; two classes need at least two")
+    present = np.flatnonzero(moments.counts)
+    if len(present) == 1:
+        raise LearningError(
+            f"all rows are of one class, {classes[present[0]]!r}; "
+            "there is nothing to tell apart"
+        )
+    if len(usable_features(moments)) == 0:
+        raise LearningError("every column is constant or too large to square")

@@ -1,0 +1,285 @@
+"""Fuzzy pattern vectors (paper, 2.3 step 2): what stands for a class.
+
+A class has one pattern, or several if it has several shapes: clusters of its rows, found
+by bisecting k-means in units of the features' spreads within classes. No step is random.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.statistics import (
+    Moments,
+    Sample,
+    grouped_moments,
+)
+
+SCATTER_NUMBERS = 1 << 23
+"""Scatter matrices are kept per pattern up to this many numbers (64 MiB)."""
+
+MOST_COMBINABLE = 512
+"""Combinations look at no more features than this."""
+
+_ROUNDS = 25
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """Every pattern, with the sample rows that it is made of.
+
+    Attributes:
+        labels: The class of each pattern, shape (patterns,).
+        numbers: Which pattern of its class it is, from 1.
+        weights: How many rows of the table each stands for.
+        moments: Means, spreads, lows and highs, shape (patterns, features).
+        rows: The sample, ordered by pattern; shape (rows, features).
+        owners: The pattern of each sample row.
+        row_weights: How many rows of the table each sample row stands for.
+        starts: Where each pattern's rows begin, and their end; shape (patterns + 1,).
+        centre: The origin of standard units, per feature.
+        scale: The unit of standard units, per feature: a spread within patterns.
+        scatter: Covariance per pattern in standard units, shape (patterns, features,
+            features); one for all (shape (1, ...)) if there are too many.
+        usable: The features that are not constant and do not overflow.
+        combinable: Those of them that combinations may use: all, or the most powerful
+            ones of very many.
+    """
+
+    labels: IntArray
+    numbers: IntArray
+    weights: FloatArray
+    moments: Moments
+    rows: FloatArray
+    owners: IntArray
+    row_weights: FloatArray
+    starts: IntArray
+    centre: FloatArray
+    scale: FloatArray
+    scatter: FloatArray
+    usable: IntArray
+    combinable: IntArray
+
+    @property
+    def size(self) -> int:
+        """How many patterns there are."""
+        return len(self.labels)
+
+    def members(self, patterns: IntArray) -> IntArray:
+        """Return the numbers of the sample rows of some patterns, in pattern order."""
+        pieces = [np.arange(self.starts[p], self.starts[p + 1]) for p in patterns]
+        return np.concatenate(pieces) if pieces else np.empty(0, np.int64)
+
+
+def usable_features(moments: Moments) -> IntArray:
+    """Return the features that vary and whose spreads are finite."""
+    filled = moments.counts > 0
+    lows = moments.lows[filled].min(axis=0, initial=np.inf)
+    highs = moments.highs[filled].max(axis=0, initial=-np.inf)
+    with np.errstate(over="ignore", invalid="ignore"):
+        is_sound = np.isfinite(moments.spreads[filled]).all(axis=0)
+        is_sound &= np.isfinite((highs - lows) ** 2)
+    return np.flatnonzero((lows < highs) & is_sound).astype(np.int64)
+
+
+def standard_units(moments: Moments, usable: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the origin and the unit of each feature: pooled spread within classes.
+
+    A feature that does not vary within any class takes a thousandth of its range.
+    """
+    filled = moments.counts > 0
+    counts = moments.counts[filled].astype(np.float64)[:, None]
+    means, spreads = moments.means[filled], moments.spreads[filled]
+    centre = np.zeros(means.shape[1])
+    scale = np.ones(means.shape[1])
+    chosen = means[:, usable]
+    first = chosen[0]
+    centre[usable] = first + (counts * (chosen - first)).sum(axis=0) / counts.sum()
+    within = np.sqrt((counts * spreads[:, usable] ** 2).sum(axis=0) / counts.sum())
+    extent = (
+        moments.highs[filled].max(axis=0) / 2 - moments.lows[filled].min(axis=0) / 2
+    )
+    scale[usable] = np.maximum(within, 1e-3 * extent[usable])
+    return centre, scale
+
+
+def make_patterns(
+    moments: Moments, sample: Sample, clusters: dict[int, IntArray]
+) -> Patterns:
+    """Gather patterns from the classes and, where given, their clusters.
+
+    Args:
+        moments: Of the classes, over all rows of the table.
+        sample: Rows kept, ordered by class.
+        clusters: For a class with several patterns, the cluster (from 0) of each of
+            its sample rows. A class that is not named has one pattern.
+    """
+    classes = len(moments.counts)
+    inner = np.zeros(len(sample.codes), np.int64)
+    sizes = np.zeros(classes, np.int64)
+    sizes[moments.counts > 0] = 1
+    borders = np.searchsorted(sample.codes, np.arange(classes + 1))
+    for code, found in clusters.items():
+        inner[borders[code] : borders[code + 1]] = found
+        sizes[code] = int(found.max(initial=0)) + 1
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    owners = first[sample.codes] + inner
+    order = np.argsort(owners, kind="stable")
+    return _finished(moments, sample, sizes, owners, order)
+
+
+def _finished(
+    moments: Moments,
+    sample: Sample,
+    sizes: IntArray,
+    owners: IntArray,
+    order: IntArray,
+) -> Patterns:
+    size = int(sizes.sum())
+    labels = np.repeat(np.arange(len(sizes)), sizes)
+    firsts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    numbers = np.arange(size) - np.repeat(firsts, sizes) + 1
+    untouched = order[0] == 0 and bool((np.diff(order) == 1).all())
+    rows = sample.rows if untouched else sample.rows[order]
+    owners = owners[order]
+    own = grouped_moments(rows, owners, size)
+    whole = np.flatnonzero(sizes[labels] == 1)
+    kept_of_class = np.bincount(sample.codes, minlength=len(sizes))
+    row_weights = moments.counts / np.maximum(kept_of_class, 1)
+    weights = own.counts * row_weights[labels]
+    for target, source in (
+        (own.means, moments.means),
+        (own.spreads, moments.spreads),
+        (own.lows, moments.lows),
+        (own.highs, moments.highs),
+    ):
+        target[whole] = source[labels[whole]]
+    usable = usable_features(moments)
+    centre, scale = standard_units(moments, usable)
+    starts = np.searchsorted(owners, np.arange(size + 1)).astype(np.int64)
+    combinable = _most_powerful(own, weights, scale, usable)
+    scatter = _scatter(rows, starts, scale, combinable)
+    return Patterns(
+        labels,
+        numbers,
+        weights,
+        own,
+        rows,
+        owners,
+        row_weights[labels[owners]],
+        starts,
+        centre,
+        scale,
+        scatter,
+        usable,
+        combinable,
+    )
+
+
+def _most_powerful(
+    moments: Moments, weights: FloatArray, scale: FloatArray, usable: IntArray
+) -> IntArray:
+    """Return the usable features, the most powerful ones if they are too many."""
+    if len(usable) <= MOST_COMBINABLE:
+        return usable
+    means = moments.means[:, usable]
+    share = (weights / weights.sum())[:, None]
+    middle = (share * means).sum(axis=0)
+    power = np.sqrt((share * (means - middle) ** 2).sum(axis=0)) / scale[usable]
+    leading = np.argsort(-power, kind="stable")[:MOST_COMBINABLE]
+    return np.sort(usable[leading])
+
+
+def _scatter(
+    rows: FloatArray,
+    starts: IntArray,
+    scale: FloatArray,
+    usable: IntArray,
+) -> FloatArray:
+    """Return covariances of some features, per pattern or for all together."""
+    width, size = len(usable), len(starts) - 1
+    is_apart = size * width * width <= SCATTER_NUMBERS
+    found = np.zeros((size if is_apart else 1, width, width))
+    if width == 0:
+        return found
+    for pattern in range(size):
+        piece = rows[starts[pattern] : starts[pattern + 1]][:, usable]
+        if len(piece) < 2:
+            continue
+        piece = (piece - piece[0]) / scale[usable]
+        piece -= piece.mean(axis=0)
+        product = piece.T @ piece
+        if is_apart:
+            found[pattern] = product / (len(piece) - 1)
+        else:
+            found[0] += product
+    return found if is_apart else found / max(1, len(rows) - size)
+
+
+def clusters_of(rows: FloatArray, count: int) -> IntArray:
+    """Return a cluster number for each row, by bisecting k-means without chance.
+
+    The widest cluster is cut at its mean along its longest axis until there are
+    `count`; then all centres move together until no row changes its cluster.
+
+    Args:
+        rows: In standard units, shape (rows, features).
+        count: How many clusters; fewer come back if rows are too few or equal.
+    """
+    owners = np.zeros(len(rows), np.int64)
+    for new in range(1, min(count, len(rows))):
+        totals = _inertias(rows, owners, new)
+        widest = int(totals.argmax())
+        if totals[widest] <= 0:
+            break
+        inside = np.flatnonzero(owners == widest)
+        owners[inside[_upper_half(rows[inside])]] = new
+        owners = _settled(rows, owners, new + 1, rounds=5)
+    return _compacted(_settled(rows, owners, int(owners.max(initial=0)) + 1))
+
+
+def _inertias(rows: FloatArray, owners: IntArray, size: int) -> FloatArray:
+    centres = _centres(rows, owners, size)
+    squares = ((rows - centres[owners]) ** 2).sum(axis=1)
+    return np.bincount(owners, weights=squares, minlength=size)
+
+
+def _upper_half(rows: FloatArray) -> IntArray:
+    """Return the rows above the mean along the longest axis of a cluster."""
+    moved = rows - rows.mean(axis=0)
+    axis = moved[np.argmax((moved * moved).sum(axis=1))]
+    for _ in range(10):
+        axis = moved.T @ (moved @ axis)
+        length = float(np.sqrt(axis @ axis))
+        if length == 0.0:
+            return np.arange(0)
+        axis = axis / length
+    return np.flatnonzero(moved @ axis > 0)
+
+
+def _centres(rows: FloatArray, owners: IntArray, size: int) -> FloatArray:
+    order = np.argsort(owners, kind="stable")
+    return np.nan_to_num(grouped_moments(rows[order], owners[order], size).means)
+
+
+def _settled(
+    rows: FloatArray, owners: IntArray, size: int, rounds: int = _ROUNDS
+) -> IntArray:
+    """Move rows to the nearest centre and centres to their rows, until they stay."""
+    for _ in range(rounds):
+        centres = _centres(rows, owners, size)
+        squares = (centres * centres).sum(axis=1)
+        nearest = np.argmin(squares - 2.0 * (rows @ centres.T), axis=1)
+        if (nearest == owners).all():
+            break
+        owners = nearest.astype(np.int64)
+    return owners
+
+
+def _compacted(owners: IntArray) -> IntArray:
+    """Number clusters from 0 without gaps, in the order in which rows meet them."""
+    _, first, inverse = np.unique(owners, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    return rank[inverse].astype(np.int64)

@@ -1,0 +1,189 @@
+"""Fuzzy sets by curve fitting (paper, 2.2.2), and the flanks of relative terms.
+
+A set's polynomial goes through the centre, where the degree is 1, and n points on each
+side. With `t = u` within one spread and `v = 2 t - 1` the degree is `1 - t Q(v)`, so the
+n coefficients of Q solve `Q(v_k) = (1 - degree_k) / t_k`: exact interpolation, in a basis
+that keeps its digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.learning.arrays import FloatArray, IntArray
+
+REACH = 5.0
+"""Where a set's tail ends, in spreads."""
+
+SAMPLES = 33
+"""How many points of a ratio a flank is fitted to."""
+
+_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class SetRepairs:
+    """How often the data departed from what the paper assumes of it.
+
+    Attributes:
+        off_peak: Sets in which some S(k) is larger than S(0).
+        empty_centre: Sets whose S(0) is 0; the largest S(k) stands in.
+        clipped: Points above 1, set to 1.
+        lowered: Points above an inner neighbour, lowered to it.
+        overshooting: Sides whose polynomial leaves [0, 1] between its points.
+        rising: Sides whose polynomial rises somewhere.
+    """
+
+    off_peak: int = 0
+    empty_centre: int = 0
+    clipped: int = 0
+    lowered: int = 0
+    overshooting: int = 0
+    rising: int = 0
+
+
+@dataclass(frozen=True)
+class FittedSets:
+    """LR sets on one axis, one for each pattern.
+
+    Attributes:
+        means: Shape (patterns,).
+        spreads: Shape (patterns,); above 0.
+        left: Coefficients of Q below the mean, shape (patterns, n).
+        right: The same above the mean.
+        repairs: What had to be repaired.
+    """
+
+    means: FloatArray
+    spreads: FloatArray
+    left: FloatArray
+    right: FloatArray
+    repairs: SetRepairs
+
+    def degrees(self, chosen: IntArray, points: FloatArray) -> FloatArray:
+        """Return the degree of some sets at each point, shape (chosen, points)."""
+        u = (points - self.means[chosen, None]) / self.spreads[chosen, None]
+        below = _side(-u, self.left[chosen])
+        return np.minimum(below, _side(u, self.right[chosen]))
+
+
+def _side(u: FloatArray, curve: FloatArray) -> FloatArray:
+    u = np.clip(u, 0.0, REACH)
+    t = np.minimum(u, 1.0)
+    v = 2.0 * t - 1.0
+    total = np.broadcast_to(curve[:, -1:], u.shape)
+    for k in range(curve.shape[1] - 2, -1, -1):
+        total = total * v + curve[:, k : k + 1]
+    w = np.clip((REACH - u) / (REACH - 1.0), 0.0, 1.0)
+    return np.clip(1.0 - t * total, 0.0, 1.0) * w**4
+
+
+def fitted_sets(
+    means: FloatArray, spreads: FloatArray, counts: IntArray, *, separate_sides: bool
+) -> FittedSets:
+    """Fit LR sets to window counts.
+
+    Args:
+        means: M of each pattern.
+        spreads: SD of each pattern, above 0.
+        counts: S(-n) to S(n), shape (patterns, 2n + 1).
+        separate_sides: Whether left and right are fitted apart; else their mean is.
+    """
+    n = (counts.shape[1] - 1) // 2
+    centre = counts[:, n].astype(np.float64)
+    largest = counts.max(axis=1).astype(np.float64)
+    base = np.where(centre > 0, centre, np.maximum(largest, 1.0))[:, None]
+    right = counts[:, n + 1 :] / base
+    left = counts[:, n - 1 :: -1] / base if n > 0 else right
+    if not separate_sides:
+        left = right = (left + right) / 2.0
+    sides = [left] if not separate_sides else [left, right]
+    clipped = sum(int(np.count_nonzero(side > 1.0)) for side in sides)
+    lowered = 0
+    curves: list[FloatArray] = []
+    overshooting = rising = 0
+    for side in sides:
+        points = np.minimum(side, 1.0)
+        falling = np.minimum.accumulate(points, axis=1)
+        lowered += int(np.count_nonzero(points > falling))
+        curve = _interpolated(falling)
+        over, up = _flaws(curve)
+        overshooting += over
+        rising += up
+        curves.append(curve)
+    repairs = SetRepairs(
+        off_peak=int(np.count_nonzero(largest > centre)),
+        empty_centre=int(np.count_nonzero(centre == 0)),
+        clipped=clipped,
+        lowered=lowered,
+        overshooting=overshooting,
+        rising=rising,
+    )
+    return FittedSets(means, spreads, curves[0], curves[-1], repairs)
+
+
+def _interpolated(degrees: FloatArray) -> FloatArray:
+    """Return the coefficients of Q through the degrees at k/n, k = 1..n."""
+    n = degrees.shape[1]
+    t = np.arange(1, n + 1) / n
+    powers = np.vander(2.0 * t - 1.0, n, increasing=True)
+    wanted = (1.0 - degrees) / t
+    return np.linalg.solve(powers, wanted.T).T
+
+
+def _flaws(curve: FloatArray) -> tuple[int, int]:
+    """Return how many polynomials leave [0, 1], and how many rise."""
+    t = np.linspace(0.0, 1.0, SAMPLES)
+    powers = np.vander(2.0 * t - 1.0, curve.shape[1], increasing=True)
+    values = 1.0 - t * (curve @ powers.T)
+    out = (values < -_TOLERANCE) | (values > 1.0 + _TOLERANCE)
+    up = np.diff(values, axis=1) > _TOLERANCE
+    return int(out.any(axis=1).sum()), int(up.any(axis=1).sum())
+
+
+def fitted_flanks(ratios: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fit falling flanks to sampled ratios.
+
+    The flank is a cubic that is 0 at q = 0 and 1 at q = 1 and never falls with q: in
+    Bernstein form 0, b1, b2, 1 with `0 <= b1 <= b2 <= 1`. The least squares solution
+    lies inside that triangle, on one of its sides or in a corner; all are tried.
+
+    Args:
+        ratios: At q = 0, 1/32, ..., 1, shape (flanks, 33), not falling with q.
+
+    Returns:
+        The coefficients c0, c1, c2 of `q (c0 + q (c1 + q c2))`, and the largest
+        difference from the ratios, per flank.
+    """
+    q = np.linspace(0.0, 1.0, SAMPLES)
+    first = 3.0 * q * (1.0 - q) ** 2
+    second = 3.0 * q**2 * (1.0 - q)
+    wanted = ratios - q**3
+    aa, ab, bb = first @ first, first @ second, second @ second
+    ya, yb = wanted @ first, wanted @ second
+    zero, one = np.zeros(len(ratios)), np.ones(len(ratios))
+    determinant = aa * bb - ab * ab
+    inner = (ya * bb - yb * ab) / determinant, (yb * aa - ya * ab) / determinant
+    is_inside = (inner[0] >= 0) & (inner[0] <= inner[1]) & (inner[1] <= 1)
+    both = np.clip((ya + yb) / (aa + 2 * ab + bb), 0.0, 1.0)
+    pairs = [
+        (np.where(is_inside, inner[0], 0.0), np.where(is_inside, inner[1], 0.0)),
+        (zero, np.clip(yb / bb, 0.0, 1.0)),
+        (np.clip((ya - ab) / aa, 0.0, 1.0), one),
+        (both, both),
+    ]
+    costs = np.stack(
+        [
+            b1 * b1 * aa + 2 * b1 * b2 * ab + b2 * b2 * bb - 2 * (b1 * ya + b2 * yb)
+            for b1, b2 in pairs
+        ]
+    )
+    best = costs.argmin(axis=0)
+    rows = np.arange(len(ratios))
+    b1 = np.stack([pair[0] for pair in pairs])[best, rows]
+    b2 = np.stack([pair[1] for pair in pairs])[best, rows]
+    curve = np.stack([3 * b1, 3 * b2 - 6 * b1, 3 * b1 - 3 * b2 + 1], axis=1)
+    fit = b1[:, None] * first + b2[:, None] * second + q**3
+    return curve, np.abs(fit - ratios).max(axis=1, initial=0.0)

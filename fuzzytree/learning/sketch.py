@@ -1,0 +1,103 @@
+"""A tree in the making: axes, splits and leaves over patterns, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fuzzytree.learning.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A feature, or a combination of features as a fixed chain.
+
+    Attributes:
+        features: Column numbers, in the order of the chain.
+        weights: One per feature; not used for a single feature.
+        centres: One per feature; not used for a single feature.
+        is_combined: Whether it is a combination.
+    """
+
+    features: IntArray
+    weights: FloatArray
+    centres: FloatArray
+    is_combined: bool
+
+    def values(self, rows: FloatArray) -> FloatArray:
+        """Return the axis value of each row, rounded as every runtime rounds it."""
+        if not self.is_combined:
+            return rows[:, self.features[0]]
+        first = self.features[0]
+        with np.errstate(over="ignore", invalid="ignore"):
+            total: FloatArray = self.weights[0] * (rows[:, first] - self.centres[0])
+            for k in range(1, len(self.features)):
+                step = rows[:, self.features[k]] - self.centres[k]
+                total = total + self.weights[k] * step
+        return total
+
+
+def single(feature: int) -> Axis:
+    """Return the axis of one feature."""
+    return Axis(np.array([feature]), np.ones(1), np.zeros(1), False)
+
+
+@dataclass(frozen=True)
+class Split:
+    """A question and its answers.
+
+    Attributes:
+        axis: What it looks at.
+        cuts: Increasing; interval i is (cuts[i - 1], cuts[i]].
+        owners: The branch of each interval; neighbours differ.
+        groups: The patterns of each branch.
+    """
+
+    axis: Axis
+    cuts: FloatArray
+    owners: IntArray
+    groups: tuple[IntArray, ...]
+
+    def branches(self, rows: FloatArray) -> IntArray:
+        """Return the branch that each row takes."""
+        values = self.axis.values(rows)
+        return self.owners[np.searchsorted(self.cuts, values, side="left")]
+
+
+@dataclass
+class Sketch:
+    """A tree over patterns; node 0 is the root.
+
+    Attributes:
+        splits: One per node.
+        children: Per node and branch: a node number, or ~leaf number.
+        leaves: The patterns of each leaf.
+        leaf_classes: The class of each leaf.
+    """
+
+    splits: list[Split] = field(default_factory=list[Split])
+    children: list[list[int]] = field(default_factory=list[list[int]])
+    leaves: list[IntArray] = field(default_factory=list[IntArray])
+    leaf_classes: list[int] = field(default_factory=list[int])
+
+    def descend(self, rows: FloatArray, start: int = 0) -> IntArray:
+        """Return the leaf that each row reaches from a node (or from ~leaf)."""
+        leaves = np.zeros(len(rows), np.int64)
+        start = start if self.splits else ~0
+        todo: list[tuple[int, IntArray]] = [(start, np.arange(len(rows)))]
+        while todo:
+            node, chosen = todo.pop()
+            if node < 0:
+                leaves[chosen] = ~node
+                continue
+            taken = self.splits[node].branches(rows[chosen])
+            for branch, child in enumerate(self.children[node]):
+                inside = chosen[taken == branch]
+                if len(inside):
+                    todo.append((child, inside))
+        return leaves
+
+    def classify(self, rows: FloatArray, start: int = 0) -> IntArray:
+        """Return the class that each row is given from a node on."""
+        return np.asarray(self.leaf_classes, np.int64)[self.descend(rows, start)]
