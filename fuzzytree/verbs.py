@@ -152,17 +152,16 @@ def learn_table(
         raise TableError(
             f"a unit for {absent[0]!r}, which is no column; it has {known}"
         )
-    learnt = learn_arrays(
+    return learn_arrays(
         table.values.T,
         table.codes,
         columns=table.columns,
         classes=table.classes,
         units=units,
+        name=name,
         settings=settings,
         progress=progress,
     )
-    named = msgspec.structs.replace(learnt.tree, name=name)
-    return msgspec.structs.replace(learnt, tree=named)
 
 
 def _name_of(table: object) -> str:

@@ -1,0 +1,194 @@
+"""The verbs in Python: names, lines that run, and mistakes in sentences."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+
+import fuzzytree as ft
+from fuzzytree import verbs
+from fuzzytree.errors import LossError, ReadError, TableError
+from fuzzytree.learning import Settings
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.testing import random_tree
+from fuzzytree.tree import FuzzyTree
+
+WINE = Path(__file__).resolve().parent.parent / "examples" / "wine" / "wine.csv"
+TREE = random_tree(3, inputs=3)
+ROWS = np.random.default_rng(0).normal(size=(20, 3))
+FEW = np.array([[1.0], [1.5], [2.0], [7.0], [7.5], [8.0]])
+KINDS = ["soft"] * 3 + ["firm"] * 3
+
+
+def test_every_public_name_is_there_and_listed() -> None:
+    for name in ft.__all__:
+        assert getattr(ft, name) is not None
+    assert dir(ft) == sorted(ft.__all__)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError) as caught:
+        ft.lern  # type: ignore[attr-defined] # noqa: B018
+    assert str(caught.value) == "module 'fuzzytree' has no attribute 'lern'"
+
+
+def test_the_lines_of_the_readme_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    table = pd.read_csv(WINE)
+    tree = ft.learn(table, target="cultivar", name="wine")
+    rules = ft.rules_from_tree(tree)
+    assert str(rules).startswith("1. IF ")
+    ft.save(rules, "wine.yaml")
+    assert ft.load("wine.yaml") == rules
+    answers = ft.run(rules, table)
+    assert answers.class_strengths is not None
+    assert answers.class_strengths.shape == (3, 178)
+    onnx = ft.export(rules, "onnx").content
+    found = ft.check(tree, rules, onnx, data=table, runtimes=["native"], limit=500)
+    found.raise_if_not_ok()
+
+
+def test_learn_offers_every_setting_with_its_default() -> None:
+    offered = inspect.signature(ft.learn).parameters
+    for field in msgspec.structs.fields(Settings):
+        default = getattr(Settings(), field.name)
+        assert offered[field.name].default in (default, default or None)
+
+
+def test_every_kind_of_table_gives_the_same_tree() -> None:
+    columns = {"x1": FEW[:, 0].tolist(), "grip": KINDS}
+    trees = [
+        ft.learn(frame, target="grip")
+        for frame in (pd.DataFrame(columns), pl.DataFrame(columns), pa.table(columns))
+    ]
+    trees.append(ft.learn(FEW, target=KINDS))
+    assert all(tree == trees[0] for tree in trees)
+
+
+def test_a_tree_has_the_name_of_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "grasps.csv"
+    path.write_text(
+        "x,grip\n" + "".join(f"{v[0]},{k}\n" for v, k in zip(FEW, KINDS, strict=True))
+    )
+    assert ft.learn(path, target="grip").name == "grasps"
+    assert ft.learn(FEW, target=KINDS).name == "tree"
+
+
+def test_units_are_kept_and_must_belong_to_a_column() -> None:
+    tree = ft.learn(FEW, target=KINDS, columns=["force"], units={"force": "N"})
+    assert tree.variables[0].unit == "N"
+    with pytest.raises(TableError) as caught:
+        ft.learn(FEW, target=KINDS, columns=["force"], units={"slip": "mm"})
+    message = "a unit for 'slip', which is no column; it has force"
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("rows", [ROWS, ROWS[:0], np.asfortranarray(ROWS)])
+def test_every_carrier_of_a_tree_answers_alike(
+    tmp_path: Path, rows: np.ndarray
+) -> None:  # type: ignore[type-arg]
+    path = tmp_path / "tree.onnx"
+    content = ft.save(TREE, path).content
+    expected = ft.run(TREE, rows).classes
+    for carrier in (
+        ft.rules_from_tree(TREE),
+        content,
+        path,
+        str(path),
+        open_onnx(content, "tree.onnx"),
+    ):
+        assert ft.run(carrier, rows).classes == expected
+
+
+def test_many_rows_are_answered_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = ft.run(ft.rules_from_tree(TREE), ROWS).to_csv("rule")
+    monkeypatch.setattr(verbs, "_BLOCK", 7)
+    assert ft.run(ft.rules_from_tree(TREE), ROWS).to_csv("rule") == expected
+
+
+def test_strengths_are_left_out_on_request() -> None:
+    rules = ft.rules_from_tree(TREE)
+    assert ft.run(rules, ROWS, with_strengths=False).strengths is None
+
+
+def test_an_array_of_another_width_is_refused() -> None:
+    with pytest.raises(TableError) as caught:
+        ft.run(msgspec.structs.replace(TREE, columns=("x1", "x2", "x3")), ROWS[:, :2])
+    assert str(caught.value) == (
+        "the array has 2 columns without names, and the model was learnt from 3: "
+        "x1, x2, x3"
+    )
+
+
+def test_an_unknown_runtime_is_refused() -> None:
+    with pytest.raises(ValueError, match="no runtime 'nativ'"):
+        ft.run(TREE, ROWS, runtime="nativ")
+
+
+@pytest.mark.parametrize("model", [TREE, ft.rules_from_tree(TREE)])
+def test_what_was_saved_is_loaded(tmp_path: Path, model: FuzzyTree | RuleBase) -> None:
+    path = tmp_path / "model.yaml"
+    ft.save(model, path)
+    assert ft.load(path) == model
+
+
+def test_a_format_can_be_named_whatever_the_suffix(tmp_path: Path) -> None:
+    path = tmp_path / "model.txt"
+    ft.save(TREE, path, to="yaml")
+    assert path.read_bytes() == ft.export(TREE, "yaml").content
+
+
+def test_a_file_without_a_known_suffix_is_no_model(tmp_path: Path) -> None:
+    with pytest.raises(ReadError) as caught:
+        ft.load("model.txt")
+    assert str(caught.value) == (
+        "model.txt: has the suffix '.txt'; there is yaml, onnx, python"
+    )
+
+
+def test_an_unknown_format_is_refused() -> None:
+    with pytest.raises(ValueError, match="no format") as caught:
+        ft.export(TREE, "fcl")
+    assert str(caught.value) == "no format 'fcl'; there is yaml, onnx, python"
+
+
+def test_an_option_that_a_writer_does_not_have_is_refused() -> None:
+    with pytest.raises(ValueError, match="no option") as caught:
+        ft.export(TREE, "onnx", dtpe="float32")
+    assert str(caught.value) == (
+        "onnx has no option 'dtpe'; it has dtype, opset, ir, signature, outputs, "
+        "readable, plain, verify"
+    )
+
+
+def test_check_takes_files_and_names_them(tmp_path: Path) -> None:
+    yaml, onnx = tmp_path / "tree.yaml", tmp_path / "tree.onnx"
+    ft.save(TREE, yaml)
+    ft.save(ft.load(yaml), onnx)
+    found = ft.check(yaml, onnx, data=ROWS, runtimes=["native"], limit=300)
+    assert found.ok
+    assert str(onnx) in {comparison.carrier for comparison in found.comparisons}
+
+
+def test_check_finds_a_file_of_another_model() -> None:
+    other = random_tree(4, inputs=3)
+    found = ft.check(TREE, other, runtimes=["native"], limit=300)
+    assert not found.ok
+
+
+def test_a_runtime_that_does_not_run_trees_says_so() -> None:
+    with pytest.raises(LossError) as caught:
+        ft.run(TREE, ROWS, runtime="best-first")
+    assert str(caught.value) == (
+        f"cannot run {TREE.name} in best-first: it runs rules, not a tree"
+    )
