@@ -12,7 +12,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from fuzzytree.learning import LearningReport, Settings, learn_arrays
+from fuzzytree.learning import Learner, LearningReport, Settings
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import Status
 from fuzzytree.runtimes import find_runtime
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import Carrier, FloatArray, IntArray, Outcome, Run
 
 LabelArray = npt.NDArray[np.generic]
+Mode = Literal["default", "paper"]
 PatternsPerClass = int | Literal["auto"] | Mapping[str, int] | None
 Choice = Literal["alpha", "l_max", "shrinkage", "entry"]
 
@@ -67,17 +68,21 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         [0, 1]
     """
 
+    mode: Mode
+    patterns_per_class: PatternsPerClass
+    choices: Sequence[Choice]
     tree_: FuzzyTree
     report_: LearningReport
     classes_: LabelArray
     n_features_in_: int
     feature_names_in_: npt.NDArray[np.object_]
+    _learner: Learner
     _run: Callable[[Carrier], Run]
 
     def __init__(
         self,
         *,
-        mode: Literal["default", "paper"] = "default",
+        mode: Mode = "default",
         alpha: float = 0.9,
         l_max: float | None = None,
         points: int = 3,
@@ -119,14 +124,52 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         check_classification_targets(labels)
         if len(values) == 1:
             raise ValueError("cannot learn from one sample (n_samples = 1)")
-        self.classes_, codes = np.unique(labels, return_inverse=True)
-        learnt = learn_arrays(
-            values,
-            codes,
-            columns=self._columns(),
-            classes=[str(label) for label in self.classes_],
-            settings=self._settings(),
-        )
+        self._start(np.unique(labels))
+        return self._learn(values, labels)
+
+    def partial_fit(
+        self, X: npt.ArrayLike, y: npt.ArrayLike, classes: npt.ArrayLike | None = None
+    ) -> Self:
+        """Take more rows and learn again from all rows so far.
+
+        Only statistics and a bounded sample of the rows are kept. The last tree is
+        the one of a single `fit` on all rows, however they were cut; a first chunk
+        must hold rows of two classes.
+
+        Args:
+            X: As in `fit`.
+            y: As in `fit`; labels out of `classes`.
+            classes: All labels that will come; needed in the first call.
+
+        Returns:
+            The classifier itself.
+
+        Raises:
+            ValueError: As `fit`, or if a label is not among the classes.
+        """
+        is_first = not hasattr(self, "_learner")
+        values, labels = _validated(self, X, y, dtype=np.float64, reset=is_first)
+        check_classification_targets(labels)
+        if is_first:
+            if classes is None:
+                raise ValueError("the first call of partial_fit needs classes")
+            self._start(np.unique(np.asarray(classes)))
+        unknown = np.setdiff1d(labels, self.classes_)
+        if len(unknown):
+            raise ValueError(
+                f"label {unknown[0]!s} is not among the classes {self.classes_}"
+            )
+        return self._learn(values, labels)
+
+    def _start(self, classes: LabelArray) -> None:
+        self.classes_ = classes
+        names = [str(label) for label in classes]
+        settings = self._settings()
+        self._learner = Learner(self._columns(), names, settings=settings)
+
+    def _learn(self, values: FloatArray, labels: LabelArray) -> Self:
+        self._learner.partial_fit(values, np.searchsorted(self.classes_, labels))
+        learnt = self._learner.finish()
         self.tree_, self.report_ = learnt.tree, learnt.report
         self._run = _prepared(self.tree_)
         return self

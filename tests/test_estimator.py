@@ -98,6 +98,34 @@ def test_clones_and_pickles_learn_and_answer_alike() -> None:
     assert (loaded.predict_proba(IRIS) == model.predict_proba(IRIS)).all()
 
 
+def test_chunks_of_any_size_give_the_tree_of_the_whole_table() -> None:
+    order = np.random.default_rng(0).permutation(len(IRIS))
+    values, labels = IRIS[order], SPECIES[order]
+    whole = FuzzyTreeClassifier().fit(values, labels)
+    for size in (20, 64):
+        model = FuzzyTreeClassifier()
+        for start in range(0, len(values), size):
+            rows = slice(start, start + size)
+            model.partial_fit(values[rows], labels[rows], classes=[0, 1, 2])
+        assert model.tree_ == whole.tree_
+
+
+@pytest.mark.parametrize(
+    ("classes", "message"),
+    [
+        (None, "the first call of partial_fit needs classes"),
+        ([0, 1], "label 2 is not among the classes [0 1]"),
+    ],
+    ids=["no classes", "unknown label"],
+)
+def test_partial_fit_needs_to_know_every_class(
+    classes: list[int] | None, message: str
+) -> None:
+    with pytest.raises(ValueError, match="classes") as caught:
+        FuzzyTreeClassifier().partial_fit(IRIS, SPECIES, classes=classes)
+    assert str(caught.value) == message
+
+
 def test_a_pipeline_and_a_grid_search_take_it() -> None:
     pipeline = make_pipeline(StandardScaler(), FuzzyTreeClassifier())
     assert cross_val_score(pipeline, IRIS, SPECIES, cv=5).mean() > 0.93

@@ -30,11 +30,9 @@ assert "site-packages" in fuzzytree.__file__ or EDITABLE, fuzzytree.__file__
 assert (files("fuzzytree") / "py.typed").is_file()
 for name in ("tree.schema.json", "rulebase.schema.json"):
     assert (files("fuzzytree.schemas") / name).is_file(), name
-table = {"size": [1.0, 1.5, 2.0, 2.5, 7.0, 7.5, 8.0, 8.5], "kind": ["a"] * 4 + ["b"] * 4}
 import numpy as np
-values = np.array(table["size"]).reshape(-1, 1)
-from fuzzytree.learning import learn_arrays
-tree = learn_arrays(values, table["kind"], columns=["size"], classes=["a", "b"]).tree
+values = np.array([[1.0], [1.5], [2.0], [2.5], [7.0], [7.5], [8.0], [8.5]])
+tree = fuzzytree.learn(values, target=list("aaaabbbb"), columns=["size"])
 rules = fuzzytree.rules_from_tree(tree)
 fuzzytree.save(rules, "model.yaml")
 assert fuzzytree.load("model.yaml") == rules
