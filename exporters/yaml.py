@@ -438,7 +438,7 @@ def _flow(entry: Entry) -> str:
             return _scalar(entry)
 
 
-_PLAIN: Final = re.compile(r"[^\W_](?:[\w .()/%+*^°²-]*[\w.()/%+*^°²-])?")
+_PLAIN: Final = re.compile(r"(?:[^\W_]|°)(?:[\w .()/%+*^°²-]*[\w.()/%+*^°²-])?")
 _WORDS: Final = frozenset(
     ["y", "n", "yes", "no", "on", "off", "true", "false", "null", "nan", "inf"]
 )

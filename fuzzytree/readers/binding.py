@@ -10,7 +10,7 @@ from typing import Final, TypeVar
 
 from msgspec import inspect
 
-from fuzzytree.readers.layout import Record
+from fuzzytree.readers.layout import Form, Record
 from fuzzytree.readers.nodes import (
     MOST_SHOWN,
     Found,
@@ -46,12 +46,14 @@ def entries(node: MappingNode, kind: type[Record], found: list[Found]) -> Entrie
     """Return the values of a mapping by key; check its keys and their choice."""
     known = _fields(kind)
     kept: Entries = {}
+    is_known = True
     for key, value in node.pairs:
         if not isinstance(key, Scalar):
             _expected(key, f"a key of {kind.noun} must be text", found)
         elif key.text in kept:
             _add(found, key, f"key {shortened(key.text)} stands twice")
         elif key.text not in known:
+            is_known = False
             choice = _choice(key.text, known, has_hint=len(found) < MOST_SHOWN)
             text = f"{kind.noun} has no key {shortened(key.text)}; {choice}"
             _add(found, key, text)
@@ -60,7 +62,8 @@ def entries(node: MappingNode, kind: type[Record], found: list[Found]) -> Entrie
     for name, field in known.items():
         if field.required and name not in kept:
             _add(found, node, f"{kind.noun} needs {shortened(name)}")
-    _check_forms(node, kind, kept, found)
+    if is_known and not _fits_a_form(kind, kept):
+        _add(found, node, _form_mistake(kind, kept))
     return kept
 
 
@@ -87,25 +90,26 @@ def _fields(kind: type[Record]) -> dict[str, inspect.Field]:
 
 
 def _fits_a_form(kind: type[Record], kept: Iterable[str]) -> bool:
-    choosable = {key for form in kind.forms for key in (*form.needs, *form.may)}
-    chosen = choosable.intersection(kept)
+    chosen = frozenset[str]().union(*map(_keys, kind.forms)).intersection(kept)
     return not kind.forms or any(
-        chosen.issuperset(form.needs) and chosen <= {*form.needs, *form.may}
-        for form in kind.forms
+        chosen.issuperset(form.needs) and chosen <= _keys(form) for form in kind.forms
     )
 
 
-def _check_forms(
-    node: Node, kind: type[Record], kept: Entries, found: list[Found]
-) -> None:
-    if _fits_a_form(kind, kept):
-        return
-    either = "; or ".join(
-        " and ".join(map(shortened, form.needs))
-        + (f" (and {', '.join(map(shortened, form.may))})" if form.may else "")
-        for form in kind.forms
-    )
-    _add(found, node, f"{kind.noun} needs one of these, and no more: {either}")
+def _form_mistake(kind: type[Record], kept: Iterable[str]) -> str:
+    """Return which keys belong together."""
+    sets: dict[frozenset[str], str] = {}
+    for form in kind.forms:
+        sets.setdefault(_keys(form), ", ".join((*form.needs, *form.may)))
+    choosable = frozenset[str]().union(*map(_keys, kind.forms))
+    has = ", ".join(sorted(choosable.intersection(kept))) or "nothing"
+    either = "; or ".join(sets.values())
+    return f"{kind.noun} cannot be made of {has}; it is made of {either}"
+
+
+@functools.cache
+def _keys(form: Form) -> frozenset[str]:
+    return frozenset((*form.needs, *form.may))
 
 
 def _value(

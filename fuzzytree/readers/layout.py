@@ -24,7 +24,7 @@ Answer = Annotated[
     str,
     Meta(
         pattern=r"^(no class|class [\s\S]+)$",
-        description="`no class`, or `class` and the name of a class",
+        description="'no class', or 'class' and the name of a class",
         examples=["no class", "class setosa"],
     ),
 ]
@@ -32,7 +32,7 @@ GoTo = Annotated[
     str,
     Meta(
         pattern=r"^(node|leaf) [1-9][0-9]{0,8}$",
-        description="`node` or `leaf` and a number, such as `node 2`",
+        description="'node' or 'leaf' and a number, such as 'node 2'",
         examples=["node 2", "leaf 1"],
     ),
 ]

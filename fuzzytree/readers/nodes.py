@@ -138,6 +138,7 @@ def compose(content: bytes, name: str) -> tuple[Node, list[Found]]:
                 found += _document_mistakes(event, is_first=not root)
                 if root:
                     raise report(name, found)
+                continue
             case ScalarEvent():
                 siblings.append(
                     Scalar(event.value, event.style in (None, ""), *_start(event))

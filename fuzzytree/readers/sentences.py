@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 import msgspec
@@ -29,7 +30,7 @@ Vocabulary = Mapping[str, Words]
 def words(terms: Iterable[str]) -> Words:
     """Return what `readings` needs to know about a variable's terms."""
     names = frozenset(terms)
-    return Words(names, max((name.count(_OR) for name in names), default=0))
+    return Words(names, max((len(_places(name)) for name in names), default=0))
 
 
 def vocabulary_of(variables: Iterable[Variable]) -> Vocabulary:
@@ -81,40 +82,47 @@ def guess(text: str, vocabulary: Vocabulary) -> Clause | None:
 
 def _lists(text: str, known: Words) -> list[tuple[str, ...]]:
     """Return the lists of terms, joined by OR, that a text can mean: two at most."""
-    pieces = text.split(_OR)
-    if not known.most_ors:
-        return [tuple(pieces)] if known.terms.issuperset(pieces) else []
-    # steps[i]: where a term that starts with piece i can end, if the rest can be read.
-    steps: list[list[int]] = [[] for _ in pieces]
-    for start in range(len(pieces) - 1, -1, -1):
-        for end in range(start + 1, min(start + known.most_ors + 1, len(pieces)) + 1):
-            is_readable = end == len(pieces) or bool(steps[end])
-            if is_readable and _OR.join(pieces[start:end]) in known.terms:
-                steps[start].append(end)
-    first = _walk(pieces, steps, branch_at=None)
-    forks = [start for start in _starts(steps) if len(steps[start]) > 1]
-    if not steps[0] or not forks:
-        return [first] if steps[0] else []
-    return [first, _walk(pieces, steps, branch_at=forks[0])]
+    if not known.most_ors and " or or " not in text:
+        terms = tuple(text.split(_OR))
+        return [terms] if known.terms.issuperset(terms) else []
+    ors = _places(text)
+    starts, ends = [0, *(place + len(_OR) for place in ors)], [*ors, len(text)]
+    # steps[i]: the pairs (term, next i) with which the rest from starts[i] can be read.
+    steps: list[list[tuple[str, int]]] = [[] for _ in starts]
+    for start in range(len(starts) - 1, -1, -1):
+        # A term can share a blank with the ` or ` before it and with the one behind.
+        furthest = min(start + known.most_ors + 2, len(ends) - 1)
+        for end in range(start, furthest + 1):
+            term = text[starts[start] : ends[end]]
+            is_last = end == len(ends) - 1
+            if term in known.terms and (is_last or steps[end + 1]):
+                steps[start].append((term, end + 1))
+    return [*_two_walks(steps)] if steps[0] else []
 
 
-def _starts(steps: list[list[int]]) -> list[int]:
-    """Return where the terms of the first reading start."""
-    starts: list[int] = []
+def _places(text: str) -> list[int]:
+    """Return where ` or ` stands, also where one begins with the end of another."""
+    return [match.start() for match in re.finditer("(?= or )", text)]
+
+
+def _two_walks(steps: list[list[tuple[str, int]]]) -> Iterator[tuple[str, ...]]:
+    """Yield the first list of terms, and one that turns off where that is possible."""
+    first: list[str] = []
+    turn: list[str] | None = None
     position = 0
-    while position < len(steps) and steps[position]:
-        starts.append(position)
-        position = steps[position][0]
-    return starts
+    while position < len(steps):
+        if turn is None and len(steps[position]) > 1:
+            turn = [*first, *_walk(steps, *steps[position][1])]
+        term, position = steps[position][0]
+        first.append(term)
+    yield tuple(first)
+    if turn is not None:
+        yield tuple(turn)
 
 
-def _walk(
-    pieces: list[str], steps: list[list[int]], *, branch_at: int | None
-) -> tuple[str, ...]:
-    terms: list[str] = []
-    start = 0
-    while start < len(pieces) and steps[start]:
-        end = steps[start][1 if start == branch_at else 0]
-        terms.append(_OR.join(pieces[start:end]))
-        start = end
-    return tuple(terms)
+def _walk(steps: list[list[tuple[str, int]]], term: str, position: int) -> list[str]:
+    terms = [term]
+    while position < len(steps):
+        term, position = steps[position][0]
+        terms.append(term)
+    return terms
