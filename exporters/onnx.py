@@ -153,6 +153,10 @@ def _check_options(
             raise ValueError(f"{name}: there is {', '.join(choices)}, not {value!r}")
     if not outputs or len(set(outputs)) != len(outputs):
         raise ValueError(f"outputs: name each once, at least one, not {outputs!r}")
+    if "strengths" in outputs and _is_tree(model):
+        raise ValueError(
+            "outputs: a tree has no strengths; write its rules to have them"
+        )
     if opset not in OPSETS:
         raise ValueError(_range_text("opset", OPSETS, opset))
     if ir not in IRS:

@@ -75,7 +75,8 @@ class Sheet:
         result = named or self._fresh(op.lower())
         if not (named or attributes or domain):
             self._results[key] = result
-        made = helper.make_node(op, inputs, [result], domain=domain)
+        # Some versions of onnxruntime mistake nodes without a name for one another.
+        made = helper.make_node(op, inputs, [result], name=result, domain=domain)
         for name in sorted(attributes):
             made.attribute.append(helper.make_attribute(name, attributes[name]))
         self.nodes.append(made)

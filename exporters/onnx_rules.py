@@ -211,7 +211,9 @@ def _bounds(edges: Sequence[Edge], numbers: Numbers) -> RealArray:
     """Return for each edge the smallest value, times its sign, at which it is 1."""
     bounds = rounded([edge.sign * edge.bound for edge in edges], numbers.axis)
     is_left = np.array([edge.sign > 0 for edge in edges])
-    bounds = np.where(is_left, np.nextafter(bounds, numbers.axis(np.inf)), bounds)
+    with np.errstate(over="ignore"):  # nothing lies above the largest number
+        above = np.nextafter(bounds, numbers.axis(np.inf))
+    bounds = np.where(is_left, above, bounds)
     is_always = np.array([edge == ALWAYS for edge in edges])
     return np.where(is_always, numbers.axis(-np.inf), bounds)
 

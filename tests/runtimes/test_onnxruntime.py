@@ -1,0 +1,471 @@
+"""Bits against the reference and against numpy, hostile files, an old onnxruntime."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+from onnx import TensorProto, helper
+
+from fuzzytree.contracts import Dtype, Model, Outcome
+from fuzzytree.errors import LossError, ReadError
+from fuzzytree.exporters.onnx import OLDEST, write
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import descend, evaluate
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Conjunction,
+    Flank,
+    Part,
+    Rule,
+    RuleBase,
+    Semantics,
+    Shape,
+    Side,
+    Term,
+    Variable,
+    fingerprint,
+)
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.runtimes.reference import load as load_reference
+from fuzzytree.testing import probes, random_tree
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray
+
+    Arrays = dict[str, npt.NDArray[np.generic]]
+
+DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
+
+
+def random_rules(seed: int) -> RuleBase:
+    """Return rules of every kind: OR, NOT, open terms, empty rules, long curves."""
+    chance = random.Random(seed)
+
+    def curve() -> tuple[float, ...]:
+        return tuple(chance.uniform(-1, 2) for _ in range(chance.randint(1, 8)))
+
+    def flank(start: float, sign: int) -> Flank | None:
+        if chance.random() < 0.2:
+            return None
+        return Flank(start, start + sign * chance.uniform(0.1, 3), curve())
+
+    def side() -> Side:
+        return Side(chance.uniform(0.1, 2), curve(), chance.choice((5.0, 1.5, 8.0)))
+
+    def shape() -> Shape:
+        low, high = sorted((chance.gauss(0, 1), chance.gauss(0, 1)))
+        kind = chance.random()
+        if kind < 0.4:
+            left = side()
+            return LR(low, left, left if chance.random() < 0.5 else side())
+        bottom = None if chance.random() < 0.3 else low
+        top = None if chance.random() < 0.3 else high
+        return Band(
+            bottom,
+            top,
+            None if bottom is None else flank(bottom, -1),
+            None if top is None else flank(top, 1),
+        )
+
+    def terms() -> tuple[Term, ...]:
+        return tuple(Term(f"t{k}", shape()) for k in range(1, chance.randint(2, 5)))
+
+    inputs = [f"x{k}" for k in range(1, chance.randint(2, 5))]
+    variables = [Variable(name, terms()) for name in inputs]
+    for number in range(chance.randint(0, 3)):
+        chosen = [chance.choice(inputs) for _ in range(chance.randint(1, 5))]
+        parts = tuple(
+            Part(n, chance.gauss(0, 1), chance.choice((0.0, 0.3))) for n in chosen
+        )
+        variables.append(Variable(f"z{number}", terms(), parts=parts))
+
+    def clause() -> Clause:
+        variable = chance.choice(variables)
+        names = [term.name for term in variable.terms]
+        some = tuple(chance.sample(names, chance.randint(1, len(names))))
+        return Clause(variable.name, some, chance.random() < 0.3)
+
+    classes = ("no", "ja", "élan ☂")
+    sizes = range(5) if chance.random() < 0.5 else (1, 2, 3)
+    rules = tuple(
+        Rule(
+            tuple(clause() for _ in range(chance.choice(sizes))), chance.choice(classes)
+        )
+        for _ in range(chance.randint(1, 9))
+    )
+    answers = (None, *classes)
+    conjunction: Conjunction = chance.choice(("min", "product"))
+    semantics = Semantics(conjunction, chance.choice(answers), chance.choice(answers))
+    return RuleBase(f"random {seed}", classes, tuple(variables), rules, semantics)
+
+
+def random_models(seed: int) -> tuple[Model, ...]:
+    leaves = (1, 2, 3, 5, 7, 12, 20, 40)[seed % 8]
+    semantics = Semantics(missing="class 1") if seed % 2 else None
+    tree = random_tree(seed, leaves=leaves, inputs=1 + seed % 5, semantics=semantics)
+    return (
+        tree,
+        rules_from_tree(tree),
+        rules_from_tree(tree, conjunction="product"),
+        rules_from_tree(tree, "raw"),
+        rules_from_tree(tree, "raw", conjunction="product"),
+        random_rules(seed),
+        random_rules(1000 + seed),
+    )
+
+
+def values_for(model: Model, limit: int = 1500) -> FloatArray:
+    rows = probes(model, limit=limit)
+    table = [[row[name] for row in rows] for name in model.inputs]
+    return np.array(table, np.float64).reshape(len(model.inputs), len(rows))
+
+
+def assert_equal_bits(found: Outcome, expected: Outcome) -> None:
+    assert np.array_equal(found.rule, expected.rule)
+    assert np.array_equal(found.status, expected.status)
+    if found.strengths is not None and expected.strengths is not None:
+        assert np.array_equal(found.strengths, expected.strengths, equal_nan=True)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_double_gives_the_bits_of_the_reference(seed: int) -> None:
+    for model in random_models(seed):
+        values = values_for(model, 1200 if seed % 8 < 6 else 200)
+        expected = load_reference(model)(values)
+        variants = ("float64", "plain" if isinstance(model, FuzzyTree) else "readable")
+        for variant in variants:
+            found = find_runtime(f"onnxruntime {variant}").load(model)(values)
+            assert_equal_bits(found, expected)
+
+
+@pytest.mark.parametrize("dtype", ["mixed", "float32"])
+@pytest.mark.parametrize("seed", range(12))
+def test_single_types_give_the_bits_of_numpy(seed: int, dtype: Dtype) -> None:
+    for model in random_models(seed):
+        values = values_for(model)
+        expected = find_runtime(f"native {dtype}").load(model)(values)
+        found = find_runtime(f"onnxruntime {dtype}").load(model)(values)
+        assert_equal_bits(found, expected)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_relative_rules_decide_as_the_tree_in_every_type(seed: int) -> None:
+    tree = random_tree(seed, leaves=9, inputs=3)
+    values = values_for(tree)
+    for dtype in DTYPES:
+        load = find_runtime(f"onnxruntime {dtype}").load
+        rules, path = load(rules_from_tree(tree))(values), load(tree)(values)
+        assert np.array_equal(rules.rule, path.rule)
+        assert np.array_equal(rules.status, path.status)
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_optimising_a_graph_changes_no_bit(seed: int) -> None:
+    for model in random_models(seed):
+        outputs = ("rule", "status") if isinstance(model, FuzzyTree) else None
+        written = write(model, outputs=outputs or ("rule", "strengths"))
+        options = onnxruntime.SessionOptions()
+        level = onnxruntime.GraphOptimizationLevel
+        table = np.ascontiguousarray(values_for(model).T)
+        answers = []
+        for chosen in (level.ORT_DISABLE_ALL, level.ORT_ENABLE_ALL):
+            options.graph_optimization_level = chosen
+            session = onnxruntime.InferenceSession(written.content, options)
+            answers.append(session.run(None, {"inputs": table}))
+        for one, other in zip(*answers, strict=True):
+            assert np.array_equal(one, other, equal_nan=one.dtype == np.float64)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_chunks_rows_and_orders_change_no_bit(dtype: Dtype) -> None:
+    rules = rules_from_tree(random_tree(4, leaves=300, inputs=5))
+    run = find_runtime(f"onnxruntime {dtype}").load(rules)
+    values = values_for(rules)
+    whole = run(values)
+    assert whole.strengths is not None
+    assert_equal_bits(run(np.asfortranarray(values)), whole)
+    for part in (slice(0, 0), slice(7, 8), slice(100, 333)):
+        cut = Outcome(whole.rule[part], whole.status[part], whole.strengths[:, part])
+        assert_equal_bits(run(values[:, part]), cut)
+
+
+def test_a_wrong_width_is_refused_with_one_sentence() -> None:
+    run = find_runtime("onnxruntime float64").load(random_tree(1, inputs=2))
+    with pytest.raises(ValueError, match="one line for each of the 2 inputs"):
+        run(np.zeros((3, 4)))
+
+
+def test_text_in_place_of_numbers_is_refused() -> None:
+    run = find_runtime("onnxruntime float64").load(random_tree(1, inputs=2))
+    with pytest.raises(ValueError, match="could not convert string to float"):
+        run(np.array([["a"], ["b"]]))
+
+
+def test_whole_numbers_are_taken_as_doubles() -> None:
+    tree = random_tree(1, inputs=2)
+    run = find_runtime("onnxruntime float32").load(tree)
+    whole = np.array([[1, -2], [3, 10**6]])
+    assert_equal_bits(run(whole), run(whole.astype(np.float64)))
+
+
+def test_a_failed_run_says_nothing_on_stderr(capfd: pytest.CaptureFixture[str]) -> None:
+    model = open_onnx(write(random_tree(1, inputs=2)).content, "tree.onnx")
+    with pytest.raises(ValueError, match="one line for each"):
+        model.run(np.zeros((5, 1)))
+    with pytest.raises(ReadError):
+        open_onnx(_changed(lambda proto: proto.graph.node.pop()), "cut.onnx")
+    assert capfd.readouterr() == ("", "")
+
+
+def _changed(change: object, model: Model | None = None) -> bytes:
+    proto = onnx.load_from_string(write(model or random_tree(1, inputs=2)).content)
+    assert callable(change)
+    change(proto)
+    content: bytes = proto.SerializeToString()
+    return content
+
+
+def test_a_shipped_file_tells_what_it_is_and_answers_alone() -> None:
+    tree = random_tree(7, leaves=9, inputs=3, semantics=Semantics(missing="class 2"))
+    values = values_for(tree)
+    for model in (tree, rules_from_tree(tree, "raw", conjunction="product")):
+        written = write(model, outputs=("status", "label", "rule"), signature="all")
+        found = open_onnx(written.content, "model.onnx")
+        assert isinstance(found, OnnxModel)
+        assert found.fingerprint == fingerprint(model)
+        assert found.classes == tree.classes
+        assert (found.inputs, found.columns) == (tree.inputs, tree.columns)
+        assert found.semantics == model.semantics
+        units = ["cm" if name in tree.inputs else "" for name in tree.columns]
+        assert found.units == tuple(units)
+        expected = load_reference(model)(values)
+        assert_equal_bits(found.run(values), expected)
+        rows = [dict(zip(tree.inputs, row, strict=True)) for row in values.T.tolist()]
+        answers = [
+            descend(model, r) if isinstance(model, FuzzyTree) else evaluate(model, r)
+            for r in rows
+        ]
+        assert found.labels is not None
+        assert found.labels(values) == tuple(answer.label for answer in answers)
+
+
+def test_a_file_without_status_tells_missing_from_uncovered() -> None:
+    low = Term("low", Band(high=0.0))
+    rules = RuleBase(
+        "r", ("a",), (Variable("x", (low,)),), (Rule((Clause("x", ("low",)),), "a"),)
+    )
+    found = open_onnx(write(rules).content, "r.onnx")
+    assert found.run(np.array([[-1.0, 1.0, np.nan]])).status.tolist() == [0, 2, 3]
+
+
+def _other_graph() -> bytes:
+    node = helper.make_node("Identity", ["a"], ["b"])
+    ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, [1]) for n in "ab"]
+    graph = helper.make_graph([node], "g", ends[:1], ends[1:])
+    imports = [helper.make_opsetid("", 17)]
+    made = helper.make_model(graph, opset_imports=imports, ir_version=8)
+    content: bytes = made.SerializeToString()
+    return content
+
+
+def _set_fact(proto: onnx.ModelProto, key: str, value: str) -> None:
+    for entry in proto.metadata_props:
+        if entry.key == f"fuzzytree.{key}":
+            entry.value = value
+
+
+def _move_out(proto: onnx.ModelProto) -> None:
+    proto.graph.initializer[0].external_data.add(key="location", value="/etc/passwd")
+
+
+def _call_home(proto: onnx.ModelProto) -> None:
+    proto.graph.node[0].domain = "com.example"
+
+
+def _nest(proto: onnx.ModelProto) -> None:
+    inner = proto.graph.node[0].attribute.add(name="body", type=5)
+    inner.g.name = "inner"
+
+
+def _drop_rule(proto: onnx.ModelProto) -> None:
+    del proto.graph.output[1]
+    _set_fact(proto, "outputs", '["label"]')
+
+
+NOT_OURS = (
+    "this ONNX file is not one of fuzzytree: its metadata has no 'fuzzytree.format'"
+)
+NO_ONNX = "this is no ONNX file, or only a part of one"
+
+
+def _with_fact(key: str, value: str) -> bytes:
+    return _changed(lambda proto: _set_fact(proto, key, value))
+
+
+HOSTILE = {
+    "empty": (b"", NOT_OURS),
+    "yaml": (b"hello: this is yaml", NO_ONNX),
+    "truncated": (write(random_tree(1)).content[:-40], NO_ONNX),
+    "other": (_other_graph(), NOT_OURS),
+    "newer": (
+        _with_fact("format", "2"),
+        "the file has format '2', and this fuzzytree reads format '1'; "
+        "a newer one may help",
+    ),
+    "broken json": (
+        _with_fact("classes", "[1"),
+        "the file's metadata is broken: Expecting ',' delimiter: "
+        "line 1 column 3 (char 2)",
+    ),
+    "wrong json": (
+        _with_fact("classes", "[1]"),
+        "the file's metadata is broken: Expected `str`, got `int` - at `$.classes[0]`",
+    ),
+    "unknown input": (
+        _with_fact("inputs", '["other"]'),
+        "the file's metadata contradicts itself",
+    ),
+    "other width": (
+        _with_fact("columns", '["x1", "x2", "x3"]'),
+        "the graph's inputs and outputs are not those of its metadata",
+    ),
+    "external data": (
+        _changed(_move_out),
+        "constant 'rows' lies in another file",
+    ),
+    "custom operator": (
+        _changed(_call_home),
+        "operator 'Transpose' of 'com.example' is not ONNX's own",
+    ),
+    "subgraph": (
+        _changed(_nest),
+        "operator 'Transpose' holds a graph of its own",
+    ),
+    "no rule": (
+        _changed(_drop_rule),
+        "the file has no output 'rule', so it cannot be run here; "
+        "write it with the outputs label and rule",
+    ),
+}
+
+
+@pytest.mark.parametrize(("content", "text"), HOSTILE.values(), ids=HOSTILE)
+def test_a_file_that_is_not_ours_is_refused_with_one_sentence(
+    content: bytes, text: str
+) -> None:
+    with pytest.raises(ReadError) as caught:
+        open_onnx(content, "shipped.onnx")
+    assert str(caught.value) == f"shipped.onnx: {text}"
+
+
+def test_a_huge_file_is_refused_before_it_is_parsed() -> None:
+    with pytest.raises(ReadError) as caught:
+        open_onnx(bytes(129 * 2**20), "huge.onnx")
+    expected = "huge.onnx: the file has 129 MiB, and 128 are the most that is read"
+    assert str(caught.value) == expected
+
+
+def test_a_graph_that_onnxruntime_refuses_is_refused() -> None:
+    content = _changed(lambda proto: proto.graph.node.pop())
+    with pytest.raises(ReadError, match=r"^cut\.onnx: onnxruntime does not load it: "):
+        open_onnx(content, "cut.onnx")
+
+
+def test_a_type_that_cannot_hold_the_model_is_refused_at_loading() -> None:
+    low = Term("low", Band(high=1e300))
+    rules = RuleBase(
+        "r", ("a",), (Variable("x", (low,)),), (Rule((Clause("x", ("low",)),), "a"),)
+    )
+    with pytest.raises(LossError, match=r"high 1e\+300 lies beyond float32"):
+        find_runtime("onnxruntime float32").load(rules)
+
+
+OLD_SCRIPT = textwrap.dedent("""
+    import json, sys, numpy, onnxruntime
+    folder = sys.argv[1]
+    assert onnxruntime.__version__ == sys.argv[2], onnxruntime.__version__
+    values = numpy.load(folder + "/values.npz")
+    answers = {}
+    for name in values:
+        options = onnxruntime.SessionOptions()
+        options.log_severity_level = 4
+        session = onnxruntime.InferenceSession(folder + "/" + name, options)
+        outputs = [output.name for output in session.get_outputs()]
+        found = session.run(outputs, {"inputs": values[name]})
+        for output, array in zip(outputs, found):
+            kind = "U" if output == "label" else array.dtype
+            answers[name + " " + output] = array.astype(kind)
+    numpy.savez(folder + "/answers.npz", **answers)
+""")
+
+
+def old_python(folder: Path, version: str) -> Path:
+    """Return the Python of a fresh environment with an old onnxruntime."""
+    python = folder / "bin" / "python"
+    wanted = [f"onnxruntime=={version}", "numpy<2"]
+    for command in (
+        [sys.executable, "-m", "venv", str(folder)],
+        [str(python), "-m", "pip", "install", "-q", *wanted],
+    ):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            pytest.skip(f"cannot install {wanted[0]}: {done.stderr.strip()[-200:]}")
+    return python
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("version", sorted(set(OLDEST.values())))
+def test_the_oldest_onnxruntime_gives_equal_bits(version: str, tmp_path: Path) -> None:
+    is_oldest = version == OLDEST["rules"]
+    values: Arrays = {}
+    expected: dict[str, Arrays] = {}
+    for seed in range(8):
+        for number, model in enumerate(random_models(seed)):
+            is_tree = isinstance(model, FuzzyTree)
+            for dtype in DTYPES:
+                name = f"{seed} {number} {dtype}.onnx"
+                written = write(
+                    model,
+                    dtype=dtype,
+                    plain=is_tree and is_oldest,
+                    readable=not is_tree and seed % 2 == 1,
+                    outputs=("label", "rule", "status")
+                    + (() if is_tree else ("strengths",)),
+                )
+                (tmp_path / name).write_bytes(written.content)
+                kind = np.float32 if dtype == "float32" else np.float64
+                with np.errstate(over="ignore"):
+                    table = np.ascontiguousarray(values_for(model, 600).T.astype(kind))
+                values[name] = table
+                session = onnxruntime.InferenceSession(written.content)
+                names = [output.name for output in session.get_outputs()]
+                answers = session.run(names, {"inputs": table})
+                expected[name] = dict(zip(names, answers, strict=True))
+    np.savez(tmp_path / "values.npz", **values)
+    script = tmp_path / "run.py"
+    script.write_text(OLD_SCRIPT)
+    python = old_python(tmp_path / "old", version)
+    command = [str(python), str(script), str(tmp_path), version]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    with np.load(tmp_path / "answers.npz") as found:
+        for name, outputs in expected.items():
+            for output, array in outputs.items():
+                old = found[f"{name} {output}"]
+                is_real = array.dtype.kind == "f"
+                assert np.array_equal(old, array.astype(old.dtype), equal_nan=is_real)
