@@ -16,6 +16,7 @@ import os
 import platform
 import time
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -30,6 +31,7 @@ from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load, load_best_first
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets
 
+Singles = npt.NDArray[np.float32]
 Floats = npt.NDArray[np.float64]
 Candidates = Mapping[str, Callable[[], object]]
 
@@ -82,7 +84,7 @@ def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
     grown = _grow(leaves, is_many=is_many)
     tree = tree_of(grown)
     run = load(tree)
-    kind = "a class for each leaf" if is_many else "7 classes"
+    kind = "a class for each leaf" if is_many else "3 classes"
     print(
         f"\n## descent, {len(tree.leaves)} leaves, depth {grown.get_depth()}, {kind}: "
         "ratio to scikit-learn's predict on float32"
@@ -90,18 +92,19 @@ def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
     for count in (1, 100_000) if quick else (1, 100_000, 1_000_000):
         if is_many and leaves > 100 and count > 100_000:
             continue  # predict would need rows x classes doubles
-        single = np.random.default_rng(1).normal(size=(count, FEATURES))
-        single = single.astype(np.float32)
+        drawn = np.random.default_rng(1).normal(size=(count, FEATURES))
+        single = drawn.astype(np.float32)
         double = single.astype(np.float64)
         values = np.ascontiguousarray(double[:, _needed(tree)].T)
         _compare_answers(run, values, grown, single)
+        rows_first = values.T.copy().T
         candidates: dict[str, Callable[[], object]] = {
-            "scikit-learn predict float32": lambda x=single: grown.predict(x),
-            "scikit-learn predict float64": lambda x=double: grown.predict(x),
-            "scikit-learn tree_.apply": lambda x=single: grown.tree_.apply(x),
-            "native descent": lambda x=values: run(x),
-            "native descent, rows first": lambda x=values.T.copy().T: run(x),
-            "floor: sum of the columns": lambda x=values: x.sum(),
+            "scikit-learn predict float32": partial(grown.predict, single),
+            "scikit-learn predict float64": partial(grown.predict, double),
+            "scikit-learn tree_.apply": partial(grown.tree_.apply, single),
+            "native descent": partial(run, values),
+            "native descent, rows first": partial(run, rows_first),
+            "floor: sum of the columns": partial(np.sum, values),
         }
         if count == 1:
             candidates["generated Python"] = _generated(tree, values)
@@ -125,13 +128,12 @@ def _rules(count: int, *, raw: bool, rounds: int) -> None:
         assert np.array_equal(fired.rule, found.rule)
         assert np.array_equal(fired.status, found.status)
         candidates: dict[str, Callable[[], object]] = {
-            "native float64": lambda x=values: run(x),
-            "best-first": lambda x=values: best(x),
-            "floor: sum of the columns": lambda x=values: x.sum(),
+            "native float64": partial(run, values),
+            "best-first": partial(best, values),
+            "floor: sum of the columns": partial(np.sum, values),
         }
-        for dtype in ("mixed", "float32"):
-            other = load(rules, "mixed" if dtype == "mixed" else "float32")
-            candidates[f"native {dtype}"] = lambda x=values, run=other: run(x)
+        for name in ("native mixed", "native float32"):
+            candidates[name] = partial(find_runtime(name).load(rules), values)
         candidates.update(_onnx("rules", rules, values))
         _table(candidates, rows, rounds if rows > 1 else 50)
     few = values[:, :200].copy()
@@ -167,7 +169,7 @@ def _grow(leaves: int, *, is_many: bool) -> DecisionTreeClassifier:
     """Return a tree of scikit-learn with so many leaves, on seeded data."""
     chance = np.random.default_rng(0)
     values = chance.normal(size=(100_000, FEATURES)).astype(np.float32)
-    scores = values @ chance.normal(size=(FEATURES, 7))
+    scores = values @ chance.normal(size=(FEATURES, 3))
     labels = (scores + 0.5 * chance.normal(size=scores.shape)).argmax(axis=1)
     grown = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0)
     grown.fit(values, labels)
@@ -182,7 +184,7 @@ def _needed(tree: FuzzyTree) -> list[int]:
 
 
 def _compare_answers(
-    run: Run, values: Floats, grown: DecisionTreeClassifier, single: npt.NDArray[np.float32]
+    run: Run, values: Floats, grown: DecisionTreeClassifier, single: Singles
 ) -> None:
     places = grown.apply(single[:20_000])
     numbers = run(values[:, :20_000]).rule
@@ -197,7 +199,8 @@ def _walk(grown: DecisionTreeClassifier) -> Iterable[int]:
         place = todo.pop()
         yield place
         if grown.tree_.feature[place] >= 0:
-            todo += [grown.tree_.children_right[place], grown.tree_.children_left[place]]
+            todo.append(grown.tree_.children_right[place])
+            todo.append(grown.tree_.children_left[place])
 
 
 def tree_of(grown: DecisionTreeClassifier) -> FuzzyTree:
@@ -261,7 +264,7 @@ def _sets(
     grown: DecisionTreeClassifier, name: str, leaf_of: Mapping[int, int]
 ) -> tuple[Term, ...]:
     """Return the set of each leaf on a variable, as wide as its cell."""
-    cells: dict[int, tuple[float, float]] = {0: (-3.0, 3.0)}
+    cells: dict[int, tuple[float, float]] = {0: (-8.0, 8.0)}
     found: dict[int, Term] = {}
     for place in _walk(grown):
         low, high = cells[place]
@@ -270,7 +273,8 @@ def _sets(
             label = f"pattern {leaf_of[place]}"
             found[leaf_of[place]] = Term(label, LR((low + high) / 2.0, side, side))
             continue
-        left, right = grown.tree_.children_left[place], grown.tree_.children_right[place]
+        left = grown.tree_.children_left[place]
+        right = grown.tree_.children_right[place]
         cut = float(grown.tree_.threshold[place])
         is_asked = COLUMNS[grown.tree_.feature[place]] == name
         cells[left] = (low, min(high, cut)) if is_asked else (low, high)
@@ -278,9 +282,7 @@ def _sets(
     return tuple(found[number] for number in sorted(found))
 
 
-def _skl2onnx(
-    grown: DecisionTreeClassifier, single: npt.NDArray[np.float32]
-) -> Callable[[], object]:
+def _skl2onnx(grown: DecisionTreeClassifier, single: Singles) -> Callable[[], object]:
     import onnxruntime
     from skl2onnx import to_onnx
 
@@ -299,16 +301,15 @@ def _options() -> object:
     return options
 
 
-def _onnx(
-    what: str, model: FuzzyTree | RuleBase, values: Floats
-) -> Candidates:
+def _onnx(what: str, model: FuzzyTree | RuleBase, values: Floats) -> Candidates:
     """Return our own graphs in onnxruntime, and the floor of a session call."""
     found: dict[str, Callable[[], object]] = {}
     for dtype in ("float64", "mixed", "float32"):
         runtime = find_runtime(f"onnxruntime {dtype}")
         if what in runtime.runs:
-            run = runtime.load(model)
-            found[f"our {what} in {runtime.name}"] = lambda run=run: run(values)
+            found[f"our {what} in {runtime.name}"] = partial(
+                runtime.load(model), values
+            )
     found["floor: an empty session call"] = _empty_call(values)
     return found
 

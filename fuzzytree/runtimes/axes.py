@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from fuzzytree.contracts import FloatArray, IntArray
 
-    Single = np.dtype[np.float64] | np.dtype[np.float32]
+    Reals = npt.NDArray[np.floating[Any]]
+    Real = np.dtype[np.floating[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +29,8 @@ class Step:
     """The parts at one position of all combinations that are long enough."""
 
     inputs: IntArray
-    weights: npt.NDArray[np.floating[Any]]
-    centres: npt.NDArray[np.floating[Any]]
+    weights: Reals
+    centres: Reals
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class Axes:
     inputs: int
     steps: tuple[Step, ...]
     chains: tuple[tuple[tuple[int, float, float], ...], ...]
-    dtype: type[np.float64] | type[np.float32]
+    dtype: Real
 
     @property
     def count(self) -> int:
@@ -59,29 +60,30 @@ class Axes:
 
 def plan_axes(
     variables: Sequence[Variable],
-    dtype: type[np.float64] | type[np.float32] = np.float64,
+    dtype: Real | None = None,
 ) -> Axes:
-    """Return how to compute the variables of a model."""
+    """Return how to compute the variables of a model; in double unless given."""
+    kind: Real = np.dtype(np.float64) if dtype is None else dtype
     inputs = [v.name for v in variables if not v.parts]
     mixed = [v for v in variables if v.parts]
     mixed.sort(key=lambda v: -len(v.parts))
     line = {name: i for i, name in enumerate([*inputs, *(v.name for v in mixed)])}
     longest = len(mixed[0].parts) if mixed else 0
     steps = tuple(
-        _step([v.parts[p] for v in mixed if len(v.parts) > p], line, dtype)
+        _step([v.parts[p] for v in mixed if len(v.parts) > p], line, kind)
         for p in range(longest)
     )
     chains = tuple(
         tuple((line[part.input], part.weight, part.centre) for part in v.parts)
         for v in mixed
     )
-    return Axes(line, len(inputs), steps, chains, dtype)
+    return Axes(line, len(inputs), steps, chains, kind)
 
 
 def _step(
     parts: Sequence[Part],
     line: dict[str, int],
-    dtype: type[np.float64] | type[np.float32],
+    dtype: Real,
 ) -> Step:
     return Step(
         np.array([line[part.input] for part in parts], np.int64),
@@ -90,7 +92,7 @@ def _step(
     )
 
 
-def axis_lines(axes: Axes, values: FloatArray) -> npt.NDArray[np.floating[Any]]:
+def axis_lines(axes: Axes, values: FloatArray) -> Reals:
     """Return the value of every variable, of shape (variables, rows).
 
     Args:
@@ -98,14 +100,14 @@ def axis_lines(axes: Axes, values: FloatArray) -> npt.NDArray[np.floating[Any]]:
         values: Doubles of shape (inputs, rows); returned as they are if the plan has
             no combinations and computes in doubles.
     """
-    base = values.astype(axes.dtype, copy=False)
+    base: Reals = values.astype(axes.dtype, copy=False)
     if not axes.steps:
         return base
     lines = np.empty((axes.count, values.shape[1]), axes.dtype)
     lines[: axes.inputs] = base
     chains = lines[axes.inputs :]
     for position, step in enumerate(axes.steps):
-        term = base[step.inputs]
+        term: Reals = base[step.inputs]
         term -= step.centres
         term *= step.weights
         if position == 0:
@@ -126,12 +128,12 @@ def axis_row(axes: Axes, row: list[float]) -> list[float]:
     return values
 
 
-def missing_rows(lines: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.bool_] | None:
+def missing_rows(lines: Reals) -> npt.NDArray[np.bool_] | None:
     """Return which rows hold a value that is not finite; None if no row does.
 
     The sum is a fast first look: it is finite only if every summand is.
     """
     if np.isfinite(lines.sum()):
         return None
-    missing: npt.NDArray[np.bool_] = ~np.isfinite(lines).all(axis=0)
+    missing = ~np.logical_and.reduce(np.isfinite(lines), axis=0)
     return missing if missing.any() else None

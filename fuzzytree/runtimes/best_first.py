@@ -97,7 +97,7 @@ def search(rules: RuleBase) -> Run:
     axes = plan_axes(rules.variables)
     splits = _splits(rules, forks, axes.line)
     if splits is not None:
-        return descend_by(axes, plan_descent(splits), rules.inputs)
+        return descend_by(axes, plan_descent(splits, axes.dtype), rules.inputs)
     looks = [_look(rules, fork, axes.line) for fork in forks]
     is_product = rules.semantics.conjunction == "product"
 
@@ -165,8 +165,9 @@ def _splits(
 def _plateaus(
     fork: Fork, shapes: dict[tuple[str, str], Shape]
 ) -> list[tuple[float | None, int]] | None:
-    """Return where each plateau ends and which fork it leads to; None if they do not
-    follow one another from end to end of one axis.
+    """Return where each plateau ends and which fork it leads to.
+
+    None if they do not follow one another from end to end of one axis.
     """
     bands: list[tuple[float, Band, int]] = []
     for clause, target in zip(fork.clauses, fork.targets, strict=True):

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
-    Real = type[np.float64] | type[np.float32]
+    Real = np.dtype[np.floating[Any]]
 
 BLOCK = 1 << 15
 """Numbers in a block: with its scratch it fits into a second-level cache."""
@@ -50,13 +50,16 @@ class Numbers:
     @property
     def cap(self) -> Reals:
         """The largest number below 1 of the degrees' type."""
-        return np.nextafter(self.degree(1), self.degree(0))
+        return np.nextafter(np.ones((), self.degree), np.zeros((), self.degree))
 
+
+DOUBLE: Real = np.dtype(np.float64)
+SINGLE: Real = np.dtype(np.float32)
 
 NUMBERS: dict[Dtype, Numbers] = {
-    "float64": Numbers(np.float64, np.float64),
-    "mixed": Numbers(np.float64, np.float32),
-    "float32": Numbers(np.float32, np.float32),
+    "float64": Numbers(DOUBLE, DOUBLE),
+    "mixed": Numbers(DOUBLE, SINGLE),
+    "float32": Numbers(SINGLE, SINGLE),
 }
 
 
@@ -144,7 +147,7 @@ def _kind(atom: Atom) -> tuple[int, int]:
     match atom:
         case Edge(flank=None):
             return 0, 0
-        case Edge(flank=flank):
+        case Edge(flank=Flank() as flank):
             return 1, 0 if flank.curve == (1.0,) else len(flank.curve)
         case Slope(sign=0):
             return 2, len(atom.side.curve)
@@ -197,7 +200,8 @@ def _flanks(
     span = _column([flank.start - flank.end for flank in flanks], numbers.axis)
     curve = _curve([flank.curve for flank in flanks], numbers.degree)
     is_line = all(flank.curve == (1.0,) for flank in flanks)
-    zero, one, cap = numbers.degree(0), numbers.degree(1), numbers.cap
+    zero, one = (np.array(value, numbers.degree) for value in (0, 1))
+    cap = numbers.cap
 
     def run(x: Reals, out: Reals, q: Reals) -> None:
         inside = core(x)
@@ -234,7 +238,8 @@ def _slopes(
 ) -> Callable[[Reals, Reals, Reals], None]:
     """Return what computes sides of LR sets (paper, 2.2.2, with a tail)."""
     is_both = slopes[0].sign == 0
-    kind, one, zero, two = numbers.degree, *map(numbers.degree, (1, 0, 2))
+    kind = numbers.degree
+    zero, one, two = (np.array(value, kind) for value in (0, 1, 2))
     mean = _column([slope.mean for slope in slopes], numbers.axis)
     spread = _column([(s.sign or 1) * s.side.spread for s in slopes], numbers.axis)
     reach = _column([slope.side.reach for slope in slopes], kind)
@@ -265,3 +270,24 @@ def _slopes(
         out *= u
 
     return run
+
+
+def shape_degrees(shape: Shape, values: Reals) -> Reals:
+    """Return the degree of each of some finite doubles, bit-equal to the reference.
+
+    Example:
+        >>> from fuzzytree.rulebase import Band
+        >>> band = Band(0.0, 1.0, right=Flank(1.0, 2.0))
+        >>> shape_degrees(band, np.array([0.0, 1.0, 1.25])).tolist()
+        [0.0, 1.0, 0.75]
+    """
+    found = np.ones(len(values))
+    atoms = atoms_of(0, shape)
+    _, blocks = plan_blocks(atoms, NUMBERS["float64"], max(len(values), 1))
+    with np.errstate(all="ignore"):
+        for block in blocks:
+            lines = np.repeat(values[np.newaxis], len(block.lines), axis=0)
+            out = np.empty_like(lines)
+            block.run(lines, out, np.empty_like(lines))
+            np.minimum(found, out.min(axis=0), out=found)
+    return found

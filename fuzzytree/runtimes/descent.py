@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.contracts import IntArray
 
+    Real = np.dtype[np.floating[Any]]
     Reals = npt.NDArray[np.floating[Any]]
     Bytes = npt.NDArray[np.uint8]
 
@@ -106,9 +107,7 @@ class Descent:
     is_whole: bool
 
 
-def plan_descent(
-    splits: Sequence[Split], kind: type[np.float64] | type[np.float32] = np.float64
-) -> Descent:
+def plan_descent(splits: Sequence[Split], kind: Real) -> Descent:
     """Return a tree as lists of questions.
 
     Args:
@@ -200,9 +199,7 @@ def _leaves_below(splits: Sequence[Split]) -> list[int]:
     return weights
 
 
-def _plan_top(
-    draft: _Draft, kind: type[np.float64] | type[np.float32]
-) -> tuple[tuple[Ask, ...], list[int]]:
+def _plan_top(draft: _Draft, kind: Real) -> tuple[tuple[Ask, ...], list[int]]:
     """Choose the questions that most leaves lie below; return them and their exits."""
     count = draft.leaf.count(0)
     least = 0.0 if count <= _SMALL else _SHARE * draft.weight[0]
@@ -221,7 +218,7 @@ def _plan_top(
 
 
 def _order_top(
-    draft: _Draft, chosen: set[int], kind: type[np.float64] | type[np.float32]
+    draft: _Draft, chosen: set[int], kind: Real
 ) -> tuple[tuple[Ask, ...], list[int]]:
     """Put the chosen questions in an order in which answers come before their use."""
     asks: list[Ask] = []
@@ -264,7 +261,7 @@ class Desk:
     It belongs to one call, and is written over by every chunk.
     """
 
-    def __init__(self, rows: int, kind: type[np.float64] | type[np.float32]) -> None:
+    def __init__(self, rows: int, kind: Real) -> None:
         self.order = np.arange(rows)
         self.rows = np.empty((3, rows), np.int64)
         self.here = np.empty((3, rows), np.int64)

@@ -279,7 +279,7 @@ def clause_degrees(degrees: Degrees, lines: Reals) -> Reals:
     if len(degrees.negated):
         start = degrees.count - len(degrees.negated)
         plain = found[:start].take(degrees.negated, axis=0)
-        np.subtract(degrees.numbers.degree(1), plain, out=found[start:])
+        np.subtract(np.ones((), found.dtype), plain, out=found[start:])
     return found
 
 

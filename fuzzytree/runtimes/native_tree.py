@@ -55,13 +55,12 @@ def follow(tree: FuzzyTree, dtype: Dtype = "float64") -> Run:
 
 def descend_by(axes: Axes, descent: Descent, inputs: tuple[str, ...]) -> Run:
     """Return a function that descends planned splits on planned axes."""
-
-    is_plain = not axes.steps and axes.dtype is np.float64
+    is_plain = not axes.steps and axes.dtype == np.float64
 
     def run(values: FloatArray) -> Outcome:
         array = checked(values, inputs)
         count = array.shape[1]
-        if count == 1 and axes.dtype is np.float64:
+        if count == 1 and axes.dtype == np.float64:
             row = axis_row(axes, array[:, 0].tolist())
             return _one(descent.splits, row)
         rule = np.empty(count, np.int64)

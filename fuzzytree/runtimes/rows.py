@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,7 +33,9 @@ def checked(values: npt.ArrayLike, inputs: Sequence[str]) -> FloatArray:
     return array
 
 
-def winners(strengths: FloatArray, missing: npt.NDArray[np.bool_]) -> IntArray:
+def winners(
+    strengths: npt.NDArray[np.floating[Any]], missing: npt.NDArray[np.bool_]
+) -> IntArray:
     """Return rule numbers and status codes as the two lines of one array.
 
     Args:

@@ -1,0 +1,125 @@
+"""Shapes as points, for engines that know nothing else, with a certified error.
+
+Points lie on every landmark, on the doubles next to it, and between them. So plateaus
+begin and end at the very double, and an engine that joins the points by lines keeps
+every decision of relative rules: degree 1 on the plateaus, below 1 elsewhere.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.probing import landmarks
+from fuzzytree.rulebase import LR, Band, Flank, Shape, Side
+from fuzzytree.runtimes.degrees import shape_degrees
+
+FloatArray = npt.NDArray[np.float64]
+
+HIGHEST = 1.0 - 2.0**-50
+"""The highest sample off a plateau: joined by lines, such samples stay below 1."""
+
+_ROUNDING = 2.0**-40  # relative to a curve's coefficients; covers far more than it must
+
+
+def universe(shapes: Sequence[Shape], points: int) -> FloatArray:
+    """Return increasing values at which to sample all shapes of one variable.
+
+    Args:
+        shapes: The shapes.
+        points: How many values to put on each curved piece.
+    """
+    found: list[FloatArray] = [np.array([0.0])]
+    for shape in shapes:
+        marks = np.array(landmarks(shape))
+        found += [marks, np.nextafter(marks, -np.inf), np.nextafter(marks, np.inf)]
+        for start, end in _pieces(shape):
+            share = np.arange(points + 1) / points
+            found.append(start * (1.0 - share) + end * share)
+    values = np.unique(np.concatenate(found))
+    return values[np.isfinite(values)]
+
+
+def samples(shape: Shape, values: FloatArray) -> FloatArray:
+    """Return the degrees of a shape at some values, not above `HIGHEST` but for 1."""
+    degrees = shape_degrees(shape, values)
+    return np.where(degrees == 1.0, 1.0, np.minimum(degrees, HIGHEST))
+
+
+def line_error(shape: Shape, values: FloatArray) -> float:
+    """Return how far lines between the samples can be from the shape's degrees.
+
+    On a piece where the degree is a polynomial p of u, a line between two points that
+    are h apart in u is within `max |p''| h**2 / 8` of p. Where p is held between 0 and
+    1, the line between the held ends adds at most by how much p exceeds the range at
+    them. Both are computed for every pair of neighbours.
+
+    Args:
+        shape: The shape.
+        values: Increasing, with every landmark and its neighbours among them.
+    """
+    match shape:
+        case Band(left=left, right=right):
+            flanks = [flank for flank in (left, right) if flank is not None]
+            errors = [_flank_error(flank, values) for flank in flanks]
+        case LR(mean=mean, left=below, right=above):
+            errors = [
+                _side_error(side, (values - mean) * sign)
+                for side, sign in ((below, -1.0), (above, 1.0))
+            ]
+    return max(errors, default=0.0)
+
+
+def _pieces(shape: Shape) -> Iterator[tuple[float, float]]:
+    match shape:
+        case Band(left=left, right=right):
+            for flank in (left, right):
+                if flank is not None:
+                    yield flank.start, flank.end
+        case LR(mean=mean, left=below, right=above):
+            for side, sign in ((below, -1.0), (above, 1.0)):
+                ends = [mean + sign * side.spread * u for u in (0.0, 1.0, side.reach)]
+                for start, end in itertools.pairwise(ends):
+                    if math.isfinite(start) and math.isfinite(end):
+                        yield start, end
+
+
+def _flank_error(flank: Flank, values: FloatArray) -> float:
+    position = (values - flank.end) / (flank.start - flank.end)
+    curve = np.array([0.0, *flank.curve])
+    return _curve_error(curve, np.clip(position, 0.0, 1.0)) + 2.0**-50
+
+
+def _side_error(side: Side, distance: FloatArray) -> float:
+    u = np.clip(distance / side.spread, 0.0, side.reach)
+    # 1 - t Q(2 t - 1) as a polynomial of t, for t up to 1; then body * w**4.
+    inner = np.polynomial.Polynomial(side.curve)
+    body = 1.0 - np.polynomial.Polynomial([0.0, 1.0]) * inner(
+        np.polynomial.Polynomial([-1.0, 2.0])
+    )
+    level = min(max(float(body(1.0)), 0.0), 1.0)
+    gaps = np.diff(np.clip(u, 1.0, side.reach)) / (side.reach - 1.0)
+    tail = 12.0 * level * float(np.max(gaps, initial=0.0)) ** 2 / 8.0
+    slack = _ROUNDING * (1.0 + sum(map(abs, side.curve)) * 4.0 ** len(side.curve))
+    return (
+        max(_curve_error(np.asarray(body.coef, np.float64), np.clip(u, 0.0, 1.0)), tail)
+        + slack
+    )
+
+
+def _curve_error(curve: FloatArray, position: FloatArray) -> float:
+    """Return the error of lines on a polynomial held in [0, 1]; positions in [0, 1]."""
+    powers = np.arange(len(curve))
+    bend = float(np.sum(np.abs(curve) * powers * (powers - 1)))
+    gaps = np.abs(np.diff(position))
+    height = np.polynomial.polynomial.polyval(position, curve)
+    over = np.maximum(height - 1.0, 0.0) + np.maximum(-height, 0.0)
+    state = np.sign(np.maximum(height - 1.0, 0.0)) - np.sign(np.maximum(-height, 0.0))
+    is_kink = state[1:] != state[:-1]
+    error = bend * gaps**2 / 8.0 + np.where(is_kink, over[1:] + over[:-1], 0.0)
+    slack = _ROUNDING * (1.0 + float(np.sum(np.abs(curve))))
+    return float(np.max(error[gaps > 0], initial=0.0)) + slack

@@ -1,0 +1,202 @@
+"""scikit-fuzzy: a rule base as a system of that library, evaluated by its own code.
+
+Each variable becomes an `Antecedent` whose universe holds the points of
+`fuzzytree.runtimes.sampling`, each rule a `Rule` over its terms, joined by the
+library's `&`, `|` and `~`. Its simulation fuzzifies the values and computes the rules.
+Its last step, defuzzification, has no meaning for classes: we take the strongest rule.
+
+The system is put together from its variables' graphs, and the rules are kept beside it:
+`ControlSystem(rules)` takes a minute for 60 rules, and adds only their order.
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from fuzzytree.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.errors import LossError, MissingExtraError
+from fuzzytree.rulebase import Clause, RuleBase, Shape
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+_MOST_POINTS = 128  # on each curved piece of a shape
+_MOST_NUMBERS = 1 << 20  # samples of one variable, over all of its terms
+_MOST_RULES = 200
+
+_CANNOT = (
+    "trees: it runs rule bases",
+    "rules without a clause: it needs a condition",
+    f"more than {_MOST_RULES} rules: each term is a list of many points",
+    "curves: they are points joined by lines, within a stated bound",
+    "missing values: they are answered before it is asked",
+    "combinations: they are computed before and given to it as inputs",
+)
+
+
+def load(model: Model) -> Run:
+    """Return a function that answers many rows by a scikit-fuzzy system.
+
+    Raises:
+        LossError: If the model is a tree, has a rule without a clause, or is too large.
+        MissingExtraError: If scikit-fuzzy is not installed.
+    """
+    rules = _carried(model)
+    try:
+        import networkx
+        from skfuzzy import control
+        from skfuzzy.control.controlsystem import CrispValueCalculator
+    except ImportError as error:
+        raise MissingExtraError(
+            "running scikit-fuzzy needs the extra 'skfuzzy': "
+            "pip install 'fuzzytree-toolkit[skfuzzy]'"
+        ) from error
+    import numpy as np
+
+    from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
+    from fuzzytree.runtimes.rows import checked, winners
+
+    antecedents, fired = _build(rules)
+    system = control.ControlSystem()
+    system.graph = networkx.compose_all([a.graph for a in antecedents.values()])
+    simulation = control.ControlSystemSimulation(system, cache=False)
+    axes = plan_axes(rules.variables)
+
+    def run(values: FloatArray) -> Outcome:
+        array = checked(values, rules.inputs)
+        rows = array.shape[1]
+        strengths = np.empty((len(rules.rules), rows))
+        with np.errstate(all="ignore"):
+            lines = axis_lines(axes, array)
+            missing = missing_rows(lines)
+        if missing is None:
+            missing = np.zeros(rows, np.bool_)
+        for name, antecedent in antecedents.items():
+            known = np.where(missing, 0.0, lines[axes.line[name]])
+            simulation.input[name] = known
+            fuzzify = CrispValueCalculator(antecedent, simulation)
+            fuzzify.fuzz(antecedent.input[simulation])
+        for line, rule in zip(strengths, fired, strict=True):
+            (consequent,) = rule.consequent
+            consequent.term.membership_value[simulation] = None  # of the last run
+            simulation.compute_rule(rule)
+            line[:] = rule.aggregate_firing[simulation]
+        found = winners(strengths, missing)
+        strengths[:, missing] = np.nan
+        return Outcome(found[0], found[1], strengths)
+
+    return run
+
+
+def _carried(model: Model) -> RuleBase:
+    """Return a rule base that the library can hold, or raise LossError."""
+    reason = ""
+    if not isinstance(model, RuleBase):
+        raise LossError(f"cannot run {model.name} as scikit-fuzzy: it runs rule bases")
+    if len(model.rules) > _MOST_RULES:
+        reason = f"it has {len(model.rules)} rules, more than {_MOST_RULES}"
+    for number, rule in enumerate(model.rules, 1):
+        if not rule.when:
+            reason = f"rule {number} has no clause"
+    if reason:
+        raise LossError(f"cannot run {model.name} as scikit-fuzzy: {reason}")
+    return model
+
+
+def _asked(rules: RuleBase) -> dict[str, dict[str, Shape]]:
+    """Return the shapes that clauses name, by variable and term."""
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    found: dict[str, dict[str, Shape]] = {}
+    for rule in rules.rules:
+        for clause in rule.when:
+            for term in clause.terms:
+                known = found.setdefault(clause.variable, {})
+                known[term] = shapes[clause.variable, term]
+    return found
+
+
+def _universe(shapes: Sequence[Shape]) -> FloatArray:
+    """Return the points of a variable: fewer on each piece the more terms there are."""
+    from fuzzytree.runtimes.sampling import universe
+
+    share = _MOST_NUMBERS // (4 * len(shapes) ** 2)
+    return universe(shapes, min(max(share, 4), _MOST_POINTS))
+
+
+def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
+    """Return the library's antecedents, by name, and its rules."""
+    import numpy as np
+    from skfuzzy import control
+
+    from fuzzytree.runtimes.sampling import samples
+
+    is_product = rules.semantics.conjunction == "product"
+    conjunction = np.multiply if is_product else np.fmin
+    antecedents: dict[str, Any] = {}
+    for name, shapes in _asked(rules).items():
+        points = _universe(list(shapes.values()))
+        antecedents[name] = control.Antecedent(points, name)
+        for term, shape in shapes.items():
+            antecedents[name][term] = samples(shape, points)
+    answer = control.Consequent(np.arange(len(rules.classes) + 1.0), "class")
+    for number, label in enumerate(rules.classes):
+        answer[label] = (answer.universe == number).astype(np.float64)
+    fired: list[Any] = []
+    for number, rule in enumerate(rules.rules, 1):
+        clauses = [_condition(antecedents[c.variable], c) for c in rule.when]
+        condition = functools.reduce(operator.and_, clauses)
+        then = answer[rule.then]
+        fired.append(control.Rule(condition, then, str(number), conjunction, np.fmax))
+    return antecedents, fired
+
+
+def _condition(antecedent: Any, clause: Clause) -> Any:
+    either = _either([antecedent[term] for term in clause.terms])
+    return ~either if clause.negated else either
+
+
+def _either(terms: list[Any]) -> Any:
+    """Join terms by OR as a balanced tree: the library walks it by recursion."""
+    if len(terms) == 1:
+        return terms[0]
+    middle = len(terms) // 2
+    return _either(terms[:middle]) | _either(terms[middle:])
+
+
+def bound(model: Model) -> tuple[float, str]:
+    """Return how far strengths may be from the reference's, and why.
+
+    The minimum passes on the largest error of a degree; a product adds them up.
+    """
+    from fuzzytree.runtimes.sampling import line_error
+
+    rules = _carried(model)
+    errors: dict[tuple[str, str], float] = {}
+    for name, shapes in _asked(rules).items():
+        points = _universe(list(shapes.values()))
+        for term, shape in shapes.items():
+            errors[name, term] = line_error(shape, points)
+    worst = 0.0
+    for rule in rules.rules:
+        clauses = [max(errors[c.variable, term] for term in c.terms) for c in rule.when]
+        is_product = rules.semantics.conjunction == "product"
+        worst = max(worst, sum(clauses) if is_product else max(clauses))
+    how = "summed" if rules.semantics.conjunction == "product" else "largest"
+    return min(worst, 1.0), f"{how} error of lines between the points of the terms"
+
+
+RUNTIMES = (
+    Runtime(
+        "scikit-fuzzy",
+        ("rules",),
+        load,
+        bound=bound,
+        cannot=_CANNOT,
+        extra="skfuzzy",
+        modules=("skfuzzy", "scipy", "networkx"),
+        is_slow=True,
+    ),
+)
