@@ -53,6 +53,19 @@ def write_atomically(path: PathLike, content: bytes) -> None:
         file.write(content)
 
 
+def check_place(path: PathLike) -> None:
+    """Refuse a place that is a folder or has none, before long work is done for it.
+
+    Raises:
+        WriteError: If a file cannot be written there, as far as can be told.
+    """
+    name, target = os.fspath(path), Path(path)
+    if target.is_dir():
+        raise WriteError(f"{name}: cannot be written: it is a folder")
+    if not target.parent.is_dir():
+        raise WriteError(f"{name}: cannot be written: no such file or directory")
+
+
 @contextlib.contextmanager
 def open_atomically(path: PathLike) -> Generator[BinaryIO]:
     """Open a file that appears under its name only when the block has ended well.

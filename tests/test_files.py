@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.errors import ReadError, WriteError
-from fuzzytree.files import open_atomically, read_bounded, write_atomically
+from fuzzytree.files import check_place, open_atomically, read_bounded, write_atomically
 
 
 def test_a_file_is_read_whole(tmp_path: Path) -> None:
@@ -139,6 +139,21 @@ def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(WriteError) as caught:
         write_atomically(path, b"new")
     assert str(caught.value) == f"{path}: cannot be written: no such file or directory"
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("folder", "it is a folder"), ("absent/x.yaml", "no such file or directory")],
+)
+def test_an_impossible_place_is_refused_beforehand(
+    tmp_path: Path, name: str, why: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    path = tmp_path / name
+    with pytest.raises(WriteError) as caught:
+        check_place(path)
+    assert str(caught.value) == f"{path}: cannot be written: {why}"
+    check_place(tmp_path / "possible.yaml")
 
 
 def test_an_interrupted_writer_leaves_the_old_file(tmp_path: Path) -> None:

@@ -27,7 +27,8 @@ from fuzzytree.cli.talk import (
     standard_input,
 )
 from fuzzytree.contracts import Carrier
-from fuzzytree.files import write_atomically
+from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.files import check_place, write_atomically
 from fuzzytree.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
@@ -150,6 +151,8 @@ def command(
     from fuzzytree.tables import read_table
 
     form = wanted_format(output, None)
+    if output != "-":
+        check_place(output)
     settings = _settings(chosen)
     found = read_table(
         standard_input() if table == "-" else table,
@@ -163,13 +166,18 @@ def command(
     say_rows(("read", found.name, _read_text(found)), width=width, quiet=quiet)
     begin = time.perf_counter()
     with progress_bar(quiet=quiet) as tell:
-        learnt = verbs.learn_table(
-            found,
-            name=name or ("tree" if table == "-" else Path(table).stem),
-            units=dict(_pairs("--unit", units)),
-            settings=settings,
-            progress=tell,
-        )
+        try:
+            learnt = verbs.learn_table(
+                found,
+                name=name or ("tree" if table == "-" else Path(table).stem),
+                units=dict(_pairs("--unit", units)),
+                settings=settings,
+                progress=tell,
+            )
+        except ValueError as error:
+            if isinstance(error, FuzzyTreeError):
+                raise
+            raise click.UsageError(str(error)) from error
         took = time.perf_counter() - begin
         model = carried(
             learnt.tree, carrier=carrier, kind=kind, conjunction=conjunction, form=form
@@ -224,7 +232,7 @@ def _pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:
     for text in texts:
         column, equals, value = text.rpartition("=")
         if not (column and equals):
-            raise click.UsageError(f"{option} {text!r}: is not COLUMN=...")
+            raise click.UsageError(f"{option} {text!r}: is not COLUMN=VALUE")
         pairs.append((column, value))
     return pairs
 
@@ -269,8 +277,10 @@ def _read_text(table: Table) -> str:
         f"{counted(len(table.classes), 'class', 'classes')}"
     )
     odd = [
-        f"{table.missing} missing cells" if table.missing else "",
-        f"{table.unlabelled} rows without a class left out" if table.unlabelled else "",
+        counted(table.missing, "missing cell") if table.missing else "",
+        counted(table.unlabelled, "row") + " without a class left out"
+        if table.unlabelled
+        else "",
     ]
     shown = ", ".join(filter(None, odd))
     return f"{text} ({shown})" if shown else text
@@ -285,9 +295,26 @@ def _tested_text(found: Accuracy | None) -> str:
 
 
 def _learnt_rows(learnt: Learnt, seconds: float) -> list[tuple[str, str, str]]:
+    """Return lines about the tree, and about what was left out of the table."""
     from fuzzytree.report.text import counted, depth
 
-    tree = learnt.tree
+    tree, report = learnt.tree, learnt.report
     size = f"depth {depth(tree)}, {len(tree.inputs)} of {len(tree.columns)} columns"
     leaves = counted(len(tree.leaves), "leaf", "leaves")
-    return [("learnt", leaves, f"{size}, {seconds:.2f} s")]
+    rows = [("learnt", leaves, f"{size}, {seconds:.2f} s")]
+    if report.rows_dropped:
+        text = counted(report.rows_dropped, "row")
+        rows.append(("dropped", text, "a value is missing or not finite"))
+    if report.features_ignored:
+        text = counted(len(report.features_ignored), "column")
+        names = ", ".join(report.features_ignored[:8])
+        more = ", ..." if len(report.features_ignored) > 8 else ""
+        rows.append(("ignored", text, f"constant or too large: {names}{more}"))
+    if report.classes_without_rows:
+        text = counted(len(report.classes_without_rows), "class", "classes")
+        names = ", ".join(report.classes_without_rows[:8])
+        rows.append(("forgot", text, f"no usable row is left of: {names}"))
+    if report.inseparable:
+        text = counted(report.inseparable, "pattern")
+        rows.append(("merged", text, "nothing tells their classes apart"))
+    return rows

@@ -1,0 +1,72 @@
+"""`fuzzytree check` says what agrees, and exits with 1 if something does not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import fuzzytree as ft
+from tests.cli.conftest import Call, grip
+
+NATIVE = ("--runtime", "native", "--limit", "200")
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    ft.save(ft.load("grip.yaml"), "grip.onnx")
+
+
+def test_a_model_and_its_files_agree(call: Call) -> None:
+    words = ("rules.yaml", "grip.onnx", "--data", "grasps.csv")
+    code, out, err = call("check", "grip.yaml", *words, *NATIVE)
+    assert code == 0
+    assert out.splitlines()[0].split() == [
+        *("carrier", "against", "on", "rows"),
+        *("largest", "difference", "allowed", "verdict"),
+    ]
+    assert "DISAGREES" not in out
+    assert err.endswith(" comparisons, and none disagrees\n")
+
+
+def test_a_changed_cut_is_found(call: Call) -> None:
+    text = Path("grip.yaml").read_text("utf-8")
+    Path("other.yaml").write_text(text.replace("0.5", "0.5000000000000001"), "utf-8")
+    code, out, err = call("check", "grip.yaml", "other.yaml", *NATIVE)
+    assert code == 1
+    assert "DISAGREES" in out
+    assert "disagree" in err
+
+
+def test_a_swapped_class_in_an_onnx_file_is_found(call: Call) -> None:
+    content = ft.export(grip(), "onnx").content
+    swapped = content.replace(b"firm", b"tmp!").replace(b"soft", b"firm")
+    Path("swapped.onnx").write_bytes(swapped.replace(b"tmp!", b"soft"))
+    code, out, _ = call("check", "grip.yaml", "swapped.onnx", *NATIVE)
+    assert code == 1
+    assert "DISAGREES" in out
+
+
+def test_json_tells_the_same_facts(call: Call) -> None:
+    code, out, _ = call("check", "grip.yaml", "--json", "--quiet", *NATIVE)
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["ok"] is True
+    assert facts["comparisons"]
+
+
+def test_quiet_leaves_the_exit_code_alone(call: Call) -> None:
+    assert call("check", "grip.yaml", "--quiet", *NATIVE) == (0, "", "")
+
+
+def test_an_unknown_runtime_is_one_sentence(call: Call) -> None:
+    code, out, err = call("check", "grip.yaml", "--runtime", "nativ")
+    assert (code, out) == (2, "")
+    assert err.startswith("no runtime 'nativ'")
+
+
+def test_rows_that_do_not_fit_are_one_sentence(call: Call) -> None:
+    Path("few.csv").write_text("force\n1\n", "utf-8")
+    message = "few.csv has no column 'slip', which the model needs; it has force\n"
+    assert call("check", "grip.yaml", "--data", "few.csv") == (2, "", message)

@@ -1,0 +1,91 @@
+"""`fuzzytree formats` and `fuzzytree doctor` tell what is there."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import tomllib
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+import pytest
+
+from fuzzytree import verbs
+from fuzzytree.cli.doctor import CORE, EXTRAS
+from fuzzytree.exporters import all_formats
+from fuzzytree.runtimes import all_runtimes
+from tests.cli.conftest import Call
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+
+
+def _without(monkeypatch: pytest.MonkeyPatch, module: str) -> None:
+    real = importlib.util.find_spec
+
+    def find(name: str, package: str | None = None) -> ModuleSpec | None:
+        return None if name == module else real(name, package)
+
+    monkeypatch.setattr(importlib.util, "find_spec", find)
+
+
+def test_the_packages_are_those_of_the_project() -> None:
+    text = (ROOT / "pyproject.toml").read_text("utf-8")
+    project = tomllib.loads(text)["project"]
+
+    def names(requirements: list[str]) -> set[str]:
+        return {re.split(r"[<>=\[]", one)[0].lower() for one in requirements}
+
+    assert names(project["dependencies"]) == {name.lower() for name in CORE}
+    extras = project["optional-dependencies"]
+    assert set(EXTRAS) == set(extras) - {"all", "dev"}
+    for extra, packages in EXTRAS.items():
+        assert names(extras[extra]) == set(packages)
+
+
+def test_every_format_and_runtime_is_listed(call: Call) -> None:
+    code, out, err = call("formats")
+    assert (code, err) == (0, "")
+    starts = [line.split("  ")[0] for line in out.splitlines()]
+    for known in (*all_formats(), *all_runtimes()):
+        assert known.name in starts
+        for limit in known.cannot:
+            assert f"  {known.name}: {limit}" in out.splitlines()
+
+
+def test_formats_are_told_to_programs(call: Call) -> None:
+    facts = json.loads(call("formats", "--json")[1])
+    assert [one["name"] for one in facts["formats"]] == ["yaml", "onnx", "python"]
+    assert all(one["is_installed"] for one in facts["runtimes"])
+
+
+def test_a_missing_extra_is_marked(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    _without(monkeypatch, "onnxruntime")
+    assert "onnx (not installed)" in call("formats")[1]
+
+
+def test_the_doctor_tells_versions_and_tries_everything(call: Call) -> None:
+    code, out, err = call("doctor")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0].split()[0] == "fuzzytree"
+    assert out.endswith("self-test: learning, writing, reading and running agree\n")
+
+
+def test_the_doctor_tells_how_to_install_what_is_missing(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _without(monkeypatch, "onnxruntime")
+    code, out, _ = call("doctor")
+    assert code == 0
+    assert (
+        "extra 'onnx' is not installed: pip install 'fuzzytree-toolkit[onnx]'\n" in out
+    )
+
+
+def test_a_failed_self_test_is_exit_one(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(verbs.Answers, "classes", property(lambda _: ["other"]))
+    code, out, _ = call("doctor", "--json")
+    assert code == 1
+    assert json.loads(out)["faults"] == ["the tree answers other classes"]

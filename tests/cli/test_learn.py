@@ -1,0 +1,218 @@
+"""`fuzzytree learn` says what it read, learnt, tested and wrote."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import msgspec
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.cli.learn import command
+from fuzzytree.learning import Settings
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.tree import FuzzyTree
+from tests.cli.conftest import Call
+
+WINE = str(
+    Path(__file__).resolve().parent.parent.parent / "examples" / "wine" / "wine.csv"
+)
+HELP = "\n  fuzzytree learn --help tells more\n"
+FEW = "a,grip\n" + "".join(f"{k},{'soft' if k < 6 else 'firm'}\n" for k in range(12))
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("few.csv").write_text(FEW, "utf-8")
+
+
+def _refused(call: Call, text: str, *words: str) -> str:
+    Path("t.csv").write_text(text, "utf-8")
+    Path("t.yaml").write_text("old", "utf-8")
+    more = words or ("--target", "grip")
+    code, out, err = call("learn", "t.csv", "-o", "t.yaml", "--quiet", *more)
+    assert (code, out) == (2, "")
+    assert Path("t.yaml").read_text("utf-8") == "old"
+    return err
+
+
+def test_four_lines_tell_what_happened(call: Call) -> None:
+    code, out, err = call("learn", "few.csv", "--target", "grip", "-o", "few.yaml")
+    assert (code, out) == (0, "")
+    assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
+        "read     few.csv  12 rows, 1 column, 2 classes\n"
+        "learnt   2 leaves depth 1, 1 of 1 columns, 0 s\n"
+        "tested   accuracy 1.000 (5 folds: 1.000 to 1.000)\n"
+        "wrote    few.yaml next: fuzzytree check few.yaml --data few.csv\n"
+    )
+    tree = ft.load("few.yaml")
+    assert isinstance(tree, FuzzyTree)
+    assert tree.name == "few"
+
+
+def test_what_was_left_out_is_told(call: Call) -> None:
+    lines = [f"{k},7,{'soft' if k < 6 else 'firm'}" for k in range(12)]
+    text = "\n".join(["a,same,grip", *lines, "NA,7,soft", "3,7,", ""])
+    Path("t.csv").write_text(text, "utf-8")
+    words = ("learn", "t.csv", "--target", "grip", "-o", "t.yaml", "--no-test")
+    err = call(*words)[2]
+    assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
+        "read     t.csv    13 rows, 2 columns, 2 classes "
+        "(1 missing cell, 1 row without a class left out)\n"
+        "learnt   2 leaves depth 1, 1 of 2 columns, 0 s\n"
+        "dropped  1 row    a value is missing or not finite\n"
+        "ignored  1 column constant or too large: same\n"
+        "wrote    t.yaml   next: fuzzytree check t.yaml --data t.csv\n"
+    )
+
+
+def test_json_tells_the_same_facts(call: Call) -> None:
+    code, out, err = call(
+        "learn", WINE, "--target", "cultivar", "-o", "wine.yaml", "--json", "--quiet"
+    )
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert facts["rows"] == 178
+    assert facts["classes"] == ["barbera", "barolo", "grignolino"]
+    assert facts["accuracy"] == sum(facts["folds"]) / 5 > 0.9
+    assert facts["report"]["mode"] == "default"
+
+
+def test_a_stream_gives_the_tree_of_the_file(call: Call) -> None:
+    words = ("--target", "grip", "--name", "few", "--quiet")
+    call("learn", "few.csv", "-o", "few.yaml", *words)
+    code, out, err = call("learn", "-", "-o", "-", *words, stdin=FEW.encode())
+    assert (code, err) == (0, "")
+    assert out.encode() == Path("few.yaml").read_bytes()
+
+
+@pytest.mark.parametrize("kind", ["relative", "raw"])
+def test_rules_can_be_written_in_place_of_the_tree(call: Call, kind: str) -> None:
+    words = ("--as", "rules", "--terms", kind, "--conjunction", "product")
+    call("learn", "few.csv", "--target", "grip", "-o", "few.yaml", *words)
+    rules = ft.load("few.yaml")
+    assert isinstance(rules, RuleBase)
+    assert (rules.kind, rules.semantics.conjunction) == (kind, "product")
+
+
+def test_every_setting_has_its_option() -> None:
+    offered = {parameter.name for parameter in command.params}
+    assert {field.name for field in msgspec.structs.fields(Settings)} <= offered
+
+
+def test_the_options_reach_the_learner(call: Call) -> None:
+    code, out, _ = call(
+        *("learn", WINE, "--target", "cultivar", "-o", "wine.yaml", "--json"),
+        *("--mode", "paper", "--l-max", "3", "--alpha", "0.5", "--points", "2"),
+        *("--separate-sides", "--patterns", "1", "--seed", "3", "--cost", "ash=2"),
+        *("--unit", "ash=g/l", "--ignore", "proline", "--quiet"),
+    )
+    assert code == 0
+    assert json.loads(out)["report"]["mode"] == "paper"
+    tree = ft.learn(
+        WINE, target="cultivar", mode="paper", l_max=3.0, alpha=0.5, points=2,
+        separate_sides=True, patterns_per_class=1, seed=3, costs={"ash": 2.0},
+        units={"ash": "g/l"}, ignore=["proline"],
+    )  # fmt: skip
+    assert ft.load("wine.yaml") == tree
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--alpha", "7"), "alpha lies in [0, 1], not 7.0"),
+        (("--patterns", "few"), "--patterns NUMBER|auto: 'few' is no number"),
+        (("--cost", "a"), "--cost 'a': is not COLUMN=VALUE"),
+        (("--cost", "a=b"), "--cost a: 'b' is no number"),
+        (("--cost", "b=1"), "costs: there is no column 'b'"),
+        (("--unit", "N"), "--unit 'N': is not COLUMN=VALUE"),
+    ],
+)
+def test_a_wrong_option_is_one_sentence(
+    call: Call, words: tuple[str, ...], message: str
+) -> None:
+    assert _refused(call, FEW, "--target", "grip", *words) == message + HELP
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "t.csv is empty: it needs a line with column names"),
+        ("a,grip\n", "t.csv has no rows"),
+        ("a,grip\n1,x\n", "cannot learn from one row; two classes need two at least"),
+        (
+            "a,grip\n1,x\n2,x\n3,x\n",
+            "cannot learn from one class: every row is 'x'",
+        ),
+        (
+            "a,grap\n1,x\n",
+            "t.csv has no column 'grip'; it has a, grap (did you mean 'grap'?)",
+        ),
+        (
+            "a,b,grip\n1,wet,x\nq,2,y\n",
+            "t.csv:3: column 'a' holds text where a number is needed: 'q'\n"
+            "t.csv:2: column 'b' holds text where a number is needed: 'wet'\n"
+            "  leave columns out with --ignore a --ignore b",
+        ),
+        (
+            "a,grip\n1,x\n1,y\n1,x\n",
+            "cannot learn without a column that varies: every column is constant, "
+            "or so large that its square overflows",
+        ),
+        (
+            "a,grip\n1,x\nnan,y\ninf,y\n2,x\n",
+            "cannot learn from one class: every row is 'x'",
+        ),
+        ("a,a,grip\n1,1,x\n", "t.csv: column 'a' stands there more than once"),
+    ],
+)
+def test_a_table_that_nothing_can_be_learnt_from_is_one_sentence(
+    call: Call, text: str, message: str
+) -> None:
+    assert _refused(call, text) == message + "\n"
+
+
+def test_missing_values_can_be_refused(call: Call) -> None:
+    words = ("--target", "grip", "--missing", "refuse")
+    assert _refused(call, FEW + ",soft\n", *words) == (
+        "1 of 13 rows hold a missing or infinite value or no class\n"
+        "  choose missing='drop' to leave them out\n"
+    )
+
+
+def test_classes_that_look_like_words_or_numbers_are_answered_as_they_are(
+    call: Call,
+) -> None:
+    names = ["no", "01", "1e-05", "~", "null", "12:30"]
+    rows = [
+        f"{10 * k + step},{name}" for k, name in enumerate(names) for step in (0, 1)
+    ]
+    Path("odd.csv").write_text("\n".join(["a,grip", *rows, ""]), "utf-8")
+    words = ("--target", "grip", "--patterns", "1", "--quiet")
+    assert call("learn", "odd.csv", "-o", "odd.yaml", *words)[0] == 0
+    assert sorted(ft.load("odd.yaml").classes) == sorted(names)
+    for path in ("odd.yaml", "odd.onnx"):
+        ft.save(ft.load("odd.yaml"), path)
+        out = call("run", path, "odd.csv", "--quiet")[1]
+        answers = [line.split(",")[0] for line in out.splitlines()[1:]]
+        assert answers == [name for name in names for _ in range(2)]
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_learning(call: Call) -> None:
+    words = ("learn", "few.csv", "--target", "grip", "-o", "absent/few.yaml")
+    message = "absent/few.yaml: cannot be written: no such file or directory\n"
+    assert call(*words) == (2, "", message)
+
+
+def test_a_full_disk_is_one_sentence(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    message = "t.yaml: cannot be written: no space left on device\n"
+    assert _refused(call, FEW) == message
