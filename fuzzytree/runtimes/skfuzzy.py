@@ -62,12 +62,13 @@ def load(model: Model) -> Run:
     antecedents, fired = _build(rules)
     system = control.ControlSystem()
     system.graph = networkx.compose_all([a.graph for a in antecedents.values()])
-    simulation = control.ControlSystemSimulation(system, cache=False)
     axes = plan_axes(rules.variables)
 
     def run(values: FloatArray) -> Outcome:
         array = checked(values, rules.inputs)
         rows = array.shape[1]
+        # A simulation warns when it is given another number of rows than before.
+        simulation = control.ControlSystemSimulation(system, cache=False)
         strengths = np.empty((len(rules.rules), rows))
         with np.errstate(all="ignore"):
             lines = axis_lines(axes, array)
@@ -84,6 +85,7 @@ def load(model: Model) -> Run:
             consequent.term.membership_value[simulation] = None  # of the last run
             simulation.compute_rule(rule)
             line[:] = rule.aggregate_firing[simulation]
+        simulation.reset()
         found = winners(strengths, missing)
         strengths[:, missing] = np.nan
         return Outcome(found[0], found[1], strengths)
