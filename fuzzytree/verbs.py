@@ -198,10 +198,9 @@ def opened(source: Carried) -> Model | OnnxModel:
         case bytes():
             return open_onnx(source, "the bytes")
         case str() | os.PathLike():
-            path = cast("str | os.PathLike[str]", source)
-            if Path(path).suffix.lower() == ".onnx":
-                return open_onnx(read_bounded(path), os.fspath(path))
-            return load(path)
+            if Path(source).suffix.lower() == ".onnx":
+                return open_onnx(read_bounded(source), os.fspath(source))
+            return load(source)
         case _:
             return source
 

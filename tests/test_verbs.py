@@ -18,6 +18,7 @@ from fuzzytree.errors import LossError, ReadError, TableError
 from fuzzytree.learning import Settings
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.tables import FloatArray
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree
 
@@ -95,8 +96,8 @@ def test_units_are_kept_and_must_belong_to_a_column() -> None:
 
 @pytest.mark.parametrize("rows", [ROWS, ROWS[:0], np.asfortranarray(ROWS)])
 def test_every_carrier_of_a_tree_answers_alike(
-    tmp_path: Path, rows: np.ndarray
-) -> None:  # type: ignore[type-arg]
+    tmp_path: Path, rows: FloatArray
+) -> None:
     path = tmp_path / "tree.onnx"
     content = ft.save(TREE, path).content
     expected = ft.run(TREE, rows).classes

@@ -112,11 +112,12 @@ def _answered(answers: Answers, strengths: By | None, model: str) -> Columns:
 
 
 def _kept(batch: Batch) -> Columns:
-    cells = batch.piece.cells
-    return {
-        name: column.tolist() if hasattr(column, "tolist") else column
-        for name, column in zip(batch.piece.columns, cells, strict=True)
-    }
+    import numpy as np
+
+    columns: Columns = {}
+    for name, cells in zip(batch.piece.columns, batch.piece.cells, strict=True):
+        columns[name] = cells.tolist() if isinstance(cells, np.ndarray) else cells
+    return columns
 
 
 def _add(columns: Columns, more: Columns, name: str) -> None:

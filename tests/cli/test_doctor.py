@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree import verbs
+from fuzzytree.answers import Answers
 from fuzzytree.cli.doctor import CORE, EXTRAS
 from fuzzytree.exporters import all_formats
 from fuzzytree.runtimes import all_runtimes
@@ -47,10 +47,12 @@ def test_every_format_and_runtime_is_listed(call: Call) -> None:
     code, out, err = call("formats")
     assert (code, err) == (0, "")
     starts = [line.split("  ")[0] for line in out.splitlines()]
-    for known in (*all_formats(), *all_runtimes()):
-        assert known.name in starts
-        for limit in known.cannot:
-            assert f"  {known.name}: {limit}" in out.splitlines()
+    known = [(one.name, one.cannot) for one in all_formats()]
+    known += [(one.name, one.cannot) for one in all_runtimes()]
+    for name, cannot in known:
+        assert name in starts
+        for limit in cannot:
+            assert f"  {name}: {limit}" in out.splitlines()
 
 
 def test_formats_are_told_to_programs(call: Call) -> None:
@@ -85,7 +87,7 @@ def test_the_doctor_tells_how_to_install_what_is_missing(
 def test_a_failed_self_test_is_exit_one(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verbs.Answers, "classes", property(lambda _: ["other"]))
+    monkeypatch.setattr(Answers, "classes", property(lambda _: ["other"]))
     code, out, _ = call("doctor", "--json")
     assert code == 1
     assert json.loads(out)["faults"] == ["the tree answers other classes"]
