@@ -12,7 +12,7 @@ from typing import Final
 from fuzzytree.readers.binding import shortened
 from fuzzytree.readers.sentences import Vocabulary
 from fuzzytree.rulebase import Clause, Mistake, Path, Rule, Variable, clause_text
-from fuzzytree.tree import Node
+from fuzzytree.tree import Branch, Node
 
 _MOST_COMPARED: Final = 200_000
 
@@ -29,10 +29,22 @@ def clauses_of_rules(rules: Sequence[Rule]) -> Iterator[Asked]:
 
 def clauses_of_nodes(nodes: Sequence[Node]) -> Iterator[Asked]:
     """Yield the branches of nodes as clauses."""
+    for path, where, node, branch in _branches(nodes):
+        yield path, where, Clause(node.variable, branch.terms)
+
+
+def sets_of_nodes(nodes: Sequence[Node]) -> Iterator[Asked]:
+    """Yield the fitted sets of branches as clauses."""
+    for path, where, node, branch in _branches(nodes):
+        if branch.sets:
+            yield path, where, Clause(node.variable, branch.sets)
+
+
+def _branches(nodes: Sequence[Node]) -> Iterator[tuple[Path, str, Node, Branch]]:
     for number, node in enumerate(nodes, 1):
         for index, branch in enumerate(node.branches):
             path: Path = ("nodes", number - 1, "branches", index)
-            yield path, f"node {number}", Clause(node.variable, branch.terms)
+            yield path, f"node {number}", node, branch
 
 
 def unknown_terms(asked: Iterable[Asked], vocabulary: Vocabulary) -> Iterator[Mistake]:
@@ -60,19 +72,22 @@ def unknown_classes(
             yield ("rules", number - 1, "then"), text
 
 
-def unknown_inputs(variables: Sequence[Variable]) -> Iterator[Mistake]:
-    """Yield the summands of unknown inputs."""
+def unknown_inputs(
+    variables: Sequence[Variable], columns: Sequence[str]
+) -> Iterator[Mistake]:
+    """Yield the summands of unknown inputs, and inputs that are no columns."""
     known = {variable.name for variable in variables if not variable.parts}
+    of_table = frozenset(columns) if columns else known
     for position, variable in enumerate(variables):
+        if not variable.parts and variable.name not in of_table:
+            path: Path = ("variables", position, "name")
+            yield path, f"input {shortened(variable.name)} is not among the columns"
         for index, part in enumerate(variable.parts):
             if part.input not in known:
-                path: Path = ("variables", position, "parts", index, "input")
+                path = ("variables", position, "parts", index, "input")
                 yield path, f"no input {shortened(part.input)}"
 
 
-def is_flood(
-    unknown: Sequence[Mistake], vocabulary: Vocabulary, classes: Sequence[str]
-) -> bool:
+def is_flood(unknown: Sequence[Mistake], known: int) -> bool:
     """Return whether so much is unknown that looking for similar names takes long."""
-    names = len(classes) + sum(1 + len(one.terms) for one in vocabulary.values())
-    return len(unknown) * names > _MOST_COMPARED
+    return len(unknown) * known > _MOST_COMPARED

@@ -24,12 +24,13 @@ from fuzzytree.readers.references import (
     clauses_of_nodes,
     clauses_of_rules,
     is_flood,
+    sets_of_nodes,
     unknown_classes,
     unknown_inputs,
     unknown_terms,
 )
 from fuzzytree.readers.rules import read_rules
-from fuzzytree.readers.sentences import vocabulary_of
+from fuzzytree.readers.sentences import Vocabulary, vocabulary_of, words
 from fuzzytree.rulebase import (
     Band,
     Mistake,
@@ -142,15 +143,15 @@ def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
     rules = read_rules(bound, head.classes[0], vocabulary, mistakes)
     found += _located(root, mistakes)
     unknown = [
-        *unknown_inputs(variables),
+        *unknown_inputs(variables, head.columns),
         *unknown_classes(rules, head.classes),
         *unknown_terms(clauses_of_rules(rules), vocabulary),
     ]
-    if is_flood(unknown, vocabulary, head.classes):
+    if is_flood(unknown, _names_declared(head, vocabulary)):
         found += _located(root, unknown)
         return None
-    try:
-        return RuleBase(
+    return _built(
+        lambda: RuleBase(
             name=head.name,
             classes=head.classes,
             variables=variables,
@@ -158,10 +159,9 @@ def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
             semantics=values.semantics(semantics),
             kind=head.terms,
             columns=head.columns,
-        )
-    except InvalidModelError as error:
-        found += _located(root, error.mistakes, broken)
-        return None
+        ),
+        root, found, broken,
+    )  # fmt: skip
 
 
 def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
@@ -177,38 +177,59 @@ def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
     if head is None or known is None:
         return None
     variables, broken = known
-    nodes, leaves, sets = _whole(questions), _whole(ends), _whole(groups)
-    given = tuple(values.node(node) for node in nodes or ())
+    nodes, leaves, fitted = _whole(questions), _whole(ends), _whole(groups)
+    asked = tuple(map(values.node, nodes or ()))
+    sets = tuple(map(values.sets, fitted or ()))
     vocabulary = vocabulary_of(variables)
-    unknown = [
-        *unknown_inputs(variables),
-        *unknown_terms(clauses_of_nodes(given), vocabulary),
+    patterns = {group.variable: words(t.name for t in group.terms) for group in sets}
+    astray = [
+        *unknown_terms(clauses_of_nodes(asked), vocabulary),
+        *(unknown_terms(sets_of_nodes(asked), patterns) if fitted is not None else ()),
     ]
-    if is_flood(unknown, vocabulary, head.classes):
+    unknown = [*unknown_inputs(variables, head.columns), *astray]
+    if is_flood(unknown, _names_declared(head, vocabulary, patterns)):
         found += _located(root, unknown)
         return None
     meant = values.semantics(semantics)
-    if nodes is None or leaves is None or sets is None:
+    if nodes is None or leaves is None or fitted is None or broken:
         mistakes = [
             *naming_mistakes(head.name, head.classes, meant),
             *variable_mistakes(variables, head.columns),
         ]
-        found += _located(root, mistakes, broken)
+        found += _located(root, [*mistakes, *astray], broken)
         return None
-    try:
-        return FuzzyTree(
+    return _built(
+        lambda: FuzzyTree(
             name=head.name,
             classes=head.classes,
             variables=variables,
-            nodes=given,
+            nodes=asked,
             leaves=tuple(map(values.leaf, leaves)),
-            sets=tuple(map(values.sets, sets)),
+            sets=sets,
             semantics=meant,
             columns=head.columns,
-        )
+        ),
+        root, found, broken,
+    )  # fmt: skip
+
+
+M = TypeVar("M", RuleBase, FuzzyTree)
+
+
+def _built(
+    build: Callable[[], M], root: Node, found: list[Found], broken: set[int]
+) -> M | None:
+    """Return the model, or None after adding what is wrong with it."""
+    try:
+        return build()
     except InvalidModelError as error:
         found += _located(root, error.mistakes, broken)
         return None
+
+
+def _names_declared(head: layout.Head, *vocabularies: Vocabulary) -> int:
+    of_variables = sum(1 + len(w.terms) for v in vocabularies for w in v.values())
+    return len(head.classes) + len(head.columns) + of_variables
 
 
 _READERS: Final[Mapping[str, Callable[[MappingNode, list[Found]], Model | None]]] = {

@@ -93,7 +93,7 @@ def test_every_line_that_can_be_left_out_matters_or_is_refused() -> None:
 FRAGMENTS = (
     "[", "]", "{", "}", ":", "- ", "? ", "#", "&a ", "*a ", "!!int ", "'", '"', "\n",
     "\t", "---\n", "...\n", "%YAML 1.2\n", "|\n", ">\n", "~", "null", ".nan", "-1",
-    "1e999", "\x00", "\ud7ff", "é", " is ", " or ", "not ", "node 1", "leaf 9", "  ", "<<: ",
+    "1e999", "\x00", "\ud7ff", "é", " is ", " or ", "not ", "node 1", "leaf 9", "<<: ",
 )  # fmt: skip
 
 
