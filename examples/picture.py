@@ -7,6 +7,7 @@ the wine table and writes `docs/wine.svg`, the picture of the README.
 from __future__ import annotations
 
 import sys
+import textwrap
 from collections.abc import Iterator
 from html import escape
 from pathlib import Path
@@ -19,7 +20,7 @@ from fuzzytree.tree import Branch, FuzzyTree
 HERE = Path(__file__).resolve().parent
 WIDTH = 960
 ROW = 96  # from one level of the tree to the next
-PLOT_WIDTH, PLOT_HEIGHT = 400, 84
+PLOT_WIDTH, PLOT_HEIGHT, PLOT_PITCH = 400, 84, 172
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#d55e00", "#56b4e9")
 STYLE = """
   text { font: 13px system-ui, sans-serif; fill: #24292f; }
@@ -39,9 +40,9 @@ def picture(tree: FuzzyTree, rules: RuleBase) -> str:
     asked = [v for v in rules.variables if v.terms]
     drawn = list(_tree(tree, colours))
     for position, variable in enumerate(asked):
-        drawn += _terms(tree, variable, 40 + position * (PLOT_HEIGHT + 62))
+        drawn += _terms(tree, variable, 40 + position * PLOT_PITCH)
     levels = 1 + max(depth for _, _, depth, _ in _places(tree))
-    top = 40 + max(levels * ROW, len(asked) * (PLOT_HEIGHT + 62))
+    top = 20 + max(levels * ROW, len(asked) * PLOT_PITCH)
     for line, rule in enumerate(rules.rules, 1):
         x, y = 24, top + 24 * line
         drawn.append(
@@ -93,8 +94,9 @@ def _tree(tree: FuzzyTree, colours: dict[str, str]) -> Iterator[str]:
                 f'<path class="line" d="M{above_x:.1f} {above_y + 16:.1f} '
                 f'L{x:.1f} {y - 16:.1f}"/>'
             )
-            middle = (above_x + 2 * x) / 3, (above_y + 2 * y) / 3
-            yield _text(*middle, " or ".join(branch.terms), "small faint", "middle")
+            side, anchor = (-8, "end") if x < above_x else (8, "start")
+            middle = (above_x + x) / 2 + side, (above_y + y) / 2 + 4
+            yield _text(*middle, " or ".join(branch.terms), "small faint", anchor)
     for (branch, *_), (x, y) in zip(places, points, strict=True):
         if branch.node is not None:
             label, colour = tree.nodes[branch.node - 1].variable + "?", None
@@ -125,12 +127,15 @@ def _terms(tree: FuzzyTree, variable: Variable, top: float) -> Iterator[str]:
     margin = (high - low) * 0.12 or 1.0
     low, high = low - margin, high + margin
     left = WIDTH - PLOT_WIDTH - 24
-    bottom = top + 16 + PLOT_HEIGHT
+    formula = textwrap.wrap(_formula(variable), 66)
+    bottom = top + 16 + PLOT_HEIGHT + 15 * len(formula)
 
     def across(value: float) -> float:
         return left + (value - low) / (high - low) * PLOT_WIDTH
 
     yield _text(left, top, variable.name, "strong")
+    for line, text in enumerate(formula, 1):
+        yield _text(left, top + 15 * line, text, "small faint")
     yield f'<path class="line" d="M{left} {bottom} h{PLOT_WIDTH}"/>'
     for index, term in enumerate(variable.terms):
         colour = COLOURS[-1 - index % len(COLOURS)]
@@ -141,13 +146,24 @@ def _terms(tree: FuzzyTree, variable: Variable, top: float) -> Iterator[str]:
         )
         yield f'<polyline class="curve" style="stroke:{colour}" points="{points}"/>'
         middle = _middle(term.shape, low, high) if isinstance(term.shape, Band) else low
-        yield _text(across(middle), top + 30, term.name, "small", "middle")
+        yield _text(
+            across(middle), bottom - PLOT_HEIGHT - 4, term.name, "small", "middle"
+        )
     for cut in cuts:
         yield (
             f'<path class="line" stroke-dasharray="3 3" '
             f'd="M{across(cut):.1f} {bottom} v-{PLOT_HEIGHT}"/>'
         )
         yield _text(across(cut), bottom + 15, f"{cut:.4g}", "small faint", "middle")
+
+
+def _formula(variable: Variable) -> str:
+    summands = [
+        f"{'-' if part.weight < 0 else '+'} {abs(part.weight):.3g} "
+        f"({part.input} - {part.centre:.4g})"
+        for part in variable.parts
+    ]
+    return " ".join(["=", *summands]).replace("= + ", "= ") if summands else ""
 
 
 def _middle(band: Band, low: float, high: float) -> float:
@@ -166,7 +182,8 @@ def _text(x: float, y: float, text: str, style: str = "", anchor: str = "start")
 
 def drawn() -> str:
     """Learn on the wine table and return its picture."""
-    tree = ft.learn(HERE / "wine" / "wine.csv", target="cultivar", name="wine")
+    table = HERE / "wine" / "wine.csv"
+    tree = ft.learn(table, target="cultivar", name="wine", entry=25)
     return picture(tree, ft.rules_from_tree(tree))
 
 

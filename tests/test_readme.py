@@ -16,15 +16,20 @@ import runpy
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import Runtime
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n", re.MULTILINE | re.DOTALL)
-FORMATS = re.compile(r"(?<=<!-- formats -->\n\n).*?(?=\n<!-- end -->)", re.DOTALL)
+TABLE = re.compile(r"<!-- (\w+) -->\n\n(.*?)\n<!-- end -->\n", re.DOTALL)
 PROGRAM = f"{sys.executable} -m fuzzytree"
 CHANGING = (
     # Times, speeds and hashes depend on the machine and on versions.
@@ -71,10 +76,17 @@ def test_every_example_prints_what_the_readme_shows(tmp_path: Path) -> None:
     assert _masked(_rewritten_examples(text, tmp_path)) == _masked(text)
 
 
-def test_the_table_of_formats_is_the_one_of_the_code() -> None:
-    shown = FORMATS.search(README.read_text("utf-8"))
-    assert shown is not None
-    assert shown.group(0) == _formats()
+@pytest.mark.parametrize(
+    "name",
+    [
+        "formats",
+        pytest.param("differences", marks=pytest.mark.heavy),
+        pytest.param("accuracy", marks=pytest.mark.heavy),
+    ],
+)
+def test_a_table_of_the_readme_is_what_the_code_gives(name: str) -> None:
+    shown = dict(TABLE.findall(README.read_text("utf-8")))
+    assert shown[name] == TABLES[name]()
 
 
 def test_the_map_names_every_module() -> None:
@@ -171,44 +183,113 @@ def _printed(code: str, folder: Path) -> str:
 
 
 def _formats() -> str:
-    """Return the tables of formats and runtimes as the README shows them."""
+    """Return the tables of formats and runtimes."""
     from fuzzytree.exporters import all_formats
     from fuzzytree.runtimes import all_runtimes
 
-    lines = [
-        "| format | suffix | reads | writes | extra | cannot |",
-        "|---|---|---|---|---|---|",
-    ]
-    for one in all_formats():
-        carried = " and ".join(one.carries)
-        cells = (
+    formats = [
+        (
             one.name,
             ", ".join(f"`{suffix}`" for suffix in one.suffixes),
-            carried if one.read else "",
-            carried,
+            " and ".join(one.carries) if one.read else "",
+            " and ".join(one.carries),
             one.extra or "",
             "; ".join(one.cannot),
         )
-        lines.append("| " + " | ".join(cells) + " |")
-    lines += [
-        "",
-        "| runtime | runs | numbers | agreement with the reference | extra | cannot |",
-        "|---|---|---|---|---|---|",
+        for one in all_formats()
     ]
-    for runtime in all_runtimes():
-        promise = "equal bits" if runtime.bound is None else "within a derived bound"
-        if runtime.bound is None and runtime.dtype != "float64":
-            promise = f"equal bits with native {runtime.dtype}"
-        cells = (
-            runtime.name,
-            " and ".join(runtime.runs),
-            runtime.dtype,
-            promise,
-            runtime.extra or "",
-            "; ".join(runtime.cannot),
+    runtimes = [
+        (
+            one.name,
+            " and ".join(one.runs),
+            one.dtype,
+            _promise(one),
+            one.extra or "",
+            "; ".join(one.cannot),
         )
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        for one in all_runtimes()
+    ]
+    return "\n".join(
+        (
+            _table("format", "suffix", "reads", "writes", "extra", "cannot", formats),
+            _table(
+                "runtime", "runs", "numbers", "strengths", "extra", "cannot", runtimes
+            ),
+        )
+    )
+
+
+def _promise(runtime: Runtime) -> str:
+    """Say how a runtime's strengths compare with others of the table."""
+    if runtime.bound is not None or runtime.name == f"native {runtime.dtype}":
+        return "within a derived bound"
+    if runtime.dtype == "float64":
+        return "equal bits"
+    return f"equal bits with native {runtime.dtype}"
+
+
+def _differences() -> str:
+    """Return how far the runtimes' strengths lie apart on the wine tree."""
+    import fuzzytree as ft
+
+    table = ROOT / "examples" / "wine" / "wine.csv"
+    tree = ft.learn(table, target="cultivar", name="wine")
+    rows = [
+        (
+            one.carrier.split(":")[0],
+            one.against,
+            str(one.rows),
+            f"{one.largest_difference:.2g}",
+            f"{one.allowed:.2g}",
+        )
+        for one in ft.check(tree, data=table).comparisons
+        if one.carrier.endswith(": relative rules") and one.basis == "rows"
+    ]
+    return _table("runtime", "against", "rows", "largest difference", "allowed", rows)
+
+
+def _accuracy() -> str:
+    """Return the accuracy of both modes beside three classifiers."""
+    from sklearn import datasets
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+    from sklearn.model_selection import StratifiedKFold, cross_val_score
+    from sklearn.naive_bayes import GaussianNB
+    from sklearn.tree import DecisionTreeClassifier
+
+    from fuzzytree.estimator import FuzzyTreeClassifier
+
+    folds = StratifiedKFold(10, shuffle=True, random_state=0)
+    learners = {
+        "fuzzytree": FuzzyTreeClassifier(),
+        "paper mode": FuzzyTreeClassifier(mode="paper"),
+        "DecisionTree": DecisionTreeClassifier(random_state=0),
+        "GaussianNB": GaussianNB(),
+        "LDA": LinearDiscriminantAnalysis(),
+    }
+    rows: list[tuple[str, ...]] = []
+    for name in ("iris", "wine", "breast_cancer", "digits"):
+        values, labels = getattr(datasets, f"load_{name}")(return_X_y=True)
+        with warnings.catch_warnings():
+            # Columns of digits that never vary make LDA warn.
+            warnings.simplefilter("ignore")
+            shares = [
+                cross_val_score(one, values, labels, cv=folds).mean()
+                for one in learners.values()
+            ]
+        leaves = len(FuzzyTreeClassifier().fit(values, labels).tree_.leaves)
+        cells = (f"{100 * share:.1f}" for share in shares)
+        rows.append((name.replace("_", " "), *cells, str(leaves)))
+    return _table("table", *learners, "leaves of fuzzytree", rows)
+
+
+def _table(*parts: str | Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown; the last part is its rows, the others its head."""
+    *head, rows = parts
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
+
+
+TABLES = {"formats": _formats, "differences": _differences, "accuracy": _accuracy}
 
 
 def _script(name: str) -> dict[str, Callable[[], str]]:
@@ -222,7 +303,11 @@ def _rewrite() -> None:
     text = README.read_text("utf-8")
     with tempfile.TemporaryDirectory() as folder:
         text = _rewritten_examples(text, Path(folder))
-    README.write_text(FORMATS.sub(lambda _: _formats(), text), "utf-8")
+    for name, made in TABLES.items():
+        marks = f"<!-- {name} -->\n\n", "\n<!-- end -->\n"
+        before, rest = text.split(marks[0], 1)
+        text = before + marks[0] + made() + marks[1] + rest.split(marks[1], 1)[1]
+    README.write_text(text, "utf-8")
 
 
 if __name__ == "__main__":
