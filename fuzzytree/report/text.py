@@ -202,24 +202,19 @@ def term_lines(variables: Sequence[Variable]) -> Iterator[str]:
             span = f", {number(variable.low)} to {number(variable.high)}"
         yield f"{variable.name}{unit}{span}"
         if variable.parts:
-            yield f"  = {_sum_text(variable)}"
+            yield from _sum_lines(variable)
         rows = [(f"  {t.name}", shape_text(t.shape)) for t in variable.terms]
         yield from aligned(rows)
 
 
-def _sum_text(variable: Variable) -> str:
-    text = ""
-    for part in variable.parts:
-        sign = "-" if part.weight < 0 else "+"
-        weight = number(abs(part.weight))
+def _sum_lines(variable: Variable) -> Iterator[str]:
+    for position, part in enumerate(variable.parts):
+        sign = "-" if part.weight < 0 else "+" if position else " "
         centre = "-" if part.centre >= 0 else "+"
         shifted = f"({part.input} {centre} {number(abs(part.centre))})"
-        term = f"{weight} * {shifted if part.centre else part.input}"
-        if text:
-            text += f" {sign} {term}"
-        else:
-            text = term if sign == "+" else f"-{term}"
-    return text
+        inner = shifted if part.centre else part.input
+        lead = " " if position else "="
+        yield f"  {lead} {sign} {number(abs(part.weight))} * {inner}"
 
 
 def shape_text(shape: Shape) -> str:
@@ -266,20 +261,26 @@ def _side_text(side: Side) -> str:
 
 
 def agreement_lines(found: Agreement, *, is_full: bool = False) -> Iterator[str]:
-    """Yield a check as a table, with the worst rows of what disagrees."""
-    yield from aligned(
-        [
-            ("carrier", "against", "on", "rows", "largest difference", "allowed",
-             "verdict"),
-            *map(_comparison_row, found.comparisons),
-        ]
-    )  # fmt: skip
-    for comparison in found.comparisons:
-        is_wrong = comparison.verdict != "agrees"
-        told = comparison.detail if is_full else comparison.detail[: 5 * is_wrong]
-        if told:
+    """Yield a check as a table, with the worst rows of what disagrees.
+
+    Args:
+        found: The check.
+        is_full: Whether to tell also each way of calling that did not fail, and rows
+            that differ as they may.
+    """
+    yield _basis_text(found)
+    calm = [c for c in found.comparisons if c.basis == "calls" and not c.differing]
+    shown = [c for c in found.comparisons if is_full or c not in calm]
+    yield from aligned([_COMPARISON, *map(_comparison_row, shown)])
+    if calm and not is_full:
+        yield (
+            f"{counted(len(calm), 'carrier')} called without rows, row by row, in "
+            "another memory order and with a wrong width: none fails"
+        )
+    for comparison in shown:
+        if comparison.detail and (is_full or comparison.verdict == "DISAGREES"):
             yield f"{comparison.carrier} against {comparison.against}:"
-            yield from (f"  {line}" for line in told)
+            yield from (f"  {line}" for line in comparison.detail)
     for count in found.counts:
         yield (
             f"{count.carrier}: of {counted(count.rows, 'row')} {count.ties} tied, "
@@ -288,12 +289,33 @@ def agreement_lines(found: Agreement, *, is_full: bool = False) -> Iterator[str]
     yield from (f"not examined: {text}" for text in found.skipped)
 
 
+_COMPARISON = (
+    "carrier",
+    "against",
+    "on",
+    "rows",
+    "largest difference",
+    "allowed",
+    "verdict",
+)
+
+
+def _basis_text(found: Agreement) -> str:
+    rows = max((c.rows for c in found.counts), default=found.probes)
+    data = rows - found.probes
+    text = f"{found.model}: {counted(found.probes, 'probe')}"
+    text += f", {counted(data, 'row')} of data" if data else ""
+    return text + (f", {counted(found.cells, 'cell')}" if found.cells else "")
+
+
 def _comparison_row(one: Comparison) -> tuple[str, ...]:
     verdict: str = one.verdict
     if one.differing:
         verdict += f" in {one.differing}"
-    if one.flips:
-        verdict += f", {counted(one.flips, 'class', 'classes')} differ"
+    if one.flips and not one.differing:
+        verdict += f", {counted(one.flips, 'class', 'classes')} differ as allowed"
+    if one.largest_flip_margin:
+        verdict += f" (margin up to {one.largest_flip_margin:.2g})"
     return (
         one.carrier,
         one.against,

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
+from fuzzytree.agreement import Agreement, Comparison
+from fuzzytree.report.text import agreement_lines
 from tests.cli.conftest import Call, grip
 
 NATIVE = ("--runtime", "native", "--limit", "200")
@@ -22,7 +24,8 @@ def test_a_model_and_its_files_agree(call: Call) -> None:
     words = ("rules.yaml", "grip.onnx", "--data", "grasps.csv")
     code, out, err = call("check", "grip.yaml", *words, *NATIVE)
     assert code == 0
-    assert out.splitlines()[0].split() == [
+    assert out.splitlines()[0].endswith(" probes, 4 rows of data, 4 cells")
+    assert out.splitlines()[1].split() == [
         *("carrier", "against", "on", "rows"),
         *("largest", "difference", "allowed", "verdict"),
     ]
@@ -70,3 +73,32 @@ def test_rows_that_do_not_fit_are_one_sentence(call: Call) -> None:
     Path("few.csv").write_text("force\n1\n", "utf-8")
     message = "few.csv has no column 'slip', which the model needs; it has force\n"
     assert call("check", "grip.yaml", "--data", "few.csv") == (2, "", message)
+
+
+def test_calls_that_do_not_fail_are_one_line_unless_asked_for(call: Call) -> None:
+    short = call("check", "grip.yaml", *NATIVE)[1]
+    full = call("check", "grip.yaml", "--rows", *NATIVE)[1]
+    line = (
+        "2 carriers called without rows, row by row, in another memory order and with "
+        "a wrong width: none fails\n"
+    )
+    assert line in short
+    assert " calls " not in short
+    assert line not in full
+    assert " calls " in full
+
+
+def test_a_disagreement_is_told_with_its_worst_row() -> None:
+    wrong = Comparison(
+        "x.onnx", "tree", "rows", 9, "DISAGREES", 2, 0.25, 0.0, "equal bits", 2, 0.5,
+        ("probe 1: force 2.0: tree answers soft, x.onnx firm",),
+    )  # fmt: skip
+    found = Agreement("grip", "0" * 64, (wrong,), probes=9)
+    assert list(agreement_lines(found)) == [
+        "grip: 9 probes",
+        "carrier  against  on    rows  largest difference  allowed  verdict",
+        "x.onnx   tree     rows  9     0.25                0        "
+        "DISAGREES in 2 (margin up to 0.5)",
+        "x.onnx against tree:",
+        "  probe 1: force 2.0: tree answers soft, x.onnx firm",
+    ]
