@@ -145,10 +145,10 @@ def plan_blocks(
 
 def _kind(atom: Atom) -> tuple[int, int]:
     match atom:
-        case Edge(flank=None):
-            return 0, 0
         case Edge(flank=Flank() as flank):
             return 1, 0 if flank.curve == (1.0,) else len(flank.curve)
+        case Edge():
+            return 0, 0
         case Slope(sign=0):
             return 2, len(atom.side.curve)
         case Slope():

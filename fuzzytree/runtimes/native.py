@@ -41,8 +41,8 @@ def load_best_first(model: Model) -> Run:
     """
     if not isinstance(model, RuleBase):
         raise LossError(
-            f"cannot run {model.name} as best-first: it searches rule bases, "
-            "and a tree is descended without a search"
+            f"cannot run {model.name} as best-first: it searches rule bases, and this "
+            "is a tree\n  pass rules_from_tree(tree)"
         )
     return search(model)
 

@@ -97,7 +97,10 @@ def _carried(model: Model) -> RuleBase:
     """Return a rule base that the library can hold, or raise LossError."""
     reason = ""
     if not isinstance(model, RuleBase):
-        raise LossError(f"cannot run {model.name} as scikit-fuzzy: it runs rule bases")
+        raise LossError(
+            f"cannot run {model.name} as scikit-fuzzy: it runs rule bases, and this "
+            "is a tree\n  pass rules_from_tree(tree)"
+        )
     if len(model.rules) > _MOST_RULES:
         reason = f"it has {len(model.rules)} rules, more than {_MOST_RULES}"
     for number, rule in enumerate(model.rules, 1):

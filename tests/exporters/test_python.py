@@ -1,0 +1,167 @@
+"""Generated Python: bits, hostile names, depth, and that it tests itself."""
+
+from __future__ import annotations
+
+import ast
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fuzzytree.exporters.python import FORMAT, parameters, write
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import descend, evaluate
+from fuzzytree.rulebase import (
+    Band,
+    Clause,
+    Flank,
+    Part,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+    fingerprint,
+)
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.testing import probes, random_tree
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+
+HOSTILE = (
+    "\nimport os; os.abort()\n#",
+    '"""',
+    "'; raise SystemExit #",
+    "class",
+    "1st col",
+    "\\",
+    "answer",
+    "coding: utf-16",
+    "{0} %s \u2028 \r é ☂",
+)
+
+
+def executed(content: bytes) -> dict[str, Any]:
+    space: dict[str, Any] = {"__name__": "generated"}
+    exec(compile(content, "generated", "exec"), space)
+    return space
+
+
+def hostile_rules() -> RuleBase:
+    terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
+    inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
+    mix = Variable("mix\n#", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
+    rules = tuple(
+        Rule((Clause(name, (name,)), Clause("mix\n#", HOSTILE[:2], True)), name)
+        for name in HOSTILE
+    )
+    semantics = Semantics("product", HOSTILE[0], HOSTILE[1])
+    return RuleBase('coding: latin-1\n\'"""', HOSTILE, (*inputs, mix), rules, semantics)
+
+
+@pytest.mark.parametrize("kind", ["tree", "relative", "raw"])
+def test_decide_and_strengths_have_the_bits_of_the_reference(kind: str) -> None:
+    tree = random_tree(8, leaves=9)
+    rules = rules_from_tree(tree, "raw" if kind == "raw" else "relative")
+    model = tree if kind == "tree" else rules
+    space = executed(write(model).content)
+    for row in probes(model, limit=200):
+        answer = descend(tree, row) if kind == "tree" else evaluate(rules, row)
+        assert space["decide"](**row) == (answer.label, answer.rule, answer.status)
+        if kind != "tree":
+            found = space["strengths"](**row)
+            np.testing.assert_array_equal(found, answer.strengths)
+
+
+def test_hostile_names_stay_text() -> None:
+    rules = hostile_rules()
+    content = write(rules).content
+    space = executed(content)
+    row = dict.fromkeys(rules.inputs, 0.5)
+    answer = evaluate(rules, row)
+    assert space["answer"](list(row.values()))[:3] == (
+        answer.label,
+        answer.rule,
+        answer.status,
+    )
+    names = parameters(rules.inputs)
+    given = dict.fromkeys(names, math.nan)
+    assert space["decide"](**given) == (HOSTILE[1], 0, 3)
+    tree = ast.parse(content)
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import)]
+    assert [alias.name for node in imports for alias in node.names] == ["math"]
+
+
+def test_parameters_are_distinct_identifiers() -> None:
+    names = parameters([*HOSTILE, "a b", "a-b", "a_b_2", "", "é"])
+    assert len(set(names)) == len(HOSTILE) + 5
+    assert all(name.isidentifier() and name.isascii() for name in names)
+    assert "answer" not in names
+
+
+def chain(length: int) -> FuzzyTree:
+    """Return a tree as deep as it has nodes."""
+    terms: list[Term] = []
+    nodes: list[Node] = []
+    for number in range(1, length + 1):
+        cut = float(number)
+        terms.append(Term(f"to {number}", Band(high=cut)))
+        terms.append(Term(f"from {number}", Band(low=cut)))
+        is_last = number == length
+        nodes.append(
+            Node(
+                "x",
+                (cut,),
+                (0, 1),
+                (
+                    Branch((f"to {number}",), leaf=number),
+                    Branch(
+                        (f"from {number}",),
+                        node=None if is_last else number + 1,
+                        leaf=number + 1 if is_last else None,
+                    ),
+                ),
+            )
+        )
+    leaves = tuple(Leaf("a") for _ in range(length + 1))
+    return FuzzyTree(
+        "deep", ("a",), (Variable("x", tuple(terms)),), tuple(nodes), leaves
+    )
+
+
+def test_a_tree_of_any_depth_can_be_written_and_run() -> None:
+    tree = chain(1500)
+    run = find_runtime("python").load(tree)
+    assert run(np.array([[0.0, 700.5, 1e9]])).rule.tolist() == [1, 701, 1501]
+
+
+def test_the_file_tests_itself_and_tells_a_changed_number(tmp_path: Path) -> None:
+    file = tmp_path / "rules.py"
+    content = write(rules_from_tree(random_tree(3))).content
+    file.write_bytes(content)
+    command = [sys.executable, "-I", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == "7 examples answered as expected\n"
+    broken = content.replace(b"if best == 0.0:", b"if best >= 0.0:")
+    assert broken != content
+    file.write_bytes(broken)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "instead of" in done.stderr
+
+
+def test_a_single_leaf_without_inputs_can_be_written() -> None:
+    tree = FuzzyTree("one", ("a",), (), (), (Leaf("a"),))
+    assert executed(write(tree).content)["decide"]() == ("a", 1, 0)
+
+
+def test_the_same_model_gives_the_same_bytes_with_its_fingerprint() -> None:
+    tree = random_tree(3)
+    content = write(tree).content
+    assert write(random_tree(3)).content == content
+    assert f"# Fingerprint: {fingerprint(tree)}\n".encode() in content
+    assert write(tree).losses == ()
+    assert FORMAT.suffixes == (".py",)

@@ -1,0 +1,107 @@
+"""scikit-fuzzy: what it refuses, and the certified error of its points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fuzzytree.errors import LossError
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Rule,
+    RuleBase,
+    Shape,
+    Side,
+    Term,
+    Variable,
+)
+from fuzzytree.runtimes.degrees import shape_degrees
+from fuzzytree.runtimes.sampling import HIGHEST, line_error, samples, universe
+from fuzzytree.runtimes.skfuzzy import bound, load
+from fuzzytree.testing import random_tree
+
+SHAPES: list[Shape] = [
+    Band(0.0, 1.0, Flank(0.0, -1.0, (0.0, 3.0, -2.0)), Flank(1.0, 3.0)),
+    Band(high=0.0, right=Flank(0.0, 2.0, (3.0, -7.0, 4.5))),
+    Band(0.0, 1.0),
+    LR(0.0, Side(1.0, (0.4, 0.3, -0.2), 1.5), Side(3.0, (2.0, 0.5))),
+    LR(1e6, Side(1e-3, (0.4,)), Side(1e-3, (0.4,))),
+]
+
+
+@pytest.mark.parametrize("points", [4, 16, 128])
+@pytest.mark.parametrize("shape", SHAPES, ids=repr)
+def test_lines_between_points_keep_their_certified_error(
+    shape: Shape, points: int
+) -> None:
+    places = universe([shape], points)
+    heights = samples(shape, places)
+    center = 1e6 if isinstance(shape, LR) and shape.mean else 0.0
+    width = 1e-2 if center else 20.0
+    chance = np.random.default_rng(0)
+    values = center + width * chance.uniform(-1.0, 1.0, 100_000)
+    joined = np.interp(values, places, heights)
+    error = np.abs(joined - shape_degrees(shape, values)).max()
+    assert error <= line_error(shape, places)
+
+
+def test_more_points_make_the_certified_error_smaller() -> None:
+    few, many = (line_error(SHAPES[0], universe(SHAPES[:1], n)) for n in (16, 128))
+    assert many < few / 40
+    assert many < 2e-4
+
+
+def test_samples_are_one_on_the_plateau_only() -> None:
+    places = universe(SHAPES[:1], 32)
+    heights = samples(SHAPES[0], places)
+    assert np.array_equal(heights == 1.0, (places > 0.0) & (places <= 1.0))
+    assert heights[heights < 1.0].max() == HIGHEST
+
+
+def test_a_tree_is_refused() -> None:
+    with pytest.raises(LossError) as caught:
+        load(random_tree(0))
+    assert str(caught.value) == (
+        "cannot run random 7 as scikit-fuzzy: it runs rule bases, and this is a tree\n"
+        "  pass rules_from_tree(tree)"
+    )
+
+
+def test_a_rule_without_a_clause_is_refused() -> None:
+    rules = RuleBase("r", ("a",), (), (Rule((), "a"),))
+    with pytest.raises(LossError) as caught:
+        load(rules)
+    assert str(caught.value) == "cannot run r as scikit-fuzzy: rule 1 has no clause"
+
+
+def test_too_many_rules_are_refused() -> None:
+    rules = rules_from_tree(random_tree(0, leaves=201, inputs=6))
+    with pytest.raises(LossError) as caught:
+        load(rules)
+    assert str(caught.value) == (
+        "cannot run random 201 as scikit-fuzzy: it has 201 rules, more than 200"
+    )
+
+
+def test_the_bound_says_where_it_comes_from() -> None:
+    x = Variable("x", (Term("low", SHAPES[2]),))
+    rules = RuleBase("r", ("a",), (x,), (Rule((Clause("x", ("low",)),), "a"),))
+    assert bound(rules) == (
+        0.0,
+        "largest error of lines between the points of the terms",
+    )
+
+
+def test_a_second_run_forgets_the_first() -> None:
+    rules = rules_from_tree(random_tree(2, leaves=5))
+    run = load(rules)
+    values = np.random.default_rng(0).normal(size=(len(rules.inputs), 50)) * 1e3
+    first = run(values)
+    run(values[:, :7] * 100)
+    again = run(values)
+    assert first.strengths is not None
+    np.testing.assert_array_equal(first.strengths, again.strengths)
