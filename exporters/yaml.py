@@ -16,14 +16,8 @@ import msgspec
 
 from fuzzytree.contracts import Format, Loss, Model, Written
 from fuzzytree.errors import LossError
-from fuzzytree.readers.layout import (
-    FORMAT as LAYOUT,
-)
-from fuzzytree.readers.layout import (
-    LARGEST_COUNT,
-    LONGEST_NAME,
-    LONGEST_SENTENCE,
-)
+from fuzzytree.readers import layout
+from fuzzytree.readers.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
 from fuzzytree.readers.nodes import MOST_BYTES, MOST_NODES
 from fuzzytree.readers.sentences import Vocabulary, readings, vocabulary_of
 from fuzzytree.readers.yaml import read
@@ -224,7 +218,7 @@ def _tree(tree: FuzzyTree) -> dict[str, Entry]:
 
 
 def _head(model: Model, kind: str) -> dict[str, Entry]:
-    return {"format": LAYOUT, "kind": kind, "name": model.name}
+    return {"format": layout.FORMAT, "kind": kind, "name": model.name}
 
 
 def _body(model: Model) -> dict[str, Entry]:
