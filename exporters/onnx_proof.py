@@ -74,7 +74,7 @@ def sample_rows(model: Model, limit: int) -> Iterator[dict[str, float]]:
         for v in model.variables
         if not v.parts
     }
-    for number in range(max(3, min(limit, _MOST_CLAUSES // size))):
+    for number in range(max(1, min(limit, _MOST_CLAUSES // size))):
         yield {
             name: values[(number * (3 + 2 * position) + position) % len(values)]
             for position, (name, values) in enumerate(points.items())

@@ -14,7 +14,7 @@ that strengths have the same bits as its own. What is rearranged changes no bit:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import msgspec
 import numpy as np
@@ -364,28 +364,39 @@ def _largest(
     return {clause: rows[0] for clause, rows in lists.items()}
 
 
-def _levels(sequences: Sequence[Sequence[object]]) -> list[dict[object, int]]:
-    """Return the distinct beginnings of each length, numbered."""
-    levels: list[dict[object, int]] = []
-    for length in range(1, max(map(len, sequences), default=0) + 1):
-        starts = dict.fromkeys(tuple(s[:length]) for s in sequences if len(s) >= length)
-        levels.append({start: number for number, start in enumerate(starts)})
-    return levels
+def _levels(
+    sequences: Sequence[Sequence[Hashable]],
+) -> tuple[list[dict[tuple[int, Hashable], int]], list[int]]:
+    """Return the distinct beginnings of each length, and where each sequence ends.
+
+    A beginning is known by its number among those of its length, given the number of
+    the beginning that is shorter by one, and its last element.
+    """
+    levels: list[dict[tuple[int, Hashable], int]] = []
+    here = [0] * len(sequences)
+    for position in range(max(map(len, sequences), default=0)):
+        level: dict[tuple[int, Hashable], int] = {}
+        for number, rows in enumerate(sequences):
+            if len(rows) > position:
+                step = (here[number], rows[position])
+                here[number] = level.setdefault(step, len(level))
+        levels.append(level)
+    return levels, here
 
 
-def _slot_cost(sequences: Sequence[Sequence[object]]) -> int:
+def _slot_cost(sequences: Sequence[Sequence[Hashable]]) -> int:
     """Return the passes over one row of a block; a node counts as five of them."""
     longest = max(map(len, sequences), default=0)
     return 2 * len(sequences) * longest + 5 * longest
 
 
-def _prefix_cost(sequences: Sequence[Sequence[object]]) -> int:
-    levels = _levels(sequences)
+def _prefix_cost(sequences: Sequence[Sequence[Hashable]]) -> int:
+    levels, _ = _levels(sequences)
     steps = sum(3 * len(level) for level in levels[1:])
     return steps + 15 * len(levels) + 2 * len(sequences)
 
 
-def _cost(sequences: Sequence[Sequence[object]]) -> int:
+def _cost(sequences: Sequence[Sequence[Hashable]]) -> int:
     return min(_slot_cost(sequences), _prefix_cost(sequences))
 
 
@@ -425,21 +436,19 @@ def _by_prefix(
     sheet: Sheet, table: Table, sequences: Sequences, *, is_product: bool
 ) -> str:
     """Compute each common beginning of sequences once, one length after another."""
-    levels = _levels(sequences)
+    levels, end = _levels(sequences)
     lengths = {len(rows) for rows in sequences}
-    ends, place = Table(sheet), dict[object, int]()
-    block = ""
+    ends, first = Table(sheet), dict[int, int]()
+    shorter, block = Table(sheet), ""
     for length, level in enumerate(levels, 1):
-        starts = [rows[:length] for rows in sequences if len(rows) >= length]
-        starts = list(dict.fromkeys(starts))
-        longer = table.take([start[-1] for start in starts])
+        rows = [row for _, row in level if isinstance(row, int)]
+        longer = table.take(rows)
         if length > 1:
-            known, numbers = Table(sheet), levels[length - 2]
-            known.append(block, len(numbers))
-            before = known.take([numbers[start[:-1]] for start in starts])
+            before = shorter.take([number for number, _ in level])
             longer = _and(sheet, [before, longer], is_product=is_product)
-        block = longer
+        shorter, block = Table(sheet), longer
+        shorter.append(block, len(level))
         if length in lengths:
-            first = ends.append(block, len(level))
-            place |= {start: first + number for start, number in level.items()}
-    return ends.take([place[rows] for rows in sequences])
+            first[length] = ends.append(block, len(level))
+    places = zip(sequences, end, strict=True)
+    return ends.take([first[len(rows)] + number for rows, number in places])
