@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Literal
 
 import msgspec
@@ -17,13 +17,13 @@ from fuzzytree.errors import InvalidModelError
 
 _LARGEST_COEFFICIENT = 1e6  # keeps every polynomial finite, in float32 too
 
+_MOST_COMPARED = 1000  # names among which a similar one is sought
+
 Path = tuple[str | int, ...]
 Mistake = tuple[Path, str]
 
 
-class Value(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True
-):
+class Value(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A frozen, comparable, hashable record."""
 
 
@@ -282,12 +282,13 @@ def variable_mistakes(
     """Yield what is wrong with variables: names, ranges, shapes, combinations."""
     yield from _repeated(("variables",), "variable", [v.name for v in variables])
     yield from _repeated(("columns",), "column", columns)
+    named = set(columns)
     known: dict[str, bool] = {}
     for position, variable in enumerate(variables):
         path: Path = ("variables", position)
         if not variable.name:
             yield (*path, "name"), "a variable needs a name"
-        if columns and not variable.parts and variable.name not in columns:
+        if columns and not variable.parts and variable.name not in named:
             yield (
                 (*path, "name"),
                 f"input {variable.name!r} is not among the columns; "
@@ -327,10 +328,10 @@ def _range_mistakes(path: Path, variable: Variable) -> Iterator[Mistake]:
 def _part_mistakes(
     path: Path, variable: Variable, known: dict[str, bool]
 ) -> Iterator[Mistake]:
-    inputs = [name for name, combined in known.items() if not combined]
     for index, part in enumerate(variable.parts):
         where = (*path, "parts", index)
-        if part.input not in inputs:
+        if known.get(part.input, True):
+            inputs = [name for name, combined in known.items() if not combined]
             yield (
                 (*where, "input"),
                 f"combination {variable.name!r} needs input {part.input!r}, "
@@ -403,8 +404,13 @@ def _curve_mistakes(name: str, curve: tuple[float, ...]) -> Iterator[str]:
         yield f"the coefficients of the {name} must lie within +-1e6"
 
 
+def term_names(variables: Iterable[Variable]) -> dict[str, dict[str, None]]:
+    """Return the names of each variable's terms, in order and quick to look up."""
+    return {v.name: dict.fromkeys(term.name for term in v.terms) for v in variables}
+
+
 def clause_mistakes(
-    path: Path, where: str, clause: Clause, terms: dict[str, tuple[str, ...]]
+    path: Path, where: str, clause: Clause, terms: Mapping[str, Collection[str]]
 ) -> Iterator[Mistake]:
     """Yield what is wrong with a clause, given the term names of each variable."""
     if clause.variable not in terms:
@@ -433,11 +439,12 @@ def clause_mistakes(
 def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
     if not rules.rules:
         yield ("rules",), "a rule base needs at least one rule"
-    terms = {v.name: tuple(t.name for t in v.terms) for v in rules.variables}
+    classes = dict.fromkeys(rules.classes)
+    terms = term_names(rules.variables)
     checked: set[int] = set()  # clauses are shared between rules of one tree
     for number, rule in enumerate(rules.rules, 1):
         path: Path = ("rules", number - 1)
-        if rule.then not in rules.classes:
+        if rule.then not in classes:
             yield (
                 (*path, "then"),
                 f"rule {number}: no class {rule.then!r}; "
@@ -466,6 +473,8 @@ def _choice(wrong: str, names: Iterable[str]) -> str:
     import difflib
 
     known = list(dict.fromkeys(names))
+    if len(known) > _MOST_COMPARED:
+        return f"there are {len(known)}: {', '.join(known[:12])}, ..."
     if not known:
         return "there is none"
     shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")

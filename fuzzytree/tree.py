@@ -24,6 +24,7 @@ from fuzzytree.rulebase import (
     Variable,
     clause_mistakes,
     naming_mistakes,
+    term_names,
     variable_mistakes,
 )
 
@@ -206,7 +207,7 @@ def _short_numbers(values: set[float]) -> dict[float, str]:
 
 
 def _set_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
-    names = [variable.name for variable in tree.variables]
+    names = {variable.name for variable in tree.variables}
     for position, group in enumerate(tree.sets):
         path: Path = ("sets", position)
         if group.variable not in names:
@@ -218,8 +219,9 @@ def _set_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
 def _leaf_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
     if not tree.leaves:
         yield ("leaves",), "a tree needs at least one leaf"
+    classes = set(tree.classes)
     for number, leaf in enumerate(tree.leaves, 1):
-        if leaf.label not in tree.classes:
+        if leaf.label not in classes:
             yield (
                 ("leaves", number - 1, "label"),
                 f"leaf {number}: no class {leaf.label!r}",
@@ -232,8 +234,8 @@ def _leaf_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
 
 
 def _node_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
-    terms = {v.name: tuple(t.name for t in v.terms) for v in tree.variables}
-    sets = {s.variable: tuple(t.name for t in s.terms) for s in tree.sets}
+    terms = term_names(tree.variables)
+    sets = term_names(Variable(s.variable, s.terms) for s in tree.sets)
     for number, node in enumerate(tree.nodes, 1):
         path: Path = ("nodes", number - 1)
         where = f"node {number}"

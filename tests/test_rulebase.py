@@ -191,3 +191,12 @@ def test_an_input_must_be_one_of_the_columns() -> None:
         "input 'force' is not among the columns; "
         "there is Force, slip (did you mean 'Force'?)"
     )
+
+
+def test_a_default_that_is_spelt_out_does_not_change_the_fingerprint() -> None:
+    spelt = Flank(1.0, 3.0, tuple([1.0]))
+    term = Term("low", Band(high=1.0, right=spelt))
+    other = rule_base(variables=(Variable("force", (term, HIGH)),))
+    same = rule_base(variables=(Variable("force", (LOW, HIGH)),))
+    assert other == same
+    assert fingerprint(other) == fingerprint(same)
