@@ -235,7 +235,7 @@ def _bandwidth(values: FloatArray, is_right: BoolArray, weights: FloatArray) -> 
         for group in (values[is_right], values[~is_right])
         if len(group) > 1
     ]
-    return 0.7 * min(widths, default=0.0)
+    return min(widths, default=0.0)
 
 
 def _robust_spread(group: FloatArray) -> float:

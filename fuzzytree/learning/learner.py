@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -23,8 +24,7 @@ from fuzzytree.tree import FuzzyTree
 Progress = Callable[[str, float], None]
 
 
-@dataclass(frozen=True)
-class Learnt:
+class Learnt(msgspec.Struct, frozen=True):
     """What learning gives: the tree, and what was counted on the way."""
 
     tree: FuzzyTree
@@ -289,20 +289,22 @@ def _codes(
 
 def _check_table(moments: Moments, dropped: int, classes: Sequence[str]) -> None:
     rows = int(moments.counts.sum())
+    if rows == 0 and dropped:
+        raise LearningError(
+            f"cannot learn from a table without complete rows: all {dropped} hold a "
+            "missing or infinite value or no class"
+        )
     if rows == 0:
-        if dropped:
-            raise LearningError(
-                f"no row is left: all {dropped} hold a missing or infinite value "
-                "or no class"
-            )
-        raise LearningError("the table has no rows")
+        raise LearningError("cannot learn from a table without rows")
     if rows == 1:
-        raise LearningError("the table has one row; two classes need at least two")
+        raise LearningError("cannot learn from one row; two classes need two at least")
     present = np.flatnonzero(moments.counts)
     if len(present) == 1:
         raise LearningError(
-            f"all rows are of one class, {classes[present[0]]!r}; "
-            "there is nothing to tell apart"
+            f"cannot learn from one class: every row is {classes[present[0]]!r}"
         )
     if len(usable_features(moments)) == 0:
-        raise LearningError("every column is constant or too large to square")
+        raise LearningError(
+            "cannot learn without a column that varies: every column is constant, "
+            "or so large that its square overflows"
+        )

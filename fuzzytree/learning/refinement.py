@@ -18,6 +18,7 @@ from fuzzytree.learning.sketch import Axis, Sketch, Split, single
 
 _MOST_ROWS = 20_000
 _NEWTON_STEPS = 8
+_LEAST = 0.5
 
 
 def refined(
@@ -106,6 +107,7 @@ def _better_split(
     lowest = float(weights[split.branches(rows) != is_right].sum())
     if lowest == 0.0 or is_right.all() or not is_right.any():
         return None
+    bar = lowest - _LEAST * float(np.sqrt(lowest * weights.mean()))
     best: Split | None = None
     for axis in (
         split.axis,
@@ -119,8 +121,8 @@ def _better_split(
             if (np.diff(found.cuts) <= 0).any() or not np.isfinite(found.cuts).all():
                 continue
             error = float(weights[found.branches(rows) != is_right].sum())
-            if error < lowest:
-                lowest, best = error, found
+            if error < bar:
+                bar, best = error, found
     return best
 
 

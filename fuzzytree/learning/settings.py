@@ -18,7 +18,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             patterns a class, and refines the cuts.
         alpha: Weight of the difference of means in the distance; beta is 1 - alpha.
         l_max: The paper's L_MAX. Large asks for a wide margin before one feature is
-            trusted. None is 4 in paper mode and 16 in default mode.
+            trusted. None is 4 in paper mode and 10 in default mode.
         points: n of the paper's 2n + 1 points on a fuzzy set, 1 to 8.
         separate_sides: Whether a set's left and right sides are fitted apart.
         patterns_per_class: How many patterns (clusters) a class has: a number, a
@@ -112,4 +112,4 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         """The L_MAX that holds in this mode."""
         if self.l_max is not None:
             return self.l_max
-        return 4.0 if self.mode == "paper" else 16.0
+        return 4.0 if self.mode == "paper" else 10.0
