@@ -73,7 +73,8 @@ def test_the_first_command_works_in_a_fresh_copy(tmp_path: Path) -> None:
 
 def test_every_example_prints_what_the_readme_shows(tmp_path: Path) -> None:
     text = README.read_text("utf-8")
-    assert _masked(_rewritten_examples(text, tmp_path)) == _masked(text)
+    now = _masked(_rewritten_examples(text, tmp_path))
+    assert now == _masked(text), "python tests/test_readme.py rewrites the README"
 
 
 @pytest.mark.parametrize(
