@@ -67,3 +67,12 @@ def test_progress_is_told_fold_by_fold() -> None:
     told: list[str] = []
     accuracy(_table(20), Settings(), progress=lambda text, _: told.append(text))
     assert told == [f"testing fold {k} of 5" for k in range(1, 6)]
+
+
+def test_with_many_classes_fewer_folds_are_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(holdout, "_CLASSES", 4)
+    found = accuracy(_table(60), Settings())
+    assert found is not None
+    assert len(found.folds) == 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fuzzytree import tables
-from fuzzytree.errors import TableError
+from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.tables import Table, batches, class_names, read_table
 
 GRASPS = "force,slip,grip\n1.5,0,soft\n2.5,1,firm\n3.5,0,firm\n"
@@ -95,6 +96,18 @@ def test_a_parquet_file_and_stream_give_the_rows_of_the_table(tmp_path: Path) ->
     for source in (path, str(path), io.BytesIO(path.read_bytes())):
         table = read_table(source, target="grip")
         assert table.values.tolist() == [[1.5, 2.5, 3.5], [0.0, 1.0, 0.0]]
+
+
+def test_parquet_without_its_library_names_the_extra(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtraError) as caught:
+        _values(io.BytesIO(b"PAR1"), ["a"])
+    assert str(caught.value) == (
+        "reading parquet needs the extra 'parquet': "
+        "pip install 'fuzzytree-toolkit[parquet]'"
+    )
 
 
 def test_a_parquet_file_without_rows_has_columns(tmp_path: Path) -> None:

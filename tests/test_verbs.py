@@ -175,7 +175,7 @@ def test_an_option_that_a_writer_does_not_have_is_refused() -> None:
 def test_check_takes_files_and_names_them(tmp_path: Path) -> None:
     yaml, onnx = tmp_path / "tree.yaml", tmp_path / "tree.onnx"
     ft.save(TREE, yaml)
-    ft.save(ft.load(yaml), onnx)
+    ft.save(TREE, onnx)
     found = ft.check(yaml, onnx, data=ROWS, runtimes=["native"], limit=300)
     assert found.ok
     assert str(onnx) in {comparison.carrier for comparison in found.comparisons}

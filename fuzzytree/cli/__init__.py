@@ -6,8 +6,10 @@ something; 2 it could not run; 130 interrupted; 141 nobody reads the output any 
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import importlib
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -16,6 +18,7 @@ import click
 
 from fuzzytree.cli.talk import say
 from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.files import reason
 
 VERBS = ("learn", "show", "export", "run", "check", "formats", "doctor")
 """Each verb is the `command` of the module `fuzzytree.cli.VERB`."""
@@ -83,6 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: The words after the program's name; those of the process if None.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
+    _spare_encodings()
     try:
         with program.make_context("fuzzytree", words) as context:
             code = program.invoke(context)
@@ -95,8 +99,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         _forget_stdout()
         return 141
-    except (FuzzyTreeError, OSError) as error:
+    except FuzzyTreeError as error:
         say(str(error))
+        return 2
+    except OSError as error:
+        say(f"cannot go on: {reason(error)}")
+        _forget_stdout()
         return 2
     except (KeyboardInterrupt, click.Abort):
         say("interrupted; files are as they were")
@@ -115,6 +123,13 @@ def _usage_text(error: click.ClickException) -> str:
 
 
 def _forget_stdout() -> None:
-    """Keep Python from flushing to a pipe that nobody reads, which would complain."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
+    """Keep Python from flushing what nobody can take any more, and complaining."""
+    with contextlib.suppress(OSError):  # tests have a stdout without a number
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _spare_encodings() -> None:
+    """Write a character that the terminal does not know as an escape, not an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.encoding.lower() != "utf-8":
+            stream.reconfigure(errors="backslashreplace")

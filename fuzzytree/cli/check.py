@@ -69,7 +69,7 @@ def command(
         raise click.UsageError(str(error)) from error
     if as_json:
         answer(found.to_json())
-    elif not quiet:
+    else:
         answer("\n".join(text.agreement_lines(found, is_full=is_full)))
     wrong = sum(c.verdict == "DISAGREES" for c in found.comparisons)
     count = text.counted(len(found.comparisons), "comparison")

@@ -287,11 +287,14 @@ def _read_text(table: Table) -> str:
 
 
 def _tested_text(found: Accuracy | None) -> str:
+    from fuzzytree.report.text import counted
+
     if found is None:
         return "too few rows for a test"
     span = f"{min(found.folds):.3f} to {max(found.folds):.3f}"
     part = f" on {found.rows} of {found.of} rows" if found.rows < found.of else ""
-    return f"{found.mean:.3f} ({len(found.folds)} folds{part}: {span})"
+    folds = counted(len(found.folds), "fold")
+    return f"{found.mean:.3f} ({folds}{part}: {span})"
 
 
 def _learnt_rows(learnt: Learnt, seconds: float) -> list[tuple[str, str, str]]:

@@ -53,7 +53,12 @@ Columns = dict[str, Sequence[object]]
     "--runtime", metavar="NAME", help="What executes the model; native if none."
 )
 @delimiter_option
-@click.option("--json", "as_json", is_flag=True, help="Write JSON lines, not CSV.")
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Write JSON lines, not CSV; null for nothing.",
+)
 @quiet_option
 def command(
     model: str,
@@ -189,7 +194,8 @@ def _csv_writer(stream: TextIO) -> Callable[[Columns], None]:
 def _json_writer(stream: TextIO) -> Callable[[Columns], None]:
     def write(columns: Columns) -> None:
         for row in zip(*columns.values(), strict=True):
-            facts = dict(zip(columns, row, strict=True))
+            cells = (None if cell == "" else cell for cell in row)
+            facts = dict(zip(columns, cells, strict=True))
             stream.write(json.dumps(facts, ensure_ascii=False) + "\n")
 
     return write

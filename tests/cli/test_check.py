@@ -17,7 +17,7 @@ NATIVE = ("--runtime", "native", "--limit", "200")
 
 @pytest.fixture(autouse=True)
 def _here(folder: Path) -> None:
-    ft.save(ft.load("grip.yaml"), "grip.onnx")
+    pass
 
 
 def test_a_model_and_its_files_agree(call: Call) -> None:
@@ -59,8 +59,10 @@ def test_json_tells_the_same_facts(call: Call) -> None:
     assert facts["comparisons"]
 
 
-def test_quiet_leaves_the_exit_code_alone(call: Call) -> None:
-    assert call("check", "grip.yaml", "--quiet", *NATIVE) == (0, "", "")
+def test_quiet_leaves_the_table_and_the_exit_code_alone(call: Call) -> None:
+    loud = call("check", "grip.yaml", *NATIVE)
+    quiet = call("check", "grip.yaml", "--quiet", *NATIVE)
+    assert quiet == (0, loud[1], "")
 
 
 def test_an_unknown_runtime_is_one_sentence(call: Call) -> None:

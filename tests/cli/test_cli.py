@@ -95,20 +95,34 @@ def test_an_interrupt_ends_with_130(
     assert call("run", "a", "b") == (130, "", message)
 
 
+def _shell(command: str, folder: Path, **more: str) -> tuple[int, str, str]:
+    done = subprocess.run(
+        ["bash", "-c", command.replace("fuzzytree", f"{sys.executable} -m fuzzytree")],
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT), **more},
+        text=True, capture_output=True, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stdout, done.stderr
+
+
 def test_a_reader_who_leaves_early_sees_no_traceback(folder: Path) -> None:
     with (folder / "long.csv").open("w") as file:
         file.write("force,slip\n" + "1,0\n" * 50_000)
     command = (
-        f"{sys.executable} -m fuzzytree run grip.yaml long.csv --quiet | head -1; "
-        "exit ${PIPESTATUS[0]}"
+        "fuzzytree run grip.yaml long.csv --quiet | head -1; exit ${PIPESTATUS[0]}"
     )
-    done = subprocess.run(
-        ["bash", "-c", command],
-        cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)},
-        text=True, capture_output=True, check=False,
-    )  # fmt: skip
-    assert (done.stdout, done.stderr) == ("class,rule,status\n", "")
-    assert done.returncode == 141
+    assert _shell(command, folder) == (141, "class,rule,status\n", "")
+
+
+def test_a_full_standard_output_is_one_sentence(folder: Path) -> None:
+    code, _, err = _shell("fuzzytree show grip.yaml > /dev/full", folder)
+    assert (code, err) == (2, "cannot go on: no space left on device\n")
+
+
+def test_a_terminal_without_lines_to_draw_gets_escapes(folder: Path) -> None:
+    command = "fuzzytree show grip.yaml"
+    code, out, err = _shell(command, folder, PYTHONIOENCODING="latin-1")
+    assert (code, err) == (0, "")
+    assert "\\u251c\\u2500 low (<= 2): soft" in out
 
 
 def test_a_bar_appears_only_on_a_terminal(

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-import fuzzytree as ft
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.report.text import model_lines, shape_text
 from fuzzytree.rulebase import LR, Band, Flank, Side, fingerprint
@@ -65,7 +64,7 @@ def test_rules_are_numbered_sentences(call: Call) -> None:
 def test_json_tells_the_same_facts(call: Call) -> None:
     facts = json.loads(call("show", "grip.yaml", "--json")[1])
     assert facts["carrier"] == "tree"
-    assert facts["fingerprint"] == fingerprint(ft.load("grip.yaml"))
+    assert facts["fingerprint"] == fingerprint(grip())
     assert facts["rules"][0] == {
         "number": 1,
         "text": "IF force is low THEN soft",
