@@ -304,7 +304,8 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
         facts = msgspec.convert(known, Facts)
     except (json.JSONDecodeError, msgspec.ValidationError) as error:
         raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
-    if not set(facts.inputs) <= set(facts.columns) or facts.rules < 1:
+    is_possible = 1 <= facts.rules <= proto.ByteSize()
+    if not set(facts.inputs) <= set(facts.columns) or not is_possible:
         raise ReadError(f"{name}: the file's metadata contradicts itself")
     return facts
 

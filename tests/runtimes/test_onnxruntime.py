@@ -340,6 +340,10 @@ HOSTILE = {
         _with_fact("inputs", '["other"]'),
         "the file's metadata contradicts itself",
     ),
+    "too many rules": (
+        _with_fact("rules", "1000000000000"),
+        "the file's metadata contradicts itself",
+    ),
     "other width": (
         _with_fact("columns", '["x1", "x2", "x3"]'),
         "the graph's inputs and outputs are not those of its metadata",
@@ -371,6 +375,17 @@ def test_a_file_that_is_not_ours_is_refused_with_one_sentence(
     with pytest.raises(ReadError) as caught:
         open_onnx(content, "shipped.onnx")
     assert str(caught.value) == f"shipped.onnx: {text}"
+
+
+def test_a_file_that_answers_in_another_shape_is_refused_at_running() -> None:
+    content = write(rules_from_tree(random_tree(1)), outputs=("rule", "strengths"))
+    proto = onnx.load_from_string(content.content)
+    _set_fact(proto, "rules", "8")
+    model = open_onnx(proto.SerializeToString(), "rules.onnx")
+    with pytest.raises(LossError) as caught:
+        model.run(np.zeros((len(model.inputs), 2)))
+    expected = "random 7: the ONNX file gives answers without meaning"
+    assert str(caught.value) == expected
 
 
 def test_a_huge_file_is_refused_before_it_is_parsed() -> None:
