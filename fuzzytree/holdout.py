@@ -106,7 +106,7 @@ def folds_of(codes: IntArray, folds: int, seed: int) -> IntArray:
 
     Example:
         >>> folds_of(np.array([0, 0, 1, 1]), 2, 0).tolist()
-        [1, 0, 1, 0]
+        [0, 1, 0, 1]
     """
     found = np.empty(len(codes), np.int64)
     found[_by_class(codes, seed)] = np.arange(len(codes)) % folds
