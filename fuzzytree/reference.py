@@ -74,12 +74,18 @@ def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
         missing = (math.nan,) * len(rules.rules)
         return Answer(0, rules.semantics.missing, Status.MISSING, missing)
     shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    # The rules of a tree share their clauses: each is evaluated once.
+    clauses = {id(clause): clause for rule in rules.rules for clause in rule.when}
+    degrees = {
+        key: clause_degree(clause, shapes, axes[clause.variable])
+        for key, clause in clauses.items()
+    }
     strengths = tuple(
         strength(
-            [clause_degree(clause, shapes, axes[clause.variable]) for clause in r.when],
+            [degrees[id(clause)] for clause in rule.when],
             is_product=rules.semantics.conjunction == "product",
         )
-        for r in rules.rules
+        for rule in rules.rules
     )
     best = max(strengths)
     if best == 0.0:

@@ -260,6 +260,8 @@ def naming_mistakes(
     """Yield what is wrong with a model's name, classes and default answers."""
     if not name:
         yield ("name",), "a model needs a name"
+    if not _is_writable(name):
+        yield ("name",), f"the name {name!r} cannot be written as UTF-8"
     if not classes:
         yield ("classes",), "a model needs at least one class"
     yield from _repeated(("classes",), "class", classes)
@@ -463,9 +465,19 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
 def _repeated(path: Path, what: str, names: Iterable[str]) -> Iterator[Mistake]:
     seen: set[str] = set()
     for position, name in enumerate(names):
+        if not _is_writable(name):
+            yield (*path, position), f"{what} {name!r} cannot be written as UTF-8"
         if name in seen:
             yield (*path, position), f"{what} {name!r} stands twice"
         seen.add(name)
+
+
+def _is_writable(name: str) -> bool:
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _choice(wrong: str, names: Iterable[str]) -> str:

@@ -200,3 +200,12 @@ def test_a_default_that_is_spelt_out_does_not_change_the_fingerprint() -> None:
     same = rule_base(variables=(Variable("force", (LOW, HIGH)),))
     assert other == same
     assert fingerprint(other) == fingerprint(same)
+
+
+def test_a_name_that_no_file_can_hold_is_refused() -> None:
+    with pytest.raises(InvalidModelError) as caught:
+        rule_base(name="\ud800", classes=("soft", "firm", "\udfff"))
+    assert str(caught.value) == (
+        "the name '\\ud800' cannot be written as UTF-8\n"
+        "class '\\udfff' cannot be written as UTF-8"
+    )
