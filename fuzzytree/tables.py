@@ -154,7 +154,9 @@ def read_table(
             classes.append(piece.cells[piece.columns.index(target)])
     if numbers.faults:
         hint = " ".join(f"--ignore {_quoted(k)}" for k in numbers.faults)
-        raise TableError(f"{numbers.fault_text()}\n  leave columns out with {hint}")
+        raise TableError(
+            f"{numbers.fault_text()}\n  leave columns out with ignore ({hint})"
+        )
     values = numbers.joined()
     if not values.shape[1]:
         raise TableError(f"{first.name} has no rows")

@@ -226,7 +226,7 @@ def test_a_decimal_comma_is_refused_with_a_hint() -> None:
     assert _error("force;grip\n1,5;soft\n") == (
         "grasps.csv:2: column 'force' holds text where a number is needed: '1,5' "
         "(numbers are written with a decimal point)\n"
-        "  leave columns out with --ignore force"
+        "  leave columns out with ignore (--ignore force)"
     )
 
 
@@ -236,7 +236,7 @@ def test_every_column_with_text_is_named_with_its_first_row() -> None:
         "'?' (and 1 more)\n"
         "grasps.csv:2: column 'surface type' holds text where a number is needed: "
         "'wet' (and 1 more)\n"
-        "  leave columns out with --ignore force --ignore 'surface type'"
+        "  leave columns out with ignore (--ignore force --ignore 'surface type')"
     )
 
 

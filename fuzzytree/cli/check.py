@@ -12,8 +12,8 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say,
     standard_input,
+    wrong_options,
 )
-from fuzzytree.errors import FuzzyTreeError
 
 
 @click.command("check", short_help="Compare a model with all that is made of it.")
@@ -55,7 +55,7 @@ def command(
     from fuzzytree import verbs
     from fuzzytree.report import text
 
-    try:
+    with wrong_options():
         found = verbs.check(
             model,
             *files,
@@ -63,10 +63,6 @@ def command(
             runtimes=runtimes or None,
             limit=limit,
         )
-    except ValueError as error:
-        if isinstance(error, FuzzyTreeError):
-            raise
-        raise click.UsageError(str(error)) from error
     if as_json:
         answer(found.to_json())
     else:

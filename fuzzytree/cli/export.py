@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import click
 
@@ -20,11 +23,15 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say,
     say_rows,
+    wrong_options,
 )
-from fuzzytree.contracts import Carrier, Written
-from fuzzytree.errors import FuzzyTreeError, LossError
+from fuzzytree.contracts import Carrier, Model, Written
+from fuzzytree.errors import LossError
 from fuzzytree.files import write_atomically
 from fuzzytree.rulebase import Conjunction, Kind
+
+if TYPE_CHECKING:
+    from fuzzytree.verbs import Option
 
 
 @click.command("export", short_help="Write a model in another format.")
@@ -100,22 +107,27 @@ def command(
         conjunction=conjunction,
         form=form,
     )
-    try:
-        written = verbs.export(found, form.name, allow_loss=allow_loss, **options)
-    except LossError as error:
-        text = str(error).replace("allow_loss=True", "--allow-loss")
-        raise LossError(text) from error
-    except ValueError as error:
-        if isinstance(error, FuzzyTreeError):
-            raise
-        raise click.UsageError(str(error)) from error
+    with wrong_options():
+        written = _written(found, form.name, options, allow_loss=allow_loss)
     if output == "-":
         answer_bytes(written.content)
     else:
         write_atomically(output, written.content)
     can_check = form.read is not None or form.name == "onnx"
-    after = f"fuzzytree check {model} {output}" if can_check else ""
+    after = shlex.join(["fuzzytree", "check", model, output]) if can_check else ""
     _tell(written, form.name, output, after, as_json=as_json, quiet=quiet)
+
+
+def _written(
+    model: Model, to: str, options: Mapping[str, Option], *, allow_loss: bool
+) -> Written:
+    from fuzzytree import verbs
+
+    try:
+        return verbs.export(model, to, allow_loss=allow_loss, **options)
+    except LossError as error:
+        text = str(error).replace("allow_loss=True", "--allow-loss")
+        raise LossError(text) from error
 
 
 def _tell(

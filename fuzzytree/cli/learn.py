@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -25,9 +27,9 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say_rows,
     standard_input,
+    wrong_options,
 )
 from fuzzytree.contracts import Carrier
-from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import check_place, write_atomically
 from fuzzytree.rulebase import Conjunction, Kind
 
@@ -146,14 +148,14 @@ def command(
     TABLE is CSV or Parquet, or `-` for standard input. The accuracy that is told is
     that of trees learnt without the rows that they are tested on.
     """
-    from fuzzytree import verbs
     from fuzzytree.holdout import accuracy
     from fuzzytree.tables import read_table
+    from fuzzytree.verbs import export, learn_table
 
     form = wanted_format(output, None)
     if output != "-":
         check_place(output)
-    settings = _settings(chosen)
+    settings, units_of = _settings(chosen), dict(_pairs("--unit", units))
     found = read_table(
         standard_input() if table == "-" else table,
         target=target,
@@ -161,49 +163,32 @@ def command(
         delimiter=delimiter,
         name="standard input" if table == "-" else None,
     )
-    quiet = quiet or output == "-"
+    is_silent = quiet or output == "-"
     width = max(map(len, (found.name, output, "accuracy")))
-    say_rows(("read", found.name, _read_text(found)), width=width, quiet=quiet)
+    tell_rows = functools.partial(say_rows, width=width, quiet=is_silent)
+    tell_rows(("read", found.name, _read_text(found)))
     begin = time.perf_counter()
-    with progress_bar(quiet=quiet) as tell:
-        try:
-            learnt = verbs.learn_table(
-                found,
-                name=name or ("tree" if table == "-" else Path(table).stem),
-                units=dict(_pairs("--unit", units)),
-                settings=settings,
-                progress=tell,
-            )
-        except ValueError as error:
-            if isinstance(error, FuzzyTreeError):
-                raise
-            raise click.UsageError(str(error)) from error
-        took = time.perf_counter() - begin
-        model = carried(
-            learnt.tree, carrier=carrier, kind=kind, conjunction=conjunction, form=form
+    with progress_bar(quiet=is_silent) as tell, wrong_options():
+        title = name or ("tree" if table == "-" else Path(table).stem)
+        learnt = learn_table(
+            found, name=title, units=units_of, settings=settings, progress=tell
         )
-        say_rows(*_learnt_rows(learnt, took), width=width, quiet=quiet)
-        tested = (
-            None
-            if no_test
-            else accuracy(found, settings, seed=settings.seed, progress=tell)
-        )
-    say_rows(
-        ("tested", "accuracy", _tested_text(tested)),
-        width=width,
-        quiet=quiet or no_test,
+        tell_rows(*_learnt_rows(learnt, time.perf_counter() - begin))
+        tested = None
+        if not no_test:
+            tested = accuracy(found, settings, seed=settings.seed, progress=tell)
+            tell_rows(("tested", "accuracy", _tested_text(tested)))
+    model = carried(
+        learnt.tree, carrier=carrier, kind=kind, conjunction=conjunction, form=form
     )
-    content = verbs.export(model, form.name).content
+    content = export(model, form.name).content
     if output == "-":
         answer_bytes(content)
         return
     write_atomically(output, content)
-    data = "" if table == "-" else f" --data {table}"
-    say_rows(
-        ("wrote", output, f"next: fuzzytree check {output}{data}"),
-        width=width,
-        quiet=quiet,
-    )
+    data = [] if table == "-" else ["--data", table]
+    after = shlex.join(["fuzzytree", "check", output, *data])
+    tell_rows(("wrote", output, f"next: {after}"))
     if as_json:
         answer_json(_facts(found, learnt, tested, output))
 
@@ -221,10 +206,8 @@ def _settings(chosen: Mapping[str, object]) -> Settings:
     if isinstance(patterns, str) and patterns != "auto":
         number = _parsed("--patterns", "NUMBER|auto", patterns, int)
         given["patterns_per_class"] = number
-    try:
+    with wrong_options():
         return Settings(**given)  # type: ignore[arg-type] # options have its types
-    except ValueError as error:
-        raise click.UsageError(str(error)) from error
 
 
 def _pairs(option: str, texts: Sequence[str]) -> list[tuple[str, str]]:

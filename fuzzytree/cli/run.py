@@ -18,8 +18,9 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say_rows,
     standard_input,
+    wrong_options,
 )
-from fuzzytree.errors import FuzzyTreeError, TableError
+from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import RuleBase
@@ -83,12 +84,8 @@ def command(
     reason = _reasons(model, found) if why else None
     if strengths and isinstance(found, FuzzyTree):
         found = rules_from_tree(found)
-    try:
+    with wrong_options():
         answer = verbs.answering(found, runtime, with_strengths=strengths is not None)
-    except ValueError as error:
-        if isinstance(error, FuzzyTreeError):
-            raise
-        raise click.UsageError(str(error)) from error
     source = standard_input() if table == "-" else table
     name = "standard input" if table == "-" else table
     tally = _Tally(_tells_ties(found))

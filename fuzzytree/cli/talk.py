@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, BinaryIO
 import click
 import msgspec
 
+from fuzzytree.errors import FuzzyTreeError
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -61,6 +63,17 @@ def answer_bytes(content: bytes) -> None:
 def standard_input() -> BinaryIO:
     """Return the stream behind `-`."""
     return sys.stdin.buffer
+
+
+@contextlib.contextmanager
+def wrong_options() -> Generator[None]:
+    """Tell a value that an option cannot have as a mistake in the command."""
+    try:
+        yield
+    except ValueError as error:
+        if isinstance(error, FuzzyTreeError):
+            raise
+        raise click.UsageError(str(error)) from error
 
 
 @contextlib.contextmanager

@@ -155,7 +155,7 @@ def test_a_wrong_option_is_one_sentence(
             "a,b,grip\n1,wet,x\nq,2,y\n",
             "t.csv:3: column 'a' holds text where a number is needed: 'q'\n"
             "t.csv:2: column 'b' holds text where a number is needed: 'wet'\n"
-            "  leave columns out with --ignore a --ignore b",
+            "  leave columns out with ignore (--ignore a --ignore b)",
         ),
         (
             "a,grip\n1,x\n1,y\n1,x\n",
