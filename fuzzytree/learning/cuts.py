@@ -8,6 +8,7 @@ themselves, smoothed (`smoothed_cuts`). A cut never lies on a value of the table
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -164,7 +165,8 @@ def smoothed_cuts(
         two: Whether two cuts may be placed, the outer group owning both outer
             intervals; they must save 3 % of the smaller group's weight.
     """
-    low, high = _robust_range(values, is_right)
+    sides = [_Extent.of(values[is_right]), _Extent.of(values[~is_right])]
+    low, high = _robust_range(sides)
     step = (high - low) / _GRID
     if not step > 0:
         middle = float(np.median(values))
@@ -172,7 +174,7 @@ def smoothed_cuts(
     place = np.clip((values - low) / step, 0, _GRID - 1).astype(np.int64)
     signed = np.where(is_right, weights, -weights)
     balance = np.bincount(place, weights=signed, minlength=_GRID)
-    balance = _smoothed(balance, _bandwidth(values, is_right, weights) / step)
+    balance = _smoothed(balance, _bandwidth(sides) / step)
     gain = np.concatenate([[0.0], np.cumsum(balance)])
     edges = low + step * np.arange(_GRID + 1)
     rising = _best_place(-gain)
@@ -192,7 +194,8 @@ def smoothed_cuts(
 def _best_place(score: FloatArray) -> int:
     """Return the middle of the places with the largest score, ends left out."""
     inner = score[1:-1]
-    best = np.flatnonzero(inner >= inner.max() - 1e-12 * (1 + np.abs(inner).max()))
+    highest = float(inner.max())
+    best = np.flatnonzero(inner >= highest - 1e-12 * (1.0 + abs(highest)))
     runs = np.split(best, np.flatnonzero(np.diff(best) > 1) + 1)
     longest = max(runs, key=len)
     return int(longest[len(longest) // 2]) + 1
@@ -214,35 +217,49 @@ def _two_cuts(gain: FloatArray, edges: FloatArray, at_least: float) -> Cuts | No
     return best
 
 
-def _robust_range(values: FloatArray, is_right: BoolArray) -> tuple[float, float]:
+@dataclass(frozen=True)
+class _Extent:
+    """Where a group of rows lies: its ends, quartiles, spread and size."""
+
+    low: float
+    quarter: float
+    half: float
+    three: float
+    high: float
+    spread: float
+    size: int
+
+    @staticmethod
+    def of(group: FloatArray) -> _Extent:
+        """Return the extent of a group that holds a row at least."""
+        size = len(group)
+        ordered = np.sort(group)
+        low, quarter, half, three, high = ordered[
+            [0, (size - 1) // 4, (size - 1) // 2, 3 * (size - 1) // 4, size - 1]
+        ].tolist()
+        spread = math.sqrt(float(((group - half) ** 2).mean()))
+        return _Extent(low, quarter, half, three, high, spread, size)
+
+
+def _robust_range(sides: Sequence[_Extent]) -> tuple[float, float]:
     """Return an extent of both groups that a few outliers do not widen."""
-    lows, highs = [], []
-    for group in (values[is_right], values[~is_right]):
-        if len(group) == 0:
-            continue
-        quarter, half, three = np.quantile(group, [0.25, 0.5, 0.75])
-        reach = 4.0 * max(three - quarter, 1e-6 * abs(half))
-        lows.append(max(float(group.min()), quarter - reach))
-        highs.append(min(float(group.max()), three + reach))
-    low, high = min(lows), max(highs)
+    low, high = math.inf, -math.inf
+    for side in sides:
+        reach = 4.0 * max(side.three - side.quarter, 1e-6 * abs(side.half))
+        low = min(low, max(side.low, side.quarter - reach))
+        high = max(high, min(side.high, side.three + reach))
     margin = 1e-3 * (high - low)
-    return float(low - margin), float(high + margin)
+    return low - margin, high + margin
 
 
-def _bandwidth(values: FloatArray, is_right: BoolArray, weights: FloatArray) -> float:
-    widths = [
-        1.06 * _robust_spread(group) * len(group) ** -0.2
-        for group in (values[is_right], values[~is_right])
-        if len(group) > 1
-    ]
-    return min(widths, default=0.0)
-
-
-def _robust_spread(group: FloatArray) -> float:
-    quarter, three = np.quantile(group, [0.25, 0.75])
-    spread = float((group / 2).std() * 2)
-    middle = float(three - quarter) / 1.349
-    return min(spread, middle) if middle > 0 else spread
+def _bandwidth(sides: Sequence[_Extent]) -> float:
+    """Return the width of smoothing: Silverman's, of the narrower group."""
+    widths: list[float] = []
+    for side in sides:
+        middle = (side.three - side.quarter) / 1.349
+        spread = min(side.spread, middle) if middle > 0 else side.spread
+        widths.append(1.06 * spread * side.size**-0.2)
+    return min(widths)
 
 
 def _smoothed(counts: FloatArray, width: float) -> FloatArray:

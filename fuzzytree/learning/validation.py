@@ -1,13 +1,19 @@
-"""Inner validation: how many patterns each class has, and settings on request."""
+"""Inner validation: how many patterns each class has, and settings on request.
+
+Trees are grown on parts of the sample and answer the rows left out. First every class
+gets the same number of patterns, more and more of them; then, class by class, one class
+more or fewer. A richer tree is chosen only if it is right on more of the rows on which
+two trees differ than chance explains, so a table of simple classes keeps one pattern each.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.growing import Grown, GrowthRules, grow
 from fuzzytree.learning.patterns import (
     Patterns,
@@ -18,12 +24,38 @@ from fuzzytree.learning.patterns import (
 )
 from fuzzytree.learning.refinement import refined
 from fuzzytree.learning.settings import Settings
-from fuzzytree.learning.statistics import Moments, Sample
+from fuzzytree.learning.statistics import (
+    Moments,
+    Sample,
+    grouped_moments,
+    hashed,
+)
+
+LADDER = (1, 2, 3, 5, 8, 12, 16)
+"""Numbers of patterns that are tried for a class."""
+
+_FOLDS = 4
+_ROWS = 2_000
+_ROWS_PER_PATTERN = 6
+_MOST_PATTERNS = 64
+_CLASSES_APART = 8
+_VALUES = 200_000
+
+Progress = Callable[[str, float], None]
+Numbers = tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The tree that was chosen."""
+    """The tree that was chosen.
+
+    Attributes:
+        patterns: Of the tree.
+        grown: The tree over them.
+        refused: Patterns that were wanted and not made, for want of rows.
+        chosen: What inner validation chose, by setting.
+        accuracy: Share of right answers in inner validation; None without it.
+    """
 
     patterns: Patterns
     grown: Grown
@@ -38,43 +70,239 @@ def chosen_tree(
     settings: Settings,
     classes: Sequence[str],
     costs: FloatArray,
-    progress: Callable[[str, float], None] | None,
+    progress: Progress | None,
 ) -> Choice:
     """Return the tree for the settings, chosen by inner validation where asked."""
-    rules = GrowthRules(
-        settings.mode == "paper",
-        settings.alpha,
-        settings.effective_l_max,
-        settings.shrinkage,
-        settings.entry,
-        costs,
-        settings.keep_reversals,
+    tell = progress or _silent
+    rules = _rules(settings, costs)
+    numbers = _asked(settings, classes)
+    is_open = _is_open(settings, moments)
+    accuracy: float | None = None
+    chosen: dict[str, float | str] = {}
+    if is_open or settings.choices:
+        trials = _Trials(_folds(moments, sample, settings.seed), tell)
+        if is_open:
+            numbers = _best_numbers(trials, rules, moments)
+            shown = zip(classes, numbers, strict=True)
+            several = [f"{c} {n}" for c, n in shown if n > 1]
+            chosen["patterns_per_class"] = ", ".join(several) or "1 each"
+        for name in settings.choices:
+            rules, value = _best_rule(trials, rules, numbers, name)
+            chosen[name] = value
+        accuracy = float(trials.right(numbers, rules).mean())
+    tell("growing", 0.0)
+    patterns, refused = patterns_of(moments, sample, numbers)
+    grown = grown_tree(patterns, rules, lambda share: tell("growing", share))
+    return Choice(patterns, grown, refused, chosen, accuracy)
+
+
+def _silent(_: str, __: float) -> None:
+    """Tell nobody."""
+
+
+def _rules(settings: Settings, costs: FloatArray) -> GrowthRules:
+    return GrowthRules(
+        is_literal=settings.mode == "paper",
+        alpha=settings.alpha,
+        l_max=settings.effective_l_max,
+        shrinkage=settings.shrinkage,
+        entry=settings.entry,
+        costs=costs,
+        keep_reversals=settings.keep_reversals,
     )
-    numbers = {}
-    per = settings.patterns_per_class
-    if isinstance(per, int):
-        numbers = {k: per for k in range(len(classes))}
-    elif isinstance(per, Mapping):
-        numbers = {list(classes).index(k): v for k, v in per.items()}
-    patterns, refused = build(moments, sample, numbers)
-    grown = grow(patterns, rules)
-    if not rules.is_literal:
-        grown.sketch = refined(grown.sketch, patterns)
-    return Choice(patterns, grown, refused, {}, None)
 
 
-def build(
-    moments: Moments, sample: Sample, numbers: Mapping[int, int]
+def _asked(settings: Settings, classes: Sequence[str]) -> Numbers:
+    """Return how many patterns each class is asked to have; 1 where that is open."""
+    wanted = settings.patterns_per_class
+    if isinstance(wanted, int):
+        return (wanted,) * len(classes)
+    if isinstance(wanted, Mapping):
+        return tuple(wanted.get(name, 1) for name in classes)
+    return (1,) * len(classes)
+
+
+def _is_open(settings: Settings, moments: Moments) -> bool:
+    """Return whether the numbers of patterns are to be chosen, and can be."""
+    is_auto = settings.patterns_per_class == "auto" or (
+        settings.patterns_per_class is None and settings.mode == "default"
+    )
+    classes = int(np.count_nonzero(moments.counts))
+    return is_auto and 2 * classes <= _MOST_PATTERNS
+
+
+def patterns_of(
+    moments: Moments, sample: Sample, numbers: Sequence[int]
 ) -> tuple[Patterns, int]:
+    """Return patterns with so many clusters a class, and how many were refused."""
     usable = usable_features(moments)
     centre, scale = standard_units(moments, usable)
     borders = np.searchsorted(sample.codes, np.arange(len(moments.counts) + 1))
     clusters: dict[int, IntArray] = {}
     refused = 0
-    for code, number in numbers.items():
+    for code, number in enumerate(numbers):
         rows = sample.rows[borders[code] : borders[code + 1]]
         if number > 1 and len(rows):
             found = clusters_of(((rows - centre) / scale)[:, usable], number)
             clusters[code] = found
             refused += number - 1 - int(found.max(initial=0))
     return make_patterns(moments, sample, clusters), refused
+
+
+def grown_tree(
+    patterns: Patterns,
+    rules: GrowthRules,
+    progress: Callable[[float], None] | None = None,
+) -> Grown:
+    """Return a grown tree, refined unless the paper is taken to the letter."""
+    grown = grow(patterns, rules, progress)
+    if not rules.is_literal:
+        grown.sketch = refined(grown.sketch, patterns)
+    return grown
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """Rows to learn from and rows to answer."""
+
+    moments: Moments
+    sample: Sample
+    rows: FloatArray
+    codes: IntArray
+
+
+def _folds(moments: Moments, sample: Sample, seed: int) -> list[_Fold]:
+    """Return folds of a bounded part of the sample, with all classes in each part."""
+    kept = _thinned(moments, sample)
+    rows, codes = sample.rows[kept], sample.codes[kept]
+    order = np.lexsort((hashed(kept + 1_000_003 * (seed + 1)), codes))
+    rows, codes = rows[order], codes[order]
+    starts = np.searchsorted(codes, codes, side="left")
+    turn = (np.arange(len(codes)) - starts + codes) % _FOLDS
+    folds: list[_Fold] = []
+    for fold in range(_FOLDS):
+        inside = turn != fold
+        found = grouped_moments(rows[inside], codes[inside], len(moments.counts))
+        if len(usable_features(found)) and (~inside).any():
+            part = Sample(rows[inside], codes[inside])
+            folds.append(_Fold(found, part, rows[~inside], codes[~inside]))
+    return folds
+
+
+def _thinned(moments: Moments, sample: Sample) -> IntArray:
+    """Return sample rows in the table's proportions, few enough to learn often."""
+    width = max(1, sample.rows.shape[1])
+    most = int(min(_ROWS, max(400, _VALUES // width)))
+    kept: list[IntArray] = []
+    borders = np.searchsorted(sample.codes, np.arange(len(moments.counts) + 1))
+    total = int(moments.counts.sum())
+    for code, count in enumerate(moments.counts.tolist()):
+        inside = np.arange(borders[code], borders[code + 1])
+        wanted = max(min(len(inside), 20), round(most * count / total))
+        if len(inside) > wanted:
+            order = np.argsort(hashed(inside), kind="stable")
+            inside = np.sort(inside[order[:wanted]])
+        kept.append(inside)
+    return np.concatenate(kept)
+
+
+@dataclass
+class _Trials:
+    """Answers of the trees tried so far."""
+
+    folds: list[_Fold]
+    tell: Progress
+    known: dict[tuple[Numbers, float, float, float, float], BoolArray] | None = None
+
+    def right(self, numbers: Numbers, rules: GrowthRules) -> BoolArray:
+        """Return which rows left out are answered rightly."""
+        if self.known is None:
+            self.known = {}
+        key = (numbers, rules.alpha, rules.l_max, rules.shrinkage, rules.entry)
+        if key not in self.known:
+            parts = [_answered(fold, numbers, rules) for fold in self.folds]
+            self.known[key] = np.concatenate([np.zeros(0, bool), *parts])
+            self.tell("choosing", 1.0 - 1.0 / (1.0 + 0.1 * len(self.known)))
+        return self.known[key]
+
+
+def _answered(fold: _Fold, numbers: Numbers, rules: GrowthRules) -> BoolArray:
+    patterns, _ = patterns_of(fold.moments, fold.sample, numbers)
+    sketch = grown_tree(patterns, rules).sketch
+    return sketch.classify(fold.rows) == fold.codes
+
+
+def _is_better(richer: BoolArray, simpler: BoolArray) -> bool:
+    """Return whether the rows on which two trees differ favour the richer one."""
+    won = int(np.count_nonzero(richer & ~simpler))
+    lost = int(np.count_nonzero(simpler & ~richer))
+    return won - lost > 1.0 * np.sqrt(won + lost)
+
+
+def _best_numbers(trials: _Trials, rules: GrowthRules, moments: Moments) -> Numbers:
+    """Return how many patterns each class should have."""
+    counts = moments.counts
+    limits = np.maximum(1, counts // _ROWS_PER_PATTERN)
+    present = int(np.count_nonzero(counts))
+    best: Numbers = (1,) * len(counts)
+    failures = 0
+    for number in LADDER[1:]:
+        numbers = tuple(int(min(number, limit)) for limit in limits)
+        if number * present > _MOST_PATTERNS or failures == 2:
+            break
+        is_better = _is_better(trials.right(numbers, rules), trials.right(best, rules))
+        best, failures = (numbers, 0) if is_better else (best, failures + 1)
+    if present <= _CLASSES_APART:
+        best = _class_by_class(trials, rules, best, limits)
+    return best
+
+
+def _class_by_class(
+    trials: _Trials, rules: GrowthRules, best: Numbers, limits: IntArray
+) -> Numbers:
+    """Change one class at a time: fewer patterns if not worse, more if better."""
+    for code in range(len(best)):
+        if limits[code] < 2:
+            continue
+        place = int(np.searchsorted(LADDER, best[code]))
+        for step in (-1, 1):
+            other = min(max(place + step, 0), len(LADDER) - 1)
+            number = int(min(LADDER[other], limits[code]))
+            if number == best[code]:
+                continue
+            numbers = (*best[:code], number, *best[code + 1 :])
+            old, new = trials.right(best, rules), trials.right(numbers, rules)
+            if _is_better(new, old) if step > 0 else new.sum() >= old.sum():
+                best = numbers
+                break
+    return best
+
+
+def _best_rule(
+    trials: _Trials, rules: GrowthRules, numbers: Numbers, name: str
+) -> tuple[GrowthRules, float]:
+    """Return the rules with the best value of one setting, and the value."""
+    tried: dict[str, tuple[float, ...]] = {
+        "alpha": (0.9, 1.0, 0.7, 0.5),
+        "l_max": (4.0, 6.0, 10.0, 16.0, 24.0),
+        "shrinkage": (1e-3, 1e-2, 1e-1, 0.5),
+        "entry": (0.0, 2.0, 4.0, 10.0),
+    }
+    best = rules
+    for value in tried[name]:
+        other = _with_rule(rules, name, value)
+        if _is_better(trials.right(numbers, other), trials.right(numbers, best)):
+            best = other
+    return best, float(getattr(best, name))
+
+
+def _with_rule(rules: GrowthRules, name: str, value: float) -> GrowthRules:
+    match name:
+        case "alpha":
+            return replace(rules, alpha=value)
+        case "l_max":
+            return replace(rules, l_max=value)
+        case "shrinkage":
+            return replace(rules, shrinkage=value)
+        case _:
+            return replace(rules, entry=value)
