@@ -168,16 +168,17 @@ def command(
     tell_rows = functools.partial(say_rows, width=width, quiet=is_silent)
     tell_rows(("read", found.name, _read_text(found)))
     begin = time.perf_counter()
-    with progress_bar(quiet=is_silent) as tell, wrong_options():
-        title = name or ("tree" if table == "-" else Path(table).stem)
+    title = name or ("tree" if table == "-" else Path(table).stem)
+    with wrong_options(), progress_bar(quiet=is_silent) as tell:
         learnt = learn_table(
             found, name=title, units=units_of, settings=settings, progress=tell
         )
-        tell_rows(*_learnt_rows(learnt, time.perf_counter() - begin))
-        tested = None
-        if not no_test:
+    tell_rows(*_learnt_rows(learnt, time.perf_counter() - begin))
+    tested = None
+    if not no_test:
+        with progress_bar(quiet=is_silent) as tell:
             tested = accuracy(found, settings, seed=settings.seed, progress=tell)
-            tell_rows(("tested", "accuracy", _tested_text(tested)))
+        tell_rows(("tested", "accuracy", _tested_text(tested)))
     model = carried(
         learnt.tree, carrier=carrier, kind=kind, conjunction=conjunction, form=form
     )
