@@ -5,10 +5,11 @@ path: in floating point too, neither the minimum nor a product of numbers in [0,
 exceeds its smallest operand. So whatever lies below a strength that is already
 exceeded need not be looked at; what is equal must be, for a tie is part of the answer.
 
-1. Each row first follows its best branch down to a rule: the strength of that rule is
-   a lower bound of the best.
-2. Then the tree is walked once in order, at each node with the rows whose strength so
-   far is not below their bound.
+1. Each row first follows its best branches down to a rule: the strength of that rule
+   is a lower bound of the best. The strongest branch that it left aside bounds all
+   other rules; where that is smaller, the row is done.
+2. For the other rows, the tree is walked once in order, at each node with the rows
+   whose strength so far is not below their bound.
 
 Where the plateaus of each node's branches are disjoint and cover the axis (relative
 rules), the bound is 1 after the first step and no other branch can reach it: the second
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     Reals = npt.NDArray[np.floating[Any]]
 
 _CHUNK = 1 << 17  # rows: a node's few operations shall be wide
+_CELLS, _FEWEST = 1 << 17, 256  # degrees and rows that go through a fork together
 
 
 @dataclass(slots=True)
@@ -68,12 +70,21 @@ class Look:
 
 @dataclass(slots=True)
 class Found:
-    """What is known of each row: of the winner so far, and of the best strength."""
+    """What is known of each row.
+
+    Attributes:
+        rule: The winner so far.
+        status: Its status.
+        best: Its strength.
+        bound: What the winner's strength is at least.
+        rival: What any rule off the row's best branches is at most.
+    """
 
     rule: IntArray
     status: IntArray
     best: Reals
     bound: Reals
+    rival: Reals
 
 
 def search(rules: RuleBase) -> Run:
@@ -200,14 +211,10 @@ def _look(rules: RuleBase, fork: Fork, line: dict[str, int]) -> Look:
 def _search(
     forks: Sequence[Fork], looks: Sequence[Look], lines: Reals, *, is_product: bool
 ) -> Found:
-    rows = lines.shape[1]
-    found = Found(
-        np.zeros(rows, np.int64),
-        np.zeros(rows, np.int64),
-        np.zeros(rows),
-        _bounds(forks, looks, lines, is_product=is_product),
-    )
-    todo = [(0, np.arange(rows), np.ones(rows))]
+    found = _run_down(forks, looks, lines, is_product=is_product)
+    rest = np.flatnonzero(found.rival >= found.bound)
+    found.rule[rest], found.best[rest] = 0, 0.0
+    todo = [(0, rest, np.ones(len(rest)))] if len(rest) else []
     while todo:
         number, here, strength = todo.pop()
         fork = forks[number]
@@ -225,35 +232,55 @@ def _search(
     return found
 
 
-def _bounds(
+def _run_down(
     forks: Sequence[Fork], looks: Sequence[Look], lines: Reals, *, is_product: bool
-) -> Reals:
-    """Return the strength of the rule at the end of each row's best branches."""
+) -> Found:
+    """Follow each row's best branches to a rule, and note the strongest branch left."""
     rows = lines.shape[1]
-    bound = np.zeros(rows)
+    found = Found(
+        np.zeros(rows, np.int64),
+        np.zeros(rows, np.int64),
+        np.zeros(rows),
+        np.zeros(rows),
+        np.zeros(rows),
+    )
     todo = [(0, np.arange(rows), np.ones(rows))]
     while todo:
         number, here, strength = todo.pop()
         fork = forks[number]
         if fork.rules:
-            bound[here] = np.maximum(bound.take(here), strength)
+            found.bound[here] = np.maximum(found.bound.take(here), strength)
+            found.best[here], found.rule[here] = strength, fork.rules[0]
+            if fork.clauses or len(fork.rules) > 1:
+                found.rival[here] = np.maximum(found.rival.take(here), strength)
         if not fork.clauses:
             continue
         degrees = _degrees(looks[number], lines, here)
         choice = degrees.argmax(axis=0)
         best = degrees.max(axis=0)
         total = strength * best if is_product else np.minimum(strength, best)
+        if len(fork.targets) > 1:
+            degrees[choice, np.arange(len(here))] = 0.0
+            left = degrees.max(axis=0)
+            left = strength * left if is_product else np.minimum(strength, left)
+            found.rival[here] = np.maximum(found.rival.take(here), left)
         for position, target in enumerate(fork.targets):
             mine = np.flatnonzero(choice == position)
             if len(mine):
                 todo.append((target, here.take(mine), total.take(mine)))
-    return bound
+    return found
 
 
 def _degrees(look: Look, lines: Reals, here: IntArray) -> Reals:
     """Return the degree of each clause of a fork in some of the rows."""
-    values = lines.take(look.lines, axis=0).take(here, axis=1)
-    return clause_degrees(look.degrees, values).take(look.places, axis=0)
+    found = np.empty((len(look.places), len(here)))
+    size = max(_CELLS // (look.degrees.atoms + look.degrees.count), _FEWEST)
+    for start in range(0, len(here), size):
+        part = here[start : start + size]
+        values = np.array([lines[line].take(part) for line in look.lines])
+        degrees = clause_degrees(look.degrees, values)
+        found[:, start : start + size] = degrees.take(look.places, axis=0)
+    return found
 
 
 def _meet(found: Found, rule: int, here: IntArray, strength: Reals) -> None:

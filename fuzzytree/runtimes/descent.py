@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     Bytes = npt.NDArray[np.uint8]
 
 _SMALL = 24  # questions up to which all of them are asked of all rows
-_SHARE = 0.06  # of the leaves: what a question at the top must decide to pay
+_SHARE = 0.05  # of the leaves: what a question at the top must decide to pay
 _MOST_EXITS = 255
-_LIVE = 0.7  # share of rows still walking below which the others leave
+_LIVE = 0.6  # share of rows still walking below which the others leave
 CHUNK = 1 << 15
 """Rows that go through together: their values and answers stay in the cache."""
 
@@ -341,27 +341,31 @@ def _walk_on(
     offsets = walk.line * lines.shape[1]
     flat = lines.reshape(-1)
 
-    def step(rows: IntArray, here: IntArray) -> npt.NDArray[np.bool_]:
-        """Answer one question for each row and move on; return who moved."""
+    def step(rows: IntArray, here: IntArray, out: IntArray) -> None:
+        """Answer one question for each row: write the place that it leads to."""
         count = len(here)
-        where, yes = desk.where[:count], desk.yes[:count]
-        value, cut = desk.value[:count], desk.cut[:count]
-        offsets.take(here, out=where, mode="clip")
-        np.add(where, rows, where)
-        flat.take(where, out=value, mode="clip")
+        yes, value, cut = desk.yes[:count], desk.value[:count], desk.cut[:count]
+        offsets.take(here, out=out, mode="clip")
+        np.add(out, rows, out)
+        flat.take(out, out=value, mode="clip")
         walk.cut.take(here, out=cut, mode="clip")
         np.greater(value, cut, yes)
-        walk.child.take(here, out=where, mode="clip")
-        np.add(where, yes, where)
-        np.not_equal(where, here, yes)
-        here[:] = where
-        return yes
+        walk.child.take(here, out=out, mode="clip")
+        np.add(out, yes, out)
 
+    other = desk.where[: len(places)]
     for _ in range(walk.sure):
-        step(rows, here)
+        step(rows, here, other)
+        here, other = other, here
+    if here is not places:
+        places[:] = here
+        here = places
     spare = 1
     while True:
-        moved = step(rows, here)
+        new, moved = desk.where[: len(here)], desk.yes[: len(here)]
+        step(rows, here, new)
+        np.not_equal(new, here, moved)
+        here[:] = new
         live = int(np.count_nonzero(moved))
         if here is not places and live < _LIVE * len(here):
             np.subtract(rows, start, rows)
