@@ -150,8 +150,11 @@ def _equivalence(
     else:
         yield f"all cells one by one ({size:.3g} points): the proof covers them"
     yield compare_bits(relative, path, rows)
+    # Probes lie where the two part; how often they do so in use, only data tells.
+    own = slice(rows.probes if len(rows.numbers) > rows.probes else 0, None)
     for other in raw:
-        yield compare_answers(other, path, rows, by_design=True)
+        found, expected = other.part(own), path.part(own)
+        yield compare_answers(found, expected, rows.part(own), by_design=True)
 
 
 def _all_cells(tree: FuzzyTree, carrier: str, against: str, size: int) -> Comparison:
@@ -187,11 +190,12 @@ def _runtimes(
             yield f"{title}: {error}"
             continue
         step = _stride(carrier.model, rows) if runtime.is_slow else 1
-        some = rows.every(step)
+        share = slice(None, None, step)
+        some = rows.part(share)
         found = Answers(title, carrier.model, run(some.values))
         if runtime.name != "native":
             base = _base(runtime, carrier, bases, rows)
-            yield _held(runtime, found, base.every(step), some)
+            yield _held(runtime, found, base.part(share), some)
         yield _calls(title, run, some)
 
 

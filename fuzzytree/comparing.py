@@ -37,11 +37,9 @@ class Rows(msgspec.Struct, frozen=True):
     numbers: IntArray
     probes: int
 
-    def every(self, step: int) -> Rows:
-        """Return each step-th row."""
-        return Rows(
-            self.inputs, self.values[:, ::step], self.numbers[::step], self.probes
-        )
+    def part(self, rows: slice) -> Rows:
+        """Return some of the rows, which keep their numbers."""
+        return Rows(self.inputs, self.values[:, rows], self.numbers[rows], self.probes)
 
     def name(self, row: int) -> str:
         """Return what people call a row: `probe 3`, or `row 3` of the data."""
@@ -64,17 +62,17 @@ class Answers(msgspec.Struct, frozen=True):
     model: Model
     outcome: Outcome
 
-    def every(self, step: int) -> Answers:
-        """Return each step-th answer."""
+    def part(self, rows: slice) -> Answers:
+        """Return some of the answers."""
         all_of = self.outcome
         strengths = all_of.strengths
         return Answers(
             self.title,
             self.model,
             Outcome(
-                all_of.rule[::step],
-                all_of.status[::step],
-                None if strengths is None else strengths[:, ::step],
+                all_of.rule[rows],
+                all_of.status[rows],
+                None if strengths is None else strengths[:, rows],
             ),
         )
 

@@ -132,4 +132,4 @@ def test_a_margin_lies_between_classes_and_not_between_rules() -> None:
 
 def test_data_rows_are_numbered_from_one_behind_the_probes() -> None:
     assert [ROWS.name(0), ROWS.name(1), ROWS.name(2)] == ["probe 1", "row 1", "row 2"]
-    assert ROWS.every(2).name(1) == "row 2"
+    assert ROWS.part(slice(None, None, 2)).name(1) == "row 2"
