@@ -43,7 +43,7 @@ PIECE = 4096
 _REAL = frozenset("biuf")  # numpy's letters for truth values, integers, floats
 _DELIMITERS = (",", ";", "\t")
 _NUMBER = re.compile(
-    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf|infinity)",
+    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf|infinity|nan)",
     re.IGNORECASE,
 )
 

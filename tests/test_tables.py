@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import random
 import sys
 from pathlib import Path
 
@@ -263,6 +264,33 @@ def test_missing_cells_become_nan_and_are_counted(cell: str) -> None:
     [batch] = batches(_csv(f"a,b\n{cell},1\n2,3\n"), ["a", "b"])
     assert math.isnan(batch.values[0, 0])
     assert batch.missing == 1
+
+
+def test_a_cell_means_the_same_whatever_stands_beside_it() -> None:
+    for cell in ("-nan", "+NaN", " 1.5", "1.", ".5", "+1e-3", "-Infinity", "1E5"):
+        [alone] = _values(_csv(f"a,b\n{cell},1\n"), ["a"])
+        [beside] = _values(_csv(f"a,b\n{cell},1\n,2\n"), ["a"])
+        assert repr(alone[0]) == repr(beside[0])
+
+
+def test_bytes_at_random_give_a_table_or_one_sentence() -> None:
+    chance = random.Random(0)
+    alphabet = [b"a", b"1", b".", b",", b";", b'"', b"\n", b"\r", b"\0", b"\xe9", b" "]
+    found = [
+        _outcome(start + b"".join(chance.choices(alphabet, k=chance.randint(0, 20))))
+        for _ in range(1000)
+        for start in (b"", b"a,grip\n1,x\n")
+    ]
+    assert {text.split(":")[0].split(" ")[0] for text in found} == {"t.csv", "rows"}
+    assert found.count("rows") > 50
+
+
+def _outcome(content: bytes) -> str:
+    try:
+        read_table(io.BytesIO(content), target="grip", name="t.csv")
+    except TableError as error:
+        return str(error)
+    return "rows"
 
 
 def test_missing_values_of_tables_in_memory_are_nan() -> None:
