@@ -124,17 +124,11 @@ def _solved(within: FloatArray, step: FloatArray) -> FloatArray:
 def _best_place(view: NodeView, axis: FloatArray) -> tuple[float, BoolArray]:
     """Return the least expected error of a cut on an axis, and what lies right of it."""
     means = view.means @ axis
+    usual = float(np.sqrt(max(axis @ view.within @ axis, 1e-300)))
     if len(view.scatter) == len(means):
-        spreads = np.sqrt(
-            np.maximum(
-                np.einsum("i,pij,j->p", axis, view.scatter, axis, optimize=True), 0
-            )
-        )
+        spreads = np.sqrt(np.maximum((view.scatter @ axis) @ axis, 1e-6 * usual**2))
     else:
-        spreads = np.full(len(means), np.sqrt(max(axis @ view.within @ axis, 0.0)))
-    spreads = np.maximum(
-        spreads, 1e-3 * np.sqrt(max(axis @ view.within @ axis, 1e-300))
-    )
+        spreads = np.full(len(means), usual)
     order = np.argsort(means, kind="stable")
     places = _places(len(means))
     m, s = means[order], spreads[order]

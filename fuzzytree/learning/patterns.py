@@ -260,8 +260,10 @@ def _upper_half(rows: FloatArray) -> IntArray:
 
 
 def _centres(rows: FloatArray, owners: IntArray, size: int) -> FloatArray:
-    order = np.argsort(owners, kind="stable")
-    return np.nan_to_num(grouped_moments(rows[order], owners[order], size).means)
+    members = (owners == np.arange(size)[:, None]).astype(np.float64)
+    counts = members.sum(axis=1, keepdims=True)
+    centres: FloatArray = (members @ rows) / np.maximum(counts, 1.0)
+    return centres
 
 
 def _settled(

@@ -53,7 +53,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     entry: float = 2.0
     costs: Mapping[str, float] = {}
     choices: tuple[Literal["alpha", "l_max", "shrinkage", "entry"], ...] = ()
-    rows_per_class: int = 20_000
+    rows_per_class: int = 5_000
     seed: int = 0
     keep_reversals: bool = False
     missing: Literal["drop", "refuse"] = "drop"

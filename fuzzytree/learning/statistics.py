@@ -77,7 +77,7 @@ class Statistics:
 
     classes: int
     features: int
-    rows_per_class: int = 20_000
+    rows_per_class: int = 5_000
     dropped: int = 0
     _rows: int = 0
     _filled: int = 0

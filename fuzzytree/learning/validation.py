@@ -9,7 +9,7 @@ two trees differ than chance explains, so a table of simple classes keeps one pa
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,7 +39,11 @@ _ROWS = 2_000
 _ROWS_PER_PATTERN = 6
 _MOST_PATTERNS = 64
 _CLASSES_APART = 8
-_VALUES = 200_000
+_VALUES = 100_000
+_GOOD_ENOUGH = 0.01
+_BUDGET = 2_000.0
+_BUDGET_LARGE = 500.0
+_LARGE = 4_000_000
 
 Progress = Callable[[str, float], None]
 Numbers = tuple[int, ...]
@@ -80,7 +84,9 @@ def chosen_tree(
     accuracy: float | None = None
     chosen: dict[str, float | str] = {}
     if is_open or settings.choices:
-        trials = _Trials(_folds(moments, sample, settings.seed), tell)
+        is_large = moments.counts.sum() * sample.rows.shape[1] > _LARGE
+        budget = _BUDGET_LARGE if is_large else _BUDGET
+        trials = _Trials(_folds(moments, sample, settings.seed), tell, budget)
         if is_open:
             numbers = _best_numbers(trials, rules, moments)
             shown = zip(classes, numbers, strict=True)
@@ -131,21 +137,39 @@ def _is_open(settings: Settings, moments: Moments) -> bool:
     return is_auto and 2 * classes <= _MOST_PATTERNS
 
 
+Clusters = dict[tuple[int, int], IntArray]
+"""The cluster of each row of a class, by class and number of clusters wanted."""
+
+
 def patterns_of(
-    moments: Moments, sample: Sample, numbers: Sequence[int]
+    moments: Moments,
+    sample: Sample,
+    numbers: Sequence[int],
+    known: Clusters | None = None,
 ) -> tuple[Patterns, int]:
-    """Return patterns with so many clusters a class, and how many were refused."""
+    """Return patterns with so many clusters a class, and how many were refused.
+
+    Args:
+        moments: Of the classes.
+        sample: Their rows.
+        numbers: Patterns wanted, per class.
+        known: Clusters found before; new ones are added.
+    """
     usable = usable_features(moments)
     centre, scale = standard_units(moments, usable)
     borders = np.searchsorted(sample.codes, np.arange(len(moments.counts) + 1))
+    found: Clusters = {} if known is None else known
     clusters: dict[int, IntArray] = {}
     refused = 0
     for code, number in enumerate(numbers):
         rows = sample.rows[borders[code] : borders[code + 1]]
-        if number > 1 and len(rows):
-            found = clusters_of(((rows - centre) / scale)[:, usable], number)
-            clusters[code] = found
-            refused += number - 1 - int(found.max(initial=0))
+        if number < 2 or len(rows) == 0:
+            continue
+        if (code, number) not in found:
+            points = (rows[:, usable] - centre[usable]) / scale[usable]
+            found[code, number] = clusters_of(points, number)
+        clusters[code] = found[code, number]
+        refused += number - 1 - int(clusters[code].max(initial=0))
     return make_patterns(moments, sample, clusters), refused
 
 
@@ -169,6 +193,7 @@ class _Fold:
     sample: Sample
     rows: FloatArray
     codes: IntArray
+    clusters: Clusters
 
 
 def _folds(moments: Moments, sample: Sample, seed: int) -> list[_Fold]:
@@ -185,7 +210,7 @@ def _folds(moments: Moments, sample: Sample, seed: int) -> list[_Fold]:
         found = grouped_moments(rows[inside], codes[inside], len(moments.counts))
         if len(usable_features(found)) and (~inside).any():
             part = Sample(rows[inside], codes[inside])
-            folds.append(_Fold(found, part, rows[~inside], codes[~inside]))
+            folds.append(_Fold(found, part, rows[~inside], codes[~inside], {}))
     return folds
 
 
@@ -206,37 +231,68 @@ def _thinned(moments: Moments, sample: Sample) -> IntArray:
     return np.concatenate(kept)
 
 
+_Key = tuple[Numbers, float, float, float, float]
+
+
 @dataclass
 class _Trials:
-    """Answers of the trees tried so far."""
+    """Answers of the trees tried so far, fold by fold.
+
+    Attributes:
+        folds: Rows to learn from and to answer.
+        tell: Hears of the progress.
+        budget: How much work may be done, about in milliseconds.
+        spent: How much was done.
+    """
 
     folds: list[_Fold]
     tell: Progress
-    known: dict[tuple[Numbers, float, float, float, float], BoolArray] | None = None
+    budget: float
+    spent: float = 0.0
+    known: dict[tuple[_Key, int], BoolArray] = field(
+        default_factory=dict[tuple[_Key, int], BoolArray]
+    )
 
-    def right(self, numbers: Numbers, rules: GrowthRules) -> BoolArray:
-        """Return which rows left out are answered rightly."""
-        if self.known is None:
-            self.known = {}
+    def right(
+        self, numbers: Numbers, rules: GrowthRules, folds: int = _FOLDS
+    ) -> BoolArray:
+        """Return which rows left out are answered rightly, in the first folds."""
+        parts = [np.zeros(0, bool)]
         key = (numbers, rules.alpha, rules.l_max, rules.shrinkage, rules.entry)
-        if key not in self.known:
-            parts = [_answered(fold, numbers, rules) for fold in self.folds]
-            self.known[key] = np.concatenate([np.zeros(0, bool), *parts])
-            self.tell("choosing", 1.0 - 1.0 / (1.0 + 0.1 * len(self.known)))
-        return self.known[key]
+        for place, fold in enumerate(self.folds[:folds]):
+            if (key, place) not in self.known:
+                self.known[key, place] = _answered(fold, numbers, rules)
+                size = fold.sample.rows.size
+                self.spent += sum(numbers) * (1.0 + size / 20_000)
+                self.tell("choosing", min(1.0, self.spent / self.budget))
+            parts.append(self.known[key, place])
+        return np.concatenate(parts)
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether the work is done or too much."""
+        return self.spent >= self.budget
+
+    def prefers(
+        self, richer: tuple[Numbers, GrowthRules], simpler: tuple[Numbers, GrowthRules]
+    ) -> bool:
+        """Return whether the rows on which two trees differ favour the first one.
+
+        Half of the folds are asked first; a tree that is no better there is dropped.
+        """
+        for folds, least in ((_FOLDS // 2, 0.0), (_FOLDS, 1.0)):
+            new, old = self.right(*richer, folds), self.right(*simpler, folds)
+            won = int(np.count_nonzero(new & ~old))
+            lost = int(np.count_nonzero(old & ~new))
+            if won - lost <= least * np.sqrt(won + lost):
+                return False
+        return True
 
 
 def _answered(fold: _Fold, numbers: Numbers, rules: GrowthRules) -> BoolArray:
-    patterns, _ = patterns_of(fold.moments, fold.sample, numbers)
+    patterns, _ = patterns_of(fold.moments, fold.sample, numbers, fold.clusters)
     sketch = grown_tree(patterns, rules).sketch
     return sketch.classify(fold.rows) == fold.codes
-
-
-def _is_better(richer: BoolArray, simpler: BoolArray) -> bool:
-    """Return whether the rows on which two trees differ favour the richer one."""
-    won = int(np.count_nonzero(richer & ~simpler))
-    lost = int(np.count_nonzero(simpler & ~richer))
-    return won - lost > 1.0 * np.sqrt(won + lost)
 
 
 def _best_numbers(trials: _Trials, rules: GrowthRules, moments: Moments) -> Numbers:
@@ -247,10 +303,13 @@ def _best_numbers(trials: _Trials, rules: GrowthRules, moments: Moments) -> Numb
     best: Numbers = (1,) * len(counts)
     failures = 0
     for number in LADDER[1:]:
-        numbers = tuple(int(min(number, limit)) for limit in limits)
+        is_good = trials.right(best, rules).mean() >= 1.0 - _GOOD_ENOUGH
         if number * present > _MOST_PATTERNS or failures == 2:
             break
-        is_better = _is_better(trials.right(numbers, rules), trials.right(best, rules))
+        if is_good or trials.is_over:
+            return best
+        numbers = tuple(int(min(number, limit)) for limit in limits)
+        is_better = trials.prefers((numbers, rules), (best, rules))
         best, failures = (numbers, 0) if is_better else (best, failures + 1)
     if present <= _CLASSES_APART:
         best = _class_by_class(trials, rules, best, limits)
@@ -268,11 +327,15 @@ def _class_by_class(
         for step in (-1, 1):
             other = min(max(place + step, 0), len(LADDER) - 1)
             number = int(min(LADDER[other], limits[code]))
-            if number == best[code]:
+            if number == best[code] or trials.is_over:
                 continue
             numbers = (*best[:code], number, *best[code + 1 :])
-            old, new = trials.right(best, rules), trials.right(numbers, rules)
-            if _is_better(new, old) if step > 0 else new.sum() >= old.sum():
+            if step > 0:
+                is_better = trials.prefers((numbers, rules), (best, rules))
+            else:
+                right = trials.right(numbers, rules).sum()
+                is_better = right >= trials.right(best, rules).sum()
+            if is_better:
                 best = numbers
                 break
     return best
@@ -291,7 +354,7 @@ def _best_rule(
     best = rules
     for value in tried[name]:
         other = _with_rule(rules, name, value)
-        if _is_better(trials.right(numbers, other), trials.right(numbers, best)):
+        if trials.prefers((numbers, other), (numbers, best)):
             best = other
     return best, float(getattr(best, name))
 
