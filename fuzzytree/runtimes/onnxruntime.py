@@ -144,9 +144,13 @@ def load(
     """Write a model as ONNX, in memory, and return what runs it.
 
     Raises:
-        LossError: If the number type cannot hold the model.
+        LossError: If the number type or the kind of graph cannot hold the model.
         MissingExtraError: If onnx or onnxruntime is not installed.
     """
+    if readable and isinstance(model, FuzzyTree):
+        raise LossError("onnxruntime readable runs rules, and this is a tree")
+    if plain and not isinstance(model, FuzzyTree):
+        raise LossError("onnxruntime plain runs trees, and these are rules")
     _require_packages("running")
     from fuzzytree.exporters.onnx_session import open_session
 

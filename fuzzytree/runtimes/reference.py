@@ -18,7 +18,10 @@ def load(model: Model) -> Run:
     def run(values: FloatArray) -> Outcome:
         import numpy as np
 
-        rows = [dict(zip(model.inputs, row, strict=True)) for row in values.T.tolist()]
+        from fuzzytree.runtimes.rows import checked
+
+        table = checked(values, model.inputs).T.tolist()
+        rows = [dict(zip(model.inputs, row, strict=True)) for row in table]
         answers: list[Answer]
         if isinstance(model, RuleBase):
             answers = [evaluate(model, row) for row in rows]

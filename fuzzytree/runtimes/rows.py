@@ -17,13 +17,16 @@ def checked(values: npt.ArrayLike, inputs: Sequence[str]) -> FloatArray:
     """Return values as doubles of shape (inputs, rows), copied only if need be.
 
     Raises:
-        ValueError: If there is not one line for each input.
+        ValueError: If there is not one line for each input, or text among the values.
 
     Example:
         >>> checked([[1, 2, 3]], ["force"]).shape
         (1, 3)
     """
-    array = np.asarray(values, dtype=np.float64)
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"the values must be numbers: {error}") from error
     if array.ndim != 2 or array.shape[0] != len(inputs):
         shape = " x ".join(map(str, array.shape)) or "a single number"
         raise ValueError(
