@@ -25,9 +25,10 @@ from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets, interval_names
 ZERO_SPREAD_SHARE = 0.1
 """A set without spread gets this share of the spread within the other patterns."""
 
-_NEAREST = 64
-_ENDED = 0.005
+_NEAREST = 16
+_ENDS = (0.005, 0.02, 0.05, 0.1, 0.2)
 _SEARCH = 65
+_FALLING = np.linspace(1.0, 0.0, SAMPLES)
 
 
 @dataclass(frozen=True)
@@ -198,24 +199,35 @@ class _Flanked:
 def _all_flanks(
     sketch: Sketch, keys: Sequence[_Key], axes: dict[_Key, _AxisSets]
 ) -> tuple[list[_Flanked], float]:
-    """Fit all flanks of all nodes at once; return them and the largest fit error."""
+    """Fit all flanks of all nodes at once; return them and the largest fit error.
+
+    Of several ends that a flank could have, it takes the one with the least error.
+    """
     starts: list[float] = []
-    ends: list[float] = []
+    ends: list[FloatArray] = []
     ratios: list[FloatArray] = []
     for key, split in zip(keys, sketch.splits, strict=True):
+        field = _Field.of(split, axes[key])
         for cut in range(len(split.cuts)):
             for sign in (-1, 1):
-                end, ratio = _sampled_ratio(split, axes[key], cut, sign)
+                end, ratio = _sampled_ratios(split, axes[key], field, cut, sign)
                 starts.append(float(split.cuts[cut]))
                 ends.append(end)
                 ratios.append(ratio)
     if not ratios:
         return [], 0.0
-    curves, errors = fitted_flanks(np.array(ratios))
+    curves, errors = fitted_flanks(np.concatenate(ratios))
+    errors = errors.reshape(len(starts), -1)
+    best = errors.argmin(axis=1)
+    chosen = np.arange(len(starts)), best
     flanks = [
         Flank(start, end, tuple(curve), error)
         for start, end, curve, error in zip(
-            starts, ends, curves.tolist(), errors.tolist(), strict=True
+            starts,
+            np.array(ends)[chosen].tolist(),
+            curves.reshape(*errors.shape, -1)[chosen].tolist(),
+            errors[chosen].tolist(),
+            strict=True,
         )
     ]
     result: list[_Flanked] = []
@@ -224,32 +236,37 @@ def _all_flanks(
         own = flanks[position : position + 2 * len(split.cuts)]
         position += len(own)
         result.append(_Flanked(tuple(own[0::2]), tuple(own[1::2])))
-    return result, float(errors.max())
+    return result, float(errors[chosen].max())
 
 
-def _sampled_ratio(
-    split: Split, sets: _AxisSets, cut: int, sign: int
-) -> tuple[float, FloatArray]:
-    """Return where a flank ends, and its ratio at 33 points from end to cut.
+def _sampled_ratios(
+    split: Split, sets: _AxisSets, field: _Field, cut: int, sign: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return where a flank may end, and for each end its ratio at 33 points.
 
     The flank with sign 1 leaves the interval below the cut upwards, with sign -1 the
     interval above it downwards. The ratio is the branch's raw degree divided by the
     largest degree of its siblings, taken as 1 at the cut, where it must be, and never
-    rising away from it.
+    rising away from it. The points go from the end to the cut.
     """
     start = float(split.cuts[cut])
     owner = int(split.owners[cut if sign > 0 else cut + 1])
-    mine, others = _contestants(split, sets, owner, start)
-    reach = _flank_reach(split, sets, mine, cut, sign, owner)
-    far = start + sign * reach * np.linspace(0.0, 1.0, _SEARCH)
-    ratio = _ratio(sets, mine, others, far)
-    low = np.flatnonzero(ratio <= max(_ENDED, float(ratio[-1])))
-    last = max(1, int(low[0])) if len(low) else _SEARCH - 1
-    end = float(far[last])
-    if end == start:
-        end = float(np.nextafter(start, sign * np.inf))
-    points = end + (start - end) * np.linspace(0.0, 1.0, SAMPLES)
-    return end, _ratio(sets, mine, others, points[::-1])[::-1]
+    mine, others = field.contestants(owner, start)
+    reach = _flank_reach(split, sets, field, mine, cut, sign)
+    part = np.linspace(0.0, 1.0, _SEARCH)
+    ratio = _ratio(sets, mine, others, start + sign * reach * part)
+    low = np.flatnonzero(ratio <= max(_ENDS[0], float(ratio[-1])))
+    reach *= float(part[max(1, int(low[0]))])
+    ratio = _ratio(sets, mine, others, start + sign * reach * part)
+    ends: list[float] = []
+    sampled: list[FloatArray] = []
+    for level in _ENDS:
+        low = np.flatnonzero(ratio <= max(level, float(ratio[-1])))
+        length = float(part[max(1, int(low[0]))])
+        end = start + sign * reach * length
+        ends.append(end if end != start else float(np.nextafter(start, sign * np.inf)))
+        sampled.append(np.interp(_FALLING * length, part, ratio))
+    return np.array(ends), np.array(sampled)
 
 
 def _ratio(
@@ -267,36 +284,73 @@ def _ratio(
     return np.minimum.accumulate(np.clip(ratio, 0.0, 1.0))
 
 
-def _contestants(
-    split: Split, sets: _AxisSets, owner: int, start: float
-) -> tuple[IntArray, IntArray]:
-    """Return the places of the owner's sets and of its siblings', the nearest ones."""
-    found: list[IntArray] = []
-    mine = split.groups[owner]
-    siblings = [g for k, g in enumerate(split.groups) if k != owner]
-    for group in (mine, np.concatenate(siblings)):
-        place = np.searchsorted(sets.patterns, group)
-        if len(place) > _NEAREST:
-            away = np.abs(sets.fitted.means[place] - start) / sets.fitted.spreads[place]
-            place = place[np.argsort(away, kind="stable")[:_NEAREST]]
-        found.append(place)
-    return found[0], found[1]
+@dataclass(frozen=True)
+class _Field:
+    """The sets of one node, ordered by mean."""
+
+    place: IntArray
+    branch: IntArray
+    means: FloatArray
+    before: IntArray
+    after: IntArray
+
+    @staticmethod
+    def of(split: Split, sets: _AxisSets) -> _Field:
+        """Return the field of a node."""
+        everything = np.concatenate(split.groups)
+        sizes = [len(group) for group in split.groups]
+        branch = np.repeat(np.arange(len(sizes)), sizes)
+        place = np.searchsorted(sets.patterns, everything)
+        order = np.argsort(sets.fitted.means[place], kind="stable")
+        place = place[order]
+        before, after = _owned_neighbours(split.owners)
+        means = sets.fitted.means[place]
+        return _Field(place, branch[order], means, before, after)
+
+    def contestants(self, owner: int, start: float) -> tuple[IntArray, IntArray]:
+        """Return the places of the owner's sets and of its siblings' near a cut.
+
+        Of very many sets those count whose means lie nearest: one of the owner and
+        one of a sibling at least.
+        """
+        middle = int(np.searchsorted(self.means, start))
+        reach = _NEAREST
+        while True:
+            near = slice(max(0, middle - reach), middle + reach)
+            is_mine = self.branch[near] == owner
+            found = self.place[near]
+            if is_mine.any() and not is_mine.all():
+                return found[is_mine], found[~is_mine]
+            reach *= 2
+
+
+def _owned_neighbours(owners: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the interval of the same branch before and after each one; -1 for none."""
+    order = np.argsort(owners, kind="stable")
+    is_same = np.diff(owners[order]) == 0
+    before = np.full(len(owners), -1, np.int64)
+    after = before.copy()
+    before[order[1:][is_same]] = order[:-1][is_same]
+    after[order[:-1][is_same]] = order[1:][is_same]
+    return before, after
 
 
 def _flank_reach(
-    split: Split, sets: _AxisSets, mine: IntArray, cut: int, sign: int, owner: int
+    split: Split,
+    sets: _AxisSets,
+    field: _Field,
+    mine: IntArray,
+    cut: int,
+    sign: int,
 ) -> float:
     """Return how far a flank may go: to the end of its sets, or of what it left."""
     start = float(split.cuts[cut])
     means, spreads = sets.fitted.means[mine], sets.fitted.spreads[mine]
     reach = float((sign * (means - start) + REACH * spreads).max())
-    step = cut + sign
-    while 0 <= step < len(split.cuts):
-        beyond = step + 1 if sign > 0 else step
-        if split.owners[beyond] == owner:
-            reach = min(reach, sign * (float(split.cuts[step]) - start))
-            break
-        step += sign
+    other = int(field.after[cut] if sign > 0 else field.before[cut + 1])
+    if other >= 0:
+        edge = split.cuts[other - 1] if sign > 0 else split.cuts[other]
+        reach = min(reach, sign * (float(edge) - start))
     if not reach > 0:
         reach = ZERO_SPREAD_SHARE * float(spreads.max())
     return max(reach, 16 * float(np.spacing(abs(start))))
@@ -327,7 +381,7 @@ def _pattern_names(patterns: Patterns, names: Names) -> list[str]:
     result: list[str] = []
     pairs = zip(patterns.labels.tolist(), patterns.numbers.tolist(), strict=True)
     for label, number in pairs:
-        name = names.classes[label]
+        name = names.classes[int(label)]
         if several[label]:
             name = f"{name} #{number}"
             while name in taken:
@@ -402,13 +456,16 @@ def _node(
     split = sketch.splits[node]
     owners = [int(owner) for owner in split.owners]
     branches: list[Branch] = []
+    owned: list[list[str]] = [[] for _ in split.groups]
+    for term, owner in zip(terms, owners, strict=True):
+        owned[owner].append(term)
     for branch, child in enumerate(sketch.children[node]):
         branches.append(
             Branch(
-                terms=tuple(
-                    t for t, o in zip(terms, owners, strict=True) if o == branch
+                terms=tuple(owned[branch]),
+                sets=tuple(
+                    pattern_names[int(p)] for p in np.sort(split.groups[branch])
                 ),
-                sets=tuple(pattern_names[p] for p in np.sort(split.groups[branch])),
                 node=child + 1 if child >= 0 else None,
                 leaf=~child + 1 if child < 0 else None,
             )
@@ -434,7 +491,7 @@ def _combination(
 ) -> Variable:
     axis = found.axis
     parts = tuple(
-        Part(names.columns[feature], weight, centre)
+        Part(names.columns[int(feature)], weight, centre)
         for feature, weight, centre in zip(
             axis.features.tolist(),
             axis.weights.tolist(),
@@ -458,7 +515,7 @@ def _leaves(
     return tuple(
         Leaf(
             names.classes[label],
-            " or ".join(pattern_names[p] for p in held),
+            " or ".join(pattern_names[int(p)] for p in held),
             round(float(support[leaf])),
         )
         for leaf, (held, label) in enumerate(
@@ -471,7 +528,7 @@ def _frozen_sets(name: str, found: _AxisSets, pattern_names: Sequence[str]) -> S
     fitted = found.fitted
     terms = tuple(
         Term(
-            pattern_names[pattern],
+            pattern_names[int(pattern)],
             LR(
                 mean,
                 Side(spread, tuple(left), REACH),

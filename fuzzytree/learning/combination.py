@@ -1,13 +1,14 @@
 """Step 7 of the paper: the next powerful feature is linearly combined.
 
 The best bipartition of a node's patterns is sought along few directions, then Fisher's
-direction for it, until neither moves; features enter one after another, the most powerful
-first, until another one no longer helps (a partial F test). Needs the patterns' means and
-covariances only.
+direction for it, until neither moves; features enter one after another, the most
+powerful first, until another one no longer helps (a partial F test). Needs the
+patterns' means and covariances only.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,15 +117,16 @@ def _mean_step(view: NodeView, is_right: BoolArray) -> FloatArray:
 
 def _solved(within: FloatArray, step: FloatArray) -> FloatArray:
     try:
-        return np.linalg.solve(within, step)
+        solution = np.linalg.solve(within, step)
     except np.linalg.LinAlgError:
-        return np.linalg.lstsq(within, step, rcond=1e-12)[0]
+        solution = np.linalg.lstsq(within, step, rcond=1e-12)[0]
+    return solution.astype(np.float64, copy=False)
 
 
 def _best_place(view: NodeView, axis: FloatArray) -> tuple[float, BoolArray]:
-    """Return the least expected error of a cut on an axis, and what lies right of it."""
+    """Return the least expected error of a cut on an axis, and what is right of it."""
     means = view.means @ axis
-    usual = float(np.sqrt(max(axis @ view.within @ axis, 1e-300)))
+    usual = math.sqrt(max(float(axis @ view.within @ axis), 1e-300))
     if len(view.scatter) == len(means):
         spreads = np.sqrt(np.maximum((view.scatter @ axis) @ axis, 1e-6 * usual**2))
     else:
@@ -168,7 +170,8 @@ def _foreign(view: NodeView, order: IntArray, is_right: BoolArray) -> FloatArray
     left = ~is_right * weights
     own_right = right @ same / right.sum(axis=1, keepdims=True)
     own_left = left @ same / left.sum(axis=1, keepdims=True)
-    return 1.0 - np.where(is_right, own_left, own_right)
+    foreign: FloatArray = 1.0 - np.where(is_right, own_left, own_right)
+    return foreign
 
 
 def selected_features(
@@ -242,8 +245,8 @@ def axis_of(
     rounded to a hundredth of a spread, for people: the cuts are placed afterwards.
     """
     features = patterns.combinable[selected]
-    length = float(np.sqrt(max(direction @ within @ direction, 0.0)))
-    if not np.isfinite(length) or length == 0.0:
+    length = math.sqrt(max(float(direction @ within @ direction), 0.0))
+    if not math.isfinite(length) or length == 0.0:
         return single(int(features[0]))
     weights = direction / length / patterns.scale[features]
     weights = np.array([float(f"{w:.4g}") for w in weights.tolist()])
@@ -262,5 +265,5 @@ def axis_of(
 
 def _rounded(value: float, unit: float) -> float:
     """Return a value with no more digits than a hundredth of the unit needs."""
-    digits = 2 - int(np.floor(np.log10(unit)))
+    digits = 2 - math.floor(math.log10(unit))
     return round(value, digits) if abs(digits) < 300 else value

@@ -8,6 +8,7 @@ T is never below 0. The most powerful feature makes the most groups.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -212,7 +213,7 @@ def _margin(
     """Return the smallest distance between neighbouring groups, in units of M_SD."""
     unit = float(spreads.mean())
     smallest = np.inf
-    for left, right in zip(groups[:-1], groups[1:], strict=True):
+    for left, right in itertools.pairwise(groups):
         i, j = left[-1], right[0]
         gap = alpha * abs(means[i] - means[j])
         gap += (1.0 - alpha) * abs(spreads[i] - spreads[j])

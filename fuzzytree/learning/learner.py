@@ -14,10 +14,9 @@ from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.assembly import Assembled, Names, assembled
 from fuzzytree.learning.findings import LearningReport
 from fuzzytree.learning.growing import Grown
-from fuzzytree.learning.patterns import Patterns
+from fuzzytree.learning.patterns import usable_features
 from fuzzytree.learning.settings import Settings
 from fuzzytree.learning.statistics import Moments, Sample, Statistics
-from fuzzytree.learning.patterns import usable_features
 from fuzzytree.learning.validation import Choice, chosen_tree
 from fuzzytree.tree import FuzzyTree
 
@@ -233,13 +232,11 @@ def _check_names(
     columns: Sequence[str], classes: Sequence[str], settings: Settings
 ) -> None:
     for kind, found in (("column", columns), ("class", classes)):
-        repeated = (
-            sorted({name for name in found if list(found).count(name) > 1})
-            if len(set(found)) < len(found)
-            else []
-        )
-        if repeated:
-            raise ValueError(f"the {kind} {repeated[0]!r} is named twice")
+        seen: set[str] = set()
+        for name in found:
+            if name in seen:
+                raise ValueError(f"the {kind} {name!r} is named twice")
+            seen.add(name)
     for name in settings.costs:
         if name not in columns:
             raise ValueError(f"costs: there is no column {name!r}")

@@ -1,7 +1,8 @@
 """Fuzzy pattern vectors (paper, 2.3 step 2): what stands for a class.
 
-A class has one pattern, or several if it has several shapes: clusters of its rows, found
-by bisecting k-means in units of the features' spreads within classes. No step is random.
+A class has one pattern, or several if it has several shapes: clusters of its rows,
+found by bisecting k-means in units of the features' spreads within classes. No step is
+random.
 """
 
 from __future__ import annotations
@@ -69,8 +70,10 @@ class Patterns:
 
     def members(self, patterns: IntArray) -> IntArray:
         """Return the numbers of the sample rows of some patterns, in pattern order."""
-        pieces = [np.arange(self.starts[p], self.starts[p + 1]) for p in patterns]
-        return np.concatenate(pieces) if pieces else np.empty(0, np.int64)
+        first = self.starts[patterns]
+        counts = self.starts[patterns + 1] - first
+        before = np.cumsum(counts) - counts
+        return np.arange(int(counts.sum())) + np.repeat(first - before, counts)
 
 
 def usable_features(moments: Moments) -> IntArray:
@@ -243,7 +246,7 @@ def clusters_of(rows: FloatArray, count: int) -> IntArray:
 def _inertias(rows: FloatArray, owners: IntArray, size: int) -> FloatArray:
     centres = _centres(rows, owners, size)
     squares = ((rows - centres[owners]) ** 2).sum(axis=1)
-    return np.bincount(owners, weights=squares, minlength=size)
+    return np.bincount(owners, squares, size).astype(np.float64)
 
 
 def _upper_half(rows: FloatArray) -> IntArray:

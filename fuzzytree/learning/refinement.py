@@ -1,9 +1,10 @@
-"""Cuts and directions move until they no longer help (step 7, "until it no longer moves").
+"""Cuts and directions move until they no longer help (step 7).
 
-A node of a grown tree is looked at with the rows that really reach it. Rows that are right
-on exactly one of its branches say where the cut should be; the others do not matter. The
-direction is then a logistic one over the node's own features, started at Fisher's; it
-replaces the old split only if fewer rows go wrong. No leaf is added.
+A node of a grown tree is looked at with the rows that really reach it. Rows that are
+right on exactly one of its branches say where the cut should be; the others do not
+matter. The cut is placed again, on the old axis and on a logistic direction over the
+node's own features; it stays where it was unless clearly fewer rows go wrong. No leaf
+is added.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.combination import axis_of
 from fuzzytree.learning.cuts import settled_cuts, smoothed_cuts
 from fuzzytree.learning.patterns import Patterns
-from fuzzytree.learning.sketch import Axis, Sketch, Split, single
+from fuzzytree.learning.sketch import Axis, Sketch, Split
 
 _MOST_ROWS = 20_000
 _NEWTON_STEPS = 8
 _LEAST = 0.5
+_MANY_NODES = 256
 
 
 def refined(
@@ -42,7 +44,7 @@ def refined(
         sketch.leaves,
         sketch.leaf_classes,
     )
-    for _ in range(passes):
+    for _ in range(passes if len(moved.splits) <= _MANY_NODES else 1):
         if not _visit_all(moved, patterns, rows, labels, weights, ridge):
             break
     return moved
@@ -109,29 +111,24 @@ def _better_split(
         return None
     bar = lowest - _LEAST * float(np.sqrt(lowest * weights.mean()))
     best: Split | None = None
-    for axis in (
-        split.axis,
-        _logistic_axis(split, patterns, rows, is_right, weights, ridge),
-    ):
+    turned = _logistic_axis(split, patterns, rows, is_right, weights, ridge)
+    for axis in (split.axis, turned):
         if axis is None:
             continue
-        values = axis.values(rows)
-        for cuts in _candidates(values, is_right, weights, len(split.cuts) == 2):
-            found = Split(axis, settled_cuts(cuts[0], values), cuts[1], split.groups)
-            if (np.diff(found.cuts) <= 0).any() or not np.isfinite(found.cuts).all():
-                continue
-            error = float(weights[found.branches(rows) != is_right].sum())
-            if error < bar:
-                bar, best = error, found
+        found = _cut_again(axis, split, rows, is_right, weights)
+        error = float(weights[found.branches(rows) != is_right].sum())
+        if error < bar and (np.diff(found.cuts) > 0).all():
+            bar, best = error, found
     return best
 
 
-def _candidates(
-    values: FloatArray, is_right: BoolArray, weights: FloatArray, two: bool
-) -> list[tuple[FloatArray, IntArray]]:
-    """Return the smoothed cuts on an axis."""
-    cuts = smoothed_cuts(values, is_right, weights, two=two)
-    return [(cuts.cuts, cuts.owners)]
+def _cut_again(
+    axis: Axis, split: Split, rows: FloatArray, is_right: BoolArray, weights: FloatArray
+) -> Split:
+    """Return the split with new cuts on an axis."""
+    values = axis.values(rows)
+    cuts = smoothed_cuts(values, is_right, weights, two=len(split.cuts) == 2)
+    return Split(axis, settled_cuts(cuts.cuts, values), cuts.owners, split.groups)
 
 
 def _logistic_axis(
@@ -146,55 +143,41 @@ def _logistic_axis(
     if not split.axis.is_combined:
         return None
     features = split.axis.features
-    scale, centre = patterns.scale[features], patterns.centre[features]
-    points = (rows[:, features] - centre) / scale
-    sign = 1.0 if split.owners[-1] == 1 else -1.0
-    start = sign * split.axis.weights * scale
-    direction = logistic_direction(points, is_right, weights, start, ridge)
-    places = np.searchsorted(patterns.combinable, features)
+    points = (rows[:, features] - patterns.centre[features]) / patterns.scale[features]
+    direction = logistic_direction(points, is_right, weights, ridge)
     if direction is None:
         return None
-    within = np.cov(points.T, aweights=weights)
     order = np.argsort(-np.abs(direction * points.std(axis=0)), kind="stable")
-    return axis_of(
-        patterns, places[order], direction[order], within[np.ix_(order, order)]
-    )
+    within = np.cov(points[:, order].T, aweights=weights)
+    places = np.searchsorted(patterns.combinable, features)[order]
+    return axis_of(patterns, places, direction[order], within)
 
 
 def logistic_direction(
-    points: FloatArray,
-    is_right: BoolArray,
-    weights: FloatArray,
-    start: FloatArray,
-    ridge: float,
+    points: FloatArray, is_right: BoolArray, weights: FloatArray, ridge: float
 ) -> FloatArray | None:
-    """Return the penalised logistic direction, by Newton steps from zero.
+    """Return the penalised logistic direction by Newton steps, or None if they fail.
 
     Args:
-        points: In standard units, shape (rows, features).
+        points: In standard units, shape (rows, features); outliers are drawn in to
+            eight spreads.
         is_right: The side of each row.
-        weights: Of the rows; scaled to mean 1.
-        start: What is returned if the steps do not converge to anything.
+        weights: Of the rows.
         ridge: Penalty on squared weights.
     """
-    middle = points.mean(axis=0)
     unit = points.std(axis=0)
     unit = np.where(unit > 0, unit, 1.0)
-    design = np.hstack(
-        [np.clip((points - middle) / unit, -8, 8), np.ones((len(points), 1))]
-    )
+    moved = np.clip((points - points.mean(axis=0)) / unit, -8.0, 8.0)
+    design = np.hstack([moved, np.ones((len(points), 1))])
     share = weights / weights.mean()
-    target = is_right.astype(np.float64)
     penalty = np.full(design.shape[1], ridge)
     penalty[-1] = 1e-6
     solution = np.zeros(design.shape[1])
     for _ in range(_NEWTON_STEPS):
-        chance = 1.0 / (1.0 + np.exp(-np.clip(design @ solution, -30, 30)))
-        slope = design.T @ (share * (target - chance)) - penalty * solution
-        curvature = (
-            design * (share * np.maximum(chance * (1 - chance), 1e-4))[:, None]
-        ).T @ design
-        np.einsum("ii->i", curvature)[:] += penalty
+        chance = 1.0 / (1.0 + np.exp(-np.clip(design @ solution, -30.0, 30.0)))
+        slope = design.T @ (share * (is_right - chance)) - penalty * solution
+        steep = share * np.maximum(chance * (1.0 - chance), 1e-4)
+        curvature = (design * steep[:, None]).T @ design + np.diag(penalty)
         try:
             step = np.linalg.solve(curvature, slope)
         except np.linalg.LinAlgError:
@@ -203,9 +186,4 @@ def logistic_direction(
         if np.abs(step).max() < 1e-6:
             break
     direction: FloatArray = solution[:-1] / unit
-    return direction if np.isfinite(direction).all() and direction.any() else start
-
-
-def single_axis(feature: int) -> Axis:
-    """Return the axis of one feature."""
-    return single(feature)
+    return direction if np.isfinite(direction).all() and direction.any() else None

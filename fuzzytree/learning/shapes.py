@@ -1,9 +1,9 @@
 """Fuzzy sets by curve fitting (paper, 2.2.2), and the flanks of relative terms.
 
 A set's polynomial goes through the centre, where the degree is 1, and n points on each
-side. With `t = u` within one spread and `v = 2 t - 1` the degree is `1 - t Q(v)`, so the
-n coefficients of Q solve `Q(v_k) = (1 - degree_k) / t_k`: exact interpolation, in a basis
-that keeps its digits.
+side. With `t = u` within one spread and `v = 2 t - 1` the degree is `1 - t Q(v)`, so
+the n coefficients of Q solve `Q(v_k) = (1 - degree_k) / t_k`: exact interpolation, in a
+basis that keeps its digits.
 """
 
 from __future__ import annotations

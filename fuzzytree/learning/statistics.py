@@ -145,12 +145,12 @@ class Statistics:
         if not self._filled:
             return
         values, codes = self._block[: self._filled], self._block_codes[: self._filled]
-        if self._shift is None:
-            self._shift = values[0].copy()
+        shift = values[0].copy() if self._shift is None else self._shift
+        self._shift = shift
         self._keep(values, codes)
         order = np.argsort(narrow(codes, self.classes), kind="stable")
         present, starts, counts = runs(codes[order])
-        block = _block_moments(values[order], self._shift, starts, counts)
+        block = _block_moments(values[order], shift, starts, counts)
         self._join(present, counts, block)
         self._rows += self._filled
         self._filled = 0
@@ -276,7 +276,7 @@ def finite_rows(values: FloatArray) -> BoolArray:
     """Return which rows hold finite numbers only."""
     with np.errstate(over="ignore", invalid="ignore"):
         suspects = ~np.isfinite(values.sum(axis=1))
-    usable = ~suspects
+    usable: BoolArray = ~suspects
     if suspects.any():
         usable[suspects] = np.isfinite(values[suspects]).all(axis=1)
     return usable

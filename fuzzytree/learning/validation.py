@@ -3,7 +3,8 @@
 Trees are grown on parts of the sample and answer the rows left out. First every class
 gets the same number of patterns, more and more of them; then, class by class, one class
 more or fewer. A richer tree is chosen only if it is right on more of the rows on which
-two trees differ than chance explains, so a table of simple classes keeps one pattern each.
+two trees differ than chance explains, so a table of simple classes keeps one pattern
+each.
 """
 
 from __future__ import annotations
@@ -292,7 +293,8 @@ class _Trials:
 def _answered(fold: _Fold, numbers: Numbers, rules: GrowthRules) -> BoolArray:
     patterns, _ = patterns_of(fold.moments, fold.sample, numbers, fold.clusters)
     sketch = grown_tree(patterns, rules).sketch
-    return sketch.classify(fold.rows) == fold.codes
+    is_right: BoolArray = sketch.classify(fold.rows) == fold.codes
+    return is_right
 
 
 def _best_numbers(trials: _Trials, rules: GrowthRules, moments: Moments) -> Numbers:
