@@ -2,9 +2,9 @@
 
     python benchmarks/accuracy.py [--folds 10] [--tables iris,wine,...]
 
-Ten stratified folds, shuffled, seed 0, on four tables that scikit-learn ships and on made
-ones that ask for more than a linear cut. In percent; behind trees stand the mean numbers
-of leaves and of features that a node needs, and the seconds of a fit.
+Ten stratified folds, shuffled, seed 0, on four tables that scikit-learn ships and on
+made ones that ask for more than a linear cut. In percent; behind trees stand the mean
+numbers of leaves and of features that a node needs, and the seconds of a fit.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
     python benchmarks/fit_cost.py [--rows 1000000] [--repeats 3] [--classes 10000]
 
 The first part gives the ratio to GaussianNB's fit on rows x 11 with 7 classes, both in
-this process, in turn, the fastest of each, and the most memory held beside the table. The
-second learns classes x 16 features, 10 rows a class, in a process of its own.
+this process, in turn, the fastest of each, and the most memory held beside the table.
+The second learns classes x 16 features, 10 rows a class, in a process of its own.
 """
 
 from __future__ import annotations
