@@ -194,7 +194,7 @@ def test_an_input_must_be_one_of_the_columns() -> None:
 
 
 def test_a_default_that_is_spelt_out_does_not_change_the_fingerprint() -> None:
-    spelt = Flank(1.0, 3.0, tuple([1.0]))
+    spelt = Flank(1.0, 3.0, tuple(map(float, "1")))
     term = Term("low", Band(high=1.0, right=spelt))
     other = rule_base(variables=(Variable("force", (term, HIGH)),))
     same = rule_base(variables=(Variable("force", (LOW, HIGH)),))
