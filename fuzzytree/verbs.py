@@ -59,7 +59,7 @@ def learn(
     entry: float = 2.0,
     costs: Mapping[str, float] | None = None,
     choices: tuple[Literal["alpha", "l_max", "shrinkage", "entry"], ...] = (),
-    rows_per_class: int = 20_000,
+    rows_per_class: int = 5_000,
     seed: int = 0,
     keep_reversals: bool = False,
     missing: Literal["drop", "refuse"] = "drop",
