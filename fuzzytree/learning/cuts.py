@@ -56,20 +56,30 @@ def crossing_cuts(
     floor = max(1e-3 * extent, 4 * math.ulp(float(np.abs(means).max())))
     widths = np.maximum(spreads, floor)
     order = np.argsort(means, kind="stable")
-    means, widths, groups = means[order], widths[order], groups[order]
+    first, unit = float(means[order[0]]), float(widths.max())
+    found = _standard_cuts(
+        (means[order] - first) / unit,
+        widths[order] / unit,
+        groups[order],
+        keep_reversals=keep_reversals,
+    )
+    return Cuts(first + unit * found.cuts, found.owners, found.reversals)
+
+
+def _standard_cuts(
+    means: FloatArray, widths: FloatArray, groups: IntArray, *, keep_reversals: bool
+) -> Cuts:
+    """Return the cuts for patterns ordered by mean, in units of the widest."""
     if len(means) > _ENVELOPE:
         points = _neighbour_crossings(means, widths, groups)
         borders = np.flatnonzero(np.diff(groups))
-        owners = groups[np.concatenate([[0], borders + 1])]
-        return _merged(points, owners, 0)
+        return Cuts(points, groups[np.concatenate([[0], borders + 1])])
     points = _all_crossings(means, widths, groups)
     inner = (points[1:] + points[:-1]) / 2
-    reach = 10.0 * widths.max()
-    first, last = (points[0], points[-1]) if len(points) else (means[0], means[-1])
-    probes = np.concatenate([[first - reach], inner, [last + reach]])
+    ends = points if len(points) else means
+    probes = np.concatenate([[ends[0] - 10.0], inner, [ends[-1] + 10.0]])
     height = -0.5 * ((probes[:, None] - means) / widths) ** 2 - np.log(widths)
-    owners = groups[height.argmax(axis=1)]
-    cuts = _merged(points, owners, 0)
+    cuts = _merged(points, groups[height.argmax(axis=1)], 0)
     cuts = _with_everybody(cuts, means, widths, groups)
     if keep_reversals:
         return cuts

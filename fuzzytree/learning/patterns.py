@@ -73,7 +73,9 @@ class Patterns:
         first = self.starts[patterns]
         counts = self.starts[patterns + 1] - first
         before = np.cumsum(counts) - counts
-        return np.arange(int(counts.sum())) + np.repeat(first - before, counts)
+        members: IntArray = np.repeat(first - before, counts)
+        members += np.arange(len(members))
+        return members
 
 
 def usable_features(moments: Moments) -> IntArray:

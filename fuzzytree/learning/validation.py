@@ -42,6 +42,7 @@ _MOST_PATTERNS = 64
 _CLASSES_APART = 8
 _VALUES = 100_000
 _GOOD_ENOUGH = 0.01
+_SURE = 1.3
 _BUDGET = 2_000.0
 _BUDGET_LARGE = 500.0
 _LARGE = 4_000_000
@@ -84,10 +85,12 @@ def chosen_tree(
     is_open = _is_open(settings, moments)
     accuracy: float | None = None
     chosen: dict[str, float | str] = {}
-    if is_open or settings.choices:
+    is_asked = is_open or bool(settings.choices)
+    folds = _folds(moments, sample, settings.seed) if is_asked else []
+    if folds:
         is_large = moments.counts.sum() * sample.rows.shape[1] > _LARGE
         budget = _BUDGET_LARGE if is_large else _BUDGET
-        trials = _Trials(_folds(moments, sample, settings.seed), tell, budget)
+        trials = _Trials(folds, tell, budget)
         if is_open:
             numbers = _best_numbers(trials, rules, moments)
             shown = zip(classes, numbers, strict=True)
@@ -281,7 +284,7 @@ class _Trials:
 
         Half of the folds are asked first; a tree that is no better there is dropped.
         """
-        for folds, least in ((_FOLDS // 2, 0.0), (_FOLDS, 1.0)):
+        for folds, least in ((_FOLDS // 2, 0.0), (_FOLDS, _SURE)):
             new, old = self.right(*richer, folds), self.right(*simpler, folds)
             won = int(np.count_nonzero(new & ~old))
             lost = int(np.count_nonzero(old & ~new))
