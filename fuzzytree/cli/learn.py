@@ -304,4 +304,7 @@ def _learnt_rows(learnt: Learnt, seconds: float) -> list[tuple[str, str, str]]:
     if report.inseparable:
         text = counted(report.inseparable, "pattern")
         rows.append(("merged", text, "nothing tells their classes apart"))
+    if report.repairs:
+        text = counted(report.sets, "set")
+        rows.append(("repaired", text, "; ".join(report.repairs)))
     return rows

@@ -63,6 +63,12 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
     chosen: dict[str, float | str] = {}
     inner_accuracy: float | None = None
 
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What had to be repaired in the fitted sets, with counts; empty if nothing."""
+        told = (_told(self, name, text) for name, text in _REPAIRS.items())
+        return tuple(line for line in told if line)
+
     def __str__(self) -> str:
         """Show the facts that are not zero, one a line."""
         lines = [f"{self.rows} rows, {sum(self.patterns.values())} patterns"]
@@ -70,21 +76,29 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
         lines.append(f"{self.leaves} leaves; features per node: {nodes}")
         if self.features_ignored:
             lines.append(f"columns ignored: {', '.join(self.features_ignored)}")
-        for name, text in _SENTENCES.items():
-            count: int = getattr(self, name)
-            if count:
-                lines.append(f"{text}: {count}")
+        lines += [_told(self, name, text) for name, text in _TABLE.items()]
+        lines += self.repairs
+        lines = [line for line in lines if line]
         lines.extend(f"chosen {name}: {value}" for name, value in self.chosen.items())
         return "\n".join(lines)
 
 
-_SENTENCES = {
+def _told(report: LearningReport, name: str, text: str) -> str:
+    count: int = getattr(report, name)
+    return f"{text}: {count}" if count else ""
+
+
+_TABLE = {
     "rows_dropped": "rows dropped, a value is missing or not finite",
     "patterns_refused": "patterns refused, too few rows",
     "single_rows": "patterns of one row",
-    "zero_spreads": "sets whose values are all equal",
     "inseparable": "patterns of different classes that nothing tells apart",
     "levels_raised": "levels passed over until the threshold split a node",
+}
+"""What was left out of the table, or could not be told apart."""
+
+_REPAIRS = {
+    "zero_spreads": "sets whose values are all equal",
     "reversals": "far reversals left out",
     "off_peak": "sets with a fuller window than the middle one",
     "empty_centre": "sets with an empty middle window",
@@ -93,3 +107,4 @@ _SENTENCES = {
     "overshooting": "sides whose polynomial leaves [0, 1]",
     "rising": "sides whose polynomial rises",
 }
+"""Where the data departed from what the paper assumes of fuzzy sets."""

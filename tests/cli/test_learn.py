@@ -39,12 +39,13 @@ def _refused(call: Call, text: str, *words: str) -> str:
     return err
 
 
-def test_four_lines_tell_what_happened(call: Call) -> None:
+def test_five_lines_tell_what_happened(call: Call) -> None:
     code, out, err = call("learn", "few.csv", "--target", "grip", "-o", "few.yaml")
     assert (code, out) == (0, "")
     assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
         "read     few.csv  12 rows, 1 column, 2 classes\n"
         "learnt   2 leaves depth 1, 1 of 1 columns, 0 s\n"
+        "repaired 2 sets   sides whose polynomial rises: 2\n"
         "tested   accuracy 1.000 (5 folds: 1.000 to 1.000)\n"
         "wrote    few.yaml next: fuzzytree check few.yaml --data few.csv\n"
     )
@@ -65,6 +66,7 @@ def test_what_was_left_out_is_told(call: Call) -> None:
         "learnt   2 leaves depth 1, 1 of 2 columns, 0 s\n"
         "dropped  1 row    a value is missing or not finite\n"
         "ignored  1 column constant or too large: same\n"
+        "repaired 2 sets   sides whose polynomial rises: 2\n"
         "wrote    t.yaml   next: fuzzytree check t.yaml --data t.csv\n"
     )
 
