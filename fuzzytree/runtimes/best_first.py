@@ -2,34 +2,44 @@
 
 Rules that begin with the same clauses form a tree, and a T-norm never grows along a
 path: in floating point too, neither the minimum nor a product of numbers in [0, 1]
-exceeds its smallest operand. So whatever lies below a strength that is already
-exceeded need not be looked at; what is equal must be, for a tie is part of the answer.
+exceeds its smallest operand, and both are monotone. So whatever lies below a strength
+that is already exceeded need not be looked at; what is equal must be, for a tie is part
+of the answer. Most of it is decided by bounds of the clauses' degrees in the cells of
+their axes (`envelope.py`), which are looked up and not computed:
 
-1. Each row first follows its best branches down to a rule: the strength of that rule
-   is a lower bound of the best. The strongest branch that it left aside bounds all
-   other rules; where that is smaller, the row is done.
-2. For the other rows, the tree is walked once in order, at each node with the rows
-   whose strength so far is not below their bound.
+1. Each row follows its best branches down to a rule. The lower bounds met are a lower
+   bound of that rule's strength; the largest upper bound left aside bounds all others.
+   Where that is smaller, the rule is the winner.
+2. For the other rows that strength is computed, from the few terms that can be the
+   largest of their clause in the row's cell.
+3. Where another branch may still reach it, all branches are followed whose upper
+   bounds do, and the strengths of the rules at their ends are compared. Rows with too
+   many of them are fired.
 
 Where the plateaus of each node's branches are disjoint and cover the axis (relative
-rules), the bound is 1 after the first step and no other branch can reach it: the second
-step has nothing to do, and the first is a descent.
+rules), nothing can reach the branch with degree 1: the search is a descent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fuzzytree.contracts import Outcome, Run
 from fuzzytree.rulebase import Band, Clause, RuleBase, Shape
 from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
-from fuzzytree.runtimes.degrees import NUMBERS
 from fuzzytree.runtimes.descent import Split, plan_descent
-from fuzzytree.runtimes.native_rules import Degrees, clause_degrees, plan_degrees
+from fuzzytree.runtimes.envelope import (
+    Envelope,
+    cells_of,
+    exact_degrees,
+    plan_envelope,
+    spread,
+)
+from fuzzytree.runtimes.native_rules import fire
 from fuzzytree.runtimes.native_tree import descend_by
 from fuzzytree.runtimes.rows import checked
 
@@ -38,10 +48,12 @@ if TYPE_CHECKING:
 
     from fuzzytree.contracts import FloatArray, IntArray
 
-    Reals = npt.NDArray[np.floating[Any]]
-
-_CHUNK = 1 << 17  # rows: a node's few operations shall be wide
-_CELLS, _FEWEST = 1 << 17, 256  # degrees and rows that go through a fork together
+_CHUNK = 1 << 13  # rows: their cells shall stay in the cache
+_PAIRS = 1 << 11  # rows and rules whose strengths are computed together
+_WIDEST = 1 << 18  # branches that are followed together
+_CROWD = 16  # branches of a row, or a share of all rules, from which it is fired
+_SHARE = 8
+_ALWAYS = Clause("", ())
 
 
 @dataclass(slots=True)
@@ -60,31 +72,56 @@ class Fork:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """How to compute the degrees of a fork's clauses."""
-
-    lines: IntArray
-    degrees: Degrees
-    places: IntArray
-
-
-@dataclass(slots=True)
-class Found:
-    """What is known of each row.
+class Net:
+    """The forks as arrays, every rule at an end of its own; fork 0 is the first.
 
     Attributes:
-        rule: The winner so far.
-        status: Its status.
-        best: Its strength.
-        bound: What the winner's strength is at least.
-        rival: What any rule off the row's best branches is at most.
+        first: The first branch of each fork.
+        count: The number of its branches.
+        rule: The rule that ends there, from 1; 0 at a fork with branches.
+        target: The fork behind each branch.
+        line: The axis of its clause.
+        entry: The first entry of its clause in the envelope.
+        paths: The branches to each rule, one after another.
+        begin: Where each rule's path begins, from rule 1.
+        length: Its length.
+        envelope: Bounds and degrees of the clauses.
+        is_product: Whether degrees are multiplied.
     """
 
+    first: IntArray
+    count: IntArray
     rule: IntArray
-    status: IntArray
-    best: Reals
-    bound: Reals
-    rival: Reals
+    target: IntArray
+    line: IntArray
+    entry: IntArray
+    paths: IntArray
+    begin: IntArray
+    length: IntArray
+    envelope: Envelope
+    is_product: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Values of the variables, and their cells, of some rows without missing ones."""
+
+    lines: FloatArray
+    values: FloatArray
+    cells: IntArray
+
+    def places(self, net: Net, branch: IntArray, row: IntArray) -> IntArray:
+        """Return where the value of each branch's variable stands."""
+        found = net.line.take(branch)
+        found *= self.lines.shape[1]
+        found += row
+        return found
+
+    def entries(self, net: Net, branch: IntArray, row: IntArray) -> IntArray:
+        """Return the entry of each branch's clause for a row."""
+        found = self.cells.take(self.places(net, branch, row))
+        found += net.entry.take(branch)
+        return found
 
 
 def search(rules: RuleBase) -> Run:
@@ -109,23 +146,33 @@ def search(rules: RuleBase) -> Run:
     splits = _splits(rules, forks, axes.line)
     if splits is not None:
         return descend_by(axes, plan_descent(splits, axes.dtype), rules.inputs)
-    looks = [_look(rules, fork, axes.line) for fork in forks]
-    is_product = rules.semantics.conjunction == "product"
+    net, fired = _net(rules, forks, axes.line), fire(rules)
 
     def run(values: FloatArray) -> Outcome:
         array = checked(values, rules.inputs)
-        answer = np.zeros((2, array.shape[1]), np.int64)
+        rule, status = np.zeros((2, array.shape[1]), np.int64)
+        crowded: list[IntArray] = []
         with np.errstate(all="ignore"):
             for start in range(0, array.shape[1], _CHUNK):
-                lines = axis_lines(axes, array[:, start : start + _CHUNK])
+                part = axis_lines(axes, array[:, start : start + _CHUNK])
+                lines = part.astype(np.float64, copy=False)
+                here = slice(start, start + lines.shape[1])
                 missing = missing_rows(lines)
-                found = _search(forks, looks, lines, is_product=is_product)
-                found.status[found.best == 0] = 2
-                if missing is not None:
-                    found.rule[missing], found.status[missing] = 0, 3
-                answer[0, start : start + _CHUNK] = found.rule
-                answer[1, start : start + _CHUNK] = found.status
-        return Outcome(answer[0], answer[1])
+                if missing is None:
+                    rule[here], status[here], many = _search(net, lines)
+                    crowded.append(many + start)
+                    continue
+                status[here][missing] = 3
+                whole = np.flatnonzero(~missing)
+                found = _search(net, lines.take(whole, axis=1))
+                whole += start
+                rule[whole], status[whole] = found[:2]
+                crowded.append(whole[found[2]])
+        many = np.concatenate([np.empty(0, np.int64), *crowded])
+        if len(many):
+            outcome = fired(array.take(many, axis=1))
+            rule[many], status[many] = outcome.rule, outcome.status
+        return Outcome(rule, status)
 
     return run
 
@@ -198,98 +245,219 @@ def _plateaus(
     return [(band.high, target) for _, band, target in bands]
 
 
-def _look(rules: RuleBase, fork: Fork, line: dict[str, int]) -> Look:
-    variables = list(dict.fromkeys(clause.variable for clause in fork.clauses))
-    at_line = {name: position for position, name in enumerate(variables)}
-    numbers = NUMBERS["float64"]
-    degrees = plan_degrees(rules, fork.clauses, at_line, numbers, 1 << 12)
-    places = [degrees.line[clause] for clause in fork.clauses]
-    lines = [line[name] for name in variables]
-    return Look(np.array(lines, np.int64), degrees, np.array(places, np.int64))
-
-
-def _search(
-    forks: Sequence[Fork], looks: Sequence[Look], lines: Reals, *, is_product: bool
-) -> Found:
-    found = _run_down(forks, looks, lines, is_product=is_product)
-    rest = np.flatnonzero(found.rival >= found.bound)
-    found.rule[rest], found.best[rest] = 0, 0.0
-    todo = [(0, rest, np.ones(len(rest)))] if len(rest) else []
-    while todo:
-        number, here, strength = todo.pop()
-        fork = forks[number]
-        for rule in fork.rules:
-            _meet(found, rule, here, strength)
-        if not fork.clauses:
-            continue
-        degrees = _degrees(looks[number], lines, here)
-        floor = found.bound.take(here)
-        for target, degree in zip(reversed(fork.targets), degrees[::-1], strict=True):
-            total = strength * degree if is_product else np.minimum(strength, degree)
-            alive = np.flatnonzero((total >= floor) & (total > 0))
-            if len(alive):
-                todo.append((target, here.take(alive), total.take(alive)))
-    return found
-
-
-def _run_down(
-    forks: Sequence[Fork], looks: Sequence[Look], lines: Reals, *, is_product: bool
-) -> Found:
-    """Follow each row's best branches to a rule, and note the strongest branch left."""
-    rows = lines.shape[1]
-    found = Found(
-        np.zeros(rows, np.int64),
-        np.zeros(rows, np.int64),
-        np.zeros(rows),
-        np.zeros(rows),
-        np.zeros(rows),
+def _net(rules: RuleBase, forks: Sequence[Fork], at_line: dict[str, int]) -> Net:
+    """Return the forks as arrays; rules that end at no leaf get a branch."""
+    ends = [list(fork.rules) for fork in forks]
+    branches = [list(zip(f.clauses, f.targets, strict=True)) for f in forks]
+    for fork in range(len(forks)):
+        if fork == 0 or branches[fork] or len(ends[fork]) > 1:
+            for rule in ends[fork]:
+                branches[fork].append((_ALWAYS, len(branches)))
+                branches.append([])
+                ends.append([rule])
+            ends[fork] = []
+    flat = [branch for part in branches for branch in part]
+    clauses = list(dict.fromkeys(clause for clause, _ in flat))
+    number = {clause: position for position, clause in enumerate(clauses)}
+    envelope = plan_envelope(rules, clauses, at_line)
+    count = np.array([len(part) for part in branches], np.int64)
+    target = np.array([target for _, target in flat], np.int64)
+    place = np.array([number[clause] for clause, _ in flat], np.int64)
+    ending = np.array([part[0] if part else 0 for part in ends], np.int64)
+    paths = _paths(ending, target, np.repeat(np.arange(len(count)), count))
+    length = np.array([len(path) for path in paths], np.int64)
+    return Net(
+        np.cumsum(count) - count,
+        count,
+        ending,
+        target,
+        envelope.line.take(place),
+        place * envelope.grid.count,
+        np.concatenate(paths),
+        np.cumsum(length) - length,
+        length,
+        envelope,
+        rules.semantics.conjunction == "product",
     )
-    todo = [(0, np.arange(rows), np.ones(rows))]
-    while todo:
-        number, here, strength = todo.pop()
-        fork = forks[number]
-        if fork.rules:
-            found.bound[here] = np.maximum(found.bound.take(here), strength)
-            found.best[here], found.rule[here] = strength, fork.rules[0]
-            if fork.clauses or len(fork.rules) > 1:
-                found.rival[here] = np.maximum(found.rival.take(here), strength)
-        if not fork.clauses:
-            continue
-        degrees = _degrees(looks[number], lines, here)
-        choice = degrees.argmax(axis=0)
-        best = degrees.max(axis=0)
-        total = strength * best if is_product else np.minimum(strength, best)
-        if len(fork.targets) > 1:
-            degrees[choice, np.arange(len(here))] = 0.0
-            left = degrees.max(axis=0)
-            left = strength * left if is_product else np.minimum(strength, left)
-            found.rival[here] = np.maximum(found.rival.take(here), left)
-        for position, target in enumerate(fork.targets):
-            mine = np.flatnonzero(choice == position)
-            if len(mine):
-                todo.append((target, here.take(mine), total.take(mine)))
+
+
+def _paths(rule: IntArray, target: IntArray, source: IntArray) -> list[IntArray]:
+    """Return the branches from the first fork to the end of each rule."""
+    into = {int(fork): branch for branch, fork in enumerate(target)}
+    found: dict[int, IntArray] = {}
+    for fork in np.flatnonzero(rule).tolist():
+        path: list[int] = []
+        here = fork
+        while here:
+            path.append(into[here])
+            here = int(source[into[here]])
+        found[int(rule[fork])] = np.array(path[::-1], np.int64)
+    return [found[number] for number in sorted(found)]
+
+
+def _search(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return rule and status of rows without missing values, and those to be fired."""
+    rows = Rows(lines, lines.ravel(), cells_of(net.envelope.grid, lines).ravel())
+    rule, floor, rival = _run_down(net, rows)
+    status = np.zeros(lines.shape[1], np.int64)
+    unsure = np.flatnonzero(rival >= floor)
+    if not len(unsure):
+        return rule, status, unsure
+    strength = _strengths(net, rows, unsure, rule.take(unsure))
+    floor[unsure] = strength
+    none = unsure[strength == 0]
+    rule[none], status[none] = 0, 2
+    unsure = unsure[(rival.take(unsure) >= strength) & (rival.take(unsure) > 0)]
+    crowded: list[IntArray] = []
+    size = max(_WIDEST // len(net.length), 1)
+    for start in range(0, len(unsure), size):
+        row, ends, many = _reachable(net, rows, floor, unsure[start : start + size])
+        _compare(rule, status, row, ends, _strengths(net, rows, row, ends))
+        crowded.append(many)
+    return rule, status, np.concatenate([unsure[:0], *crowded])
+
+
+def _run_down(net: Net, rows: Rows) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Follow each row's best branches to a rule.
+
+    Returns:
+        The rule, a lower bound of its strength, and an upper bound of all others'.
+    """
+    lower = net.envelope.lower
+    rule = np.zeros(rows.lines.shape[1], np.int64)
+    floor, rival = np.zeros(len(rule)), np.zeros(len(rule))
+    row, fork = np.arange(len(rule)), np.zeros(len(rule), np.int64)
+    low, high, other = np.ones(len(rule)), np.ones(len(rule)), np.zeros(len(rule))
+    while len(row):
+        branch, entry, best, second = _best(net, rows, row, fork)
+        np.maximum(other, _join(net, high, second), out=other)
+        high = _join(net, high, best)
+        low = _join(net, low, lower.take(entry).astype(np.float64))
+        fork = net.target.take(branch)
+        ended = net.rule.take(fork)
+        if ended.any():
+            done = np.flatnonzero(ended)
+            where = row.take(done)
+            rule[where], floor[where] = ended.take(done), low.take(done)
+            rival[where] = other.take(done)
+            stay = np.flatnonzero(ended == 0)
+            row, fork = row.take(stay), fork.take(stay)
+            low, high, other = low.take(stay), high.take(stay), other.take(stay)
+    return rule, floor, rival
+
+
+def _best(
+    net: Net, rows: Rows, row: IntArray, fork: IntArray
+) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Return the branch with the largest bound, its entry, the bound and the next."""
+    upper = net.envelope.upper
+    first, last = net.first.take(fork), net.count.take(fork) - 1
+    branch, entry = first.copy(), rows.entries(net, first, row)
+    best = upper.take(entry).astype(np.float64)
+    second = np.zeros(len(row))
+    fewest = int(last.min())
+    for position in range(1, int(last.max()) + 1):
+        other = first + np.minimum(last, position)
+        other_entry = rows.entries(net, other, row)
+        bound = upper.take(other_entry)
+        if position > fewest:
+            bound[last < position] = 0.0
+        is_better = bound > best
+        np.maximum(second, np.minimum(best, bound), out=second)
+        np.maximum(best, bound, out=best)
+        np.copyto(branch, other, where=is_better)
+        np.copyto(entry, other_entry, where=is_better)
+    return branch, entry, best, second
+
+
+def _join(net: Net, before: FloatArray, degree: FloatArray) -> FloatArray:
+    return before * degree if net.is_product else np.minimum(before, degree)
+
+
+def _reachable(
+    net: Net, rows: Rows, floor: FloatArray, row: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return pairs of row and rule whose upper bound is not below the row's floor.
+
+    Rows with too many branches at once come third, and in no pair.
+    """
+    limit = max(_CROWD, len(net.length) // _SHARE)
+    is_crowded = np.zeros(len(floor), np.bool_)
+    ends: list[tuple[IntArray, IntArray]] = [(row[:0], row[:0])]
+    fork, high = np.zeros(len(row), np.int64), np.ones(len(row))
+    while len(row):
+        owner, offset, _ = spread(net.count.take(fork))
+        row, branch = row.take(owner), net.first.take(fork).take(owner) + offset
+        bound = net.envelope.upper.take(rows.entries(net, branch, row))
+        high = _join(net, high.take(owner), bound.astype(np.float64))
+        stay = np.flatnonzero((high >= floor.take(row)) & (high > 0))
+        row, high = row.take(stay), high.take(stay)
+        fork = net.target.take(branch.take(stay))
+        is_crowded |= np.bincount(row, minlength=len(floor)) > limit
+        rule = net.rule.take(fork)
+        done = np.flatnonzero(rule)
+        ends.append((row.take(done), rule.take(done)))
+        stay = np.flatnonzero((rule == 0) & ~is_crowded.take(row))
+        row, fork, high = row.take(stay), fork.take(stay), high.take(stay)
+    row, rule = (np.concatenate(parts) for parts in zip(*ends, strict=True))
+    stay = np.flatnonzero(~is_crowded.take(row))
+    return row.take(stay), rule.take(stay), np.flatnonzero(is_crowded)
+
+
+def _compare(
+    rule: IntArray,
+    status: IntArray,
+    row: IntArray,
+    ends: IntArray,
+    strength: FloatArray,
+) -> None:
+    """Enter the strongest rule of each row, the first on a tie; none if all are 0."""
+    order = np.lexsort((ends, -strength, row))
+    row, ends, strength = row.take(order), ends.take(order), strength.take(order)
+    is_first = _begins(row)
+    first = np.flatnonzero(is_first & (strength > 0))
+    rule[row.take(first)], status[row.take(first)] = ends.take(first), 0
+    tied = ~is_first & (strength > 0)
+    tied[1:] &= (strength[1:] == strength[:-1]) & is_first[:-1]
+    status[row[tied]] = 1
+
+
+def _strengths(net: Net, rows: Rows, row: IntArray, rule: IntArray) -> FloatArray:
+    """Return the strength of a rule in each row, bit-equal to firing."""
+    found = np.empty(len(row))
+    for start in range(0, len(row), _PAIRS):
+        part = slice(start, start + _PAIRS)
+        found[part] = _part_strengths(net, rows, row[part], rule[part] - 1)
     return found
 
 
-def _degrees(look: Look, lines: Reals, here: IntArray) -> Reals:
-    """Return the degree of each clause of a fork in some of the rows."""
-    found = np.empty((len(look.places), len(here)))
-    size = max(_CELLS // (look.degrees.atoms + look.degrees.count), _FEWEST)
-    for start in range(0, len(here), size):
-        part = here[start : start + size]
-        values = np.array([lines[line].take(part) for line in look.lines])
-        degrees = clause_degrees(look.degrees, values)
-        found[:, start : start + size] = degrees.take(look.places, axis=0)
+def _part_strengths(net: Net, rows: Rows, row: IntArray, path: IntArray) -> FloatArray:
+    """Return strengths; what is never the smallest degree of a path is left out."""
+    envelope = net.envelope
+    owner, offset, begin = spread(net.length.take(path))
+    branch = net.paths.take(net.begin.take(path).take(owner) + offset)
+    row = row.take(owner)
+    entry = rows.entries(net, branch, row)
+    if not net.is_product:
+        highest = np.minimum.reduceat(envelope.upper.take(entry), begin)
+        needed = np.flatnonzero(envelope.lower.take(entry) <= highest.take(owner))
+        owner, row = owner.take(needed), row.take(needed)
+        branch, entry = branch.take(needed), entry.take(needed)
+        begin = np.flatnonzero(_begins(owner))
+    x = rows.values.take(rows.places(net, branch, row))
+    degree = exact_degrees(envelope, entry, x)
+    if not net.is_product:
+        least: FloatArray = np.minimum.reduceat(degree, begin)
+        return least
+    found, length = np.ones(len(path)), net.length.take(path)
+    for position in range(int(length.max())):
+        longer = np.flatnonzero(length > position)
+        found[longer] *= degree.take(begin.take(longer) + position)
     return found
 
 
-def _meet(found: Found, rule: int, here: IntArray, strength: Reals) -> None:
-    """Compare a rule with the best so far of some rows."""
-    best = found.best.take(here)
-    better = here[strength > best]
-    found.best[better] = strength[strength > best]
-    found.rule[better], found.status[better] = rule, 0
-    equal = here[strength == best]
-    found.status[equal] = 1
-    found.rule[equal] = np.minimum(found.rule.take(equal), rule)
-    found.bound[here] = np.maximum(found.bound.take(here), strength)
+def _begins(owner: IntArray) -> npt.NDArray[np.bool_]:
+    """Return where a new owner begins among sorted ones."""
+    found = np.ones(len(owner), np.bool_)
+    np.not_equal(owner[1:], owner[:-1], out=found[1:])
+    return found

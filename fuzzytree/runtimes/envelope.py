@@ -1,0 +1,476 @@
+"""Bounds of clauses on cells of their axes, and exact degrees from few terms.
+
+Each axis is cut into cells that cover all numbers, narrow where its terms are. For each
+clause and cell three things are computed once: an upper and a lower bound of its degree
+there, and its *candidates*, the terms whose upper bound is not below the largest lower
+bound.
+
+The bounds hold for the degrees as computed, not only for the formula:
+
+- A rounded difference, quotient, minimum, maximum, and product of numbers that are not
+  negative is monotone. So the distance u (or q) of any value of a cell lies between
+  those at the cell's ends, and so do t, w and the tail, to the bit.
+- On [t0, t1] a polynomial stays within M (t1 - t0)^2 / 8 of its chord, where M bounds
+  its second derivative; it need not be monotone. M is a sum over the coefficients.
+  Evaluating it, v included, costs less than 32 eps (1 + sum |c|), twice (at an end and
+  at the value): that is the margin.
+- Bounds are kept in float32, rounded outwards.
+
+The largest degree of a clause in a cell belongs to a candidate: it is not below any
+lower bound, and its own term's upper bound is not below it. A term that is no candidate
+stays below, so the maximum of the candidates is the maximum of all, to the bit. A term
+that is 0 all over the cell is a candidate only if all are, and then one is enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzytree.rulebase import LR, Band, Clause, Flank, RuleBase, Shape, Side
+from fuzzytree.runtimes.degrees import NUMBERS
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray, IntArray
+
+    Singles = npt.NDArray[np.float32]
+    Bools = npt.NDArray[np.bool_]
+
+_ENTRIES, _FEWEST, _MOST = 1 << 21, 32, 1 << 10  # of the table; of cells on an axis
+_CLOSE = 1e-12  # of an axis mapped to (-1, 1): more than rounding moves a cell's end
+_EPS = float(np.finfo(np.float64).eps)
+_LARGEST = float(np.finfo(np.float64).max)
+_CAP = float(NUMBERS["float64"].cap)
+_FAR = 0.95  # the share of landmarks within a unit of the grid's centre
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Cells of every axis: equal parts of z / (1 + |z|) with z = (x - centre) / unit.
+
+    Attributes:
+        centre: Of shape (axes, 1).
+        unit: Of shape (axes, 1); above 0.
+        count: The number of cells of each axis.
+    """
+
+    centre: FloatArray
+    unit: FloatArray
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Slopes:
+    """The sides of LR sets, left and right in turn; `curve` has a line a power."""
+
+    mean: FloatArray
+    spread: FloatArray
+    reach: FloatArray
+    curve: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Edges:
+    """The ends of bands, and their flanks, left and right in turn.
+
+    A flank that is absent has a curve of zeros; an open end is infinite.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    end: FloatArray
+    span: FloatArray
+    curve: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """What is known of each clause in each cell; entry `clause * cells + cell`.
+
+    Attributes:
+        grid: The cells.
+        line: The axis of each clause.
+        negated: Which clauses are negated.
+        lower: A lower bound of the degree, in each entry.
+        upper: An upper bound.
+        start: Where the candidates of each entry begin; one more at the end.
+        candidates: Numbers of shapes: LR sets first, then bands.
+        slopes: The LR sets.
+        edges: The bands.
+    """
+
+    grid: Grid
+    line: IntArray
+    negated: Bools
+    lower: Singles
+    upper: Singles
+    start: IntArray
+    candidates: npt.NDArray[np.int32]
+    slopes: Slopes
+    edges: Edges
+
+
+def plan_envelope(
+    rules: RuleBase, clauses: Sequence[Clause], at_line: Mapping[str, int]
+) -> Envelope:
+    """Return the envelope of some clauses.
+
+    Args:
+        rules: Where the clauses' terms are defined.
+        clauses: Distinct clauses. A clause without terms is always true.
+        at_line: The line of each variable's values.
+    """
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    always = Band(None, None)
+    of_clause = [
+        list(dict.fromkeys(shapes[c.variable, term] for term in c.terms)) or [always]
+        for c in clauses
+    ]
+    distinct = dict.fromkeys(shape for found in of_clause for shape in found)
+    sets = [shape for shape in distinct if isinstance(shape, LR)]
+    bands = [shape for shape in distinct if isinstance(shape, Band)]
+    ordered: list[Shape] = [*sets, *bands]
+    number = {shape: position for position, shape in enumerate(ordered)}
+    line = np.array([at_line[c.variable] if c.terms else 0 for c in clauses], np.int64)
+    members = [np.array([number[s] for s in found], np.int64) for found in of_clause]
+    slopes, edges = _slopes(sets), _edges(bands)
+    negated = np.array([clause.negated for clause in clauses])
+    with np.errstate(all="ignore"):
+        grid = _grid(line, members, slopes, edges, len(at_line))
+    tables = _tables(grid, line, members, slopes, edges)
+    lower, upper, start, candidates = tables
+    lower[negated], upper[negated] = 1.0 - upper[negated], 1.0 - lower[negated]
+    return Envelope(
+        grid,
+        line,
+        negated,
+        _outwards(lower, -np.inf).ravel(),
+        _outwards(upper, np.inf).ravel(),
+        start,
+        candidates,
+        slopes,
+        edges,
+    )
+
+
+def cells_of(grid: Grid, lines: FloatArray) -> IntArray:
+    """Return the cell of each value on its axis, of the shape of `lines`."""
+    half = grid.count / 2
+    z = lines - grid.centre
+    z /= grid.unit
+    far = np.abs(z)
+    far += 1.0
+    np.divide(half, far, out=far)
+    np.subtract(half, far, out=far)
+    np.copysign(far, z, out=far)
+    far += half
+    np.minimum(far, grid.count - 1, out=far)
+    return far.astype(np.int64)
+
+
+def cell_ends(grid: Grid, line: int) -> tuple[FloatArray, FloatArray]:
+    """Return numbers between which all values of each cell of an axis lie."""
+    share = np.linspace(-1.0, 1.0, grid.count + 1)
+    centre, unit = grid.centre[line, 0], grid.unit[line, 0]
+
+    def ends(moved: FloatArray, sign: float) -> FloatArray:
+        z = moved / (1.0 - np.abs(moved))
+        rounding = 8 * _EPS * (np.abs(centre) + np.abs(unit * z))
+        found: FloatArray = centre + unit * z + sign * rounding
+        return found
+
+    with np.errstate(all="ignore"):
+        low = np.append(-np.inf, ends(share[1:-1] - _CLOSE, -1.0))
+        high = np.append(ends(share[1:-1] + _CLOSE, 1.0), np.inf)
+    low = np.minimum(np.where(np.isnan(low), -np.inf, low), _LARGEST)
+    high = np.maximum(np.where(np.isnan(high), np.inf, high), -_LARGEST)
+    return low, high
+
+
+def exact_degrees(envelope: Envelope, entries: IntArray, x: FloatArray) -> FloatArray:
+    """Return degrees of clauses, bit-equal to the reference.
+
+    Args:
+        envelope: The envelope.
+        entries: `clause * cells + cell` of each, with the cell of its value.
+        x: The value of each clause's variable; finite.
+    """
+    if not len(entries):
+        return np.empty(0)
+    first = envelope.start.take(entries)
+    count = envelope.start.take(entries + 1) - first
+    owner, offset, begin = spread(count)
+    shape = envelope.candidates.take(first.take(owner) + offset).astype(np.int64)
+    degrees = _degrees(envelope, shape, x.take(owner))
+    found: FloatArray = np.maximum.reduceat(degrees, begin)
+    if envelope.negated.any():
+        negated = envelope.negated.take(entries // envelope.grid.count)
+        np.subtract(1.0, found, out=found, where=negated)
+    return found
+
+
+def spread(count: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return owner and offset of each of many members, and where each owner begins.
+
+    Example:
+        >>> owner, offset, begin = spread(np.array([2, 1]))
+        >>> owner.tolist(), offset.tolist(), begin.tolist()
+        ([0, 0, 1], [0, 1, 0], [0, 2])
+    """
+    owner = np.repeat(np.arange(len(count)), count)
+    begin = np.cumsum(count) - count
+    offset = np.arange(len(owner)) - begin.take(owner)
+    return owner, offset, begin
+
+
+def _degrees(envelope: Envelope, shape: IntArray, x: FloatArray) -> FloatArray:
+    sets = len(envelope.slopes.mean)
+    if not len(envelope.edges.low):
+        return _slope_degrees(envelope.slopes, shape, x)
+    found = np.empty(len(x))
+    is_set = shape < sets
+    mine = np.flatnonzero(is_set)
+    found[mine] = _slope_degrees(envelope.slopes, shape.take(mine), x.take(mine))
+    mine = np.flatnonzero(~is_set)
+    found[mine] = _edge_degrees(envelope.edges, shape.take(mine) - sets, x.take(mine))
+    return found
+
+
+def _slope_degrees(slopes: Slopes, shape: IntArray, x: FloatArray) -> FloatArray:
+    """Return degrees of LR sets by the side on which x lies; the other's is 1."""
+    d = x - slopes.mean.take(shape)
+    side = 2 * shape
+    side += d > 0
+    reach = slopes.reach.take(side)
+    u = np.abs(d, out=d)
+    u /= slopes.spread.take(side)
+    np.minimum(u, reach, out=u)
+    t = np.minimum(u, 1.0)
+    body = _body(slopes.curve.take(side, axis=1), t)
+    np.maximum(body, 0.0, out=body)
+    np.minimum(body, 1.0, out=body)
+    body *= _tail(reach, u)
+    return body
+
+
+def _body(curve: FloatArray, t: FloatArray) -> FloatArray:
+    v = t * 2.0
+    v -= 1.0
+    found = _horner(curve, v)
+    found *= t
+    np.subtract(1.0, found, out=found)
+    return found
+
+
+def _tail(reach: FloatArray, u: FloatArray) -> FloatArray:
+    w = reach - u
+    w /= reach - 1.0
+    np.minimum(w, 1.0, out=w)
+    w *= w
+    w *= w
+    return w
+
+
+def _horner(curve: FloatArray, x: FloatArray) -> FloatArray:
+    """Return c0 + x (c1 + ...); leading zeros change nothing."""
+    found = np.empty(np.broadcast_shapes(curve[-1].shape, x.shape))
+    found[:] = curve[-1]
+    for coefficient in curve[-2::-1]:
+        found *= x
+        found += coefficient
+    return found
+
+
+def _edge_degrees(edges: Edges, shape: IntArray, x: FloatArray) -> FloatArray:
+    is_left, is_right = x <= edges.low.take(shape), x > edges.high.take(shape)
+    side = 2 * shape
+    side += is_right
+    q = x - edges.end.take(side)
+    q /= edges.span.take(side)
+    np.maximum(q, 0.0, out=q)
+    np.minimum(q, 1.0, out=q)
+    p = _horner(edges.curve.take(side, axis=1), q)
+    p *= q
+    np.maximum(p, 0.0, out=p)
+    np.minimum(p, _CAP, out=p)
+    p[~(is_left | is_right)] = 1.0
+    return p
+
+
+def _slopes(sets: Sequence[LR]) -> Slopes:
+    sides: list[Side] = [s for shape in sets for s in (shape.left, shape.right)]
+    return Slopes(
+        np.array([shape.mean for shape in sets], np.float64),
+        np.array([side.spread for side in sides], np.float64),
+        np.array([side.reach for side in sides], np.float64),
+        _curves([side.curve for side in sides]),
+    )
+
+
+def _edges(bands: Sequence[Band]) -> Edges:
+    none = Flank(1.0, 0.0, (0.0,))
+    flanks = [flank or none for band in bands for flank in (band.left, band.right)]
+    lows = [-np.inf if band.low is None else band.low for band in bands]
+    highs = [np.inf if band.high is None else band.high for band in bands]
+    return Edges(
+        np.array(lows, np.float64),
+        np.array(highs, np.float64),
+        np.array([flank.end for flank in flanks], np.float64),
+        np.array([flank.start - flank.end for flank in flanks], np.float64),
+        _curves([flank.curve for flank in flanks]),
+    )
+
+
+def _curves(curves: Sequence[tuple[float, ...]]) -> FloatArray:
+    """Return a line for each power, low ones first, and a column for each curve."""
+    longest = max(map(len, curves), default=1)
+    found = np.zeros((longest, len(curves)))
+    for position, curve in enumerate(curves):
+        found[: len(curve), position] = curve
+    return found
+
+
+def _grid(
+    line: IntArray,
+    members: Sequence[IntArray],
+    slopes: Slopes,
+    edges: Edges,
+    axes: int,
+) -> Grid:
+    """Return cells that are narrow where means of sets and ends of bands are."""
+    sets = len(slopes.mean)
+    centre, unit = np.zeros((axes, 1)), np.ones((axes, 1))
+    for axis in range(axes):
+        mine = [members[clause] for clause in np.flatnonzero(line == axis).tolist()]
+        used = np.unique(np.concatenate([np.empty(0, np.int64), *mine]))
+        bands = used[used >= sets] - sets
+        marks = np.concatenate(
+            [slopes.mean[used[used < sets]], edges.low[bands], edges.high[bands]]
+        )
+        marks = marks[np.isfinite(marks)]
+        if len(marks):
+            centre[axis] = np.median(marks)
+            far = np.quantile(np.abs(marks - centre[axis]), _FAR)
+            widths = slopes.spread[2 * used[used < sets]]
+            far = max(far, np.median(widths)) if len(widths) else far
+            unit[axis] = far if np.isfinite(far) and far > 0 else 1.0
+    count = min(max(_ENTRIES // max(len(line), 1), _FEWEST), _MOST)
+    return Grid(centre, unit, count)
+
+
+def _tables(
+    grid: Grid,
+    line: IntArray,
+    members: Sequence[IntArray],
+    slopes: Slopes,
+    edges: Edges,
+) -> tuple[FloatArray, FloatArray, IntArray, npt.NDArray[np.int32]]:
+    """Return bounds of shape (clauses, cells), and the candidates of each entry."""
+    lower, upper = (np.empty((len(line), grid.count)) for _ in range(2))
+    counts = np.empty((len(line), grid.count), np.int64)
+    candidates: dict[int, npt.NDArray[np.int32]] = {}
+    for axis in np.unique(line):
+        mine = np.flatnonzero(line == axis)
+        used = np.unique(np.concatenate([members[clause] for clause in mine.tolist()]))
+        low, high = _shape_bounds(slopes, edges, used, cell_ends(grid, int(axis)))
+        for clause in mine.tolist():
+            at = np.searchsorted(used, members[clause])
+            tops = high.take(at, axis=0)
+            lower[clause] = low.take(at, axis=0).max(axis=0)
+            upper[clause] = tops.max(axis=0)
+            stays = (tops >= lower[clause]) & (tops > 0)
+            stays[0] |= ~stays.any(axis=0)
+            counts[clause] = stays.sum(axis=0)
+            which = np.nonzero(stays.T)[1]
+            candidates[clause] = members[clause].take(which).astype(np.int32)
+    start = np.append(0, np.cumsum(counts.ravel()))
+    ordered = [candidates[clause] for clause in range(len(line))]
+    return lower, upper, start, np.concatenate(ordered)
+
+
+def _shape_bounds(
+    slopes: Slopes, edges: Edges, used: IntArray, ends: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return bounds of shape (shapes, cells)."""
+    sets = len(slopes.mean)
+    chosen, bands = used[used < sets], used[used >= sets] - sets
+    with np.errstate(all="ignore"):
+        below = _side_bounds(slopes, chosen, 0, ends)
+        above = _side_bounds(slopes, chosen, 1, ends)
+        flat = _band_bounds(edges, bands, ends)
+    low = np.concatenate([np.minimum(below[0], above[0]), flat[0]])
+    high = np.concatenate([np.minimum(below[1], above[1]), flat[1]])
+    return np.nan_to_num(low, nan=0.0), np.nan_to_num(high, nan=1.0)
+
+
+def _side_bounds(
+    slopes: Slopes, sets: IntArray, which: int, ends: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    sides = 2 * sets + which
+    mean, reach = slopes.mean[sets, np.newaxis], slopes.reach[sides, np.newaxis]
+    scale = slopes.spread[sides, np.newaxis] * (1.0 if which else -1.0)
+    near, far = ends if which else ends[::-1]
+    u0, u1 = (np.clip((end - mean) / scale, 0.0, reach) for end in (near, far))
+    t0, t1 = np.minimum(u0, 1.0), np.minimum(u1, 1.0)
+    curve = slopes.curve.take(sides, axis=1)[:, :, np.newaxis]
+    powers = np.arange(1, len(curve) + 1)[:, np.newaxis, np.newaxis]
+    joined = curve + np.concatenate([curve[1:], np.zeros_like(curve[:1])])
+    bend = 2.0 * np.sum(powers * (powers - 1) * np.abs(joined), axis=0)
+    values = _body(curve, t0), _body(curve, t1)
+    low, high = _between(values, bend, t1 - t0, curve)
+    low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
+    return low * _tail(reach, u1), high * _tail(reach, u0)
+
+
+def _between(
+    values: tuple[FloatArray, FloatArray],
+    bend: FloatArray,
+    width: FloatArray,
+    curve: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return bounds of a polynomial from its values at the ends of a stretch.
+
+    Args:
+        values: The values at the ends.
+        bend: What its second derivative is at most, in size.
+        width: The length of the stretch.
+        curve: Its coefficients, a line for each power.
+    """
+    margin = 64 * _EPS * (1.0 + np.abs(curve).sum(axis=0))
+    slack = bend * (width * width) / 8.0 * (1.0 + 1e-9) + margin
+    return np.minimum(*values) - slack, np.maximum(*values) + slack
+
+
+def _band_bounds(
+    edges: Edges, bands: IntArray, ends: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    start, stop = ends
+    low, high = edges.low[bands, np.newaxis], edges.high[bands, np.newaxis]
+    is_core = (stop > low) & (start <= high)
+    bottom, top = np.where(is_core, 1.0, np.inf), np.where(is_core, 1.0, -np.inf)
+    for which, is_here in enumerate(((start <= low) & (low > -np.inf), stop > high)):
+        sides = 2 * bands + which
+        end, span = edges.end[sides, np.newaxis], edges.span[sides, np.newaxis]
+        q0, q1 = (np.clip((x - end) / span, 0.0, 1.0) for x in ends)
+        curve = edges.curve.take(sides, axis=1)[:, :, np.newaxis]
+        powers = np.arange(1, len(curve) + 1)[:, np.newaxis, np.newaxis]
+        bend = np.sum(powers * (powers - 1) * np.abs(curve), axis=0)
+        values = _horner(curve, q0) * q0, _horner(curve, q1) * q1
+        least, most = _between(values, bend, np.abs(q1 - q0), curve)
+        least, most = np.clip(least, 0.0, _CAP), np.clip(most, 0.0, _CAP)
+        bottom = np.where(is_here, np.minimum(bottom, least), bottom)
+        top = np.where(is_here, np.maximum(top, most), top)
+    return bottom, top
+
+
+def _outwards(bounds: FloatArray, towards: float) -> Singles:
+    """Return bounds in float32, not on the inner side of what they were."""
+    found = bounds.astype(np.float32)
+    is_inside = found < bounds if towards > 0 else found > bounds
+    moved = np.nextafter(found, np.float32(towards))
+    return np.where(is_inside, moved, found)
