@@ -1,123 +1,154 @@
-"""What learning costs: beside GaussianNB on a million rows, and with 10,000 classes.
+"""What learning costs: time beside GaussianNB's, memory, and very many classes.
 
-    python benchmarks/fit_cost.py [--rows 1000000] [--repeats 3] [--classes 10000]
-
-The first part gives the ratio to GaussianNB's fit on rows x 11 with 7 classes, both in
-this process, in turn, the fastest of each, and the most memory held beside the table.
-The second learns classes x 16 features, 10 rows a class, in a process of its own.
+Run it with `python benchmarks/fit_cost.py`. Times are medians of interleaved runs;
+memory is the largest that was allocated beyond the table.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
-import platform
+import multiprocessing
 import resource
-import subprocess
-import sys
+import statistics
 import time
 import tracemalloc
 from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from sklearn.naive_bayes import GaussianNB
 
-from fuzzytree.learning import Settings, learn_arrays
+from fuzzytree.learning import Learner, Settings, learn_arrays
 
-FEATURES, CLASSES = 11, 7
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+T = TypeVar("T")
 
-
-def overlapping(
-    rows: int, features: int, classes: int
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-    """Return normal classes around random centres, in a fixed order of rows."""
-    chance = np.random.default_rng(0)
-    codes = chance.integers(0, classes, rows)
-    codes[:classes] = np.arange(classes)
-    values = chance.normal(size=(rows, features))
-    values += chance.normal(scale=3.0, size=(classes, features))[codes]
-    return values, codes
-
-
-def peak_mib() -> float:
-    """Return the largest resident size of this process so far, in MiB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-def fastest(work: Callable[[], object]) -> float:
-    """Return the seconds that a piece of work takes."""
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
-
-
-def compare(rows: int, repeats: int) -> None:
-    """Print the ratio to GaussianNB and the memory above the table."""
-    values, codes = overlapping(rows, FEATURES, CLASSES)
-    names = [f"x{number}" for number in range(FEATURES)]
-    labels = [str(number) for number in range(CLASSES)]
-
-    def learn(**changes: object) -> object:
-        settings = Settings(**changes)  # type: ignore[arg-type]
-        return learn_arrays(
-            values, codes, columns=names, classes=labels, settings=settings
-        )
-
-    tracemalloc.start()
-    learn()
-    above = tracemalloc.get_traced_memory()[1] / 2**20
-    tracemalloc.stop()
-    ours: dict[str, float] = {}
-    peer = float("inf")
-    for _ in range(repeats):
-        peer = min(peer, fastest(lambda: GaussianNB().fit(values, codes)))
-        for name, changes in (
-            ("default", {}),
-            ("one pattern a class", {"patterns_per_class": 1}),
-            ("paper", {"mode": "paper"}),
-        ):
-            taken = fastest(lambda changes=changes: learn(**changes))  # type: ignore[misc]
-            ours[name] = min(ours.get(name, float("inf")), taken)
-    print(f"{rows} x {FEATURES}, {CLASSES} classes: GaussianNB {peer:.2f} s")
-    for name, seconds in ours.items():
-        print(f"  {name:<20} {seconds:6.2f} s  {seconds / peer:5.2f} times GaussianNB")
-    size = values.nbytes / 2**20
-    print(f"  most memory beside the table of {size:.0f} MiB: {above:.0f} MiB")
-
-
-def many(classes: int) -> None:
-    """Print what a tree of very many classes takes, in a process of its own."""
-    values, codes = overlapping(10 * classes, 16, classes)
-    names = [f"x{number}" for number in range(16)]
-    labels = [f"class {number}" for number in range(classes)]
-    start = time.perf_counter()
-    found = learn_arrays(values, codes, columns=names, classes=labels)
-    seconds = time.perf_counter() - start
-    print(
-        f"{classes} classes x 16, {len(values)} rows: {seconds:.1f} s, "
-        f"{len(found.tree.leaves)} leaves, peak {peak_mib():.0f} MiB"
-    )
+ROWS, COLUMNS, CLASSES = 1_000_000, 11, 7
+MANY, MANY_COLUMNS, MANY_ROWS = 10_000, 16, 20
+REPEATS = 3
 
 
 def main() -> None:
-    """Print both parts."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rows", type=int, default=1_000_000)
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--classes", type=int, default=10_000)
-    parser.add_argument("--many", action="store_true", help=argparse.SUPPRESS)
-    chosen = parser.parse_args()
-    if chosen.many:
-        many(chosen.classes)
-        return
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-    print(
-        f"Python {platform.python_version()}, numpy {np.__version__}, load {load:.1f}"
+    """Print the costs."""
+    for text, gap in (("apart", 2.0), ("overlapping", 0.5), ("noise", 0.0)):
+        print(f"{ROWS:,} x {COLUMNS}, {CLASSES} classes, {text}")
+        values, labels = gaussian_classes(ROWS, COLUMNS, CLASSES, gap)
+        for line in ratios(values, labels):
+            print(f"  {line}", flush=True)
+    print(f"  memory beyond the table: {memory_of_large():.0f} MB")
+    print(f"{MANY:,} classes x {MANY_COLUMNS} features, {MANY_ROWS} rows each")
+    for task in (many_default, many_paper):
+        mode, seconds, peak_gb = in_a_process(task)
+        print(f"  {mode}: {seconds:.1f} s, peak of the process {peak_gb:.2f} GB")
+
+
+def ratios(values: FloatArray, labels: IntArray) -> list[str]:
+    """Return the time of each way to learn, as a ratio to GaussianNB's fit."""
+    ways: dict[str, Callable[[], object]] = {
+        "GaussianNB": lambda: GaussianNB().fit(values, labels),
+        "default": lambda: learn(values, labels, Settings()),
+        "one pattern a class": lambda: learn(
+            values, labels, Settings(patterns_per_class=1)
+        ),
+        "paper": lambda: learn(values, labels, Settings(mode="paper")),
+        "partial_fit, 100 chunks": lambda: learn_in_chunks(values, labels, 100),
+    }
+    taken: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(REPEATS):
+        for name, run in ways.items():
+            start = time.perf_counter()
+            run()
+            taken[name].append(time.perf_counter() - start)
+    base = statistics.median(taken["GaussianNB"])
+    return [
+        f"{name:24s} {statistics.median(times):6.2f} s "
+        f"{statistics.median(times) / base:6.2f} x GaussianNB"
+        for name, times in taken.items()
+    ]
+
+
+def names(letter: str, count: int) -> list[str]:
+    """Return `a1`, `a2`, ..."""
+    return [f"{letter}{k}" for k in range(1, count + 1)]
+
+
+def learn(values: FloatArray, labels: IntArray, settings: Settings) -> int:
+    """Learn at once and return the number of leaves."""
+    columns = names("x", values.shape[1])
+    classes = names("c", int(labels.max()) + 1)
+    found = learn_arrays(
+        values, labels, columns=columns, classes=classes, settings=settings
     )
-    compare(chosen.rows, chosen.repeats)
-    command = [sys.executable, __file__, "--many", "--classes", str(chosen.classes)]
-    subprocess.run(command, check=True)
+    return len(found.tree.leaves)
+
+
+def learn_in_chunks(values: FloatArray, labels: IntArray, chunks: int) -> int:
+    """Learn chunk by chunk and return the number of leaves."""
+    columns = names("x", values.shape[1])
+    learner = Learner(columns, names("c", int(labels.max()) + 1))
+    for rows, codes in zip(
+        np.array_split(values, chunks), np.array_split(labels, chunks), strict=True
+    ):
+        learner.partial_fit(rows, codes)
+    return len(learner.finish().tree.leaves)
+
+
+def gaussian_classes(
+    rows: int, columns: int, classes: int, gap: float
+) -> tuple[FloatArray, IntArray]:
+    """Return gaussian classes whose centres have a spread of `gap`."""
+    rng = np.random.default_rng(0)
+    centres = rng.normal(0, 1, (classes, columns)) * gap
+    labels = rng.integers(0, classes, rows)
+    return rng.normal(size=(rows, columns)) + centres[labels], labels
+
+
+def memory_of_large() -> float:
+    """Return the largest memory that learning allocates beyond the table, in MB."""
+    values, labels = gaussian_classes(ROWS, COLUMNS, CLASSES, 0.5)
+    tracemalloc.start()
+    learn(values, labels, Settings())
+    return tracemalloc.get_traced_memory()[1] / 2**20
+
+
+def many(settings: Settings) -> tuple[str, float, float]:
+    """Return mode, seconds and peak GB of learning very many classes."""
+    rng = np.random.default_rng(0)
+    centres = rng.normal(size=(MANY, MANY_COLUMNS))
+    labels = np.repeat(np.arange(MANY), MANY_ROWS)
+    values = centres[labels] + 0.1 * rng.normal(size=(len(labels), MANY_COLUMNS))
+    start = time.perf_counter()
+    learn(values, labels, settings)
+    seconds = time.perf_counter() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return settings.mode, seconds, peak / 2**20
+
+
+def many_default() -> tuple[str, float, float]:
+    """Return the cost of very many classes in default mode."""
+    return many(Settings())
+
+
+def many_paper() -> tuple[str, float, float]:
+    """Return the cost of very many classes in paper mode."""
+    return many(Settings(mode="paper"))
+
+
+def in_a_process(task: Callable[[], T]) -> T:
+    """Return what a task returns, run in a fresh process."""
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=_answer, args=(there, task))
+    process.start()
+    result: T = here.recv()
+    process.join()
+    return result
+
+
+def _answer(pipe: Connection, task: Callable[[], object]) -> None:
+    pipe.send(task())
 
 
 if __name__ == "__main__":

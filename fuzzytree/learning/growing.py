@@ -23,7 +23,7 @@ from fuzzytree.learning.sketch import Axis, Sketch, Split, single
 _CLEAN = 0.005
 _CLEAN_FACTOR = 8.0
 _NODE_ROWS = 20_000
-_SINGLES = 24
+_SINGLES = 6
 
 
 @dataclass(frozen=True)
@@ -280,10 +280,23 @@ def _alternatives(
     """Return single features worth a look where a combination errs much."""
     if error <= 0.1 * task.smaller:
         return []
-    features = patterns.combinable
-    if len(features) > _SINGLES:
-        share = view.weights / view.weights.sum()
-        step = np.abs(share[is_right] @ view.means[is_right])
-        power = np.maximum(step, np.abs(share[~is_right] @ view.means[~is_right]))
-        features = features[np.argsort(-power, kind="stable")[:_SINGLES]]
-    return [int(feature) for feature in features]
+    apart = _apart(view, is_right)
+    best = np.argsort(-apart, kind="stable")[:_SINGLES]
+    return [int(feature) for feature in patterns.combinable[best]]
+
+
+def _apart(view: NodeView, is_right: BoolArray) -> FloatArray:
+    """Return how much two sides differ on each feature, in mean and in spread."""
+    variances = np.einsum("pii->pi", view.scatter)
+    second = view.means**2 + variances
+    means: list[FloatArray] = []
+    spreads: list[FloatArray] = []
+    for side in (~is_right, is_right):
+        share = view.weights[side] / view.weights[side].sum()
+        rows = second[side] if len(second) == len(side) else second[:1]
+        middle = share @ view.means[side]
+        square = (share @ rows if len(rows) == len(share) else rows[0]) - middle**2
+        means.append(middle)
+        spreads.append(np.sqrt(np.maximum(square, 1e-6)))
+    by_mean = np.abs(means[1] - means[0]) / (spreads[0] + spreads[1])
+    return by_mean + np.abs(np.log(spreads[1] / spreads[0]))

@@ -43,8 +43,9 @@ _CLASSES_APART = 8
 _VALUES = 100_000
 _GOOD_ENOUGH = 0.01
 _SURE = 1.3
+_PATIENCE = 3
 _BUDGET = 2_000.0
-_BUDGET_LARGE = 500.0
+_BUDGET_LARGE = 220.0
 _LARGE = 4_000_000
 
 Progress = Callable[[str, float], None]
@@ -245,7 +246,8 @@ class _Trials:
     Attributes:
         folds: Rows to learn from and to answer.
         tell: Hears of the progress.
-        budget: How much work may be done, about in milliseconds.
+        budget: How much work may be done: patterns of the trees grown, more for
+            larger folds; a millisecond or a few each.
         spent: How much was done.
     """
 
@@ -266,16 +268,15 @@ class _Trials:
         for place, fold in enumerate(self.folds[:folds]):
             if (key, place) not in self.known:
                 self.known[key, place] = _answered(fold, numbers, rules)
-                size = fold.sample.rows.size
-                self.spent += sum(numbers) * (1.0 + size / 20_000)
+                self.spent += _work(fold, numbers)
                 self.tell("choosing", min(1.0, self.spent / self.budget))
             parts.append(self.known[key, place])
         return np.concatenate(parts)
 
-    @property
-    def is_over(self) -> bool:
-        """Return whether the work is done or too much."""
-        return self.spent >= self.budget
+    def affords(self, numbers: Numbers) -> bool:
+        """Return whether trees with so many patterns may still be tried."""
+        work = sum(_work(fold, numbers) for fold in self.folds)
+        return self.spent + work <= self.budget
 
     def prefers(
         self, richer: tuple[Numbers, GrowthRules], simpler: tuple[Numbers, GrowthRules]
@@ -291,6 +292,10 @@ class _Trials:
             if won - lost <= least * np.sqrt(won + lost):
                 return False
         return True
+
+
+def _work(fold: _Fold, numbers: Numbers) -> float:
+    return sum(numbers) * (1.0 + fold.sample.rows.size / 20_000)
 
 
 def _answered(fold: _Fold, numbers: Numbers, rules: GrowthRules) -> BoolArray:
@@ -309,11 +314,11 @@ def _best_numbers(trials: _Trials, rules: GrowthRules, moments: Moments) -> Numb
     failures = 0
     for number in LADDER[1:]:
         is_good = trials.right(best, rules).mean() >= 1.0 - _GOOD_ENOUGH
-        if number * present > _MOST_PATTERNS or failures == 2:
+        if number * present > _MOST_PATTERNS or failures == _PATIENCE:
             break
-        if is_good or trials.is_over:
-            return best
         numbers = tuple(int(min(number, limit)) for limit in limits)
+        if is_good or not trials.affords(numbers):
+            return best
         is_better = trials.prefers((numbers, rules), (best, rules))
         best, failures = (numbers, 0) if is_better else (best, failures + 1)
     if present <= _CLASSES_APART:
@@ -332,9 +337,9 @@ def _class_by_class(
         for step in (-1, 1):
             other = min(max(place + step, 0), len(LADDER) - 1)
             number = int(min(LADDER[other], limits[code]))
-            if number == best[code] or trials.is_over:
-                continue
             numbers = (*best[:code], number, *best[code + 1 :])
+            if number == best[code] or not trials.affords(numbers):
+                continue
             if step > 0:
                 is_better = trials.prefers((numbers, rules), (best, rules))
             else:
