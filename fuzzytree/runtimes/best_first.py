@@ -10,11 +10,11 @@ their axes (`envelope.py`), which are looked up and not computed:
 1. Each row follows its best branches down to a rule. The lower bounds met are a lower
    bound of that rule's strength; the largest upper bound left aside bounds all others.
    Where that is smaller, the rule is the winner.
-2. For the other rows that strength is computed, from the few terms that can be the
-   largest of their clause in the row's cell.
-3. Where another branch may still reach it, all branches are followed whose upper
-   bounds do, and the strengths of the rules at their ends are compared. Rows with too
-   many of them are fired.
+2. For the other rows all branches are followed whose upper bounds reach that. Where
+   only one rule is left, it is the winner.
+3. Else the strengths of those rules are computed, from the few terms that can be the
+   largest of their clause in the row's cell, and compared. Rows with too many such
+   branches are fired.
 
 Where the plateaus of each node's branches are disjoint and cover the axis (relative
 rules), nothing can reach the branch with degree 1: the search is a descent.
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 _CHUNK = 1 << 13  # rows: their cells shall stay in the cache
 _PAIRS = 1 << 11  # rows and rules whose strengths are computed together
-_WIDEST = 1 << 18  # branches that are followed together
+_WIDEST = 1 << 20  # branches that are followed together
 _CROWD = 16  # branches of a row, or a share of all rules, from which it is fired
 _SHARE = 8
 _ALWAYS = Clause("", ())
@@ -86,6 +86,7 @@ class Net:
         begin: Where each rule's path begins, from rule 1.
         length: Its length.
         envelope: Bounds and degrees of the clauses.
+        is_split: Whether all branches of each fork ask for the same axis.
         is_product: Whether degrees are multiplied.
     """
 
@@ -99,6 +100,7 @@ class Net:
     begin: IntArray
     length: IntArray
     envelope: Envelope
+    is_split: bool
     is_product: bool
 
 
@@ -122,6 +124,25 @@ class Rows:
         found = self.cells.take(self.places(net, branch, row))
         found += net.entry.take(branch)
         return found
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Rows at forks, and bounds of the strength of the way there."""
+
+    row: IntArray
+    fork: IntArray
+    low: FloatArray
+    high: FloatArray
+
+    def take(self, which: IntArray) -> Places:
+        """Return some of them."""
+        return Places(
+            self.row.take(which),
+            self.fork.take(which),
+            self.low.take(which),
+            self.high.take(which),
+        )
 
 
 def search(rules: RuleBase) -> Run:
@@ -277,6 +298,7 @@ def _net(rules: RuleBase, forks: Sequence[Fork], at_line: dict[str, int]) -> Net
         np.cumsum(length) - length,
         length,
         envelope,
+        all(len({c.variable for c, _ in part}) <= 1 for part in branches),
         rules.semantics.conjunction == "product",
     )
 
@@ -301,20 +323,15 @@ def _search(net: Net, lines: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
     rule, floor, rival = _run_down(net, rows)
     status = np.zeros(lines.shape[1], np.int64)
     unsure = np.flatnonzero(rival >= floor)
-    if not len(unsure):
-        return rule, status, unsure
-    strength = _strengths(net, rows, unsure, rule.take(unsure))
-    floor[unsure] = strength
-    none = unsure[strength == 0]
-    rule[none], status[none] = 0, 2
-    unsure = unsure[(rival.take(unsure) >= strength) & (rival.take(unsure) > 0)]
-    crowded: list[IntArray] = []
+    vague = unsure[floor.take(unsure) == 0]
+    floor[vague] = _strengths(net, rows, vague, rule.take(vague))
+    rule[unsure], status[unsure] = 0, 2
+    crowded: list[IntArray] = [unsure[:0]]
     size = max(_WIDEST // len(net.length), 1)
     for start in range(0, len(unsure), size):
-        row, ends, many = _reachable(net, rows, floor, unsure[start : start + size])
-        _compare(rule, status, row, ends, _strengths(net, rows, row, ends))
-        crowded.append(many)
-    return rule, status, np.concatenate([unsure[:0], *crowded])
+        part = unsure[start : start + size]
+        crowded.append(_follow(net, rows, (rule, status, floor), part))
+    return rule, status, np.concatenate(crowded)
 
 
 def _run_down(net: Net, rows: Rows) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -352,13 +369,16 @@ def _best(
     """Return the branch with the largest bound, its entry, the bound and the next."""
     upper = net.envelope.upper
     first, last = net.first.take(fork), net.count.take(fork) - 1
-    branch, entry = first.copy(), rows.entries(net, first, row)
+    cell = rows.cells.take(rows.places(net, first, row))
+    branch, entry = first.copy(), cell + net.entry.take(first)
     best = upper.take(entry).astype(np.float64)
     second = np.zeros(len(row))
     fewest = int(last.min())
     for position in range(1, int(last.max()) + 1):
         other = first + np.minimum(last, position)
-        other_entry = rows.entries(net, other, row)
+        if not net.is_split:
+            cell = rows.cells.take(rows.places(net, other, row))
+        other_entry = cell + net.entry.take(other)
         bound = upper.take(other_entry)
         if position > fewest:
             bound[last < position] = 0.0
@@ -374,34 +394,70 @@ def _join(net: Net, before: FloatArray, degree: FloatArray) -> FloatArray:
     return before * degree if net.is_product else np.minimum(before, degree)
 
 
-def _reachable(
-    net: Net, rows: Rows, floor: FloatArray, row: IntArray
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Return pairs of row and rule whose upper bound is not below the row's floor.
+def _follow(
+    net: Net,
+    rows: Rows,
+    found: tuple[IntArray, IntArray, FloatArray],
+    unsure: IntArray,
+) -> IntArray:
+    """Enter rule and status of some rows; return those to be fired.
 
-    Rows with too many branches at once come third, and in no pair.
+    Args:
+        net: The forks.
+        rows: All rows.
+        found: The rule and the status of each row, and a lower bound of its strength,
+            which is raised.
+        unsure: The rows to do.
+    """
+    rule, status, floor = found
+    ends, crowded = _reachable(net, rows, floor, unsure)
+    np.maximum.at(floor, ends.row, ends.low)
+    ends = ends.take(np.flatnonzero(ends.high >= floor.take(ends.row)))
+    count = np.bincount(ends.row, minlength=len(floor))
+    is_sure = (count.take(ends.row) == 1) & (ends.low > 0)
+    sure, others = (ends.take(np.flatnonzero(part)) for part in (is_sure, ~is_sure))
+    rule[sure.row], status[sure.row] = net.rule.take(sure.fork), 0
+    numbers = net.rule.take(others.fork)
+    strength = _strengths(net, rows, others.row, numbers)
+    _compare(rule, status, others.row, numbers, strength)
+    return crowded
+
+
+def _reachable(
+    net: Net, rows: Rows, floor: FloatArray, unsure: IntArray
+) -> tuple[Places, IntArray]:
+    """Return the ends that some rows may reach with their floor at least.
+
+    Rows with too many branches at once come second, and are at no end.
     """
     limit = max(_CROWD, len(net.length) // _SHARE)
     is_crowded = np.zeros(len(floor), np.bool_)
-    ends: list[tuple[IntArray, IntArray]] = [(row[:0], row[:0])]
-    fork, high = np.zeros(len(row), np.int64), np.ones(len(row))
-    while len(row):
-        owner, offset, _ = spread(net.count.take(fork))
-        row, branch = row.take(owner), net.first.take(fork).take(owner) + offset
-        bound = net.envelope.upper.take(rows.entries(net, branch, row))
-        high = _join(net, high.take(owner), bound.astype(np.float64))
-        stay = np.flatnonzero((high >= floor.take(row)) & (high > 0))
-        row, high = row.take(stay), high.take(stay)
+    ones = np.ones(len(unsure))
+    here = Places(unsure, np.zeros(len(unsure), np.int64), ones, ones)
+    ends = [here.take(unsure[:0])]
+    while len(here.row):
+        owner, offset, _ = spread(net.count.take(here.fork))
+        here = here.take(owner)
+        branch = net.first.take(here.fork) + offset
+        entry = rows.entries(net, branch, here.row)
+        high = _join(net, here.high, net.envelope.upper.take(entry).astype(np.float64))
+        stay = np.flatnonzero((high >= floor.take(here.row)) & (high > 0))
+        low = net.envelope.lower.take(entry.take(stay)).astype(np.float64)
+        low = _join(net, here.low.take(stay), low)
         fork = net.target.take(branch.take(stay))
-        is_crowded |= np.bincount(row, minlength=len(floor)) > limit
-        rule = net.rule.take(fork)
-        done = np.flatnonzero(rule)
-        ends.append((row.take(done), rule.take(done)))
-        stay = np.flatnonzero((rule == 0) & ~is_crowded.take(row))
-        row, fork, high = row.take(stay), fork.take(stay), high.take(stay)
-    row, rule = (np.concatenate(parts) for parts in zip(*ends, strict=True))
-    stay = np.flatnonzero(~is_crowded.take(row))
-    return row.take(stay), rule.take(stay), np.flatnonzero(is_crowded)
+        here = Places(here.row.take(stay), fork, low, high.take(stay))
+        is_crowded |= np.bincount(here.row, minlength=len(floor)) > limit
+        is_end = net.rule.take(fork) > 0
+        ends.append(here.take(np.flatnonzero(is_end)))
+        here = here.take(np.flatnonzero(~is_end & ~is_crowded.take(here.row)))
+    joined = Places(
+        np.concatenate([part.row for part in ends]),
+        np.concatenate([part.fork for part in ends]),
+        np.concatenate([part.low for part in ends]),
+        np.concatenate([part.high for part in ends]),
+    )
+    stay = np.flatnonzero(~is_crowded.take(joined.row))
+    return joined.take(stay), np.flatnonzero(is_crowded)
 
 
 def _compare(
