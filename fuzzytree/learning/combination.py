@@ -21,6 +21,7 @@ from fuzzytree.learning.sketch import Axis, single
 _ROUNDS = 10
 _PLACES = 32
 _MANY = 48
+_OWN = 1e-12
 
 
 @dataclass(frozen=True)
@@ -205,7 +206,7 @@ def selected_features(
     power = 0.0
     for _ in range(min(most, len(step))):
         variances = np.einsum("ii->i", rest)
-        is_free = variances > 1e-6 * original
+        is_free = variances > _OWN * original
         is_free[selected] = False
         gains = np.where(is_free, step**2 / np.where(is_free, variances, 1.0), 0.0)
         best = int(np.argmax(gains / costs))

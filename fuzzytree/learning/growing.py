@@ -24,6 +24,8 @@ _CLEAN = 0.005
 _CLEAN_FACTOR = 8.0
 _NODE_ROWS = 20_000
 _SINGLES = 6
+_POOR = 0.1
+_FINE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -218,6 +220,11 @@ def _members(patterns: Patterns, chosen: IntArray) -> IntArray:
 def _combined_split(
     patterns: Patterns, chosen: IntArray, rules: GrowthRules
 ) -> Split | None:
+    """Split in two by a combination; where it errs much, look further.
+
+    Then the scatter is shrunk next to nothing, for features that are equal up to a
+    small difference, and single features are tried, for groups that differ in spread.
+    """
     view = node_view(patterns, chosen, rules.shrinkage)
     is_right = best_bipartition(view)
     if is_right.all() or not is_right.any():
@@ -230,15 +237,14 @@ def _combined_split(
         side[patterns.owners[members]],
         patterns.row_weights[members],
     )
-    selected = selected_features(
-        view,
-        is_right,
-        rows=float(len(members)),
-        entry=rules.entry,
-        costs=rules.costs[patterns.combinable],
-    )
-    axis = combined_axis(patterns, view, is_right, selected)
+    axis = _fisher_axis(patterns, view, is_right, len(members), rules)
     cuts, error = _placed(axis, task)
+    if error > _POOR * task.smaller:
+        view = node_view(patterns, chosen, rules.shrinkage * _FINE)
+        other = _fisher_axis(patterns, view, is_right, len(members), rules)
+        found, lower = _placed(other, task)
+        if lower < error - 0.02 * task.smaller:
+            axis, cuts, error = other, found, lower
     for feature in _alternatives(patterns, view, is_right, error, task):
         other = single(feature)
         found, lower = _placed(other, task)
@@ -246,6 +252,23 @@ def _combined_split(
             axis, cuts, error = other, found, lower
     groups = (chosen[~is_right], chosen[is_right])
     return finished_split(patterns, axis, cuts, groups)
+
+
+def _fisher_axis(
+    patterns: Patterns,
+    view: NodeView,
+    is_right: BoolArray,
+    rows: int,
+    rules: GrowthRules,
+) -> Axis:
+    selected = selected_features(
+        view,
+        is_right,
+        rows=float(rows),
+        entry=rules.entry,
+        costs=rules.costs[patterns.combinable],
+    )
+    return combined_axis(patterns, view, is_right, selected)
 
 
 @dataclass(frozen=True)
@@ -278,7 +301,7 @@ def _alternatives(
     task: _Task,
 ) -> list[int]:
     """Return single features worth a look where a combination errs much."""
-    if error <= 0.1 * task.smaller:
+    if error <= _POOR * task.smaller:
         return []
     apart = _apart(view, is_right)
     best = np.argsort(-apart, kind="stable")[:_SINGLES]
@@ -293,9 +316,8 @@ def _apart(view: NodeView, is_right: BoolArray) -> FloatArray:
     spreads: list[FloatArray] = []
     for side in (~is_right, is_right):
         share = view.weights[side] / view.weights[side].sum()
-        rows = second[side] if len(second) == len(side) else second[:1]
         middle = share @ view.means[side]
-        square = (share @ rows if len(rows) == len(share) else rows[0]) - middle**2
+        square = share @ second[side] - middle**2
         means.append(middle)
         spreads.append(np.sqrt(np.maximum(square, 1e-6)))
     by_mean = np.abs(means[1] - means[0]) / (spreads[0] + spreads[1])

@@ -98,6 +98,10 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"not {per_class!r}",
             ),
         ]
+        known = ("alpha", "l_max", "shrinkage", "entry")
+        for choice in self.choices:
+            text = f"choices are {', '.join(map(repr, known[:-1]))} and 'entry'"
+            claims.append((choice in known, f"{text}, not {choice!r}"))
         for name, number in named.items():
             of = f" of class {name!r}" if name else ""
             text = f"patterns_per_class{of} is at least 1, not {number!r}"

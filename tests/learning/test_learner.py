@@ -1,294 +1,443 @@
-"""What a person relies on when a tree is learnt."""
+"""Learning from tables: trees, reports, chunks and bad input."""
 
+from __future__ import annotations
+
+import itertools
+from typing import Any, Literal
+
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
 from sklearn import datasets
 from sklearn.model_selection import StratifiedKFold
 
-from fuzzytree.cells import node_faults
+from fuzzytree.cells import grid
 from fuzzytree.errors import LearningError
-from fuzzytree.learning import Learner, LearningReport, Settings, learn_arrays
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import descend, evaluate
 from fuzzytree.tree import FuzzyTree
 
-Values = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.int64]
+Mode = Literal["default", "paper"]
+MODES: tuple[Mode, ...] = ("default", "paper")
 
 
-def learnt(values: Values, codes: Codes, **changes: object) -> FuzzyTree:
-    return both(values, codes, **changes)[0]
+def learn(
+    values: npt.NDArray[np.generic],
+    labels: npt.NDArray[np.generic],
+    settings: Settings | None = None,
+    **others: Any,
+) -> Learnt:
+    columns = [f"x{k}" for k in range(values.shape[1])]
+    classes = [f"c{k}" for k in range(int(labels.max(initial=0)) + 1)]
+    arguments: dict[str, Any] = {"columns": columns, "classes": classes, **others}
+    return learn_arrays(values, labels, settings=settings, **arguments)
 
 
-def both(
-    values: Values, codes: Codes, **changes: object
-) -> tuple[FuzzyTree, LearningReport]:
-    found = learn_arrays(
-        values,
-        codes,
-        columns=[f"x{number}" for number in range(values.shape[1])],
-        classes=[str(number) for number in range(int(codes.max()) + 1)],
-        settings=Settings(**changes),  # type: ignore[arg-type]
-    )
-    return found.tree, found.report
-
-
-def answers(tree: FuzzyTree, values: Values) -> Codes:
-    columns = [int(name.removeprefix("x")) for name in tree.inputs]
-    rules = find_runtime("native").load(tree)(values.T[columns]).rule
-    return np.array([int(leaf.label) for leaf in tree.leaves])[rules - 1]
-
-
-def blobs(rows: int = 300, classes: int = 3) -> tuple[Values, Codes]:
-    chance = np.random.default_rng(1)
-    codes = np.arange(rows) % classes
-    values = (
-        chance.normal(size=(rows, 4)) + 2.5 * chance.normal(size=(classes, 4))[codes]
-    )
-    return values, codes
-
-
-def accuracy(values: Values, codes: Codes, **changes: object) -> tuple[float, float]:
-    """Return percent right over 10 folds, and the spread over the folds."""
-    shares = []
-    right = 0
-    folds = StratifiedKFold(10, shuffle=True, random_state=0)
-    for train, test in folds.split(values, codes):
-        tree = learnt(values[train], codes[train], **changes)
-        hits = answers(tree, values[test]) == codes[test]
-        right += int(hits.sum())
-        shares.append(100 * hits.mean())
-    return 100 * right / len(codes), float(np.std(shares))
-
-
-TABLES = {
-    "iris": datasets.load_iris,
-    "wine": datasets.load_wine,
-    "breast cancer": datasets.load_breast_cancer,
-    "digits": datasets.load_digits,
-}
-
-
-@pytest.mark.parametrize(
-    ("name", "published"),
-    [("iris", 95.3), ("wine", 87.6), ("breast cancer", 87.0), ("digits", 32.4)],
-)
-def test_paper_mode_reproduces_the_paper_within_a_folds_spread(
-    name: str, published: float
-) -> None:
-    found, spread = accuracy(*TABLES[name](return_X_y=True), mode="paper")
-    assert abs(found - published) <= spread
-
-
-@pytest.mark.parametrize(
-    ("name", "least"),
-    [
-        ("iris", 96.5),
-        ("wine", 97.5),
-        ("breast cancer", 96.0),
-        pytest.param("digits", 95.0, marks=pytest.mark.heavy),
-    ],
-)
-def test_the_default_mode_is_as_accurate_as_promised(name: str, least: float) -> None:
-    found, _ = accuracy(*TABLES[name](return_X_y=True))
-    assert found >= least
-
-
-@pytest.mark.parametrize("name", ["iris", "wine", "breast cancer"])
-@pytest.mark.parametrize("mode", ["paper", "default"])
-def test_there_is_at_most_one_leaf_for_a_pattern(name: str, mode: str) -> None:
-    tree, report = both(*TABLES[name](return_X_y=True), mode=mode)
-    assert len(tree.leaves) <= sum(report.patterns.values())
-    assert len(report.features_per_node) == len(tree.nodes)
-    assert not list(node_faults(tree))
-
-
-def test_paper_mode_asks_one_feature_in_each_node() -> None:
-    tree = learnt(*TABLES["wine"](return_X_y=True), mode="paper")
-    assert not any(variable.parts for variable in tree.variables)
-
-
-@pytest.mark.parametrize("sizes", [(1,), (7, 100, 3), (299,), (64, 64)])
-def test_the_tree_does_not_depend_on_the_chunks(sizes: tuple[int, ...]) -> None:
-    values, codes = blobs()
-    whole = learnt(values, codes)
-    learner = Learner(
-        columns=[f"x{k}" for k in range(4)], classes=[str(k) for k in range(3)]
-    )
-    start, turn = 0, 0
-    while start < len(values):
-        end = start + sizes[turn % len(sizes)]
-        learner.partial_fit(values[start:end], codes[start:end])
-        start, turn = end, turn + 1
-    assert learner.finish().tree == whole
-
-
-def test_the_tree_does_not_depend_on_the_memory_order() -> None:
-    values, codes = blobs()
-    assert learnt(np.asfortranarray(values), codes) == learnt(values, codes)
-
-
-def test_the_same_table_gives_the_same_tree() -> None:
-    values, codes = blobs()
-    assert learnt(values, codes) == learnt(values, codes)
-
-
-def test_merged_learners_count_what_both_have_seen() -> None:
-    values, codes = blobs()
-    halves = []
-    for part in (slice(0, 150), slice(150, 300)):
-        learner = Learner(columns=list("abcd"), classes=list("012"))
-        learner.partial_fit(values[part], codes[part])
-        halves.append(learner)
-    assert halves[0].merge(halves[1]).finish().report.rows == 300
-
-
-@pytest.mark.parametrize("power", [-300, -40, 40, 200])
-def test_powers_of_two_change_no_answer(power: int) -> None:
-    values, codes = blobs()
-    plain = learnt(values, codes, mode="paper")
-    moved = learnt(values * 2.0**power, codes, mode="paper")
-    assert [node.variable for node in moved.nodes] == [
-        node.variable for node in plain.nodes
+def answers(tree: FuzzyTree, values: FloatArray) -> list[str | None]:
+    return [
+        descend(tree, dict(zip(tree.columns, row, strict=True))).label
+        for row in values.tolist()
     ]
-    found = answers(moved, values * 2.0**power)
-    assert found.tolist() == answers(plain, values).tolist()
 
 
-def test_features_far_apart_in_scale_are_learnt_alike() -> None:
-    values, codes = blobs()
-    wide = values * np.array([1e-12, 1.0, 1e6, 1e12])
-    right = (answers(learnt(wide, codes), wide) == codes).mean()
-    assert right >= (answers(learnt(values, codes), values) == codes).mean() - 0.01
+def accuracy(tree: FuzzyTree, values: FloatArray, labels: IntArray) -> float:
+    right = [
+        answer == f"c{label}"
+        for answer, label in zip(answers(tree, values), labels, strict=True)
+    ]
+    return float(np.mean(right))
 
 
-def test_a_narrow_class_inside_a_wide_one_gets_two_cuts() -> None:
-    chance = np.random.default_rng(0)
-    values = np.concatenate([chance.normal(size=200) * 10, chance.normal(size=200)])
-    codes = np.repeat([0, 1], 200)
-    tree = learnt(values[:, None], codes)
-    assert any(len(node.cuts) == 2 for node in tree.nodes)
-    assert (answers(tree, values[:, None]) == codes).mean() > 0.85
+def blobs(rows: int = 100, gap: float = 3.0) -> tuple[FloatArray, IntArray]:
+    rng = np.random.default_rng(0)
+    labels = np.repeat([0, 1], rows)
+    return rng.normal(size=(2 * rows, 3)) + gap * labels[:, None], labels
 
 
-def test_a_class_of_two_shapes_is_told_from_what_lies_between() -> None:
-    chance = np.random.default_rng(0)
-    values = chance.uniform(-1, 1, (600, 2))
-    codes = ((values > 0).sum(axis=1) % 2).astype(np.int64)
-    tree, report = both(values, codes)
-    assert (answers(tree, values) == codes).mean() > 0.95
-    assert sum(report.patterns.values()) >= 4
+@pytest.mark.parametrize("mode", MODES)
+def test_relative_rules_answer_like_the_tree_and_raw_rules_exist(mode: Mode) -> None:
+    values, labels = datasets.load_wine(return_X_y=True)
+    tree = learn(values, labels, Settings(mode=mode)).tree
+    relative = rules_from_tree(tree)
+    assert len(rules_from_tree(tree, "raw").rules) == len(tree.leaves)
+    for row in values[::5].tolist():
+        named = dict(zip(tree.columns, row, strict=True))
+        assert evaluate(relative, named).rule == descend(tree, named).rule
 
 
-def test_patterns_can_be_set_class_by_class() -> None:
-    values, codes = blobs()
-    _, report = both(values, codes, patterns_per_class={"1": 3})
-    assert report.patterns == {"0": 1, "1": 3, "2": 1}
+@pytest.mark.parametrize("mode", MODES)
+def test_the_same_table_gives_the_same_tree(mode: Mode) -> None:
+    values, labels = datasets.load_iris(return_X_y=True)
+    first = learn(values, labels, Settings(mode=mode))
+    second = learn(np.asfortranarray(values), labels, Settings(mode=mode))
+    assert msgspec.json.encode(first) == msgspec.json.encode(second)
 
 
-def test_a_cheap_feature_is_preferred_to_an_equal_one() -> None:
-    values, codes = blobs(classes=2)
-    twice = np.hstack([values, values])
-    costs = {"x0": 5.0, "x1": 5.0, "x2": 5.0, "x3": 5.0}
-    tree = learnt(twice, codes, mode="paper", costs=costs)
-    assert set(tree.inputs) <= {"x4", "x5", "x6", "x7"}
+def test_the_tree_does_not_depend_on_the_chunks() -> None:
+    values, labels = datasets.load_breast_cancer(return_X_y=True)
+    whole = learn(values, labels)
+    learner = Learner(whole.tree.columns, whole.tree.classes)
+    for rows, codes in zip(
+        np.array_split(values, 7), np.array_split(labels, 7), strict=True
+    ):
+        learner.partial_fit(rows, codes)
+    assert learner.finish() == whole
 
 
-def test_cuts_of_whole_numbers_lie_between_them() -> None:
-    chance = np.random.default_rng(0)
-    values = chance.integers(0, 9, (400, 2)).astype(np.float64)
-    codes = (values[:, 0] > 4).astype(np.int64)
-    tree = learnt(values, codes, mode="paper")
-    assert all(cut != round(cut) for node in tree.nodes for cut in node.cuts)
+def test_merged_learners_have_seen_both_tables() -> None:
+    values, labels = blobs()
+    parts = [Learner(["a", "b", "c"], ["c0", "c1"]) for _ in range(2)]
+    for part, rows, codes in zip(
+        parts, np.split(values, 2), np.split(labels, 2), strict=True
+    ):
+        part.partial_fit(rows, codes)
+    found = parts[0].merge(parts[1]).finish()
+    assert found.report.rows == 200
+    assert accuracy(found.tree, values, labels) > 0.95
 
 
-def test_incomplete_rows_are_left_out_and_counted() -> None:
-    values, codes = blobs()
-    holed = values.copy()
-    holed[[3, 50, 51]] = [[np.nan] * 4, [np.inf, 0, 0, 0], [0, 0, 0, -np.inf]]
-    tree, report = both(holed, codes)
-    kept = np.isfinite(holed).all(axis=1)
-    assert report.rows_dropped == 3
-    assert tree == learnt(values[kept], codes[kept])
+def test_paper_mode_asks_one_feature_a_node() -> None:
+    values, labels = datasets.load_digits(return_X_y=True)
+    report = learn(values, labels, Settings(mode="paper")).report
+    assert set(report.features_per_node) == {1}
+    assert report.leaves == sum(report.patterns.values()) == 10
 
 
-def test_constant_columns_are_left_out_and_named() -> None:
-    values, codes = blobs()
-    values = np.hstack([values, np.full((300, 1), 0.1)])
-    tree, report = both(values, codes)
-    assert report.features_ignored == ("x4",)
-    assert "x4" not in tree.inputs
+def test_a_combination_asks_no_feature_that_does_not_help() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=(400, 10))
+    labels = (values[:, 3] + values[:, 7] > 0).astype(np.int64)
+    found = learn(values, labels, Settings(patterns_per_class=1, entry=12.0))
+    assert found.report.features_per_node == (2,)
+    assert set(found.tree.inputs) == {"x3", "x7"}
 
 
-def test_a_class_of_one_row_has_a_leaf() -> None:
-    values, codes = blobs()
-    values = np.vstack([values, np.full((1, 4), 50.0)])
-    tree, report = both(values, np.append(codes, 3))
-    assert "3" in {leaf.label for leaf in tree.leaves}
-    assert report.single_rows == 1
+def test_a_dear_feature_is_left_out_if_a_cheap_one_does_it() -> None:
+    values, labels = blobs(gap=5.0)
+    cheap = learn(values[:, [0, 0]], labels, Settings(costs={"x0": 5.0}))
+    assert cheap.tree.inputs == ("x1",)
 
 
 @pytest.mark.parametrize(
-    ("values", "codes", "sentence"),
+    ("name", "least"), [("xor", 0.95), ("ring", 0.9), ("checkerboard", 0.9)]
+)
+def test_classes_of_several_shapes_get_several_patterns(
+    name: str, least: float
+) -> None:
+    rng = np.random.default_rng(3)
+    values = rng.uniform(-1.5, 1.5, (900, 2))
+    tables = {
+        "xor": values[:, 0] * values[:, 1] > 0,
+        "ring": (values**2).sum(axis=1) > 1.0,
+        "checkerboard": np.floor(values).sum(axis=1) % 2 == 0,
+    }
+    labels = tables[name].astype(np.int64)
+    found = learn(values[:600], labels[:600])
+    assert found.report.leaves <= sum(found.report.patterns.values())
+    assert accuracy(found.tree, values[600:], labels[600:]) >= least
+
+
+def test_a_narrow_class_within_a_wide_one_takes_two_cuts_and_two_branches() -> None:
+    rng = np.random.default_rng(4)
+    values = np.concatenate([rng.normal(0, 1, 300), rng.normal(0, 8, 300)])[:, None]
+    labels = np.repeat([0, 1], 300)
+    for mode in MODES:
+        tree = learn(values, labels, Settings(mode=mode, patterns_per_class=1)).tree
+        (node,) = tree.nodes
+        assert len(node.cuts) == 2
+        assert node.owners[0] == node.owners[2] != node.owners[1]
+        assert accuracy(tree, values, labels) > 0.8
+
+
+def test_a_cut_lies_between_the_values_of_a_discrete_column() -> None:
+    values = np.repeat([[0.0], [1.0], [2.0], [3.0]], 20, axis=0)
+    labels = np.repeat([0, 0, 1, 1], 20)
+    for mode in MODES:
+        (node,) = learn(values, labels, Settings(mode=mode)).tree.nodes
+        assert all(1.0 < cut < 2.0 for cut in node.cuts)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e6, 1e12])
+@pytest.mark.parametrize("scale", [1.0, 2.0**-40, 2.0**40])
+def test_offsets_and_scales_do_not_matter(offset: float, scale: float) -> None:
+    values, labels = blobs()
+    moved = (values + offset) * scale
+    tree = learn(moved, labels).tree
+    assert accuracy(tree, moved, labels) > 0.98
+
+
+def test_strongly_correlated_columns_are_combined() -> None:
+    rng = np.random.default_rng(5)
+    labels = np.repeat([0, 1], 200)
+    common = rng.normal(size=400)
+    values = np.stack([common, common + 1e-3 * labels + 1e-4 * rng.normal(size=400)], 1)
+    found = learn(values * [1e-12, 1e12], labels)
+    assert found.report.features_per_node == (2,)
+    assert accuracy(found.tree, values * [1e-12, 1e12], labels) > 0.99
+
+
+def test_every_departure_is_reported() -> None:
+    values, labels = blobs()
+    values = np.column_stack([values, np.full(200, 0.1)])
+    values[5, 1] = np.nan
+    values[9, 0] = np.inf
+    found = learn(values, labels, classes=["c0", "c1", "ghost"])
+    report = found.report
+    assert report.rows == 198
+    assert report.rows_dropped == 2
+    assert report.features_ignored == ("x3",)
+    assert report.classes_without_rows == ("ghost",)
+    assert report.patterns == {"c0": 1, "c1": 1}
+    assert found.tree.classes == ("c0", "c1", "ghost")
+    assert "rows dropped, a value is missing or not finite: 2" in str(report)
+
+
+def test_patterns_without_rows_are_refused_and_counted() -> None:
+    values, labels = blobs(2)
+    report = learn(values, labels, Settings(patterns_per_class=3)).report
+    assert report.patterns_refused == 2
+
+
+def test_a_class_with_one_row_has_a_leaf() -> None:
+    values, labels = blobs()
+    found = learn(np.vstack([values, [[30.0, 30.0, 30.0]]]), np.append(labels, 2))
+    assert found.report.single_rows == 1
+    assert answers(found.tree, np.array([[29.0, 30.0, 31.0]])) == ["c2"]
+
+
+def test_patterns_that_nothing_tells_apart_share_a_leaf() -> None:
+    values = np.tile(np.arange(10.0)[:, None], (2, 1))
+    report = learn(values, np.repeat([0, 1], 10), Settings(mode="paper")).report
+    assert report.inseparable == 2
+    assert report.leaves == 1
+
+
+def test_settings_are_chosen_on_request() -> None:
+    values, labels = datasets.load_wine(return_X_y=True)
+    settings = Settings(choices=("alpha", "l_max", "shrinkage", "entry"))
+    report = learn(values, labels, settings).report
+    assert set(report.chosen) == {
+        "patterns_per_class",
+        "alpha",
+        "l_max",
+        "shrinkage",
+        "entry",
+    }
+    assert report.inner_accuracy is not None
+    assert report.inner_accuracy > 0.9
+
+
+def test_patterns_can_be_given_by_class() -> None:
+    values, labels = blobs()
+    found = learn(values, labels, Settings(patterns_per_class={"c1": 3}))
+    assert found.report.patterns == {"c0": 1, "c1": 3}
+    names = [term.name for group in found.tree.sets for term in group.terms]
+    assert names == ["c0", "c1 #1", "c1 #2", "c1 #3"]
+
+
+def test_progress_is_told_and_ends_with_the_sets() -> None:
+    values, labels = blobs()
+    heard: list[tuple[str, float]] = []
+    learn(values, labels, progress=lambda what, share: heard.append((what, share)))
+    assert heard[0] == ("counting", 0.0)
+    assert heard[-1] == ("fitting sets", 1.0)
+    assert all(0.0 <= share <= 1.0 for _, share in heard)
+
+
+def test_units_ranges_and_columns_are_kept() -> None:
+    values, labels = blobs()
+    tree = learn(
+        values,
+        labels,
+        columns=["force", "slip", "area"],
+        units={"force": "N"},
+        name="grip",
+    ).tree
+    force = {v.name: v for v in tree.variables}["force"]
+    assert (tree.name, tree.columns) == ("grip", ("force", "slip", "area"))
+    assert (force.unit, force.low, force.high) == (
+        "N",
+        values[:, 0].min(),
+        values[:, 0].max(),
+    )
+
+
+def test_a_combination_is_never_named_like_a_column() -> None:
+    values, labels = blobs(gap=1.0)
+    names = ["combination 1", "combination 1'", "c"]
+    tree = learn(values, labels, columns=names).tree
+    called = [v.name for v in tree.variables if v.parts]
+    assert called
+    assert not set(called) & set(names)
+
+
+def test_a_class_named_like_a_pattern_keeps_its_name() -> None:
+    values, labels = blobs()
+    found = learn(
+        values,
+        labels,
+        Settings(patterns_per_class={"a": 2}),
+        classes=["a", "a #1"],
+    )
+    names = {term.name for group in found.tree.sets for term in group.terms}
+    assert names == {"a #1'", "a #2", "a #1"}
+
+
+def test_whole_numbers_and_single_precision_are_taken() -> None:
+    values, labels = blobs()
+    expected = learn(np.round(values * 9), labels).tree
+    assert learn(np.round(values * 9).astype(np.int32), labels).tree == expected
+    assert learn(np.round(values * 9).astype(np.float32), labels).tree == expected
+
+
+def test_labels_may_be_names_with_gaps() -> None:
+    values, labels = blobs()
+    named: list[Any] = [f"c{k}" for k in labels]
+    named[3], named[4], named[5] = None, float("nan"), ""
+    found = learn_arrays(
+        values, named, columns=["a", "b", "c"], classes=["c0", "c1"]
+    ).report
+    assert found.rows_dropped == 3
+
+
+NONE = np.empty((0, 2))
+
+
+@pytest.mark.parametrize(
+    ("values", "labels", "message"),
     [
-        (np.empty((0, 1)), [], "cannot learn from a table without rows"),
+        (NONE, [], "cannot learn from a table without rows"),
         (
-            np.ones((1, 1)),
+            np.full((3, 2), np.nan),
+            [0, 1, 0],
+            "cannot learn from a table without complete rows: all 3 hold a missing or "
+            "infinite value or no class",
+        ),
+        (
+            np.ones((1, 2)),
             [0],
             "cannot learn from one row; two classes need two at least",
         ),
         (
-            np.array([[1.0], [2.0]]),
+            np.eye(2),
             [1, 1],
-            "cannot learn from one class: every row is 'b'",
+            "cannot learn from one class: every row is 'c1'",
         ),
         (
-            np.ones((4, 1)),
+            np.ones((4, 2)),
             [0, 1, 0, 1],
-            "cannot learn without a column that varies: every column is constant, "
-            "or so large that its square overflows",
-        ),
-        (
-            np.full((3, 1), np.nan),
-            [0, 1, 0],
-            "cannot learn from a table without complete rows: all 3 hold a missing "
-            "or infinite value or no class",
+            "cannot learn without a column that varies: every column is constant, or "
+            "so large that its square overflows",
         ),
     ],
+    ids=["empty", "all missing", "one row", "one class", "constant"],
 )
 def test_a_table_that_teaches_nothing_is_refused(
-    values: Values, codes: list[int], sentence: str
+    values: FloatArray, labels: list[int], message: str
 ) -> None:
     with pytest.raises(LearningError) as caught:
-        learn_arrays(values, np.array(codes, int), columns=["x"], classes=["a", "b"])
-    assert str(caught.value) == sentence
+        learn_arrays(
+            values,
+            np.array(labels, np.int64),
+            columns=["a", "b"],
+            classes=["c0", "c1"],
+        )
+    assert str(caught.value) == message
 
 
 def test_missing_values_can_be_refused() -> None:
-    values, codes = blobs(classes=2)
-    values[5, 1] = np.nan
+    values, labels = blobs()
+    values[0, 0] = np.nan
     with pytest.raises(LearningError) as caught:
-        both(values, codes, missing="refuse")
-    assert str(caught.value).splitlines()[0] == (
-        "1 of 300 rows hold a missing or infinite value or no class"
+        learn(values, labels, Settings(missing="refuse"))
+    assert str(caught.value) == (
+        "1 of 200 rows hold a missing or infinite value or no class\n"
+        "  choose missing='drop' to leave them out"
     )
 
 
-def test_all_settings_out_of_range_are_told_at_once() -> None:
-    with pytest.raises(ValueError, match="alpha") as caught:
-        Settings(alpha=2.0, points=9, l_max=-1.0)
-    assert str(caught.value).splitlines() == [
-        "alpha lies in [0, 1], not 2.0",
-        "l_max is above 0, not -1.0",
-        "points lies in 1 to 8, not 9",
-    ]
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"columns": ["a", "a", "b"]}, "the column 'a' is named twice"),
+        ({"classes": ["a", "a"]}, "the class 'a' is named twice"),
+        ({"columns": ["a"]}, "values have 3 columns, but 1 are named"),
+        ({"classes": ["a"]}, "label 1 has no name among the classes"),
+        ({"settings": Settings(costs={"z": 1.0})}, "costs: there is no column 'z'"),
+        (
+            {"settings": Settings(patterns_per_class={"z": 2})},
+            "patterns_per_class: there is no class 'z'",
+        ),
+        ({"labels": np.zeros(7, np.int64)}, "200 rows, but 7 labels"),
+        ({"labels": ["c0", "zebra"] * 100}, "row 2: 'zebra' is not among the classes"),
+        (
+            {"labels": np.full(200, 0.5)},
+            "labels in numbers are positions of classes, from 0",
+        ),
+        ({"values": np.zeros(200)}, "values need two dimensions, not 1"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_named(
+    arguments: dict[str, Any], message: str
+) -> None:
+    values, labels = blobs()
+    given: dict[str, Any] = {
+        "values": values,
+        "labels": labels,
+        "columns": ["a", "b", "c"],
+        "classes": ["c0", "c1"],
+        **arguments,
+    }
+    with pytest.raises(ValueError, match=r".") as caught:
+        learn_arrays(given.pop("values"), given.pop("labels"), **given)
+    assert str(caught.value) == message
 
 
+@pytest.mark.parametrize(
+    ("name", "mode", "least", "most"),
+    [
+        ("iris", "paper", 91, 99),
+        ("wine", "paper", 80, 96),
+        ("breast_cancer", "paper", 83, 91),
+        ("digits", "paper", 29, 35),
+        ("iris", "default", 96.5, 100),
+        ("wine", "default", 97.5, 100),
+        ("breast_cancer", "default", 96.0, 100),
+        ("digits", "default", 95.0, 100),
+    ],
+)
 @pytest.mark.heavy
-def test_ten_thousand_classes_are_learnt() -> None:
-    chance = np.random.default_rng(0)
-    codes = np.arange(100_000) % 10_000
-    values = chance.normal(size=(100_000, 16))
-    values += 3 * chance.normal(size=(10_000, 16))[codes]
-    tree = learnt(values, codes)
-    assert len(tree.leaves) == 10_000
+def test_accuracy_is_what_is_promised(
+    name: str, mode: Mode, least: float, most: float
+) -> None:
+    values, labels = getattr(datasets, f"load_{name}")(return_X_y=True)
+    folds = StratifiedKFold(10, shuffle=True, random_state=0)
+    found: list[float] = []
+    for fit, answer in folds.split(values, labels):
+        learnt = learn(values[fit], labels[fit], Settings(mode=mode))
+        assert learnt.report.leaves <= sum(learnt.report.patterns.values())
+        found.append(100 * accuracy(learnt.tree, values[answer], labels[answer]))
+    assert least <= np.mean(found) <= most
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_thousand_classes_are_learnt(mode: Mode) -> None:
+    rng = np.random.default_rng(6)
+    labels = np.repeat(np.arange(1000), 5)
+    values = rng.normal(size=(1000, 8))[labels] + 0.01 * rng.normal(size=(5000, 8))
+    found = learn(values, labels, Settings(mode=mode))
+    assert found.report.leaves == 1000
+    assert accuracy(found.tree, values[::97], labels[::97]) > 0.85
+
+
+def test_rules_equal_the_tree_on_the_cells_of_a_learnt_tree() -> None:
+    values, labels = datasets.load_iris(return_X_y=True)
+    tree = learn(values, labels, Settings(mode="paper")).tree
+    rules = rules_from_tree(tree)
+    for points in itertools.islice(grid(tree), 1):
+        for row in points.T[:200].tolist():
+            named = dict(zip(tree.inputs, row, strict=True))
+            assert evaluate(rules, named).rule == descend(tree, named).rule

@@ -1,0 +1,113 @@
+"""Where a decision changes on an axis."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fuzzytree.learning.cuts import crossing_cuts, settled_cuts, smoothed_cuts
+
+ORDER = np.array([0, 1])
+
+
+def crossings(
+    means: list[float], spreads: list[float], *, keep: bool = False
+) -> tuple[list[float], list[int], int]:
+    found = crossing_cuts(
+        np.array(means),
+        np.array(spreads),
+        np.arange(len(means)),
+        keep_reversals=keep,
+    )
+    return found.cuts.tolist(), found.owners.tolist(), found.reversals
+
+
+def test_equal_spreads_cross_in_the_middle() -> None:
+    assert crossings([0.0, 4.0], [1.0, 1.0]) == ([2.0], [0, 1], 0)
+
+
+def test_a_far_reversal_is_counted_and_left_out() -> None:
+    cuts, owners, reversals = crossings([0.0, 10.0], [1.0, 2.0])
+    assert (len(cuts), owners, reversals) == (1, [0, 1], 1)
+    assert 3.0 < cuts[0] < 4.0
+
+
+def test_a_far_reversal_stays_if_asked_for() -> None:
+    cuts, owners, reversals = crossings([0.0, 10.0], [1.0, 2.0], keep=True)
+    assert (len(cuts), owners, reversals) == (2, [1, 0, 1], 0)
+
+
+def test_a_narrow_class_within_a_wide_one_takes_two_cuts() -> None:
+    cuts, owners, _ = crossings([0.0, 0.0], [1.0, 4.0])
+    root = math.sqrt(2 * math.log(4) / (1 - 1 / 16))
+    assert cuts == pytest.approx([-root, root])
+    assert owners == [1, 0, 1]
+
+
+def test_equal_patterns_still_get_an_interval_each() -> None:
+    cuts, owners, _ = crossings([5.0, 5.0], [1.0, 1.0])
+    assert len(cuts) == 1
+    assert sorted(owners) == [0, 1]
+
+
+def test_patterns_without_spread_are_cut_between() -> None:
+    cuts, owners, _ = crossings([0.0, 1.0], [0.0, 0.0])
+    assert cuts == pytest.approx([0.5])
+    assert owners == [0, 1]
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-12, 1e12, 1e150])
+def test_crossings_scale_with_the_axis(scale: float) -> None:
+    cuts, owners, _ = crossings([0.0, 4.0 * scale], [scale, scale])
+    assert cuts == pytest.approx([2.0 * scale], rel=1e-6)
+    assert owners == [0, 1]
+
+
+def test_rows_are_cut_where_their_densities_cross() -> None:
+    rng = np.random.default_rng(1)
+    values = np.concatenate([rng.normal(0, 1, 2000), rng.normal(4, 1, 2000)])
+    found = smoothed_cuts(
+        values, np.repeat([False, True], 2000), np.ones(4000), two=True
+    )
+    assert found.owners.tolist() == [0, 1]
+    assert found.cuts[0] == pytest.approx(2.0, abs=0.15)
+
+
+def test_rows_of_a_ring_take_two_cuts_and_one_cut_if_two_are_not_allowed() -> None:
+    rng = np.random.default_rng(2)
+    values = np.concatenate([rng.normal(0, 1, 500), rng.normal(0, 8, 500)])
+    is_right = np.repeat([False, True], 500)
+    assert smoothed_cuts(values, is_right, np.ones(1000), two=True).owners.tolist() == [
+        1,
+        0,
+        1,
+    ]
+    assert len(smoothed_cuts(values, is_right, np.ones(1000), two=False).cuts) == 1
+
+
+@given(
+    st.lists(st.floats(-1e12, 1e12), min_size=2, max_size=30, unique=True),
+    st.floats(-1e12, 1e12),
+)
+def test_a_settled_cut_keeps_its_rows_on_their_sides(
+    values: list[float], cut: float
+) -> None:
+    rows = np.array(values)
+    settled = settled_cuts(np.array([cut]), rows)
+    assert ((rows <= settled[0]) == (rows <= cut)).all()
+
+
+def test_a_cut_stays_away_from_whole_numbers_and_is_short() -> None:
+    rows = np.array([1.0, 2.0, 3.0, 4.0])
+    assert settled_cuts(np.array([2.0]), rows).tolist() == [2.25]
+    assert settled_cuts(np.array([2.51]), rows).tolist() == [2.5]
+
+
+def test_neighbouring_doubles_can_be_cut_apart() -> None:
+    low = 1.0
+    high = math.nextafter(low, 2.0)
+    assert settled_cuts(np.array([low]), np.array([low, high])).tolist() == [low]

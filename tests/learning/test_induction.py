@@ -1,0 +1,69 @@
+"""Steps 4 and 5: groups, threshold and the most powerful feature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fuzzytree.learning import induction
+from fuzzytree.learning.arrays import FloatArray
+from fuzzytree.learning.induction import components, most_powerful, threshold
+
+
+def test_the_threshold_falls_with_the_level_and_never_below_zero() -> None:
+    spreads = np.array([[1.0, 2.0], [3.0, 2.0]])
+    assert threshold(spreads, 4.0, 0).tolist() == [4.0, 4.0]
+    assert threshold(spreads, 4.0, 3).tolist() == [1.0, 1.0]
+    assert threshold(spreads, 4.0, 9).tolist() == [0.0, 0.0]
+
+
+def test_patterns_are_connected_over_others() -> None:
+    means = np.array([0.0, 5.0, 1.0, 2.0])
+    found = components(means, np.zeros(4), 0.9, 0.9)
+    assert found.tolist() == [0, 1, 0, 0]
+
+
+def test_a_narrow_pattern_within_a_wide_one_is_apart_by_its_spread() -> None:
+    means, spreads = np.zeros(3), np.array([1.0, 1.1, 9.0])
+    assert components(means, spreads, 0.5, 0.9).tolist() == [0, 0, 1]
+
+
+def test_squares_find_the_components_that_comparing_all_pairs_finds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(5)
+    for limit in (0.01, 0.1, 0.5, 2.0):
+        means, spreads = rng.normal(size=150) * 5, rng.exponential(size=150)
+        monkeypatch.setattr(induction, "_BRUTE", 1000)
+        expected = components(means, spreads, limit, 0.9)
+        monkeypatch.setattr(induction, "_BRUTE", 1)
+        assert (components(means, spreads, limit, 0.9) == expected).all()
+
+
+def chosen(means: FloatArray, costs: list[float], *, by_margin: bool) -> int | None:
+    spreads = np.ones_like(means)
+    found = most_powerful(
+        means,
+        spreads,
+        threshold(spreads, 4.0, 0),
+        alpha=1.0,
+        costs=np.array(costs),
+        by_margin=by_margin,
+    )
+    return None if found is None else found.feature
+
+
+def test_the_feature_with_the_most_groups_is_the_most_powerful() -> None:
+    means = np.array([[0.0, 0.0], [5.0, 5.0], [6.0, 10.0]])
+    assert chosen(means, [1.0, 1.0], by_margin=False) == 1
+
+
+def test_ties_go_to_cost_then_margin_then_order() -> None:
+    means = np.array([[0.0, 0.0, 0.0], [5.0, 9.0, 5.0]])
+    assert chosen(means, [1.0, 1.0, 1.0], by_margin=False) == 0
+    assert chosen(means, [1.0, 1.0, 1.0], by_margin=True) == 1
+    assert chosen(means, [2.0, 2.0, 1.0], by_margin=True) == 2
+
+
+def test_no_feature_splits_what_is_close() -> None:
+    assert chosen(np.array([[0.0], [1.0]]), [1.0], by_margin=False) is None

@@ -1,0 +1,150 @@
+"""Moments, samples and window counts."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fuzzytree.learning import statistics as module
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.statistics import Statistics, window_counts
+
+Bits = tuple[bytes, ...]
+
+
+def table(rows: int, *, offset: float = 0.0) -> tuple[FloatArray, IntArray]:
+    rng = np.random.default_rng(3)
+    return rng.normal(size=(rows, 3)) + offset, rng.integers(0, 4, rows)
+
+
+def bits(statistics: Statistics) -> Bits:
+    moments, sample = statistics.moments(), statistics.sample()
+    return (
+        moments.counts.tobytes(),
+        moments.means.tobytes(),
+        moments.spreads.tobytes(),
+        moments.lows.tobytes(),
+        moments.highs.tobytes(),
+        sample.rows.tobytes(),
+        sample.codes.tobytes(),
+    )
+
+
+@given(st.lists(st.integers(1, 400), max_size=8))
+@settings(max_examples=25, deadline=None)
+def test_the_bits_do_not_depend_on_the_chunks(sizes: list[int]) -> None:
+    block, module.BLOCK_VALUES = module.BLOCK_VALUES, 300
+    try:
+        values, codes = table(1000)
+        values[::13, 1] = np.nan
+        whole = Statistics(4, 3, rows_per_class=50)
+        whole.update(values, codes)
+        parts = Statistics(4, 3, rows_per_class=50)
+        for piece, labels in zip(
+            np.split(values, np.minimum(np.cumsum(sizes), 1000)),
+            np.split(codes, np.minimum(np.cumsum(sizes), 1000)),
+            strict=True,
+        ):
+            parts.update(np.asfortranarray(piece), labels)
+        assert bits(parts) == bits(whole)
+        assert parts.dropped == whole.dropped == 77
+    finally:
+        module.BLOCK_VALUES = block
+
+
+def test_asking_in_between_changes_nothing() -> None:
+    values, codes = table(500)
+    asked, silent = Statistics(4, 3), Statistics(4, 3)
+    for k in range(0, 500, 100):
+        asked.update(values[k : k + 100], codes[k : k + 100])
+        asked.moments()
+        asked.sample()
+    silent.update(values, codes)
+    assert bits(asked) == bits(silent)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e6, 1e12])
+def test_spreads_keep_their_digits_at_any_offset(offset: float) -> None:
+    values, codes = table(400, offset=offset)
+    statistics = Statistics(4, 3)
+    statistics.update(values, codes)
+    found = statistics.moments()
+    for label in range(4):
+        column = [Fraction(v) for v in values[codes == label, 0].tolist()]
+        mean = sum(column) / len(column)
+        variance = sum((v - mean) ** 2 for v in column) / (len(column) - 1)
+        assert found.spreads[label, 0] == pytest.approx(math.sqrt(variance), rel=1e-13)
+        assert found.means[label, 0] == pytest.approx(float(mean), rel=1e-15, abs=1e-14)
+
+
+@pytest.mark.parametrize("constant", [0.1, 1e12 + 0.1, 1e-300, 7.0])
+def test_a_constant_column_has_its_value_as_mean_and_no_spread(constant: float) -> None:
+    statistics = Statistics(1, 1)
+    statistics.update(np.full((777, 1), constant), np.zeros(777, np.int64))
+    found = statistics.moments()
+    assert found.means[0, 0] == constant
+    assert found.spreads[0, 0] == 0.0
+
+
+def test_a_spread_whose_square_underflows_is_not_zero() -> None:
+    statistics = Statistics(1, 1)
+    statistics.update(np.array([[0.0], [1e-200]]), np.zeros(2, np.int64))
+    assert statistics.moments().spreads[0, 0] > 0.0
+
+
+def test_merged_statistics_are_those_of_both_tables() -> None:
+    values, codes = table(900, offset=1e6)
+    left, right, whole = (Statistics(4, 3) for _ in range(3))
+    left.update(values[:333], codes[:333])
+    right.update(values[333:], codes[333:])
+    whole.update(values, codes)
+    merged, expected = left.merge(right).moments(), whole.moments()
+    assert (merged.counts == expected.counts).all()
+    assert (merged.lows == expected.lows).all()
+    assert (merged.highs == expected.highs).all()
+    np.testing.assert_allclose(merged.means, expected.means, rtol=1e-15)
+    np.testing.assert_allclose(merged.spreads, expected.spreads, rtol=1e-12)
+
+
+def test_the_sample_holds_whole_rows_and_no_more_than_asked() -> None:
+    values, codes = table(5000)
+    statistics = Statistics(4, 3, rows_per_class=100)
+    statistics.update(values, codes)
+    sample = statistics.sample()
+    assert np.bincount(sample.codes).tolist() == [100] * 4
+    known = {row.tobytes() for row in values}
+    assert all(row.tobytes() in known for row in sample.rows)
+
+
+def test_the_table_is_not_changed() -> None:
+    values, codes = table(100)
+    for width in (1, 3):
+        before = values[:, :width].copy()
+        chunk = before.copy()
+        statistics = Statistics(4, width)
+        statistics.update(chunk, codes)
+        statistics.moments()
+        assert (chunk == before).all()
+
+
+def test_windows_overlap_by_half_and_are_closed_at_both_ends() -> None:
+    values = np.array([-1.0, -0.5, 0.0, 0.5, 1.0, 1.5])
+    counts = window_counts(
+        values, np.zeros(6, np.int64), np.array([0.0]), np.array([1.0]), 2
+    )
+    assert counts.tolist() == [[2, 3, 3, 3, 3]]
+
+
+def test_the_two_rows_of_a_class_lie_on_a_window_edge() -> None:
+    values = np.array([3.1, 3.7])
+    mean, spread = values.mean(), values.std(ddof=1)
+    counts = window_counts(
+        values, np.zeros(2, np.int64), np.array([mean]), np.array([spread]), 3
+    )
+    assert counts.sum() == counts[0, ::-1].sum()
+    assert (counts == counts[:, ::-1]).all()
