@@ -94,14 +94,14 @@ def _directions(view: NodeView) -> FloatArray:
     moved = view.means - view.weights @ view.means / total
     between = (moved * view.weights[:, None]).T @ moved / total
     power = np.diag(between) / np.diag(view.within)
-    count = min(len(power), 4 if len(view.labels) <= _MANY else 16)
+    count = min(len(power), 2 if len(view.labels) <= _MANY else 16)
     leading = np.argsort(-power, kind="stable")[:count]
     singles = np.zeros((len(power), count))
     singles[leading, np.arange(count)] = 1.0
     values, vectors = np.linalg.eigh(view.within)
     whitening = vectors / np.sqrt(np.maximum(values, 1e-9 * values.max()))
     _, axes = np.linalg.eigh(whitening.T @ between @ whitening)
-    count = min(len(view.labels) - 1, 4, axes.shape[1])
+    count = min(len(view.labels) - 1, 3, axes.shape[1])
     return np.hstack([whitening @ axes[:, ::-1][:, :count], singles])
 
 

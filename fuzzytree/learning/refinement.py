@@ -21,6 +21,7 @@ _MOST_ROWS = 20_000
 _NEWTON_STEPS = 8
 _LEAST = 0.5
 _MANY_NODES = 256
+_VERY_MANY_NODES = 2048
 
 
 def refined(
@@ -31,7 +32,8 @@ def refined(
     Args:
         sketch: A grown tree.
         patterns: What it was grown from.
-        passes: How often every node is visited at most.
+        passes: How often every node is visited at most; once if there are more than
+            256 nodes, not at all if there are more than 2048.
         ridge: Penalty on a logistic direction, in rows.
     """
     step = 1 + len(patterns.rows) // _MOST_ROWS
@@ -44,7 +46,9 @@ def refined(
         sketch.leaves,
         sketch.leaf_classes,
     )
-    for _ in range(passes if len(moved.splits) <= _MANY_NODES else 1):
+    nodes = len(moved.splits)
+    rounds = passes if nodes <= _MANY_NODES else int(nodes <= _VERY_MANY_NODES)
+    for _ in range(rounds):
         if not _visit_all(moved, patterns, rows, labels, weights, ridge):
             break
     return moved

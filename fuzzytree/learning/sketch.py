@@ -29,12 +29,13 @@ class Axis:
         """Return the axis value of each row, rounded as every runtime rounds it."""
         if not self.is_combined:
             return rows[:, self.features[0]]
-        first = self.features[0]
         with np.errstate(over="ignore", invalid="ignore"):
-            total: FloatArray = self.weights[0] * (rows[:, first] - self.centres[0])
-            for k in range(1, len(self.features)):
-                step = rows[:, self.features[k]] - self.centres[k]
-                total = total + self.weights[k] * step
+            parts = np.ascontiguousarray(rows[:, self.features].T)
+            parts -= self.centres[:, None]
+            parts *= self.weights[:, None]
+            total: FloatArray = parts[0]
+            for part in parts[1:]:
+                total += part
         return total
 
 
