@@ -36,7 +36,8 @@ class Leaf(Value, frozen=True):
         label: The class.
         pattern: The fuzzy pattern that it holds; the class itself, or one of several
             shapes of the class, such as `hand #2`.
-        support: How many training rows reached it, if known.
+        support: How many training rows reached it, if known; estimated from a sample
+            where learning kept one (`rows_per_class`).
     """
 
     label: str

@@ -292,6 +292,10 @@ def _learnt_rows(learnt: Learnt, seconds: float) -> list[tuple[str, str, str]]:
     if report.rows_dropped:
         text = counted(report.rows_dropped, "row")
         rows.append(("dropped", text, "a value is missing or not finite"))
+    if report.rows_sampled < report.rows:
+        text = counted(report.rows_sampled, "row")
+        told = "for patterns, combinations, sets and the support of leaves"
+        rows.append(("sampled", text, told))
     if report.features_ignored:
         text = counted(len(report.features_ignored), "column")
         names = ", ".join(report.features_ignored[:8])

@@ -71,6 +71,14 @@ def test_what_was_left_out_is_told(call: Call) -> None:
     )
 
 
+def test_a_sample_is_told_where_not_all_rows_are_kept(call: Call) -> None:
+    words = ("learn", "few.csv", "--target", "grip", "-o", "few.yaml", "--no-test")
+    err = call(*words, "--rows-per-class", "4")[2]
+    assert (
+        "sampled  8 rows   for patterns, combinations, sets and the support of leaves\n"
+    ) in err
+
+
 def test_json_tells_the_same_facts(call: Call) -> None:
     code, out, err = call(
         "learn", WINE, "--target", "cultivar", "-o", "wine.yaml", "--json", "--quiet"
