@@ -10,13 +10,11 @@ import json
 from typing import TYPE_CHECKING
 
 from fuzzytree.contracts import Model
-from fuzzytree.exporters.onnx import version, write
+from fuzzytree.exporters.onnx import write
 from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
 
 if TYPE_CHECKING:
     import onnx
-
-__all__ = ["graph_difference", "version"]
 
 
 def graph_difference(content: bytes, model: Model) -> str | None:

@@ -40,24 +40,29 @@ def free_axes(model: _Model) -> _Model:
     return replace(model, variables=variables, columns=())
 
 
+def cuts_by_variable(tree: FuzzyTree) -> dict[str, tuple[float, ...]]:
+    """Return all cuts on each variable that a node asks, in ascending order."""
+    cuts: dict[str, set[float]] = {}
+    for node in tree.nodes:
+        cuts.setdefault(node.variable, set()).update(node.cuts)
+    return {name: tuple(sorted(values)) for name, values in cuts.items()}
+
+
 def axis_points(tree: FuzzyTree) -> dict[str, tuple[float, ...]]:
     """Return, for each variable that a node asks, the points that tell all about it.
 
     They are each cut and the two floats beside it, a point inside each interval, and
     one far beyond either end.
     """
-    cuts: dict[str, set[float]] = {}
-    for node in tree.nodes:
-        cuts.setdefault(node.variable, set()).update(node.cuts)
-    return {name: tuple(_points(sorted(values))) for name, values in cuts.items()}
+    return {
+        name: tuple(_points(list(cuts)))
+        for name, cuts in cuts_by_variable(tree).items()
+    }
 
 
 def cell_count(tree: FuzzyTree) -> int:
     """Return the number of cells: the product of the numbers of intervals."""
-    cuts: dict[str, set[float]] = {}
-    for node in tree.nodes:
-        cuts.setdefault(node.variable, set()).update(node.cuts)
-    return math.prod(len(values) + 1 for values in cuts.values())
+    return math.prod(len(cuts) + 1 for cuts in cuts_by_variable(tree).values())
 
 
 def grid_size(tree: FuzzyTree) -> int:

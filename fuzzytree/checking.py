@@ -37,8 +37,9 @@ from fuzzytree.numerics.bounds import (
 )
 from fuzzytree.probing import probes
 from fuzzytree.reference import Status
-from fuzzytree.rulebase import Kind, RuleBase, Variable, fingerprint
+from fuzzytree.rulebase import Kind, RuleBase, fingerprint
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
+from fuzzytree.runtimes.axes import axis_lines, plan_axes
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -236,29 +237,19 @@ def _held(runtime: Runtime, found: Answers, base: Answers, rows: Rows) -> Compar
 
 def _rounds_across(tree: FuzzyTree, rows: Rows) -> BoolArray:
     """Return the rows that float32 may put on the other side of a cut, or overflow."""
-    cuts: dict[str, set[float]] = {}
-    for node in tree.nodes:
-        cuts.setdefault(node.variable, set()).update(node.cuts)
+    cuts = cells.cuts_by_variable(tree)
     near: BoolArray = np.full(rows.numbers.shape, fill_value=False)
     near |= np.abs(rows.values).max(axis=0, initial=0.0) > FLOAT32_MAX
+    plan = plan_axes(tree.variables)
+    with np.errstate(invalid="ignore", over="ignore"):
+        lines = axis_lines(plan, rows.values)
     for variable in tree.variables:
-        axis = _axis(variable, rows)
+        axis = lines[plan.line[variable.name]]
         slack = axis_errors(variable, rows.inputs, rows.values)
         for cut in cuts.get(variable.name, ()):
             reach = slack + 2 * UNIT * abs(cut) + 2.0**-149
             near |= np.abs(axis - cut) <= reach
     return near
-
-
-def _axis(variable: Variable, rows: Rows) -> FloatArray:
-    inputs = dict(zip(rows.inputs, rows.values, strict=True))
-    total: FloatArray = np.zeros(rows.values.shape[1])
-    if not variable.parts:
-        total += inputs[variable.name]
-    with np.errstate(invalid="ignore", over="ignore"):
-        for part in variable.parts:
-            total += part.weight * (inputs[part.input] - part.centre)
-    return total
 
 
 def _stride(model: Model, rows: Rows) -> int:
@@ -358,10 +349,7 @@ def _shipped_onnx(
         yield _counted("file", title, "the model's fingerprint", 1, faults)
         yield from _onnx_graph(title, other, expected)
     try:
-        if expected is not None:
-            yield _onnx_answers(title, other, expected, rows)
-        if other.labels is not None:
-            yield _onnx_labels(title, other, expected or model, rows)
+        yield from _onnx_rows(title, other, expected, model, rows)
     except LossError as error:  # the file loads, but onnxruntime cannot run it
         yield _counted("rows", title, "the model", len(rows.numbers), (str(error),))
 
@@ -377,7 +365,8 @@ def _onnx_counterpart(other: OnnxModel, model: Model) -> Model | None:
 
 def _onnx_graph(title: str, other: OnnxModel, expected: Model) -> Iterator[Finding]:
     """Compare the graph with the one that would be written now: a proof if equal."""
-    from fuzzytree.exporters.onnx_compare import graph_difference, version
+    from fuzzytree.exporters.onnx import version
+    from fuzzytree.exporters.onnx_compare import graph_difference
 
     try:
         fault = graph_difference(other.content, expected)
@@ -390,48 +379,53 @@ def _onnx_graph(title: str, other: OnnxModel, expected: Model) -> Iterator[Findi
         yield f"{title}: another version, {other.version}, wrote it, so only rows tell"
 
 
-def _onnx_answers(
-    title: str, other: OnnxModel, expected: Model, rows: Rows
-) -> Comparison:
-    is_tree = isinstance(expected, FuzzyTree)
-    native = find_runtime("native" if is_tree else _NATIVE[other.dtype])
-    outcome, base = other.run(rows.values), native.load(expected)(rows.values)
-    if "status" not in other.outputs:
-        outcome, base = _without_status(outcome), _without_status(base)
-    found = Answers(title, expected, outcome)
-    answers = Answers("the model", expected, base)
-    if isinstance(expected, FuzzyTree) and other.dtype == "float32":
-        excused = _rounds_across(expected, rows)
-        return compare_excused(
-            found, answers, rows, excused=excused, origin=_FLOAT32_TREE
+def _onnx_rows(
+    title: str, other: OnnxModel, expected: Model | None, model: Model, rows: Rows
+) -> Iterator[Finding]:
+    """Compare a file's answers with the native ones, then its labels."""
+    held = expected or model
+    is_rules = isinstance(held, RuleBase)
+    native = find_runtime(_NATIVE[other.dtype] if is_rules else "native")
+    base = Answers("the model", held, native.load(held)(rows.values))
+    excused: BoolArray = np.full(rows.numbers.shape, fill_value=False)
+    is_rounded = isinstance(held, FuzzyTree) and other.dtype == "float32"
+    if isinstance(held, FuzzyTree) and is_rounded:
+        excused = _rounds_across(held, rows)
+    if expected is not None:
+        found, right = Answers(title, held, other.run(rows.values)), base
+        if "status" not in other.outputs:
+            found, right = _without_status(found), _without_status(base)
+        yield (
+            compare_excused(found, right, rows, excused=excused, origin=_FLOAT32_TREE)
+            if is_rounded
+            else compare_bits(found, right, rows)
         )
-    return compare_bits(found, answers, rows)
+    if other.labels is not None:
+        told = other.labels(rows.values)
+        yield _onnx_labels(title, told, base, rows, excused)
 
 
-def _without_status(outcome: Outcome) -> Outcome:
+def _without_status(answers: Answers) -> Answers:
     """Keep of the statuses what a rule number tells."""
+    outcome = answers.outcome
     status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
-    return msgspec.structs.replace(outcome, status=status.astype(np.int64))
+    kept = msgspec.structs.replace(outcome, status=status.astype(np.int64))
+    return msgspec.structs.replace(answers, outcome=kept)
 
 
 def _onnx_labels(
-    title: str, other: OnnxModel, expected: Model, rows: Rows
+    title: str,
+    told: Sequence[str | None],
+    base: Answers,
+    rows: Rows,
+    excused: BoolArray,
 ) -> Comparison:
     """Compare the texts that a file answers with the classes of the model."""
-    assert other.labels is not None  # the caller asked
-    is_rules = isinstance(expected, RuleBase)
-    native = find_runtime(_NATIVE[other.dtype] if is_rules else "native")
-    outcome = native.load(expected)(rows.values)
-    numbers = labels(Answers(title, expected, outcome)).tolist()
-    right = [expected.classes[n] if n >= 0 else None for n in numbers]
-    excused = np.zeros(len(right), np.bool_)
-    if isinstance(expected, FuzzyTree) and other.dtype == "float32":
-        excused = _rounds_across(expected, rows)
+    classes = base.model.classes
+    right = [classes[n] if n >= 0 else None for n in labels(base).tolist()]
     faults = [
         f"{rows.name(row)}: label {found!r} where {label!r} is right"
-        for row, (found, label) in enumerate(
-            zip(other.labels(rows.values), right, strict=True)
-        )
+        for row, (found, label) in enumerate(zip(told, right, strict=True))
         if found != label and not excused[row]
     ]
     return _counted("rows", title, "the model's classes", len(right), faults)
