@@ -1,0 +1,1 @@
+"""Pictures of results: one function for each, which returns a figure."""

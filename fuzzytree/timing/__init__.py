@@ -1,0 +1,1 @@
+"""Error against run time: what each way of running a model costs, and what it gives."""
