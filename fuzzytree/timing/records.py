@@ -57,6 +57,8 @@ class Candidate(msgspec.Struct, frozen=True):
             where it comes from; None where nothing is certified.
         most_rows: Above so many rows it would take minutes; None: no limit.
         note: What a reader must know to compare it fairly.
+        is_foreign: Whether code of others runs, which may crash or hang the process;
+            a child process tries it before the study does. A peer always is.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Candidate(msgspec.Struct, frozen=True):
     bound: tuple[float, str] | None = None
     most_rows: int | None = None
     note: str = ""
+    is_foreign: bool = False
 
 
 class Omission(msgspec.Struct, frozen=True):
@@ -86,6 +89,13 @@ class Timing(msgspec.Struct, frozen=True):
         low_ns: Lower end of the 95 % confidence interval of the median, from order
             statistics (binomial); no assumption on the distribution.
         high_ns: Upper end of it.
+        confidence: How surely the median lies in the interval, exactly: at least 0.95,
+            or less where fewer than six samples could be taken.
+        calls: Calls in each sample; its time is divided by them.
+        rounds: The round of each sample. Samples of two candidates that share a round
+            were taken one after the other.
+        stolen: Share of the time in which the process did not run; None where the
+            clocks cannot tell.
     """
 
     rows: int
@@ -94,6 +104,10 @@ class Timing(msgspec.Struct, frozen=True):
     median_ns: float
     low_ns: float
     high_ns: float
+    confidence: float = 0.95
+    calls: int = 1
+    rounds: tuple[int, ...] = ()
+    stolen: float | None = None
 
 
 class Error(msgspec.Struct, frozen=True):
