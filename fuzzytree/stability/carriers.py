@@ -1,0 +1,125 @@
+"""The forms of a model, each ready in every runtime that can run it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.errors import LossError
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.probing import probes
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes import is_installed
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+_SLOW_ROWS = 60  # rows that a slow runtime is given, whatever the others get
+
+
+class Ready(msgspec.Struct, frozen=True):
+    """A form of a model in a runtime, ready to answer.
+
+    Attributes:
+        title: What to call it, such as `onnxruntime float32: raw rules`.
+        carrier: What to call the form.
+        runtime: The runtime.
+        model: The form.
+        run: Its answers.
+    """
+
+    title: str
+    carrier: str
+    runtime: Runtime
+    model: Model
+    run: Run
+
+    def some(self, values: FloatArray) -> FloatArray:
+        """Return the rows to ask: a share of them if the runtime is slow."""
+        rows = values.shape[1]
+        if not self.runtime.is_slow or rows <= _SLOW_ROWS:
+            return values
+        return values[:, :: -(-rows // _SLOW_ROWS)]
+
+
+def forms(model: Model) -> tuple[tuple[str, Model], ...]:
+    """Return the forms of a model: a tree with its rules, or the rules as they are."""
+    if isinstance(model, RuleBase):
+        return (("rules", model),)
+    made: list[tuple[str, Model]] = [
+        ("tree", model),
+        ("relative rules", rules_from_tree(model)),
+    ]
+    if model.sets:
+        made.append(("raw rules", rules_from_tree(model, "raw")))
+    return tuple(made)
+
+
+def ready(
+    model: Model, runtimes: Sequence[Runtime], skipped: list[str]
+) -> Iterator[Ready]:
+    """Yield each form of a model in each runtime that can run it.
+
+    Args:
+        model: A tree or a rule base.
+        runtimes: The runtimes.
+        skipped: Gets a sentence for each that is not installed or cannot.
+    """
+    for carrier, form in forms(model):
+        for runtime in runtimes:
+            found = made_ready(carrier, form, runtime, skipped)
+            if found is not None:
+                yield found
+
+
+def made_ready(
+    carrier: str, form: Model, runtime: Runtime, skipped: list[str]
+) -> Ready | None:
+    """Return one form in one runtime; None if that cannot be, with a reason kept."""
+    kind = "tree" if isinstance(form, FuzzyTree) else "rules"
+    if kind not in runtime.runs:
+        return None
+    if not is_installed(runtime):
+        skipped.append(f"{runtime.name} is not installed (extra {runtime.extra!r})")
+        return None
+    title = f"{runtime.name}: {carrier}"
+    try:
+        run = runtime.load(form)
+    except LossError as error:
+        skipped.append(f"{title}: {error}")
+        return None
+    return Ready(title, carrier, runtime, form, run)
+
+
+def probe_values(model: Model, limit: int, *, seed: int = 0) -> FloatArray:
+    """Return rows aimed at a model's edges, of shape (inputs, rows)."""
+    made = probes(model, limit=limit, seed=seed)
+    table = np.array([[row[n] for row in made] for n in model.inputs], np.float64)
+    return table.reshape(len(model.inputs), len(made))
+
+
+def unequal(one: Outcome, two: Outcome) -> BoolArray:
+    """Return the rows in which two outcomes differ, by a single bit if in no more."""
+    wrong: BoolArray = (one.rule != two.rule) | (one.status != two.status)
+    first, second = one.strengths, two.strengths
+    if first is None or second is None:
+        return wrong
+    if first.shape != second.shape:
+        return np.ones_like(wrong)
+    same = (first == second) | (np.isnan(first) & np.isnan(second))
+    return wrong | ~same.all(axis=0)
+
+
+def row_text(inputs: Sequence[str], values: FloatArray, row: int) -> str:
+    """Return a row as people read it, each number with all its digits."""
+    found = values[:, row].tolist()
+    shown = [f"{n} {v!r}" for n, v in zip(inputs, found, strict=True)][:8]
+    return ", ".join(shown) + (", ..." if len(inputs) > 8 else "")
