@@ -59,6 +59,8 @@ class Candidate(msgspec.Struct, frozen=True):
         note: What a reader must know to compare it fairly.
         is_foreign: Whether code of others runs, which may crash or hang the process;
             a child process tries it before the study does. A peer always is.
+        is_parallel: Whether a second thread can make it faster; if not, it is timed
+            with one only.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Candidate(msgspec.Struct, frozen=True):
     most_rows: int | None = None
     note: str = ""
     is_foreign: bool = False
+    is_parallel: bool = False
 
 
 class Omission(msgspec.Struct, frozen=True):
@@ -138,7 +141,20 @@ class Error(msgspec.Struct, frozen=True):
 
 
 class Point(msgspec.Struct, frozen=True):
-    """A candidate, measured: run time against error."""
+    """A candidate, measured: run time against error.
+
+    Attributes:
+        name: Unique in a study.
+        question: What it computes.
+        kind: As of the candidate.
+        error: On rows of the study; None for a floor, which answers nothing.
+        timings: One for each number of rows and threads.
+        load_ms: What it took to prepare it, in milliseconds, once.
+        bytes: The size of the file or code that runs, if there is one.
+        note: What a reader must know to compare it fairly.
+        probes: The error on rows aimed at edges and cuts, where carriers part; it says
+            nothing about how often that happens in use.
+    """
 
     name: str
     question: Question
@@ -148,6 +164,7 @@ class Point(msgspec.Struct, frozen=True):
     load_ms: float
     bytes: int | None = None
     note: str = ""
+    probes: Error | None = None
 
 
 class Machine(msgspec.Struct, frozen=True):
