@@ -1,9 +1,10 @@
-"""onnxruntime, opened quietly and with one thread; its errors by name."""
+"""onnxruntime, opened quietly and with few threads; its errors by name."""
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +35,9 @@ Array = npt.NDArray[np.generic]
 Session = Callable[[Sequence[str], Array], dict[str, Array]]
 """Answers the named outputs to `inputs`; raises one of `RUNTIME_ERRORS`."""
 
+Bare = Callable[[list[str], dict[str, Array]], list[Any]]
+"""The same as onnxruntime itself has it: names and arrays in, a list of arrays out."""
+
 
 def open_session(content: bytes) -> Session:
     """Return a session that writes nothing to stderr and starts no thread.
@@ -41,8 +45,27 @@ def open_session(content: bytes) -> Session:
     Raises:
         Exception: One of `RUNTIME_ERRORS`, if onnxruntime refuses the file.
     """
+    return named(open_bare(content))
+
+
+def named(bare: Bare) -> Session:
+    """Return a session that gives its outputs by name."""
+
+    def run(names: Sequence[str], inputs: Array) -> dict[str, Array]:
+        found = bare(list(names), {"inputs": inputs})
+        return {name: np.asarray(f) for name, f in zip(names, found, strict=True)}
+
+    return run
+
+
+def open_bare(content: bytes, threads: int = 1) -> Bare:
+    """Return the call of a silent session, with nothing of ours around it.
+
+    Raises:
+        Exception: One of `RUNTIME_ERRORS`, if onnxruntime refuses the file.
+    """
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
+    options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.log_severity_level = _SILENT
     session = onnxruntime.InferenceSession(
@@ -50,12 +73,7 @@ def open_session(content: bytes) -> Session:
     )
     quiet = onnxruntime.RunOptions()
     quiet.log_severity_level = _SILENT
-
-    def run(names: Sequence[str], inputs: Array) -> dict[str, Array]:
-        found = session.run(list(names), {"inputs": inputs}, quiet)
-        return {name: np.asarray(f) for name, f in zip(names, found, strict=True)}
-
-    return run
+    return lambda names, feeds: session.run(names, feeds, quiet)
 
 
 def first_line(error: Exception) -> str:

@@ -138,10 +138,53 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
     )
 
 
+class Prepared(msgspec.Struct, frozen=True):
+    """A model as a graph in a session.
+
+    Attributes:
+        run: Answers to values of shape (inputs, rows).
+        table: The same values as the graph takes them, shape (rows, columns).
+        call: The answers to such a table and nothing else: some rows at a time, as
+            `run` does, and thrown away.
+        content: The graph as a file.
+        dtype: The number type of the table.
+    """
+
+    run: Run
+    table: Callable[[FloatArray], npt.NDArray[np.generic]]
+    call: Callable[[npt.NDArray[np.generic]], None]
+    content: bytes
+    dtype: Dtype
+
+
 def load(
     model: Model, *, dtype: Dtype, readable: bool = False, plain: bool = False
 ) -> Run:
     """Write a model as ONNX, in memory, and return what runs it.
+
+    Raises:
+        LossError: If the number type or the kind of graph cannot hold the model.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+    """
+    return prepare(model, dtype=dtype, readable=readable, plain=plain).run
+
+
+def prepare(
+    model: Model,
+    *,
+    dtype: Dtype = "float64",
+    readable: bool = False,
+    plain: bool = False,
+    threads: int = 1,
+) -> Prepared:
+    """Write a model as ONNX, in memory, and open it.
+
+    Args:
+        model: A tree or a rule base.
+        dtype: The number type of the graph.
+        readable: Whether a rule base's graph has functions, for people.
+        plain: Whether a tree's graph does without tree operators.
+        threads: How many threads one call may use.
 
     Raises:
         LossError: If the number type or the kind of graph cannot hold the model.
@@ -152,7 +195,7 @@ def load(
     if plain and not isinstance(model, FuzzyTree):
         raise LossError("onnxruntime plain runs trees, and these are rules")
     _require_packages("running")
-    from fuzzytree.exporters.onnx_session import open_session
+    from fuzzytree.exporters.onnx_session import named, open_bare
 
     outputs: tuple[Output, ...] = ("rule", "status", "strengths")
     if isinstance(model, FuzzyTree):
@@ -166,7 +209,21 @@ def load(
         verify=False,
     ).content
     facts = _facts(_parsed(content, model.name), model.name)
-    return functools.partial(_run, open_session(content), facts)
+    bare = open_bare(content, threads)
+    names: list[str] = [*outputs]
+    rows = _rows_at_once(facts)
+
+    def call(table: npt.NDArray[np.generic]) -> None:
+        for start in range(0, len(table), rows):
+            bare(names, {"inputs": table[start : start + rows]})
+
+    return Prepared(
+        functools.partial(_run, named(bare), facts),
+        functools.partial(_table, facts),
+        call,
+        content,
+        dtype,
+    )
 
 
 def _require_packages(doing: str) -> None:
@@ -226,30 +283,41 @@ def _chunks(
     names: Sequence[str],
 ) -> Iterator[tuple[int, Outputs]]:
     """Yield the outputs, by name, of some rows at a time, with the first row."""
-    import numpy as np
-
     from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line
 
-    dtype = np.dtype(np.float32 if facts.dtype == "float32" else np.float64)
-    degree = 8 if facts.dtype == "float64" else 4
-    rows = max(128, min(2**13, _CACHE_BYTES // (degree * facts.rules)))
-    rows = 2**16 if facts.carrier == "tree" else rows
-    places = [facts.columns.index(name) for name in facts.inputs]
+    rows = _rows_at_once(facts)
     for start in range(0, max(values.shape[1], 1), rows):
-        part = values[:, start : start + rows]
-        table = np.zeros((part.shape[1], len(facts.columns)), dtype)
-        with np.errstate(over="ignore"):  # beyond float32 is missing in float32
-            table[:, places] = part.T
+        table = _table(facts, values[:, start : start + rows])
         try:
             found = session(names, table)
         except RUNTIME_ERRORS as error:
             text = f"onnxruntime cannot run {facts.name}: {first_line(error)}"
             raise LossError(text) from error
-        if not _is_answer(facts, found, part.shape[1]):
+        if not _is_answer(facts, found, len(table)):
             raise LossError(
                 f"{facts.name}: the ONNX file gives answers without meaning"
             )
         yield start, found
+
+
+def _rows_at_once(facts: Facts) -> int:
+    """Return how many rows are answered together, so that they stay in the cache."""
+    if facts.carrier == "tree":
+        return 2**16
+    degree = 8 if facts.dtype == "float64" else 4
+    return max(128, min(2**13, _CACHE_BYTES // (degree * facts.rules)))
+
+
+def _table(facts: Facts, values: FloatArray) -> npt.NDArray[np.generic]:
+    """Return values of shape (inputs, rows) as the graph's input."""
+    import numpy as np
+
+    dtype = np.dtype(np.float32 if facts.dtype == "float32" else np.float64)
+    places = [facts.columns.index(name) for name in facts.inputs]
+    table = np.zeros((values.shape[1], len(facts.columns)), dtype)
+    with np.errstate(over="ignore"):  # beyond float32 is missing in float32
+        table[:, places] = values.T
+    return table
 
 
 def _is_answer(facts: Facts, found: Outputs, rows: int) -> bool:
