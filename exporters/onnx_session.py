@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +34,7 @@ Array = npt.NDArray[np.generic]
 Session = Callable[[Sequence[str], Array], dict[str, Array]]
 """Answers the named outputs to `inputs`; raises one of `RUNTIME_ERRORS`."""
 
-Bare = Callable[[list[str], dict[str, Array]], list[Any]]
+Bare = Callable[[list[str], dict[str, Array]], Sequence[object]]
 """The same as onnxruntime itself has it: names and arrays in, a list of arrays out."""
 
 
@@ -73,7 +72,12 @@ def open_bare(content: bytes, threads: int = 1) -> Bare:
     )
     quiet = onnxruntime.RunOptions()
     quiet.log_severity_level = _SILENT
-    return lambda names, feeds: session.run(names, feeds, quiet)
+
+    def bare(names: list[str], feeds: dict[str, Array]) -> Sequence[object]:
+        found: Sequence[object] = session.run(names, feeds, quiet)
+        return found
+
+    return bare
 
 
 def first_line(error: Exception) -> str:
