@@ -15,7 +15,7 @@ import importlib.metadata
 import os
 import platform
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -23,20 +23,18 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 import numpy.typing as npt
 from sklearn.tree import DecisionTreeClassifier
+from trees import COLUMNS, grow, tree_of, walk
 
 from fuzzytree.contracts import Run
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import LR, Band, Flank, RuleBase, Side, Term, Variable
+from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load, load_best_first
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets
+from fuzzytree.tree import FuzzyTree
 
 Singles = npt.NDArray[np.float32]
 Floats = npt.NDArray[np.float64]
 Candidates = Mapping[str, Callable[[], object]]
-
-FEATURES = 11
-COLUMNS = tuple(f"x{number}" for number in range(FEATURES))
 
 
 def main() -> None:
@@ -81,7 +79,7 @@ def _load() -> str:
 
 
 def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
-    grown = _grow(leaves, is_many=is_many)
+    grown = grow(leaves, is_many=is_many)
     tree = tree_of(grown)
     run = load(tree)
     kind = "a class for each leaf" if is_many else "3 classes"
@@ -92,7 +90,7 @@ def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
     for count in (1, 100_000) if quick else (1, 100_000, 1_000_000):
         if is_many and leaves > 100 and count > 100_000:
             continue  # predict would need rows x classes doubles
-        drawn = np.random.default_rng(1).normal(size=(count, FEATURES))
+        drawn = np.random.default_rng(1).normal(size=(count, len(COLUMNS)))
         single = drawn.astype(np.float32)
         double = single.astype(np.float64)
         values = np.ascontiguousarray(double[:, _needed(tree)].T)
@@ -115,7 +113,7 @@ def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
 
 
 def _rules(count: int, *, raw: bool, rounds: int) -> None:
-    tree = tree_of(_grow(count, is_many=False))
+    tree = tree_of(grow(count, is_many=False))
     rules = rules_from_tree(tree, "raw" if raw else "relative")
     run, best = load(rules), load_best_first(rules)
     print(
@@ -170,21 +168,6 @@ def _fastest(candidates: Candidates, rounds: int, calls: int = 1) -> dict[str, f
     return best
 
 
-def _grow(leaves: int, *, is_many: bool) -> DecisionTreeClassifier:
-    """Return a tree of scikit-learn with so many leaves, on seeded data."""
-    chance = np.random.default_rng(0)
-    values = chance.normal(size=(100_000, FEATURES)).astype(np.float32)
-    scores = values @ chance.normal(size=(FEATURES, 3))
-    labels = (scores + 0.5 * chance.normal(size=scores.shape)).argmax(axis=1)
-    grown = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0)
-    grown.fit(values, labels)
-    if not is_many:
-        return grown
-    kinds = grown.apply(values)
-    grown = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0)
-    return grown.fit(values, kinds)
-
-
 def _needed(tree: FuzzyTree) -> list[int]:
     return [COLUMNS.index(name) for name in tree.inputs]
 
@@ -194,105 +177,8 @@ def _compare_answers(
 ) -> None:
     places = grown.apply(single[:20_000])
     numbers = run(values[:, :20_000]).rule
-    order = [place for place in _walk(grown) if grown.tree_.feature[place] < 0]
+    order = [place for place in walk(grown) if grown.tree_.feature[place] < 0]
     assert np.array_equal(places, np.array(order)[numbers - 1]), "answers differ"
-
-
-def _walk(grown: DecisionTreeClassifier) -> Iterable[int]:
-    """Yield the nodes of a scikit-learn tree depth-first, left before right."""
-    todo = [0]
-    while todo:
-        place = todo.pop()
-        yield place
-        if grown.tree_.feature[place] >= 0:
-            todo.append(grown.tree_.children_right[place])
-            todo.append(grown.tree_.children_left[place])
-
-
-def tree_of(grown: DecisionTreeClassifier) -> FuzzyTree:
-    """Return a fuzzy tree with the cuts of a tree of scikit-learn.
-
-    Flanks are one unit wide; each leaf has a set on each variable, around the mean of
-    its cell.
-    """
-    inner = [p for p in _walk(grown) if grown.tree_.feature[p] >= 0]
-    leaves = [p for p in _walk(grown) if grown.tree_.feature[p] < 0]
-    node_of = {place: number for number, place in enumerate(inner, 1)}
-    leaf_of = {place: number for number, place in enumerate(leaves, 1)}
-    below = _below(grown, leaf_of)
-    terms: dict[str, dict[str, Term]] = {}
-    nodes: list[Node] = []
-    for place in inner:
-        name = COLUMNS[grown.tree_.feature[place]]
-        cut = float(grown.tree_.threshold[place])
-        low, high = f"below {cut!r}", f"above {cut!r}"
-        known = terms.setdefault(name, {})
-        known[low] = Term(low, Band(high=cut, right=Flank(cut, cut + 1.0)))
-        known[high] = Term(high, Band(low=cut, left=Flank(cut, cut - 1.0)))
-        children = (grown.tree_.children_left[place], grown.tree_.children_right[place])
-        branches = tuple(
-            Branch(
-                (term,),
-                tuple(f"pattern {leaf}" for leaf in below[child]),
-                node_of.get(child),
-                leaf_of.get(child),
-            )
-            for term, child in zip((low, high), children, strict=True)
-        )
-        nodes.append(Node(name, (cut,), (0, 1), branches))
-    used = [name for name in COLUMNS if name in terms]
-    labels = grown.classes_[grown.tree_.value[:, 0, :].argmax(axis=1)]
-    return FuzzyTree(
-        "benchmark",
-        tuple(str(label) for label in grown.classes_),
-        tuple(Variable(name, tuple(terms[name].values())) for name in used),
-        tuple(nodes),
-        tuple(
-            Leaf(
-                str(labels[p]),
-                f"pattern {leaf_of[p]}",
-                int(grown.tree_.n_node_samples[p]),
-            )
-            for p in leaves
-        ),
-        tuple(Sets(name, _sets(grown, name, leaf_of)) for name in used),
-        columns=COLUMNS,
-    )
-
-
-def _below(
-    grown: DecisionTreeClassifier, leaf_of: Mapping[int, int]
-) -> dict[int, list[int]]:
-    below: dict[int, list[int]] = {}
-    for place in reversed(list(_walk(grown))):
-        if place in leaf_of:
-            below[place] = [leaf_of[place]]
-        else:
-            left, right = grown.tree_.children_left, grown.tree_.children_right
-            below[place] = below[left[place]] + below[right[place]]
-    return below
-
-
-def _sets(
-    grown: DecisionTreeClassifier, name: str, leaf_of: Mapping[int, int]
-) -> tuple[Term, ...]:
-    """Return the set of each leaf on a variable, as wide as its cell."""
-    cells: dict[int, tuple[float, float]] = {0: (-8.0, 8.0)}
-    found: dict[int, Term] = {}
-    for place in _walk(grown):
-        low, high = cells[place]
-        if place in leaf_of:
-            side = Side((high - low) / 2.0, (0.6, 0.1))
-            label = f"pattern {leaf_of[place]}"
-            found[leaf_of[place]] = Term(label, LR((low + high) / 2.0, side, side))
-            continue
-        left = grown.tree_.children_left[place]
-        right = grown.tree_.children_right[place]
-        cut = float(grown.tree_.threshold[place])
-        is_asked = COLUMNS[grown.tree_.feature[place]] == name
-        cells[left] = (low, min(high, cut)) if is_asked else (low, high)
-        cells[right] = (max(low, cut), high) if is_asked else (low, high)
-    return tuple(found[number] for number in sorted(found))
 
 
 def _skl2onnx(grown: DecisionTreeClassifier, single: Singles) -> Callable[[], object]:
