@@ -21,7 +21,12 @@ if TYPE_CHECKING:
 
 def load(model: Model) -> Run:
     """Return a function that answers rows one after another by generated Python."""
-    answer = _answer_of(write(model).content)
+    return load_content(write(model).content, model)
+
+
+def load_content(content: bytes, model: Model) -> Run:
+    """Return the same for a file that `fuzzytree.exporters.python` wrote of a model."""
+    answer = _answer_of(content)
     rules = len(model.rules) if isinstance(model, RuleBase) else None
 
     def run(values: FloatArray) -> Outcome:

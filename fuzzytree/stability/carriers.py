@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -94,9 +95,17 @@ def made_ready(
     try:
         run = runtime.load(form)
     except LossError as error:
-        skipped.append(f"{title}: {error}")
+        skipped.append(f"{title}: {first_line(error)}")
         return None
     return Ready(title, carrier, runtime, form, run)
+
+
+def answered(one: Ready, values: FloatArray) -> tuple[Outcome, str | None]:
+    """Return a runtime's answers, and the first warning that it let out, if any."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = one.run(values)
+    return found, str(caught[0].message) if caught else None
 
 
 def probe_values(model: Model, limit: int, *, seed: int = 0) -> FloatArray:
@@ -116,6 +125,11 @@ def unequal(one: Outcome, two: Outcome) -> BoolArray:
         return np.ones_like(wrong)
     same = (first == second) | (np.isnan(first) & np.isnan(second))
     return wrong | ~same.all(axis=0)
+
+
+def first_line(error: Exception) -> str:
+    """Return what went wrong, without the advice that follows it."""
+    return str(error).partition("\n")[0]
 
 
 def row_text(inputs: Sequence[str], values: FloatArray, row: int) -> str:

@@ -14,6 +14,7 @@ from fuzzytree.rulebase import (
     Band,
     Flank,
     Part,
+    Points,
     Shape,
     Side,
     Term,
@@ -175,6 +176,8 @@ def _shape(name: str, shape: Shape, units: Units) -> Shape:
             return Band(place(low), place(high), flank(left), flank(right))
         case LR(mean=mean, left=below, right=above):
             return LR(units.place(name, mean), side(below), side(above))
+        case Points(values=values, degrees=degrees):
+            return Points(tuple(units.place(name, v) for v in values), degrees)
 
 
 def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
