@@ -1,0 +1,1 @@
+"""The paper's claims about its own tree, measured: what `claims.py` is made of."""
