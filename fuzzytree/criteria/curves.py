@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fuzzytree.contracts import Model
 from fuzzytree.numerics.conditioning import Conduct, conduct
 from fuzzytree.rulebase import RuleBase, Shape, Term
-from fuzzytree.stability.results import Criterion, CurveFault, judged
+from fuzzytree.criteria.results import Criterion, CurveFault, judged
 from fuzzytree.tree import FuzzyTree
 
 LARGEST_SIZE = 64.0

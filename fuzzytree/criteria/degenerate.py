@@ -11,9 +11,9 @@ import numpy as np
 from fuzzytree.contracts import Model, Outcome, Runtime
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.rulebase import LR, Band, Points, RuleBase, Shape
-from fuzzytree.stability.carriers import Ready, forms, made_ready, ready, unequal
-from fuzzytree.stability.results import Criterion, judged
-from fuzzytree.stability.terms import asked, collapsed, held
+from fuzzytree.criteria.carriers import Ready, forms, made_ready, ready, unequal
+from fuzzytree.criteria.results import Criterion, judged
+from fuzzytree.criteria.terms import asked, collapsed, held
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

@@ -13,8 +13,8 @@ from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.python import load_content
-from fuzzytree.stability.carriers import first_line, forms, unequal
-from fuzzytree.stability.results import Criterion, judged
+from fuzzytree.criteria.carriers import first_line, forms, unequal
+from fuzzytree.criteria.results import Criterion, judged
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from fuzzytree.contracts import Model, Outcome, Runtime
-from fuzzytree.stability.carriers import Ready, made_ready, ready, unequal
-from fuzzytree.stability.results import Criterion, judged
+from fuzzytree.criteria.carriers import Ready, made_ready, ready, unequal
+from fuzzytree.criteria.results import Criterion, judged
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

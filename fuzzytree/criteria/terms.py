@@ -29,7 +29,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.stability.carriers import Ready, answered
+from fuzzytree.criteria.carriers import Ready, answered
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

@@ -10,18 +10,18 @@ import numpy as np
 
 from fuzzytree.contracts import Dtype, Model, Outcome, Runtime
 from fuzzytree.reference import Status
-from fuzzytree.stability.carriers import (
+from fuzzytree.criteria.carriers import (
     Ready,
     answered,
     ready,
     row_text,
     unequal,
 )
-from fuzzytree.stability.results import Criterion, judged
+from fuzzytree.criteria.results import Criterion, judged
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
-    from fuzzytree.stability.carriers import BoolArray
+    from fuzzytree.criteria.carriers import BoolArray
 
 SPECIALS = (
     math.nan,

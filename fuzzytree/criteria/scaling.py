@@ -10,13 +10,13 @@ import numpy as np
 
 from fuzzytree.contracts import Dtype, Model, Runtime
 from fuzzytree.errors import InvalidModelError, LossError
-from fuzzytree.stability.carriers import Ready, made_ready, ready, unequal
-from fuzzytree.stability.results import Criterion, Usable, judged
-from fuzzytree.stability.transforms import exponent_range, scaled
+from fuzzytree.criteria.carriers import Ready, made_ready, ready, unequal
+from fuzzytree.criteria.results import Criterion, Usable, judged
+from fuzzytree.criteria.transforms import exponent_range, scaled
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
-    from fuzzytree.stability.carriers import BoolArray
+    from fuzzytree.criteria.carriers import BoolArray
 
 _STEPS = (-300, -40, -7, 7, 40, 300)  # and the ends of the range
 _DECADES = 20.0

@@ -1,1 +1,0 @@
-"""Is a model, and learning, numerically stable: criteria N1 to N10, each a module."""
