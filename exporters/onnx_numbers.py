@@ -9,6 +9,7 @@ becomes 0, different bounds that become one.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 
 import msgspec
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from fuzzytree.contracts import Dtype, Loss, Model
 from fuzzytree.reference import BELOW_ONE
-from fuzzytree.rulebase import LR, Band, Flank, Shape, Variable
+from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Variable
 from fuzzytree.tree import FuzzyTree
 
 Real = np.float64 | np.float32
@@ -119,6 +120,29 @@ def _shape_losses(where: str, shape: Shape) -> Iterator[Loss]:
                     where, [(spread, side.spread), (reach, side.reach)]
                 )
                 yield from _zero_losses(where, spread, side.spread)
+        case Points(values=values):
+            ends = [("first point", values[0]), ("last point", values[-1])]
+            yield from _number_losses(where, ends)
+            yield from _peak_losses(where, shape)
+
+
+def _peak_losses(where: str, points: Points) -> Iterator[Loss]:
+    """Yield where points become one and a degree beyond those at their ends is gone.
+
+    Other points that become one are a step, as steep as float32 can tell.
+    """
+    single = rounded(points.values, np.float32).tolist()
+    pairs = zip(single, points.values, points.degrees, strict=True)
+    for _, group in itertools.groupby(pairs, key=lambda pair: pair[0]):
+        _, values, degrees = zip(*group, strict=True)
+        ends = degrees[0], degrees[-1]
+        lost = max(max(degrees) - max(ends), min(ends) - min(degrees))
+        if lost > 0:
+            text = (
+                f"points {values[0]!r} to {values[-1]!r} become one in float32, "
+                "and the degrees between them are gone"
+            )
+            yield Loss(where, text, lost)
 
 
 def _flank_losses(where: str, name: str, flank: Flank) -> Iterator[Loss]:

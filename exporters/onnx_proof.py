@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -13,7 +14,7 @@ from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters.onnx_numbers import Real
 from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_session
 from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import LR, Band, RuleBase, Term
+from fuzzytree.rulebase import LR, Band, Points, RuleBase, Term
 
 _MOST_CLAUSES = 50_000  # what the reference does in well under a second
 
@@ -92,6 +93,9 @@ def _landmarks(terms: Sequence[Term]) -> set[float]:
                 found.update(ends, (v for v in (low, high) if v is not None))
             case LR(mean=mean, left=left, right=right):
                 found.update((mean, mean - left.spread / 2, mean + right.spread / 2))
+            case Points(values=values):
+                found.update(values)
+                found.update(a + (b - a) / 2 for a, b in itertools.pairwise(values))
     return found
 
 

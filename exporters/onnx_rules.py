@@ -7,6 +7,7 @@ that strengths have the same bits as its own. What is rearranged changes no bit:
   left edge of `-x`: negated operands give negated differences, and equal quotients.
 - At any x at most one edge of a band is below 1, so the smallest edge is the degree.
 - An LR set is two *slopes*, or one of `|x - m|` if both sides are the same.
+- Points are one *polyline* (`onnx_lines.py`).
 - Shorter curves are filled up with zeros at the high end: `0 * q + c` is `c`.
 - Max and min may repeat operands; a product takes them in their stored order.
 """
@@ -22,8 +23,9 @@ from onnx import helper
 
 from fuzzytree.exporters.onnx_axes import Axes, axes, column, is_known, scalar
 from fuzzytree.exporters.onnx_graph import Sheet, Table
+from fuzzytree.exporters.onnx_lines import Polyline, is_chained, polylines
 from fuzzytree.exporters.onnx_numbers import Numbers, RealArray, rounded
-from fuzzytree.rulebase import LR, Clause, Flank, RuleBase, Shape, Side
+from fuzzytree.rulebase import LR, Clause, Flank, Points, RuleBase, Shape, Side
 
 Key = tuple[str, str]  # variable and term
 Curve = tuple[float, ...]
@@ -55,7 +57,7 @@ class Slope(msgspec.Struct, frozen=True):
     side: Side
 
 
-Part = Edge | Slope
+Part = Edge | Slope | Polyline
 
 GUARD = ""
 """In place of a variable: 0, or NaN in a row with a missing value."""
@@ -92,12 +94,14 @@ def rules_graph(
 
 
 def _parts(variable: str, shape: Shape) -> list[Part]:
-    """Return the edges or slopes whose smallest degree is that of a shape."""
+    """Return the parts whose smallest degree is that of a shape."""
     if isinstance(shape, LR):
         mean, left, right = shape.mean, shape.left, shape.right
         if left == right:
             return [Slope(variable, 0, mean, left)]
         return [Slope(variable, -1, mean, left), Slope(variable, 1, mean, right)]
+    if isinstance(shape, Points):
+        return [Polyline(variable, shape)]
     edges: list[Part] = []
     if shape.low is not None:
         edges.append(Edge(variable, 1, shape.low, shape.left))
@@ -142,12 +146,13 @@ def _degrees(
 def _primitives(
     sheet: Sheet, table: Table, parts: Sequence[Part], numbers: Numbers, frame: Axes
 ) -> dict[Part, int]:
-    """Add one block of edges and one of slopes; return the row of each part."""
+    """Add a block for each kind of part; return the row of each part."""
     edges = [part for part in parts if isinstance(part, Edge)]
     slopes = [part for part in parts if isinstance(part, Slope)]
     slopes.sort(key=lambda slope: abs(slope.sign))  # |x - m| first
+    lines = [part for part in parts if isinstance(part, Polyline)]
     block = frame.block
-    if slopes:  # an edge of NaN is 1, but a slope of NaN is NaN
+    if slopes or lines:  # an edge of NaN is 1, but a slope of NaN is NaN
         zero = scalar(sheet, 0.0, numbers.axis)
         known = is_known(sheet, frame, numbers)
         block = sheet.node("Where", known, block, zero)
@@ -166,6 +171,13 @@ def _primitives(
         taken = values.take([place[s.variable, s.sign or 1] for s in slopes])
         first = table.append(_slopes(sheet, taken, slopes, numbers), len(slopes))
         row |= {slope: first + number for number, slope in enumerate(slopes)}
+    for is_short in (True, False):
+        group = [line for line in lines if is_chained(line) == is_short]
+        if group:
+            taken = values.take([place[line.variable, 1] for line in group])
+            shapes = [line.points for line in group]
+            first = table.append(polylines(sheet, taken, shapes, numbers), len(group))
+            row |= {line: first + number for number, line in enumerate(group)}
     return row
 
 

@@ -21,6 +21,7 @@ from fuzzytree.rulebase import (
     Band,
     Clause,
     Flank,
+    Points,
     RuleBase,
     Shape,
     Side,
@@ -138,6 +139,23 @@ def side(distance, spread, reach, curve):
     return body * (square * square)
 
 
+def points(x, values, degrees):
+    \"\"\"Return the degree on the line between the points beside x.\"\"\"
+    low, high = 0, len(values)
+    while low < high:  # values[low - 1] < x <= values[low], by bisection
+        middle = (low + high) // 2
+        if x > values[middle]:
+            low = middle + 1
+        else:
+            high = middle
+    if low in (0, len(values)):
+        return degrees[low and -1]
+    left, right = values[low - 1], values[low]
+    here, there = degrees[low - 1], degrees[low]
+    line = there + (x - right) / (left - right) * (here - there)
+    return min(max(line, min(here, there)), max(here, there))
+
+
 def horner(coefficients, x):
     \"\"\"Return c0 + x (c1 + x (c2 + ...)), from the inside out.\"\"\"
     total = coefficients[-1]
@@ -151,7 +169,7 @@ def clip(value, high):
     return min(max(value, 0.0), high)
 
 
-SHAPES = {"band": band, "lr": lr}
+SHAPES = {"band": band, "lr": lr, "points": points}
 """
 
 _TEST = """
@@ -311,6 +329,8 @@ def _shape(shape: Shape) -> str:
             return _literal(("band", low, high, _flank(left), _flank(right)))
         case LR(mean=mean, left=below, right=above):
             return _literal(("lr", mean, _side(below), _side(above)))
+        case Points(values=values, degrees=degrees):
+            return _literal(("points", values, degrees))
 
 
 def _flank(flank: Flank | None) -> tuple[object, ...] | None:

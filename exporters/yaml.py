@@ -27,6 +27,7 @@ from fuzzytree.rulebase import (
     Clause,
     Flank,
     Part,
+    Points,
     RuleBase,
     Semantics,
     Side,
@@ -264,6 +265,12 @@ def _term(term: Term) -> dict[str, Entry]:
             if repr(left) == repr(right):  # 0.0 and -0.0 differ
                 return middle | _side(left)
             return {**middle, "left": Short(_side(left)), "right": Short(_side(right))}
+        case Points(values, degrees):
+            pairs = zip(values, degrees, strict=True)
+            return {
+                "name": term.name,
+                "points": Short([*map(_numbers, pairs)], is_run_on=True),
+            }
 
 
 def _band(band: Band) -> dict[str, Entry]:

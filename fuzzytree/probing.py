@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import axis_values
-from fuzzytree.rulebase import LR, Band, Clause, Rule, RuleBase, Shape, Variable
+from fuzzytree.rulebase import LR, Band, Clause, Points, Rule, RuleBase, Shape, Variable
 from fuzzytree.tree import FuzzyTree
 
 SPECIAL = (
@@ -84,6 +84,9 @@ def landmarks(shape: Shape) -> tuple[float, ...]:
             for sign, side in ((-1.0, below), (1.0, above)):
                 for u in (0.6, 1.0, 0.5 + 0.5 * side.reach, side.reach):
                     ends.append(mean + sign * side.spread * u)
+        case Points(values=values):
+            inner = [a + 0.4 * (b - a) for a, b in itertools.pairwise(values)]
+            ends = [*values, *inner]
     return tuple(dict.fromkeys(filter(math.isfinite, ends)))
 
 
@@ -170,6 +173,8 @@ class _Maker:
                 return low, high
             case LR(mean=mean, left=below, right=above):
                 return mean - 0.1 * below.spread, mean + 0.1 * above.spread
+            case Points():
+                return _highest(shape)
 
     def _move(self, row: Row, variable: Variable, inside: Interval) -> bool:
         """Shift a row so that a variable falls inside an interval; say if it did."""
@@ -220,6 +225,17 @@ class _Maker:
                 step = math.copysign(math.ulp(here) * self.chance.randint(1, 5), step)
             row[name] = here + step
         row.update(nearest)
+
+
+def _highest(points: Points) -> Interval:
+    """Return the longest stretch on which points reach their largest degree."""
+    top = max(points.degrees)
+    ends = [-math.inf, *points.values, math.inf]
+    degrees = [points.degrees[0], *points.degrees, points.degrees[-1]]
+    pairs = itertools.pairwise(zip(ends, degrees, strict=True))
+    level = [(a, b) for (a, p), (b, r) in pairs if p == r == top]
+    peak = points.values[points.degrees.index(top)]
+    return max(level, key=lambda ab: ab[1] - ab[0], default=(peak, peak))
 
 
 def _ranges(rules: RuleBase) -> dict[str, Interval]:

@@ -8,12 +8,23 @@ performs the same operations in the same order.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
 from enum import IntEnum
 
 import msgspec
 
-from fuzzytree.rulebase import LR, Band, Clause, Flank, RuleBase, Shape, Side, Variable
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Variable,
+)
 from fuzzytree.tree import FuzzyTree
 
 BELOW_ONE = 1.0 - 2.0**-53
@@ -170,6 +181,8 @@ def degree(shape: Shape, value: float) -> float:
         case LR(mean=mean, left=below, right=above):
             distance = value - mean
             return min(side_degree(below, -distance), side_degree(above, distance))
+        case Points():
+            return points_degree(shape, value)
 
 
 def flank_degree(flank: Flank, value: float) -> float:
@@ -189,6 +202,22 @@ def side_degree(side: Side, distance: float) -> float:
     w = _clip((side.reach - u) / (side.reach - 1.0), 1.0)
     square = w * w
     return body * (square * square)
+
+
+def points_degree(points: Points, value: float) -> float:
+    """Return the degree on the line between the points on either side of a value.
+
+    The quotient lies in [0, 1] and falls as the value grows, in rounded numbers too;
+    so does the product in size, and the sum is held between the two degrees.
+    """
+    values, degrees = points.values, points.degrees
+    after = bisect_left(values, value)  # so many points lie below the value
+    if after in (0, len(values)):
+        return degrees[after and -1]
+    left, right = values[after - 1], values[after]
+    here, there = degrees[after - 1], degrees[after]
+    line = there + (value - right) / (left - right) * (here - there)
+    return min(max(line, min(here, there)), max(here, there))
 
 
 def horner(coefficients: tuple[float, ...], x: float) -> float:

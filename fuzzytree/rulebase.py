@@ -7,6 +7,7 @@ everything that could change an answer stands in the values below.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Literal
@@ -16,6 +17,8 @@ import msgspec
 from fuzzytree.errors import InvalidModelError
 
 _LARGEST_COEFFICIENT = 1e6  # keeps every polynomial finite, in float32 too
+
+MOST_POINTS = 4096
 
 _MOST_COMPARED = 1000  # names among which a similar one is sought
 
@@ -95,7 +98,32 @@ class LR(Value, frozen=True, tag="lr"):
     right: Side
 
 
-Shape = Band | LR
+class Points(Value, frozen=True, tag="points"):
+    """Points joined by lines: triangles, trapezoids, ramps, steps and free curves.
+
+    Between two neighbours `(a, p)` and `(b, r)`, for `a < x <= b`, the degree is
+    `r + (x - b) / (a - b) * (p - r)`, each operation rounded once, held between p and
+    r: so it is exact at the points and where p = r, and monotone between them. Before
+    the first point its degree holds, behind the last one the last one's.
+
+    A value that occurs twice is a step: at the value itself the first degree holds,
+    above it the second.
+
+    Attributes:
+        values: One to 4096, in the variable's unit, none below the one before it and
+            none more than twice.
+        degrees: As many, in [0, 1].
+
+    Example:
+        >>> triangle = Points((0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
+        >>> step = Points((2.5, 2.5), (1.0, 0.0))
+    """
+
+    values: tuple[float, ...]
+    degrees: tuple[float, ...]
+
+
+Shape = Band | LR | Points
 
 
 class Term(Value, frozen=True):
@@ -362,6 +390,39 @@ def shape_mistakes(shape: Shape) -> Iterator[str]:
                 yield f"the mean must be finite, not {shape.mean!r}"
             for name, side in (("left", shape.left), ("right", shape.right)):
                 yield from _side_mistakes(name, side)
+        case Points():
+            yield from _points_mistakes(shape)
+
+
+def _points_mistakes(points: Points) -> Iterator[str]:
+    values, degrees = points.values, points.degrees
+    if len(values) != len(degrees):
+        yield f"{len(values)} values of points need as many degrees, not {len(degrees)}"
+    if not 1 <= len(values) <= MOST_POINTS:
+        yield f"a shape needs 1 to {MOST_POINTS} points, not {len(values)}"
+    if not all(map(math.isfinite, values)):
+        wrong = next(value for value in values if not math.isfinite(value))
+        yield f"the values of points must be finite, not {wrong!r}"
+        return
+    yield from itertools.islice(_order_mistakes(values), 1)
+    for value, degree in zip(values, degrees, strict=False):
+        if not 0.0 <= degree <= 1.0:
+            yield f"the degree at {value!r} must lie in [0, 1], not {degree!r}"
+            return
+
+
+def _order_mistakes(values: tuple[float, ...]) -> Iterator[str]:
+    for before, value in itertools.pairwise(values):
+        if value < before:
+            yield (
+                f"the values of points must not decrease: {value!r} stands "
+                f"behind {before!r}"
+            )
+        elif not math.isfinite(value - before):
+            yield f"the points at {before!r} and {value!r} are too far apart"
+    for before, after in zip(values, values[2:], strict=False):
+        if before == after:
+            yield f"three points at {before!r}; two make a step"
 
 
 def _band_mistakes(band: Band) -> Iterator[str]:

@@ -6,16 +6,22 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Sequence
 
-from fuzzytree.probing import SPECIAL, probes
+from msgspec.structs import replace
+
+from fuzzytree.probing import SPECIAL, landmarks, probes
 from fuzzytree.rulebase import (
     LR,
     Band,
     Flank,
     Part,
+    Points,
+    RuleBase,
     Semantics,
+    Shape,
     Side,
     Term,
     Variable,
@@ -30,7 +36,7 @@ from fuzzytree.tree import (
     intervals,
 )
 
-__all__ = ["SPECIAL", "probes", "random_tree"]
+__all__ = ["SPECIAL", "probes", "random_tree", "with_points"]
 
 
 def random_tree(
@@ -87,6 +93,45 @@ def random_tree(
     return _assemble(
         chance, columns, labels, derived, asked, plan, semantics or Semantics()
     )
+
+
+def with_points(rules: RuleBase, seed: int, *, share: float = 0.6) -> RuleBase:
+    """Return a rule base some of whose terms are points, made from a seed.
+
+    The points lie about where the term was: ramps, steps, plateaus, single points, and
+    now and then more than a few of them.
+
+    Args:
+        rules: Any rule base.
+        seed: The same seed gives the same points.
+        share: How many of the terms become points.
+    """
+    chance = random.Random(seed)
+
+    def changed(term: Term) -> Term:
+        if chance.random() > share:
+            return term
+        return Term(term.name, _points(chance, term.shape))
+
+    variables = tuple(
+        replace(variable, terms=tuple(map(changed, variable.terms)))
+        for variable in rules.variables
+    )
+    return replace(rules, variables=variables)
+
+
+def _points(chance: random.Random, shape: Shape) -> Points:
+    marks = landmarks(shape) or (0.0, 1.0)
+    low, high = min(marks), max(marks)
+    count = chance.choice((1, 2, 3, 4, 5, 9, 40))
+    chosen = [chance.choice(marks) for _ in range(count // 2)]
+    chosen += [chance.uniform(low, high) for _ in range(count - len(chosen))]
+    chosen += chance.sample(chosen, chance.randint(0, count // 2))  # steps
+    values = [v for v, same in itertools.groupby(sorted(chosen)) for _ in [*same][:2]]
+    degrees = [chance.choice((0.0, 1.0, chance.random())) for _ in values]
+    level = chance.randrange(len(values))  # and a plateau
+    degrees[level : level + 2] = [degrees[level]] * len(degrees[level : level + 2])
+    return Points(tuple(values), tuple(degrees))
 
 
 Plan = list[list[tuple[str, int]]]

@@ -163,6 +163,7 @@ def _list(
     size = len(node.items)
     if size < least or (most is not None and size > most):
         size_text = f"at least {least}" if most is None else f"{least} to {most}"
+        size_text = str(least) if least == most else size_text
         _add(found, node, f"{what} needs {size_text} entries, not {size}")
         return None
     item = f"an entry of {what}"

@@ -11,6 +11,8 @@ from typing import Annotated, ClassVar, Final, Literal
 import msgspec
 from msgspec import Meta, field
 
+from fuzzytree.rulebase import MOST_POINTS
+
 FORMAT: Final = "fuzzytree/1"
 LONGEST_NAME: Final = 1000
 LONGEST_SENTENCE: Final = 100_000
@@ -19,6 +21,11 @@ LARGEST_COUNT: Final = 2**53
 Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 Count = Annotated[int, Meta(ge=0, le=LARGEST_COUNT)]
 Number = Annotated[int, Meta(ge=1, le=LARGEST_COUNT)]
+Point = Annotated[
+    tuple[float, ...],
+    Meta(min_length=2, max_length=2, description="a value and the degree there"),
+]
+PointList = Annotated[tuple[Point, ...], Meta(min_length=1, max_length=MOST_POINTS)]
 Curve = Annotated[tuple[float, ...], Meta(min_length=1, max_length=8)]
 Answer = Annotated[
     str,
@@ -102,13 +109,15 @@ class HalfSet(Record, frozen=True, kw_only=True):
 
 
 class TermOfVariable(Record, frozen=True, kw_only=True):
-    """A label of a variable, in one of four shapes.
+    """A label of a variable, in one of five shapes.
 
     A plateau: degree 1 `above` one value and `up to` another, with flanks.
     An LR set: degree 1 at the mean; u is the distance from it in spreads,
     t = min(u, 1), v = 2 t - 1, w = clip((reach - u) / (reach - 1), 0, 1); the degree is
     `clip(1 - t * (c0 + v * (c1 + ...)), 0, 1) * w**4`.
     An LR set whose two sides differ has them under `left` and `right`.
+    Points, joined by lines: `[value, degree]` each, in ascending order; a value that
+    stands twice is a step, where the first degree holds.
     `degree: 1` is true everywhere.
     """
 
@@ -118,6 +127,7 @@ class TermOfVariable(Record, frozen=True, kw_only=True):
         Form(("up to",), ("above", "left flank", "right flank")),
         Form(("mean", "spread", "curve", "reach")),
         Form(("mean", "left", "right")),
+        Form(("points",)),
         Form(("degree",)),
     )
     name: Name
@@ -131,6 +141,7 @@ class TermOfVariable(Record, frozen=True, kw_only=True):
     reach: float | None = None
     left: HalfSet | None = None
     right: HalfSet | None = None
+    points: PointList | None = None
     degree: Literal[1] | None = None
 
 

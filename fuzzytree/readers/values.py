@@ -8,6 +8,7 @@ from fuzzytree.rulebase import (
     Band,
     Flank,
     Part,
+    Points,
     Semantics,
     Shape,
     Side,
@@ -34,6 +35,9 @@ def _term(one: layout.TermOfVariable) -> Term:
 
 
 def _shape(one: layout.TermOfVariable) -> Shape:
+    if one.points is not None:
+        pairs = zip(*one.points, strict=True)
+        return Points(*map(tuple, pairs))
     if one.mean is None:
         return Band(
             one.above, one.up_to, _flank(one.left_flank), _flank(one.right_flank)

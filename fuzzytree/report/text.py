@@ -11,6 +11,7 @@ from fuzzytree.rulebase import (
     LR,
     Band,
     Flank,
+    Points,
     RuleBase,
     Semantics,
     Shape,
@@ -20,6 +21,8 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.runtimes.onnxruntime import Facts, OnnxModel
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+
+_MOST_PAIRS = 6  # points that a line of text shows one by one
 
 
 def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
@@ -245,6 +248,14 @@ def shape_text(shape: Shape) -> str:
                 f"1 at {number(mean)}, spread {_side_text(left_side)} below, "
                 f"{_side_text(right_side)} above"
             )
+        case Points(values=values, degrees=degrees):
+            pairs = [
+                f"({number(value)}, {number(degree)})"
+                for value, degree in zip(values, degrees, strict=True)
+            ]
+            if len(pairs) > _MOST_PAIRS:
+                return f"{len(pairs)} points from {pairs[0]} to {pairs[-1]}"
+            return f"line through {', '.join(pairs)}"
 
 
 def _flank_text(edge: float, flank: Flank | None, verb: str) -> str:

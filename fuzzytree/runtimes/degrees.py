@@ -5,7 +5,7 @@ What is rearranged changes no bit:
 
 - A band is one or two *edges*; at any value at most one of them is below 1, so the
   smaller is the band's degree. An LR set is two *slopes* in the same way, or one
-  slope of |x - m| if its sides are equal.
+  slope of |x - m| if its sides are equal. Points are one *polyline*.
 - `max(min(p, CAP), core)` with a core of 0 or 1 is both `min(max(p, 0), CAP)` off the
   plateau and 1 on it.
 - (-d) / s is d / (-s); x - x and similar signs of zero are compared equal.
@@ -21,7 +21,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.contracts import Dtype
-from fuzzytree.rulebase import LR, Flank, Shape, Side
+from fuzzytree.numerics.segments import segments
+from fuzzytree.rulebase import LR, Flank, Points, Shape, Side
+from fuzzytree.runtimes.polylines import join
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -83,7 +85,15 @@ class Slope:
     side: Side
 
 
-Atom = Edge | Slope
+@dataclass(frozen=True, slots=True)
+class Polyline:
+    """Points on one variable, joined by lines."""
+
+    line: int
+    points: Points
+
+
+Atom = Edge | Slope | Polyline
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +117,8 @@ def atoms_of(line: int, shape: Shape) -> tuple[Atom, ...]:
         if left == right:
             return (Slope(line, mean, 0, left),)
         return Slope(line, mean, -1, left), Slope(line, mean, 1, right)
+    if isinstance(shape, Points):
+        return (Polyline(line, shape),)
     found: list[Atom] = []
     if shape.low is not None:
         found.append(Edge(line, shape.low, False, shape.left))
@@ -133,14 +145,19 @@ def plan_blocks(
         for start in range(0, len(members), size):
             part = members[start : start + size]
             lines = np.array([atom.line for atom in part], np.int64)
-            if kind <= 1:
-                edges = [atom for atom in part if isinstance(atom, Edge)]
-                made = _steps(edges, numbers) if kind == 0 else _flanks(edges, numbers)
-            else:
-                slopes = [atom for atom in part if isinstance(atom, Slope)]
-                made = _slopes(slopes, numbers)
-            blocks.append(Block(lines, made))
+            blocks.append(Block(lines, _made(kind, part, numbers)))
     return ordered, tuple(blocks)
+
+
+def _made(
+    kind: int, atoms: Sequence[Atom], numbers: Numbers
+) -> Callable[[Reals, Reals, Reals], None]:
+    if kind <= 1:
+        edges = [atom for atom in atoms if isinstance(atom, Edge)]
+        return _steps(edges, numbers) if kind == 0 else _flanks(edges, numbers)
+    if kind <= 3:
+        return _slopes([atom for atom in atoms if isinstance(atom, Slope)], numbers)
+    return _polylines([atom for atom in atoms if isinstance(atom, Polyline)], numbers)
 
 
 def _kind(atom: Atom) -> tuple[int, int]:
@@ -153,6 +170,8 @@ def _kind(atom: Atom) -> tuple[int, int]:
             return 2, len(atom.side.curve)
         case Slope():
             return 3, len(atom.side.curve)
+        case Polyline():
+            return 4, len(atom.points.values).bit_length()
 
 
 def _column(values: Sequence[float], kind: Real) -> Reals:
@@ -268,6 +287,19 @@ def _slopes(
         u *= u
         u *= u
         out *= u
+
+    return run
+
+
+def _polylines(
+    atoms: Sequence[Polyline], numbers: Numbers
+) -> Callable[[Reals, Reals, Reals], None]:
+    shapes = [atom.points for atom in atoms]
+    lines = segments(shapes, numbers.axis, numbers.degree)
+    shape = np.arange(len(atoms)).reshape(-1, 1)
+
+    def run(x: Reals, out: Reals, _: Reals) -> None:
+        out[:] = join(lines, shape, x)
 
     return run
 

@@ -14,6 +14,9 @@ The bounds hold for the degrees as computed, not only for the formula:
   its second derivative; it need not be monotone. M is a sum over the coefficients.
   Evaluating it, v included, costs less than 32 eps (1 + sum |c|), twice (at an end and
   at the value): that is the margin.
+- The degree on a line between points is monotone, in rounded numbers too, and held
+  between those of its ends: all over a cell it lies between those at the cell's ends
+  and at the points inside.
 - Bounds are kept in float32, rounded outwards.
 
 The largest degree of a clause in a cell belongs to a candidate: it is not below any
@@ -30,8 +33,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.rulebase import LR, Band, Clause, Flank, RuleBase, Shape, Side
-from fuzzytree.runtimes.degrees import NUMBERS
+from fuzzytree.numerics.segments import Segments, segments
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+)
+from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS
+from fuzzytree.runtimes.polylines import join
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -89,6 +103,33 @@ class Edges:
 
 
 @dataclass(frozen=True, slots=True)
+class Shapes:
+    """The shapes of all clauses, by kind.
+
+    Attributes:
+        slopes: The LR sets.
+        edges: The bands.
+        points: The points.
+        lines: Their lines.
+    """
+
+    slopes: Slopes
+    edges: Edges
+    points: Sequence[Points]
+    lines: Segments
+
+    @property
+    def bands_from(self) -> int:
+        """The number of the first band."""
+        return len(self.slopes.mean)
+
+    @property
+    def points_from(self) -> int:
+        """The number of the first shape of points."""
+        return self.bands_from + len(self.edges.low)
+
+
+@dataclass(frozen=True, slots=True)
 class Envelope:
     """What is known of each clause in each cell; entry `clause * cells + cell`.
 
@@ -99,9 +140,8 @@ class Envelope:
         lower: A lower bound of the degree, in each entry.
         upper: An upper bound.
         start: Where the candidates of each entry begin; one more at the end.
-        candidates: Numbers of shapes: LR sets first, then bands.
-        slopes: The LR sets.
-        edges: The bands.
+        candidates: Numbers of shapes: LR sets first, then bands, then points.
+        shapes: The shapes.
     """
 
     grid: Grid
@@ -111,8 +151,7 @@ class Envelope:
     upper: Singles
     start: IntArray
     candidates: npt.NDArray[np.int32]
-    slopes: Slopes
-    edges: Edges
+    shapes: Shapes
 
 
 def plan_envelope(
@@ -134,15 +173,17 @@ def plan_envelope(
     distinct = dict.fromkeys(shape for found in of_clause for shape in found)
     sets = [shape for shape in distinct if isinstance(shape, LR)]
     bands = [shape for shape in distinct if isinstance(shape, Band)]
-    ordered: list[Shape] = [*sets, *bands]
+    points = [shape for shape in distinct if isinstance(shape, Points)]
+    ordered: list[Shape] = [*sets, *bands, *points]
     number = {shape: position for position, shape in enumerate(ordered)}
     line = np.array([at_line[c.variable] if c.terms else 0 for c in clauses], np.int64)
     members = [np.array([number[s] for s in found], np.int64) for found in of_clause]
-    slopes, edges = _slopes(sets), _edges(bands)
+    lines = segments(points, DOUBLE, DOUBLE)
+    by_kind = Shapes(_slopes(sets), _edges(bands), points, lines)
     negated = np.array([clause.negated for clause in clauses])
     with np.errstate(all="ignore"):
-        grid = _grid(line, members, slopes, edges, len(at_line))
-    tables = _tables(grid, line, members, slopes, edges)
+        grid = _grid(line, members, by_kind, len(at_line))
+    tables = _tables(grid, line, members, by_kind)
     lower, upper, start, candidates = tables
     lower[negated], upper[negated] = 1.0 - upper[negated], 1.0 - lower[negated]
     return Envelope(
@@ -153,8 +194,7 @@ def plan_envelope(
         _outwards(upper, np.inf).ravel(),
         start,
         candidates,
-        slopes,
-        edges,
+        by_kind,
     )
 
 
@@ -206,7 +246,7 @@ def exact_degrees(envelope: Envelope, entries: IntArray, x: FloatArray) -> Float
     count = envelope.start.take(entries + 1) - first
     owner, offset, begin = spread(count)
     shape = envelope.candidates.take(first.take(owner) + offset).astype(np.int64)
-    degrees = _degrees(envelope, shape, x.take(owner))
+    degrees = _degrees(envelope.shapes, shape, x.take(owner))
     found: FloatArray = np.maximum.reduceat(degrees, begin)
     if envelope.negated.any():
         negated = envelope.negated.take(entries // envelope.grid.count)
@@ -228,16 +268,19 @@ def spread(count: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return owner, offset, begin
 
 
-def _degrees(envelope: Envelope, shape: IntArray, x: FloatArray) -> FloatArray:
-    sets = len(envelope.slopes.mean)
-    if not len(envelope.edges.low):
-        return _slope_degrees(envelope.slopes, shape, x)
+def _degrees(shapes: Shapes, shape: IntArray, x: FloatArray) -> FloatArray:
+    if shapes.bands_from == shapes.points_from and not shapes.points:
+        return _slope_degrees(shapes.slopes, shape, x)
     found = np.empty(len(x))
-    is_set = shape < sets
-    mine = np.flatnonzero(is_set)
-    found[mine] = _slope_degrees(envelope.slopes, shape.take(mine), x.take(mine))
-    mine = np.flatnonzero(~is_set)
-    found[mine] = _edge_degrees(envelope.edges, shape.take(mine) - sets, x.take(mine))
+    mine = np.flatnonzero(shape < shapes.bands_from)
+    found[mine] = _slope_degrees(shapes.slopes, shape.take(mine), x.take(mine))
+    is_joined = shape >= shapes.points_from
+    mine = np.flatnonzero((shape >= shapes.bands_from) & ~is_joined)
+    bands = shape.take(mine) - shapes.bands_from
+    found[mine] = _edge_degrees(shapes.edges, bands, x.take(mine))
+    mine = np.flatnonzero(is_joined)
+    points = shape.take(mine) - shapes.points_from
+    found[mine] = join(shapes.lines, points, x.take(mine))
     return found
 
 
@@ -338,37 +381,43 @@ def _curves(curves: Sequence[tuple[float, ...]]) -> FloatArray:
 def _grid(
     line: IntArray,
     members: Sequence[IntArray],
-    slopes: Slopes,
-    edges: Edges,
+    shapes: Shapes,
     axes: int,
 ) -> Grid:
-    """Return cells that are narrow where means of sets and ends of bands are."""
-    sets = len(slopes.mean)
+    """Return cells that are narrow where means, ends of bands and points are."""
+    slopes, edges = shapes.slopes, shapes.edges
     centre, unit = np.zeros((axes, 1)), np.ones((axes, 1))
     for axis in range(axes):
         mine = [members[clause] for clause in np.flatnonzero(line == axis).tolist()]
         used = np.unique(np.concatenate([np.empty(0, np.int64), *mine]))
-        bands = used[used >= sets] - sets
+        sets, bands, joined = _by_kind(shapes, used)
+        points = [np.array(shapes.points[place].values) for place in joined.tolist()]
         marks = np.concatenate(
-            [slopes.mean[used[used < sets]], edges.low[bands], edges.high[bands]]
+            [slopes.mean[sets], edges.low[bands], edges.high[bands], *points]
         )
         marks = marks[np.isfinite(marks)]
         if len(marks):
             centre[axis] = np.median(marks)
             far = np.quantile(np.abs(marks - centre[axis]), _FAR)
-            widths = slopes.spread[2 * used[used < sets]]
+            widths = slopes.spread[2 * sets]
             far = max(far, np.median(widths)) if len(widths) else far
             unit[axis] = far if np.isfinite(far) and far > 0 else 1.0
     count = min(max(_ENTRIES // max(len(line), 1), _FEWEST), _MOST)
     return Grid(centre, unit, count)
 
 
+def _by_kind(shapes: Shapes, used: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return which LR sets, bands and points are among ascending numbers of shapes."""
+    kinds = [shapes.bands_from, shapes.points_from]
+    sets, bands, points = np.split(used, np.searchsorted(used, kinds))
+    return sets, bands - kinds[0], points - kinds[1]
+
+
 def _tables(
     grid: Grid,
     line: IntArray,
     members: Sequence[IntArray],
-    slopes: Slopes,
-    edges: Edges,
+    shapes: Shapes,
 ) -> tuple[FloatArray, FloatArray, IntArray, npt.NDArray[np.int32]]:
     """Return bounds of shape (clauses, cells), and the candidates of each entry."""
     lower, upper = (np.empty((len(line), grid.count)) for _ in range(2))
@@ -377,7 +426,7 @@ def _tables(
     for axis in np.unique(line):
         mine = np.flatnonzero(line == axis)
         used = np.unique(np.concatenate([members[clause] for clause in mine.tolist()]))
-        low, high = _shape_bounds(slopes, edges, used, cell_ends(grid, int(axis)))
+        low, high = _shape_bounds(shapes, used, cell_ends(grid, int(axis)))
         for clause in mine.tolist():
             at = np.searchsorted(used, members[clause])
             tops = high.take(at, axis=0)
@@ -394,17 +443,17 @@ def _tables(
 
 
 def _shape_bounds(
-    slopes: Slopes, edges: Edges, used: IntArray, ends: tuple[FloatArray, FloatArray]
+    shapes: Shapes, used: IntArray, ends: tuple[FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Return bounds of shape (shapes, cells)."""
-    sets = len(slopes.mean)
-    chosen, bands = used[used < sets], used[used >= sets] - sets
+    sets, bands, points = _by_kind(shapes, used)
     with np.errstate(all="ignore"):
-        below = _side_bounds(slopes, chosen, 0, ends)
-        above = _side_bounds(slopes, chosen, 1, ends)
-        flat = _band_bounds(edges, bands, ends)
-    low = np.concatenate([np.minimum(below[0], above[0]), flat[0]])
-    high = np.concatenate([np.minimum(below[1], above[1]), flat[1]])
+        below = _side_bounds(shapes.slopes, sets, 0, ends)
+        above = _side_bounds(shapes.slopes, sets, 1, ends)
+        flat = _band_bounds(shapes.edges, bands, ends)
+        joined = _line_bounds(shapes, points, ends)
+    low = np.concatenate([np.minimum(below[0], above[0]), flat[0], joined[0]])
+    high = np.concatenate([np.minimum(below[1], above[1]), flat[1], joined[1]])
     return np.nan_to_num(low, nan=0.0), np.nan_to_num(high, nan=1.0)
 
 
@@ -466,6 +515,26 @@ def _band_bounds(
         bottom = np.where(is_here, np.minimum(bottom, least), bottom)
         top = np.where(is_here, np.maximum(top, most), top)
     return bottom, top
+
+
+def _line_bounds(
+    shapes: Shapes, points: IntArray, ends: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    low, high = (np.empty((len(points), len(ends[0]))) for _ in range(2))
+    ends = (np.maximum(ends[0], -_LARGEST), np.minimum(ends[1], _LARGEST))
+    for row, place in enumerate(points.tolist()):
+        number, shape = np.array(place), shapes.points[place]
+        here, there = (join(shapes.lines, number, end) for end in ends)
+        low[row], high[row] = np.minimum(here, there), np.maximum(here, there)
+        first, last = (np.searchsorted(shape.values, end) for end in ends)
+        inside = np.append(shape.degrees, 0.0)
+        between = np.stack([first, last], axis=1).ravel()
+        least = np.minimum.reduceat(inside, between)[::2]
+        most = np.maximum.reduceat(inside, between)[::2]
+        has_point = first < last
+        np.minimum(low[row], least, out=low[row], where=has_point)
+        np.maximum(high[row], most, out=high[row], where=has_point)
+    return low, high
 
 
 def _outwards(bounds: FloatArray, towards: float) -> Singles:

@@ -2,7 +2,8 @@
 
 Points lie on every landmark, on the doubles next to it, and between them. So plateaus
 begin and end at the very double, and an engine that joins the points by lines keeps
-every decision of relative rules: degree 1 on the plateaus, below 1 elsewhere.
+every decision of relative rules: degree 1 on the plateaus, below 1 elsewhere. A shape
+that is points is itself, its steps as wide as one double.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.probing import landmarks
-from fuzzytree.rulebase import LR, Band, Flank, Shape, Side
+from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side
 from fuzzytree.runtimes.degrees import shape_degrees
 
 FloatArray = npt.NDArray[np.float64]
@@ -35,7 +36,7 @@ def universe(shapes: Sequence[Shape], points: int) -> FloatArray:
     """
     found: list[FloatArray] = [np.array([0.0])]
     for shape in shapes:
-        marks = np.array(landmarks(shape))
+        marks = np.array(_marks(shape))
         found += [marks, np.nextafter(marks, -np.inf), np.nextafter(marks, np.inf)]
         for start, end in _pieces(shape):
             share = np.arange(points + 1) / points
@@ -71,7 +72,14 @@ def line_error(shape: Shape, values: FloatArray) -> float:
                 _side_error(side, (values - mean) * sign)
                 for side, sign in ((below, -1.0), (above, 1.0))
             ]
+        case Points():
+            errors = [_ROUNDING]
     return max(errors, default=0.0)
+
+
+def _marks(shape: Shape) -> tuple[float, ...]:
+    """Return the values at which a shape must be sampled, and beside them."""
+    return shape.values if isinstance(shape, Points) else landmarks(shape)
 
 
 def _pieces(shape: Shape) -> Iterator[tuple[float, float]]:
@@ -86,6 +94,8 @@ def _pieces(shape: Shape) -> Iterator[tuple[float, float]]:
                 for start, end in itertools.pairwise(ends):
                     if math.isfinite(start) and math.isfinite(end):
                         yield start, end
+        case Points():
+            return
 
 
 def _flank_error(flank: Flank, values: FloatArray) -> float:
@@ -102,7 +112,7 @@ def _side_error(side: Side, distance: FloatArray) -> float:
         np.polynomial.Polynomial([-1.0, 2.0])
     )
     level = min(max(float(body(1.0)), 0.0), 1.0)
-    gaps = np.diff(np.clip(u, 1.0, side.reach)) / (side.reach - 1.0)
+    gaps = np.abs(np.diff(np.clip(u, 1.0, side.reach))) / (side.reach - 1.0)
     tail = 12.0 * level * float(np.max(gaps, initial=0.0)) ** 2 / 8.0
     slack = _ROUNDING * (1.0 + sum(map(abs, side.curve)) * 4.0 ** len(side.curve))
     return (

@@ -34,9 +34,10 @@ def test_the_first_example_is_a_whole_file() -> None:
 
 
 def test_every_other_example_fits_the_layout() -> None:
-    _, size, clauses, nodes_and_leaves, sets = BLOCKS
+    _, size, points, clauses, nodes_and_leaves, sets = BLOCKS
     bound: list[tuple[Node, type[layout.Record]]] = [
         *((item, layout.VariableOfModel) for item in items(size)),
+        *((item, layout.TermOfVariable) for item in items(points)),
         *((item, layout.WrittenOut) for item in items(clauses)),
         *((item, layout.Question) for item in items(nodes_and_leaves, "nodes")),
         *((item, layout.End) for item in items(nodes_and_leaves, "leaves")),

@@ -1,0 +1,59 @@
+"""Degrees of points joined by lines, for many values.
+
+The line of a value is found by halving, without a branch: from a shape's first line the
+place moves on by half of the room that is left wherever the value is above the point
+there. The operations on one number, and their order, are those of
+`fuzzytree.reference`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import IntArray
+    from fuzzytree.numerics.segments import Reals, Segments
+
+
+def join(lines: Segments, shape: IntArray, x: Reals) -> Reals:
+    """Return the degree of each value in a shape.
+
+    Args:
+        lines: The lines of all shapes.
+        shape: Numbers of shapes, in a form that broadcasts to that of the values.
+        x: Finite values, in the lines' type.
+    """
+    place = _places(lines, shape, x)
+    position = _taken(lines.right, place)
+    np.subtract(x, position, out=position)
+    position /= _taken(lines.width, place)
+    start, to = _taken(lines.start, place), _taken(lines.to, place)
+    found = position.astype(to.dtype, copy=False)
+    found *= start - to
+    found += to
+    np.maximum(found, np.minimum(start, to), out=found)
+    np.minimum(found, np.maximum(start, to, out=to), out=found)
+    return found
+
+
+def _places(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
+    """Return the place of the line on which each value lies."""
+    place = np.empty(x.shape, np.int64)
+    place[:] = lines.first.take(shape)
+    room = lines.room.take(shape)
+    probe = np.empty_like(place)
+    is_above = np.empty(x.shape, np.bool_)
+    for _ in range(int(room.max(initial=0)).bit_length()):
+        np.add(place, room - 1, out=probe)
+        np.greater(x, _taken(lines.values, probe), out=is_above)
+        np.multiply(is_above, room, out=probe)
+        place += probe
+        room = room >> 1
+    return place
+
+
+def _taken(table: Reals, place: IntArray) -> Reals:
+    """Return entries of a table; a place outside of it gives that at its end."""
+    return table.take(place, mode="clip")  # faster than a check of each place
