@@ -124,7 +124,8 @@ def unequal(one: Outcome, two: Outcome) -> BoolArray:
     if first.shape != second.shape:
         return np.ones_like(wrong)
     same = (first == second) | (np.isnan(first) & np.isnan(second))
-    return wrong | ~same.all(axis=0)
+    wrong |= ~same.all(axis=0)
+    return wrong
 
 
 def first_line(error: Exception) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fuzzytree.contracts import Model
+from fuzzytree.criteria.results import Criterion, CurveFault, judged
 from fuzzytree.numerics.conditioning import Conduct, conduct
 from fuzzytree.rulebase import RuleBase, Shape, Term
-from fuzzytree.criteria.results import Criterion, CurveFault, judged
 from fuzzytree.tree import FuzzyTree
 
 LARGEST_SIZE = 64.0

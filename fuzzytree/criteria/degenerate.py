@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Model, Outcome, Runtime
-from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.rulebase import LR, Band, Points, RuleBase, Shape
 from fuzzytree.criteria.carriers import Ready, forms, made_ready, ready, unequal
 from fuzzytree.criteria.results import Criterion, judged
 from fuzzytree.criteria.terms import asked, collapsed, held
+from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.rulebase import LR, Band, Points, RuleBase, Shape
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -64,8 +64,8 @@ def _small_tables(one: Ready, values: FloatArray) -> Iterator[tuple[str, bool]]:
         column = values[:, row : row + 1]
         alone = one.run(np.ascontiguousarray(column))
         many = one.run(np.broadcast_to(column, (width, _COPIES)))
-        wrong = unequal(many, repeated(alone, _COPIES)).any()
-        yield f"{_COPIES} equal rows are not answered like one of them", bool(wrong)
+        is_other = bool(unequal(many, repeated(alone, _COPIES)).any())
+        yield f"{_COPIES} equal rows are not answered like one of them", is_other
     for size in (0, 1, 2):
         try:
             found = one.run(np.ascontiguousarray(values[:, :size]))
@@ -74,7 +74,7 @@ def _small_tables(one: Ready, values: FloatArray) -> Iterator[tuple[str, bool]]:
             continue
         shape = (min(size, count),)
         wrong = found.rule.shape != shape or found.status.shape != shape
-        yield f"a table of {size} rows gets {found.rule.shape[0]} answers", bool(wrong)
+        yield f"a table of {size} rows gets {found.rule.shape[0]} answers", wrong
 
 
 def repeated(alone: Outcome, count: int) -> Outcome:

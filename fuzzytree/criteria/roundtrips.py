@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, cast, get_args
 
 from fuzzytree.comparing import strength_gap
 from fuzzytree.contracts import Dtype, Format, Model, Outcome, Run, Written
+from fuzzytree.criteria.carriers import first_line, forms, unequal
+from fuzzytree.criteria.results import Criterion, judged
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.python import load_content
-from fuzzytree.criteria.carriers import first_line, forms, unequal
-from fuzzytree.criteria.results import Criterion, judged
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -75,7 +75,9 @@ def _tried(
         title = f"{one.name} {dtype}: {carrier}"
         # Every writer knows allow_loss; those with number types know dtype as well.
         write = cast("Callable[..., Written]", one.write)
-        options = {"dtype": dtype} if "dtype" in _options(one) else {}
+        options: dict[str, object] = {}
+        if "dtype" in _options(one):
+            options["dtype"] = dtype
         if "outputs" in _options(one):
             told = ("label", "rule", "status", "strengths")
             options["outputs"] = told if isinstance(form, RuleBase) else told[:3]

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Dtype, Model, Runtime
-from fuzzytree.errors import InvalidModelError, LossError
 from fuzzytree.criteria.carriers import Ready, made_ready, ready, unequal
 from fuzzytree.criteria.results import Criterion, Usable, judged
 from fuzzytree.criteria.transforms import exponent_range, scaled
+from fuzzytree.errors import InvalidModelError, LossError
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

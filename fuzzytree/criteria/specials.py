@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Dtype, Model, Outcome, Runtime
-from fuzzytree.reference import Status
 from fuzzytree.criteria.carriers import (
     Ready,
     answered,
@@ -18,6 +17,7 @@ from fuzzytree.criteria.carriers import (
     unequal,
 )
 from fuzzytree.criteria.results import Criterion, judged
+from fuzzytree.reference import Status
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.contracts import Dtype
+from fuzzytree.criteria.carriers import Ready, answered
 from fuzzytree.probing import landmarks, neighbours
 from fuzzytree.rulebase import (
     LR,
@@ -29,7 +30,6 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.criteria.carriers import Ready, answered
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
