@@ -1,0 +1,283 @@
+"""How many times as long a rule base takes as its tree, with the number of rules."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from trees import COLUMNS, grow, multiway_tree, tree_of
+
+from fuzzytree.contracts import Run
+from fuzzytree.errors import LossError
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.rulebase import Kind, RuleBase
+from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.timing.clock import Interval, Timed, time_calls, times_faster
+from fuzzytree.timing.records import Timing
+from fuzzytree.tree import FuzzyTree
+from paper.records import Family, Price, Size, Times, What
+
+Floats = npt.NDArray[np.float64]
+Tell = Callable[[str], None]
+
+SIZES = (7, 20, 50, 100, 300, 1000, 3000, 10_000)
+FAMILIES: tuple[Family, ...] = ("multiway", "grown")
+KINDS: tuple[Kind, ...] = ("relative", "raw")
+FIRING = ("reference", "native", "onnxruntime float64", "scikit-fuzzy")
+
+ROUNDS = 11  # the median lies between the second and the tenth with 98 %
+BATCH = 10_000  # rows in one call
+MOST_STRENGTHS = 10_000_000  # rows times rules: 80 MB
+SLOW_BATCH = 1_000  # of scikit-fuzzy, which walks graphs of Python objects
+SINGLES = 64  # rows given one at a time: they take paths of all lengths
+SAMPLE_S = 0.02  # firing takes as long for every row, so few of them do
+PATIENCE_S = 20.0  # what preparing one rule base may take
+SHORT_S = 2.0  # preparing that took less says nothing of larger ones
+
+
+class Carrier(NamedTuple):
+    """A model, ready in a runtime."""
+
+    what: What
+    kind: Kind | None
+    runtime: str
+    run: Run
+
+    @property
+    def name(self) -> str:
+        """What tells it from the others."""
+        return " ".join(filter(None, (self.what, self.kind, self.runtime)))
+
+
+class Bench:
+    """The trees, measured one by one, and what had to be left out."""
+
+    def __init__(self, *, rounds: int, seconds: float, tell: Tell) -> None:
+        self.rounds = rounds
+        self.end = time.monotonic() + seconds
+        self.tell = tell
+        self.omissions: list[str] = []
+        self.timings: list[Timing] = []
+        self.given_up: set[str] = set()
+        self.taken: dict[tuple[str, Kind, Family], tuple[int, float]] = {}
+
+    def sizes(self, numbers: Sequence[int]) -> Iterator[Size]:
+        """Yield what was measured of each tree, small trees first."""
+        todo = [(number, family) for number in numbers for family in FAMILIES]
+        for place, (number, family) in enumerate(todo):
+            left = self.end - time.monotonic()
+            if left <= 0:
+                self.omissions.append(
+                    f"{family} trees of {number:,} rules: the time was over"
+                )
+                continue
+            self.tell(f"{family} tree of {number:,} rules")
+            yield self._size(number, family, left / (len(todo) - place))
+
+    def _size(self, number: int, family: Family, seconds: float) -> Size:
+        begin = time.monotonic()
+        tree = multiway_tree(number) if family == "multiway" else _grown(number)
+        rules = {kind: rules_from_tree(tree, kind) for kind in KINDS}
+        carriers = self._carriers(tree, rules, family)
+        rows = np.random.default_rng(1).normal(size=(len(COLUMNS), BATCH))
+        rows = rows[[COLUMNS.index(name) for name in tree.inputs]]
+        path, checked = _verified(carriers, tree, rows)
+        left = max(seconds - (time.monotonic() - begin), 1.0)
+        prices = [
+            *self._prices(carriers, rows, left / 2, is_batch=False),
+            *self._prices(carriers, rows, left / 2, is_batch=True),
+        ]
+        clauses = [clause for rule in rules["raw"].rules for clause in rule.when]
+        return Size(
+            family,
+            len(tree.leaves),
+            path,
+            len(clauses),
+            # Rules of one tree share the values of their clauses.
+            len({id(clause) for clause in clauses}),
+            checked,
+            tuple(prices),
+        )
+
+    def _carriers(
+        self, tree: FuzzyTree, rules: dict[Kind, RuleBase], family: Family
+    ) -> list[Carrier]:
+        found: list[Carrier] = []
+        for name in FIRING:
+            if not is_installed(find_runtime(name)):
+                self._omit(f"{name}: it is not installed")
+                continue
+            if "tree" in find_runtime(name).runs:
+                run = find_runtime(name).load(tree)
+                found.append(Carrier("tree", None, name, run))
+            for kind in KINDS:
+                loaded = self._loaded(name, kind, rules[kind], family)
+                if loaded:
+                    found.append(Carrier("rules", kind, name, loaded))
+        for kind in KINDS:
+            run = find_runtime("best-first").load(rules[kind])
+            found.append(Carrier("best-first", kind, "native", run))
+        return found
+
+    def _loaded(
+        self, runtime: str, kind: Kind, rules: RuleBase, family: Family
+    ) -> Run | None:
+        """Prepare rules, unless they are too many or would take too long."""
+        number = len(rules.rules)
+        before, seconds = self.taken.get((runtime, kind, family), (number, 0.0))
+        expected = seconds * (number / before) ** 2
+        if seconds > SHORT_S and expected > PATIENCE_S:
+            self._omit(
+                f"{runtime}, {kind} rules of the {family} tree, {number:,} of them: "
+                f"preparing {before:,} took {seconds:.1f} s, and the square of their "
+                f"number is what it may grow with ({expected:.0f} s)"
+            )
+            return None
+        if runtime in self.given_up:
+            return None
+        begin = time.monotonic()
+        try:
+            run = find_runtime(runtime).load(rules)
+        except LossError as error:
+            self.given_up.add(runtime)
+            reason = str(error).partition(": ")[2]
+            self._omit(f"{runtime}, from {number:,} rules on: {reason}")
+            return None
+        self.taken[runtime, kind, family] = number, time.monotonic() - begin
+        return run
+
+    def _omit(self, sentence: str) -> None:
+        if sentence not in self.omissions:
+            self.omissions.append(sentence)
+
+    def _prices(
+        self,
+        carriers: Sequence[Carrier],
+        rows: Floats,
+        seconds: float,
+        *,
+        is_batch: bool,
+    ) -> Iterator[Price]:
+        chosen = [c for c in carriers if not (is_batch and c.runtime == "reference")]
+        counts: dict[str, int] = {}
+        calls: dict[str, Callable[[], object]] = {}
+        for carrier in chosen:
+            prepare = _batch if is_batch else _singles
+            counts[carrier.name], calls[carrier.name] = prepare(carrier, rows)
+        timed = time_calls(calls, rows=1, rounds=self.rounds, seconds=seconds)
+        if timed.is_interrupted:
+            raise KeyboardInterrupt
+        for error in timed.failures.values():
+            raise error
+        self.timings.extend(timed.timings.values())
+        for carrier in chosen:
+            if carrier.name in timed.timings:
+                yield _price(carrier, timed, counts, is_batch=is_batch)
+
+
+def _grown(number: int) -> FuzzyTree:
+    return tree_of(grow(number, is_many=False))
+
+
+def _verified(
+    carriers: Sequence[Carrier], tree: FuzzyTree, rows: Floats
+) -> tuple[float, int]:
+    """Return the questions that a row meets, and how many rows were compared.
+
+    Relative rules must give the tree's answers and best-first those of firing, in every
+    runtime; scikit-fuzzy, whose curves are points, is not asked about raw rules.
+
+    Raises:
+        RuntimeError: If one answers differently.
+    """
+    run = {carrier.name: carrier.run for carrier in carriers}
+    lengths = [len(rule.when) for rule in rules_from_tree(tree).rules]
+    met = np.array([0, *lengths])[run["tree native"](rows).rule]
+    checked = min(BATCH, max(MOST_STRENGTHS // len(lengths), 1))
+    few = rows[:, :checked]
+    by_tree = run["tree native"](few).rule
+    by_raw = run["rules raw native"](few).rule
+    most = {"reference": 2, "scikit-fuzzy": SLOW_BATCH}
+    for carrier in carriers:
+        if carrier.runtime == "scikit-fuzzy" and carrier.kind == "raw":
+            continue
+        count = most.get(carrier.runtime, checked)
+        expected = by_raw if carrier.kind == "raw" else by_tree
+        if np.any(carrier.run(few[:, :count]).rule != expected[:count]):
+            raise RuntimeError(f"{carrier.name} gives other answers than it must")
+    return float(met.mean()), checked
+
+
+def _singles(carrier: Carrier, rows: Floats) -> tuple[int, Callable[[], object]]:
+    """Return a call that gives rows one at a time, and how many it gives.
+
+    What a tree and best-first take depends on the row, so they answer many. Firing
+    takes as long for each, so that a few tell as much.
+    """
+    ones = [np.ascontiguousarray(rows[:, k : k + 1]) for k in range(SINGLES)]
+    if carrier.what == "rules":
+        carrier.run(ones[0])
+        begin = time.perf_counter()
+        carrier.run(ones[0])
+        taken = time.perf_counter() - begin
+        ones = ones[: max(1, min(SINGLES, int(SAMPLE_S / taken)))]
+    return len(ones), partial(_one_by_one, carrier.run, ones)
+
+
+def _one_by_one(run: Run, ones: Sequence[Floats]) -> None:
+    for row in ones:
+        run(row)
+
+
+def _batch(carrier: Carrier, rows: Floats) -> tuple[int, Callable[[], object]]:
+    """Return a call that gives all rows at once, and how many they are."""
+    count = BATCH
+    if carrier.what == "rules":
+        count = min(BATCH, MOST_STRENGTHS // _rules_of(carrier, rows))
+    if carrier.runtime == "scikit-fuzzy":
+        count = min(count, SLOW_BATCH)
+    return count, partial(carrier.run, np.ascontiguousarray(rows[:, :count]))
+
+
+def _rules_of(carrier: Carrier, rows: Floats) -> int:
+    strengths = carrier.run(rows[:, :1]).strengths
+    return 1 if strengths is None else len(strengths)
+
+
+def _price(
+    carrier: Carrier, timed: Timed, counts: dict[str, int], *, is_batch: bool
+) -> Price:
+    timing, rows = timed.timings[carrier.name], counts[carrier.name]
+    runs_trees = "tree" in find_runtime(carrier.runtime).runs
+    tree = f"tree {carrier.runtime if runs_trees else 'native'}"
+    firing = f"rules {carrier.kind} {carrier.runtime}"
+
+    def against(slow: str, fast: str) -> Times | None:
+        if slow == fast or not {slow, fast} <= set(timed.timings):
+            return None
+        found = times_faster(timed.timings[slow], timed.timings[fast])
+        return _scaled(found, counts[fast] / counts[slow])
+
+    is_search = carrier.what == "best-first"
+    return Price(
+        carrier.what,
+        carrier.kind,
+        carrier.runtime,
+        is_batch,
+        rows,
+        ns=timing.median_ns / rows,
+        low=timing.low_ns / rows,
+        high=timing.high_ns / rows,
+        to_tree=against(carrier.name, tree),
+        to_firing=against(firing, carrier.name) if is_search else None,
+    )
+
+
+def _scaled(found: Interval | None, factor: float) -> Times | None:
+    if found is None:
+        return None
+    return Times(found.median * factor, found.low * factor, found.high * factor)
