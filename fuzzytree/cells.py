@@ -22,7 +22,7 @@ from fuzzytree.tree import FuzzyTree, Node
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
 
-_Model = TypeVar("_Model", FuzzyTree, RuleBase)
+_Model = TypeVar("_Model", bound=FuzzyTree | RuleBase)
 
 
 def free_axes(model: _Model) -> _Model:

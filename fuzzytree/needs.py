@@ -232,7 +232,7 @@ def _because(what: str, whole: Contents, without: Contents) -> Because:
 def _without_combinations(model: Model) -> Model | None:
     if not any(variable.parts for variable in model.variables):
         return None
-    return free_axes(model) if isinstance(model, FuzzyTree) else free_axes(model)
+    return free_axes(model)
 
 
 def _with_rules(model: Model, change: Callable[[Clause], Clause]) -> RuleBase | None:
