@@ -11,14 +11,18 @@ from onnx import numpy_helper
 from fuzzytree.contracts import Model
 from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers, Real, RealArray, rounded
-from fuzzytree.rulebase import Part, Variable
+from fuzzytree.rulebase import Part, RuleBase, Variable
 
 
 class Axes(msgspec.Struct, frozen=True):
     """The values of the variables, features first.
 
+    A combination of which an input is not finite is not finite either, for no weight
+    is 0. So an input stands in the block only if it is asked, or in no combination.
+
     Attributes:
-        block: Their name, of shape (variables, rows); empty if there is no variable.
+        block: Their name, of shape (variables, rows); empty if there is no variable,
+            or if the values themselves are not asked for.
         order: The row of each variable in the block.
         guard: 0 where all values of a row are finite, otherwise NaN; of shape
             (1, rows), or (rows,) if asked for flat.
@@ -37,7 +41,7 @@ def axes(
     *,
     is_flat: bool = False,
 ) -> Axes:
-    """Add the values of all variables of a model and the guard over them.
+    """Add the values of the variables of a model that matter, and the guard over them.
 
     Args:
         sheet: Where the nodes go; `inputs` is its input, of shape (rows, columns).
@@ -48,22 +52,56 @@ def axes(
     """
     if not model.variables:
         return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=is_flat))
-    block = sheet.node("Transpose", "inputs", perm=[1, 0])
-    if tuple(columns) != model.inputs:
-        block = sheet.take(block, [columns.index(name) for name in model.inputs])
-    order = {name: row for row, name in enumerate(model.inputs)}
+    source = sheet.node("Transpose", "inputs", perm=[1, 0])
+    direct = _direct(model)
     derived = sorted(
         (v for v in model.variables if v.parts), key=lambda v: len(v.parts)
     )
+    pieces: list[str] = []
+    if direct == tuple(columns):
+        pieces = [source]
+    elif direct:
+        pieces = [sheet.take(source, [columns.index(name) for name in direct])]
     if derived:
-        sums = _combinations(sheet, derived, block, order, numbers.axis)
-        order |= {v.name: len(order) + row for row, v in enumerate(derived)}
-        block = sheet.node("Concat", block, *sums, axis=0)
+        pieces += _combinations(sheet, derived, source, columns, numbers.axis)
+    block = sheet.node("Concat", *pieces, axis=0) if len(pieces) > 1 else pieces[0]
+    names = [*direct, *(variable.name for variable in derived)]
     # 0 * x is 0 for a finite x and NaN otherwise, and NaN survives every addition.
     zeros = sheet.node("Mul", block, scalar(sheet, 0.0, numbers.axis))
-    if len(order) > 1 or is_flat:
+    if len(names) > 1 or is_flat:
         zeros = sheet.total(zeros, axis=0, keepdims=0 if is_flat else 1)
-    return Axes(block, order, zeros)
+    return Axes(block, {name: row for row, name in enumerate(names)}, zeros)
+
+
+def flat_guard(
+    sheet: Sheet, model: Model, numbers: Numbers, columns: Sequence[str]
+) -> Axes:
+    """Add the guard alone, for a model without combinations; rows stay rows.
+
+    Args:
+        sheet: As in `axes`.
+        model: As in `axes`.
+        numbers: As in `axes`.
+        columns: As in `axes`.
+    """
+    if not model.variables:
+        return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=True))
+    source = "inputs"
+    if model.inputs != tuple(columns):
+        chosen = sheet.numbers([columns.index(name) for name in model.inputs], "rows")
+        source = sheet.node("Gather", source, chosen, axis=1)
+    zeros = sheet.node("Mul", source, scalar(sheet, 0.0, numbers.axis))
+    return Axes("", {}, sheet.total(zeros, axis=1, keepdims=0))
+
+
+def _direct(model: Model) -> tuple[str, ...]:
+    """Return the inputs that are asked, or that no combination guards."""
+    if isinstance(model, RuleBase):
+        asked = {clause.variable for rule in model.rules for clause in rule.when}
+    else:
+        asked = {node.variable for node in model.nodes}
+    guarded = {part.input for variable in model.variables for part in variable.parts}
+    return tuple(n for n in model.inputs if n in asked or n not in guarded)
 
 
 def is_known(sheet: Sheet, frame: Axes, numbers: Numbers) -> str:
@@ -93,8 +131,8 @@ def _no_guard(sheet: Sheet, kind: type[Real], *, is_flat: bool) -> str:
 def _combinations(
     sheet: Sheet,
     derived: Sequence[Variable],
-    block: str,
-    order: dict[str, int],
+    source: str,
+    columns: Sequence[str],
     kind: type[Real],
 ) -> list[str]:
     """Add the chains `w1 (x1 - c1) + w2 (x2 - c2) + ...`, one position at a time.
@@ -114,7 +152,7 @@ def _combinations(
             total = _rows(sheet, total, ready - finished, len(derived) - finished)
             finished = ready
         parts = [v.parts[position] for v in derived[finished:]]
-        term = _summand(sheet, parts, block, order, kind)
+        term = _summand(sheet, parts, source, columns, kind)
         total = sheet.node("Add", total, term) if total else term
     return [*done, total]
 
@@ -122,11 +160,11 @@ def _combinations(
 def _summand(
     sheet: Sheet,
     parts: Sequence[Part],
-    block: str,
-    order: dict[str, int],
+    source: str,
+    columns: Sequence[str],
     kind: type[Real],
 ) -> str:
-    value = sheet.take(block, [order[part.input] for part in parts])
+    value = sheet.take(source, [columns.index(part.input) for part in parts])
     if any(part.centre for part in parts):  # x - 0.0 is x
         centres = rounded([part.centre for part in parts], kind)
         value = sheet.node("Sub", value, column(sheet, centres, "centres"))

@@ -140,8 +140,12 @@ class Sheet:
         return self.node(name, *inputs.values(), named=named, domain=DOMAIN)
 
     def take(self, source: str, rows: Sequence[int]) -> str:
-        """Return the named rows of a block."""
-        return self.node("Gather", source, self.numbers(rows, "rows"), axis=0)
+        """Return the named rows of a block; the same ones are taken once."""
+        chosen = self.numbers(rows, "rows")
+        key = ("take", source, chosen)
+        if key not in self._results:
+            self._results[key] = self.node("Gather", source, chosen, axis=0)
+        return self._results[key]
 
     def total(self, source: str, *, axis: int, keepdims: int) -> str:
         """Return the sum along an axis, in the form that the opset knows."""

@@ -14,7 +14,7 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
-from fuzzytree.exporters.onnx_axes import Axes, axes, is_known
+from fuzzytree.exporters.onnx_axes import Axes, axes, flat_guard, is_known
 from fuzzytree.exporters.onnx_graph import TREES, Constant, Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers, rounded
 from fuzzytree.tree import FuzzyTree, Node
@@ -48,21 +48,24 @@ def tree_graph(
     Returns:
         The values of the variables, with a flat guard.
     """
-    frame = axes(sheet, tree, numbers, columns, is_flat=True)
     questions = questions_of(tree)
+    is_direct = not (is_plain and questions) and not any(
+        variable.parts for variable in tree.variables
+    )
+    if is_direct:
+        frame = flat_guard(sheet, tree, numbers, columns)
+    else:
+        frame = axes(sheet, tree, numbers, columns, is_flat=True)
     if not questions:
         leaf = sheet.constant(np.array(1, np.int64), "leaf")
     elif is_plain:
         leaf = _walk(sheet, questions, frame, numbers, start=_root(tree))
     else:
-        direct = not any(variable.parts for variable in tree.variables)
         place = {name: columns.index(name) for name in tree.inputs}
         values = "inputs"
-        if not direct:
-            place, values = (
-                frame.order,
-                sheet.node("Transpose", frame.block, perm=[1, 0]),
-            )
+        if not is_direct:
+            place = frame.order
+            values = sheet.node("Transpose", frame.block, perm=[1, 0])
         leaf = _ensemble(sheet, questions, values, place, numbers, start=_root(tree))
     zero = sheet.constant(np.array(0, np.int64), "nothing")
     known = is_known(sheet, frame, numbers)
