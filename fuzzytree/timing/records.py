@@ -192,6 +192,22 @@ class Machine(msgspec.Struct, frozen=True):
     stolen: float | None = None
 
 
+class Front(msgspec.Struct, frozen=True):
+    """Whom nobody beats in both run time and error, for one question.
+
+    Attributes:
+        question: What they compute.
+        rows: Rows in each call.
+        threads: Threads they were allowed.
+        names: From the fastest to the one with the smallest error.
+    """
+
+    question: Question
+    rows: int
+    threads: int
+    names: tuple[str, ...]
+
+
 class Study(msgspec.Struct, frozen=True):
     """Error against run time for one model.
 
@@ -205,6 +221,10 @@ class Study(msgspec.Struct, frozen=True):
         warnings: What makes the numbers doubtful, such as a noisy machine.
         advice: For an error of at most E, what to use, and how much faster than what.
         is_complete: False if the budget or the user ended it early.
+        fronts: Of each question, number of rows and number of threads.
+        seed: Of made rows and of the order of the rounds.
+        seconds: What the whole study took.
+        is_interrupted: Whether the user ended it early.
     """
 
     model: str
@@ -216,6 +236,10 @@ class Study(msgspec.Struct, frozen=True):
     warnings: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
     is_complete: bool = True
+    fronts: tuple[Front, ...] = ()
+    seed: int = 0
+    seconds: float = 0.0
+    is_interrupted: bool = False
 
     def to_json(self) -> str:
         """Return the same facts for programs, every raw timing included."""

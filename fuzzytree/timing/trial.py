@@ -17,6 +17,7 @@ import queue
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO, TYPE_CHECKING, cast
@@ -78,12 +79,15 @@ def _one_child(
     """Return what one child says of each candidate until it ends; "" for well."""
     done: dict[str, str] = {}
     lines: queue.Queue[bytes | None] = queue.Queue()
-    with subprocess.Popen(
-        [sys.executable, "-c", _START],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    ) as child:
+    with (
+        tempfile.TemporaryFile() as talk,
+        subprocess.Popen(
+            [sys.executable, "-c", _START],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=talk,
+        ) as child,
+    ):
         source, target = cast("IO[bytes]", child.stdout), cast("IO[bytes]", child.stdin)
         reader = threading.Thread(target=_read, args=(source, lines), daemon=True)
         reader.start()
@@ -94,7 +98,7 @@ def _one_child(
                     tell(f"trying {name}", position / len(names))
                 line = lines.get(timeout=seconds)
                 if line is None:
-                    done[name] = _end_text(child.wait())
+                    done[name] = _end_text(child.wait(), talk)
                     break
                 done[name] = json.loads(line)
         except queue.Empty:
@@ -121,11 +125,15 @@ def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
     lines.put(None)
 
 
-def _end_text(code: int) -> str:
+def _end_text(code: int, talk: IO[bytes]) -> str:
+    """Say how a child ended, and the last thing it said."""
+    talk.seek(0)
+    lines = talk.read().decode("utf-8", "replace").strip().splitlines()
+    last = f": {lines[-1]}" if lines else ""
     if code < 0:
         names = {int(one): one.name for one in signal.Signals}
-        return f"it crashed the process ({names.get(-code, f'signal {-code}')})"
-    return f"it ended the process (exit code {code})"
+        return f"it crashed the process ({names.get(-code, f'signal {-code}')}){last}"
+    return f"it ended the process (exit code {code}){last}"
 
 
 def serve() -> None:
