@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,7 +19,10 @@ from fuzzytree.learning.shapes import (
     fitted_sets,
 )
 from fuzzytree.learning.sketch import Axis, Sketch, Split
-from fuzzytree.learning.statistics import grouped_moments, window_counts
+from fuzzytree.learning.statistics import Statistics
+from fuzzytree.learning.sums import Totals, totals_of
+from fuzzytree.learning.units import Units
+from fuzzytree.learning.windows import window_counts
 from fuzzytree.rulebase import LR, Band, Flank, Part, Side, Term, Variable
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets, interval_names
 
@@ -60,12 +64,45 @@ class Assembled:
 
 
 @dataclass(frozen=True)
+class _Unit:
+    """The unit of an axis: places are `(value - origin) / 2**exponent`."""
+
+    origin: float = 0.0
+    exponent: int = 0
+
+    @staticmethod
+    def of(axis: Axis, units: Units) -> _Unit:
+        """Return the unit of an axis; a combination has the table's."""
+        if axis.is_combined:
+            return _Unit()
+        feature = int(axis.features[0])
+        return _Unit(float(units.origins[feature]), int(units.exponents[feature]))
+
+    def place(self, value: float) -> float:
+        """Return where a value lies."""
+        return math.ldexp(value - self.origin, -self.exponent)
+
+    def value(self, place: float) -> float:
+        """Return the value at a place, rounded once from the place on."""
+        return self.origin + math.ldexp(place, self.exponent)
+
+    def ulp(self, values: FloatArray) -> FloatArray:
+        """Return the distance to the next float, in this unit."""
+        return np.ldexp(np.spacing(np.abs(values)), -self.exponent)
+
+
+@dataclass(frozen=True)
 class _AxisSets:
-    """The sets of the patterns that are asked on one axis; `place` finds a pattern."""
+    """The sets of the patterns that are asked on one axis, fitted in its unit.
+
+    `means` are those of the table; `place` finds a pattern.
+    """
 
     axis: Axis
+    unit: _Unit
     patterns: IntArray
     place: dict[int, int]
+    means: FloatArray
     fitted: FittedSets
     zero_spreads: int
     low: float
@@ -75,21 +112,31 @@ class _AxisSets:
 def assembled(
     sketch: Sketch,
     patterns: Patterns,
+    statistics: Statistics,
     names: Names,
     *,
     points: int,
     separate_sides: bool,
 ) -> Assembled:
-    """Return the frozen tree of a sketch."""
+    """Return the frozen tree of a sketch.
+
+    Args:
+        sketch: The tree.
+        patterns: What it was grown from.
+        statistics: Of the table; a class with one pattern has its mean and spread.
+        names: For people.
+        points: n of the 2n + 1 windows.
+        separate_sides: Whether a set's sides are fitted apart.
+    """
     keys = [_key(split.axis, node) for node, split in enumerate(sketch.splits)]
-    axes = _axis_sets(sketch, keys, patterns, points, separate_sides)
+    axes = _axis_sets(sketch, keys, patterns, statistics, points, separate_sides)
     flanks, largest = _all_flanks(sketch, keys, axes)
     called = _axis_names(axes, names)
     pattern_names = _pattern_names(patterns, names)
     nodes, terms = _nodes(sketch, keys, called, flanks, pattern_names)
     inputs = sorted({int(f) for a in axes.values() for f in a.axis.features})
     variables = [
-        _input(feature, patterns, names, terms.get((feature, -1), ()))
+        _input(feature, statistics, names, terms.get((feature, -1), ()))
         for feature in inputs
     ]
     for key, found in axes.items():
@@ -134,6 +181,7 @@ def _axis_sets(
     sketch: Sketch,
     keys: Sequence[_Key],
     patterns: Patterns,
+    statistics: Statistics,
     points: int,
     separate_sides: bool,
 ) -> dict[_Key, _AxisSets]:
@@ -148,6 +196,7 @@ def _axis_sets(
             axis_of[key],
             np.unique(np.concatenate(groups)),
             patterns,
+            statistics,
             points,
             separate_sides,
         )
@@ -159,33 +208,49 @@ def _sets_on(
     axis: Axis,
     chosen: IntArray,
     patterns: Patterns,
+    statistics: Statistics,
     points: int,
     separate_sides: bool,
 ) -> _AxisSets:
     members = patterns.members(chosen)
     values = axis.values(patterns.rows[members])
     owners = np.searchsorted(chosen, patterns.owners[members])
-    if axis.is_combined:
-        own = grouped_moments(values[:, None], owners, len(chosen))
-        means, spreads = own.means[:, 0], own.spreads[:, 0]
-        low, high = float(values.min()), float(values.max())
-        unit = 1.0
-    else:
+    totals = totals_of(values, owners, len(chosen))
+    unit, usual = _Unit(), 1.0
+    low, high = float(values.min()), float(values.max())
+    if not axis.is_combined:
         feature = int(axis.features[0])
-        means = patterns.moments.means[chosen, feature]
-        spreads = patterns.moments.spreads[chosen, feature]
-        low = float(patterns.moments.lows[:, feature].min())
-        high = float(patterns.moments.highs[:, feature].max())
-        unit = float(patterns.scale[feature])
+        totals = _with_classes(totals, chosen, patterns, statistics.totals(feature))
+        unit, usual = _Unit.of(axis, patterns.units), float(patterns.scale[feature])
+        low, high = statistics.extent(feature)
+    counts = window_counts(values, owners, totals, points)
+    means = totals.means()
+    spreads = totals.spreads(unit.exponent)
     is_zero = ~(spreads > 0)
-    floor = np.maximum(ZERO_SPREAD_SHARE * unit, 8 * np.spacing(np.abs(means)))
-    widths = np.where(is_zero, floor, np.maximum(spreads, np.spacing(np.abs(means))))
-    counts = window_counts(values, owners, means, widths, points)
-    fitted = fitted_sets(means, widths, counts, separate_sides=separate_sides)
+    floor = np.maximum(ZERO_SPREAD_SHARE * usual, 8 * unit.ulp(means))
+    widths = np.where(is_zero, floor, np.maximum(spreads, unit.ulp(means)))
+    moved = totals.means(unit.origin, unit.exponent)
+    fitted = fitted_sets(moved, widths, counts, separate_sides=separate_sides)
     place = {int(p): k for k, p in enumerate(chosen)}
-    return _AxisSets(
-        axis, chosen, place, fitted, int(np.count_nonzero(is_zero)), low, high
-    )
+    zeros = int(np.count_nonzero(is_zero))
+    return _AxisSets(axis, unit, chosen, place, means, fitted, zeros, low, high)
+
+
+def _with_classes(
+    own: Totals, chosen: IntArray, patterns: Patterns, classes: Totals
+) -> Totals:
+    """Return totals in which a class' only pattern has those of the whole class."""
+    several = np.bincount(patterns.labels) > 1
+    unit = min(own.unit, classes.unit)
+    picked: list[tuple[int, int, int]] = []
+    for place, label in enumerate(patterns.labels[chosen].tolist()):
+        source, k = (own, place) if several[label] else (classes, label)
+        step = source.unit - unit
+        picked.append(
+            (source.counts[k], source.sums[k] << step, source.squares[k] << 2 * step)
+        )
+    counts, sums, squares = zip(*picked, strict=True)
+    return Totals(counts, sums, squares, unit)
 
 
 @dataclass(frozen=True)
@@ -211,8 +276,9 @@ def _all_flanks(
         for cut in range(len(split.cuts)):
             for sign in (-1, 1):
                 end, ratio = _sampled_ratios(split, axes[key], field, cut, sign)
-                starts.append(float(split.cuts[cut]))
-                ends.append(end)
+                start = float(split.cuts[cut])
+                starts.append(start)
+                ends.append(_values_beyond(start, end, axes[key].unit, sign))
                 ratios.append(ratio)
     if not ratios:
         return [], 0.0
@@ -239,17 +305,29 @@ def _all_flanks(
     return result, float(errors[chosen].max())
 
 
+def _values_beyond(
+    start: float, places: FloatArray, unit: _Unit, sign: int
+) -> FloatArray:
+    """Return places as values, at least one float away from a start."""
+    values = [unit.value(place) for place in places.tolist()]
+    return np.array(
+        [v if v != start else math.nextafter(start, sign * math.inf) for v in values]
+    )
+
+
 def _sampled_ratios(
     split: Split, sets: _AxisSets, field: _Field, cut: int, sign: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return where a flank may end, and for each end its ratio at 33 points.
+
+    All is reckoned in the axis' unit.
 
     The flank with sign 1 leaves the interval below the cut upwards, with sign -1 the
     interval above it downwards. The ratio is the branch's raw degree divided by the
     largest degree of its siblings, taken as 1 at the cut, where it must be, and never
     rising away from it. The points go from the end to the cut.
     """
-    start = float(split.cuts[cut])
+    start = sets.unit.place(float(split.cuts[cut]))
     owner = int(split.owners[cut if sign > 0 else cut + 1])
     mine, others = field.contestants(owner, start)
     reach = _flank_reach(split, sets, field, mine, cut, sign)
@@ -263,8 +341,7 @@ def _sampled_ratios(
     for level in _ENDS:
         low = np.flatnonzero(ratio <= max(level, float(ratio[-1])))
         length = float(part[max(1, int(low[0]))])
-        end = start + sign * reach * length
-        ends.append(end if end != start else float(np.nextafter(start, sign * np.inf)))
+        ends.append(start + sign * reach * length)
         sampled.append(np.interp(_FALLING * length, part, ratio))
     return np.array(ends), np.array(sampled)
 
@@ -344,16 +421,16 @@ def _flank_reach(
     sign: int,
 ) -> float:
     """Return how far a flank may go: to the end of its sets, or of what it left."""
-    start = float(split.cuts[cut])
+    start = sets.unit.place(float(split.cuts[cut]))
     means, spreads = sets.fitted.means[mine], sets.fitted.spreads[mine]
     reach = float((sign * (means - start) + REACH * spreads).max())
     other = int(field.after[cut] if sign > 0 else field.before[cut + 1])
     if other >= 0:
         edge = split.cuts[other - 1] if sign > 0 else split.cuts[other]
-        reach = min(reach, sign * (float(edge) - start))
+        reach = min(reach, sign * (sets.unit.place(float(edge)) - start))
     if not reach > 0:
         reach = ZERO_SPREAD_SHARE * float(spreads.max())
-    return max(reach, 16 * float(np.spacing(abs(start))))
+    return max(reach, 16 * float(sets.unit.ulp(split.cuts[cut : cut + 1])[0]))
 
 
 def _axis_names(axes: dict[_Key, _AxisSets], names: Names) -> dict[_Key, str]:
@@ -474,16 +551,11 @@ def _node(
 
 
 def _input(
-    feature: int, patterns: Patterns, names: Names, terms: tuple[Term, ...]
+    feature: int, statistics: Statistics, names: Names, terms: tuple[Term, ...]
 ) -> Variable:
     name = names.columns[feature]
-    return Variable(
-        name,
-        terms,
-        names.units.get(name, ""),
-        float(patterns.moments.lows[:, feature].min()),
-        float(patterns.moments.highs[:, feature].max()),
-    )
+    low, high = statistics.extent(feature)
+    return Variable(name, terms, names.units.get(name, ""), low, high)
 
 
 def _combination(
@@ -537,8 +609,8 @@ def _frozen_sets(name: str, found: _AxisSets, pattern_names: Sequence[str]) -> S
         )
         for pattern, mean, spread, left, right in zip(
             found.patterns.tolist(),
-            fitted.means.tolist(),
-            fitted.spreads.tolist(),
+            found.means.tolist(),
+            np.ldexp(fitted.spreads, found.unit.exponent).tolist(),
             fitted.left.tolist(),
             fitted.right.tolist(),
             strict=True,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
-from fuzzytree.learning.cuts import tail
+from fuzzytree.learning.cuts import rounded_to, tail
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.sketch import Axis, single
 
@@ -22,6 +22,7 @@ _ROUNDS = 10
 _PLACES = 32
 _MANY = 48
 _OWN = 1e-12
+_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -226,7 +227,7 @@ def selected_features(
 def combined_axis(
     patterns: Patterns, view: NodeView, is_right: BoolArray, selected: IntArray
 ) -> Axis:
-    """Return Fisher's direction over the selected features, in raw units."""
+    """Return Fisher's direction over the selected features, in the table's units."""
     if len(selected) == 1:
         return single(int(patterns.combinable[selected[0]]))
     within = view.within[np.ix_(selected, selected)]
@@ -240,31 +241,31 @@ def axis_of(
     direction: FloatArray,
     within: FloatArray,
 ) -> Axis:
-    """Return an axis in raw units from a direction in standard units.
+    """Return an axis in the table's units from a direction in standard units.
 
-    Its unit is the spread within patterns; weights have four digits and centres are
-    rounded to a hundredth of a spread, for people: the cuts are placed afterwards.
+    Its unit is the spread within patterns. A weight is rounded so finely that a spread
+    of its column changes by no more than a thousandth of that unit; the cuts are
+    placed afterwards. Centres are the columns' origins, values of the table, so that
+    the first step of an axis, value less centre, has the digits that learning saw.
     """
     features = patterns.combinable[selected]
     length = math.sqrt(max(float(direction @ within @ direction), 0.0))
     if not math.isfinite(length) or length == 0.0:
         return single(int(features[0]))
-    weights = direction / length / patterns.scale[features]
-    weights = np.array([float(f"{w:.4g}") for w in weights.tolist()])
-    keep = np.abs(weights) >= 1e-300
+    scales = patterns.scale[features]
+    weights = np.array(
+        [
+            rounded_to(weight, -_DIGITS - math.frexp(scale)[1])
+            for weight, scale in zip(
+                (direction / length / scales).tolist(), scales.tolist(), strict=True
+            )
+        ]
+    )
+    keep = (weights != 0) & patterns.units.is_combinable[features]
     keep &= np.abs(direction) > 1e-6 * np.abs(direction).max()
     if np.count_nonzero(keep) < 2:
         return single(int(features[np.argmax(np.abs(direction))]))
-    centres = np.array(
-        [
-            _rounded(float(patterns.centre[f]), float(patterns.scale[f]))
-            for f in features[keep]
-        ]
-    )
-    return Axis(features[keep], weights[keep], centres, True)
-
-
-def _rounded(value: float, unit: float) -> float:
-    """Return a value with no more digits than a hundredth of the unit needs."""
-    digits = 2 - math.floor(math.log10(unit))
-    return round(value, digits) if abs(digits) < 300 else value
+    chosen = features[keep]
+    units = patterns.units
+    raw = np.ldexp(weights[keep], -units.exponents[chosen])
+    return Axis(chosen, raw, units.origins[chosen], True)

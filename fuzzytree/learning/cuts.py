@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -286,34 +287,68 @@ def _smoothed(counts: FloatArray, width: float) -> FloatArray:
     return inner
 
 
-def settled_cuts(cuts: FloatArray, values: FloatArray) -> FloatArray:
-    """Return cuts that lie between the values of the table, with few digits.
+def settled_cuts(
+    cuts: FloatArray,
+    values: FloatArray,
+    places: FloatArray | None = None,
+    *,
+    origin: float = 0.0,
+    exponent: int = 0,
+) -> FloatArray:
+    """Return cuts that lie between the values of the table, with few binary digits.
 
-    A cut keeps the rows that it has on either side; it stays a quarter of the gap
-    away from the values next to it, and takes the shortest decimal number there.
+    A cut keeps the rows that it has on either side and stays a quarter of the gap away
+    from the values next to it. It is rounded to the largest power of two that keeps it
+    there: 2.5 for 2.45 between 2 and 3. Unlike a decimal number it remains so where a
+    column is multiplied by a power of two, or moved by a large one. The arithmetic is
+    exact.
 
     Args:
-        cuts: Increasing.
-        values: The rows on the axis, in any order.
+        cuts: Increasing, in the axis' unit.
+        values: The rows on the axis, in the table's unit and any order.
+        places: The same rows in the axis' unit; `values` unless given.
+        origin: Of the axis' unit.
+        exponent: Of the axis' unit.
+
+    Returns:
+        Cuts in the table's unit. Between neighbouring floats it is the lower one.
+
+    Example:
+        >>> settled_cuts(np.array([2.45]), np.array([2.0, 3.0])).tolist()
+        [2.5]
     """
-    ordered = np.unique(values)
+    ordered, first = np.unique(values, return_index=True)
+    at = (values if places is None else places)[first]
+    unit = Fraction(2) ** exponent
     result: list[float] = []
     for cut in cuts.tolist():
-        k = int(np.searchsorted(ordered, cut, side="right"))
+        k = int(np.searchsorted(at, cut, side="right"))
+        exact = Fraction(origin) + Fraction(cut) * unit
         if 0 < k < len(ordered):
-            cut = _tidy(cut, float(ordered[k - 1]), float(ordered[k]))
-        result.append(cut)
+            result.append(_tidy(exact, float(ordered[k - 1]), float(ordered[k])))
+        else:
+            result.append(float(exact))
     return np.array(result)
 
 
-def _tidy(cut: float, low: float, high: float) -> float:
-    gap = high - low
-    if not math.isfinite(gap):
-        return cut
-    inner_low, inner_high = low + gap / 4, high - gap / 4
+def _tidy(cut: Fraction, low: float, high: float) -> float:
+    gap = Fraction(high) - Fraction(low)
+    inner_low, inner_high = Fraction(low) + gap / 4, Fraction(high) - gap / 4
     cut = min(max(cut, inner_low), inner_high)
-    for digits in range(1, 17):
-        shown = float(f"{cut:.{digits}g}")
-        if inner_low <= shown <= inner_high and low <= shown < high:
-            return shown
-    return cut if low <= cut < high else low
+    highest = math.frexp(max(abs(low), abs(high)))[1]
+    for exponent in range(highest, max(highest - 54, -1075), -1):
+        unit = Fraction(2) ** exponent
+        shown = round(cut / unit) * unit
+        if inner_low <= shown <= inner_high:
+            return float(shown)
+    return low
+
+
+def rounded_to(value: float, exponent: int) -> float:
+    """Return the nearest multiple of `2**exponent`; of two the even one.
+
+    Example:
+        >>> rounded_to(2.3, -2), rounded_to(-5.0, 1), rounded_to(0.3, 0)
+        (2.25, -4.0, 0.0)
+    """
+    return math.ldexp(round(math.ldexp(value, -exponent)), exponent)

@@ -14,7 +14,7 @@ class LearningReport(msgspec.Struct, frozen=True, kw_only=True):
         rows_dropped: Rows left out: a value or the class is missing or not finite.
         rows_sampled: Rows kept for clusters, combinations and window counts.
         classes_without_rows: Classes that nothing was learnt about.
-        features_ignored: Columns left out: constant, or too large to square.
+        features_ignored: Columns left out: constant, or its range overflows.
         patterns: Patterns by class name.
         patterns_refused: Clusters that were not made, for want of rows.
         single_rows: Patterns of one row.

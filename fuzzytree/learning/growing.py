@@ -15,7 +15,7 @@ from fuzzytree.learning.combination import (
     node_view,
     selected_features,
 )
-from fuzzytree.learning.cuts import Cuts, crossing_cuts, settled_cuts, smoothed_cuts
+from fuzzytree.learning.cuts import Cuts, crossing_cuts, smoothed_cuts
 from fuzzytree.learning.induction import Grouping, most_powerful, threshold
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.sketch import Axis, Sketch, Split, single
@@ -201,13 +201,17 @@ def _grouped_split(
 def finished_split(
     patterns: Patterns, axis: Axis, cuts: Cuts, groups: tuple[IntArray, ...]
 ) -> Split:
-    """Return a split whose cuts lie between the rows and increase strictly."""
-    everything = np.concatenate(groups)
-    values = axis.values(patterns.rows[_members(patterns, everything)])
-    points = settled_cuts(cuts.cuts, values)
-    for k in range(1, len(points)):
-        if points[k] <= points[k - 1]:
-            points[k] = np.nextafter(points[k - 1], np.inf)
+    """Return a split whose cuts lie between the rows.
+
+    Args:
+        patterns: Of the tree.
+        axis: Of the split.
+        cuts: In the axis' own unit.
+        groups: The patterns of each branch.
+    """
+    members = _members(patterns, np.concatenate(groups))
+    rows, moved = patterns.rows[members], patterns.moved[members]
+    points = axis.settled(cuts.cuts, rows, moved, patterns.units)
     return Split(axis, points, cuts.owners, groups)
 
 
@@ -234,6 +238,7 @@ def _combined_split(
     side[chosen] = is_right
     task = _Task(
         patterns.rows[members],
+        patterns.moved[members],
         side[patterns.owners[members]],
         patterns.row_weights[members],
     )
@@ -273,9 +278,10 @@ def _fisher_axis(
 
 @dataclass(frozen=True)
 class _Task:
-    """Rows to be separated."""
+    """Rows to be separated, as in the table and in the columns' units."""
 
     rows: FloatArray
+    moved: FloatArray
     is_right: BoolArray
     weights: FloatArray
 
@@ -287,7 +293,7 @@ class _Task:
 
 
 def _placed(axis: Axis, task: _Task) -> tuple[Cuts, float]:
-    values = axis.values(task.rows)
+    values = axis.places(task.rows, task.moved)
     cuts = smoothed_cuts(values, task.is_right, task.weights, two=True)
     taken = cuts.owners[np.searchsorted(cuts.cuts, values, side="left")]
     return cuts, float(task.weights[taken != task.is_right].sum())

@@ -15,8 +15,9 @@ from fuzzytree.learning.assembly import Assembled, Names, assembled
 from fuzzytree.learning.findings import LearningReport
 from fuzzytree.learning.growing import Grown
 from fuzzytree.learning.patterns import usable_features
+from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import Settings
-from fuzzytree.learning.statistics import Moments, Sample, Statistics
+from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.validation import Choice, chosen_tree
 from fuzzytree.tree import FuzzyTree
 
@@ -78,7 +79,7 @@ def learn_arrays(
 
 @dataclass
 class Learner:
-    """Learns from chunks; the tree does not depend on how the table was cut.
+    """Learns from chunks; neither their borders nor the rows' order change the tree.
 
     Attributes:
         columns: Names of the columns.
@@ -138,9 +139,7 @@ class Learner:
             progress("counting", 1.0)
 
     def merge(self, other: Learner) -> Learner:
-        """Return a learner that has seen both tables, the other one's rows last.
-
-        Its means and spreads equal those of one pass up to rounding.
+        """Return a learner that has seen both tables; its tree is that of one pass.
 
         Raises:
             ValueError: If columns, classes or settings differ.
@@ -162,9 +161,10 @@ class Learner:
         Raises:
             LearningError: If there is no row, one class, or no column that varies.
         """
-        moments = self._statistics.moments()
-        _check_table(moments, self._statistics.dropped, self.classes)
+        _check_rows(self._statistics, self.classes)
         sample = self._statistics.sample()
+        moments = self._statistics.moments(sample.units)
+        _check_columns(moments)
         costs = np.array([self.settings.costs.get(c, 1.0) for c in self.columns])
         choice = chosen_tree(
             moments, sample, self.settings, self.classes, costs, progress
@@ -175,6 +175,7 @@ class Learner:
         made = assembled(
             choice.grown.sketch,
             choice.patterns,
+            self._statistics,
             names,
             points=self.settings.points,
             separate_sides=self.settings.separate_sides,
@@ -284,8 +285,9 @@ def _codes(
     return codes
 
 
-def _check_table(moments: Moments, dropped: int, classes: Sequence[str]) -> None:
-    rows = int(moments.counts.sum())
+def _check_rows(statistics: Statistics, classes: Sequence[str]) -> None:
+    counts, dropped = statistics.counts(), statistics.dropped
+    rows = int(counts.sum())
     if rows == 0 and dropped:
         raise LearningError(
             f"cannot learn from a table without complete rows: all {dropped} hold a "
@@ -295,13 +297,16 @@ def _check_table(moments: Moments, dropped: int, classes: Sequence[str]) -> None
         raise LearningError("cannot learn from a table without rows")
     if rows == 1:
         raise LearningError("cannot learn from one row; two classes need two at least")
-    present = np.flatnonzero(moments.counts)
+    present = np.flatnonzero(counts)
     if len(present) == 1:
         raise LearningError(
             f"cannot learn from one class: every row is {classes[present[0]]!r}"
         )
+
+
+def _check_columns(moments: Moments) -> None:
     if len(usable_features(moments)) == 0:
         raise LearningError(
             "cannot learn without a column that varies: every column is constant, "
-            "or so large that its square overflows"
+            "or so wide that its range overflows"
         )

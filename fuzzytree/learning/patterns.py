@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fuzzytree.learning.arrays import FloatArray, IntArray
-from fuzzytree.learning.statistics import (
-    Moments,
-    Sample,
-    grouped_moments,
-)
+from fuzzytree.learning.sampling import Sample
+from fuzzytree.learning.statistics import Moments, grouped_moments
+from fuzzytree.learning.units import Units
 
 SCATTER_NUMBERS = 1 << 23
 """Scatter matrices are kept per pattern up to this many numbers (64 MiB)."""
@@ -31,15 +29,19 @@ _ROUNDS = 25
 class Patterns:
     """Every pattern, with the sample rows that it is made of.
 
+    All numbers but `rows` are in the columns' units (`units`).
+
     Attributes:
         labels: The class of each pattern, shape (patterns,).
         numbers: Which pattern of its class it is, from 1.
         weights: How many rows of the table each stands for.
         moments: Means, spreads, lows and highs, shape (patterns, features).
-        rows: The sample, ordered by pattern; shape (rows, features).
+        rows: The sample as in the table, ordered by pattern; shape (rows, features).
+        moved: The same rows in the columns' units.
         owners: The pattern of each sample row.
         row_weights: How many rows of the table each sample row stands for.
         starts: Where each pattern's rows begin, and their end; shape (patterns + 1,).
+        units: The columns' units.
         centre: The origin of standard units, per feature.
         scale: The unit of standard units, per feature: a spread within patterns.
         scatter: Covariance per pattern in standard units, shape (patterns, features,
@@ -54,9 +56,11 @@ class Patterns:
     weights: FloatArray
     moments: Moments
     rows: FloatArray
+    moved: FloatArray
     owners: IntArray
     row_weights: FloatArray
     starts: IntArray
+    units: Units
     centre: FloatArray
     scale: FloatArray
     scatter: FloatArray
@@ -79,14 +83,11 @@ class Patterns:
 
 
 def usable_features(moments: Moments) -> IntArray:
-    """Return the features that vary and whose spreads are finite."""
+    """Return the features that vary, of moments in the columns' units."""
     filled = moments.counts > 0
     lows = moments.lows[filled].min(axis=0, initial=np.inf)
     highs = moments.highs[filled].max(axis=0, initial=-np.inf)
-    with np.errstate(over="ignore", invalid="ignore"):
-        is_sound = np.isfinite(moments.spreads[filled]).all(axis=0)
-        is_sound &= np.isfinite((highs - lows) ** 2)
-    return np.flatnonzero((lows < highs) & is_sound).astype(np.int64)
+    return np.flatnonzero(lows < highs).astype(np.int64)
 
 
 def standard_units(moments: Moments, usable: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -148,8 +149,9 @@ def _finished(
     numbers = np.arange(size) - np.repeat(firsts, sizes) + 1
     untouched = order[0] == 0 and bool((np.diff(order) == 1).all())
     rows = sample.rows if untouched else sample.rows[order]
+    moved = sample.moved if untouched else sample.moved[order]
     owners = owners[order]
-    own = grouped_moments(rows, owners, size)
+    own = grouped_moments(moved, owners, size)
     whole = np.flatnonzero(sizes[labels] == 1)
     kept_of_class = np.bincount(sample.codes, minlength=len(sizes))
     row_weights = moments.counts / np.maximum(kept_of_class, 1)
@@ -165,16 +167,18 @@ def _finished(
     centre, scale = standard_units(moments, usable)
     starts = np.searchsorted(owners, np.arange(size + 1)).astype(np.int64)
     combinable = _most_powerful(own, weights, scale, usable)
-    scatter = _scatter(rows, starts, scale, combinable)
+    scatter = _scatter(moved, starts, scale, combinable)
     return Patterns(
         labels,
         numbers,
         weights,
         own,
         rows,
+        moved,
         owners,
         row_weights[labels[owners]],
         starts,
+        sample.units,
         centre,
         scale,
         scatter,

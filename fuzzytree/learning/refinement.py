@@ -9,11 +9,13 @@ is added.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.combination import axis_of
-from fuzzytree.learning.cuts import settled_cuts, smoothed_cuts
+from fuzzytree.learning.cuts import smoothed_cuts
 from fuzzytree.learning.patterns import Patterns
 from fuzzytree.learning.sketch import Axis, Sketch, Split
 
@@ -37,9 +39,12 @@ def refined(
         ridge: Penalty on a logistic direction, in rows.
     """
     step = 1 + len(patterns.rows) // _MOST_ROWS
-    rows = patterns.rows[::step]
-    labels = patterns.labels[patterns.owners[::step]]
-    weights = patterns.row_weights[::step]
+    task = _Task(
+        patterns.rows[::step],
+        patterns.moved[::step],
+        patterns.labels[patterns.owners[::step]],
+        patterns.row_weights[::step],
+    )
     moved = Sketch(
         list(sketch.splits),
         sketch.children,
@@ -49,21 +54,37 @@ def refined(
     nodes = len(moved.splits)
     rounds = passes if nodes <= _MANY_NODES else int(nodes <= _VERY_MANY_NODES)
     for _ in range(rounds):
-        if not _visit_all(moved, patterns, rows, labels, weights, ridge):
+        if not _visit_all(moved, patterns, task, ridge):
             break
     return moved
 
 
-def _visit_all(
-    sketch: Sketch,
-    patterns: Patterns,
-    rows: FloatArray,
-    labels: IntArray,
-    weights: FloatArray,
-    ridge: float,
-) -> bool:
+@dataclass(frozen=True)
+class _Task:
+    """Rows as in the table and in the columns' units, what they are and their weights.
+
+    `labels` are the classes of the rows, or whether each belongs to the right branch.
+    """
+
+    rows: FloatArray
+    moved: FloatArray
+    labels: IntArray
+    weights: FloatArray
+
+    def at(self, chosen: IntArray, labels: IntArray) -> _Task:
+        """Return some of the rows with other labels."""
+        return _Task(
+            self.rows[chosen], self.moved[chosen], labels, self.weights[chosen]
+        )
+
+    def lost(self, split: Split) -> float:
+        """Return the weight of the rows that a split sends to the wrong branch."""
+        return float(self.weights[split.branches(self.rows) != self.labels].sum())
+
+
+def _visit_all(sketch: Sketch, patterns: Patterns, task: _Task, ridge: float) -> bool:
     """Visit the nodes from the deepest on; return whether anything moved."""
-    reached = _reaching(sketch, rows)
+    reached = _reaching(sketch, task.rows)
     has_moved = False
     for node in reversed(range(len(sketch.splits))):
         split = sketch.splits[node]
@@ -71,16 +92,14 @@ def _visit_all(
         if len(split.groups) != 2 or len(inside) == 0:
             continue
         right = [
-            sketch.classify(rows[inside], child) == labels[inside]
+            sketch.classify(task.rows[inside], child) == task.labels[inside]
             for child in sketch.children[node]
         ]
         cares = right[0] != right[1]
         if np.count_nonzero(cares) < 4:
             continue
-        chosen = inside[cares]
-        better = _better_split(
-            split, patterns, rows[chosen], right[1][cares], weights[chosen], ridge
-        )
+        wanted = right[1][cares].astype(np.int64)
+        better = _better_split(split, patterns, task.at(inside[cares], wanted), ridge)
         if better is not None:
             sketch.splits[node] = better
             has_moved = True
@@ -102,57 +121,50 @@ def _reaching(sketch: Sketch, rows: FloatArray) -> list[IntArray]:
 
 
 def _better_split(
-    split: Split,
-    patterns: Patterns,
-    rows: FloatArray,
-    is_right: BoolArray,
-    weights: FloatArray,
-    ridge: float,
+    split: Split, patterns: Patterns, task: _Task, ridge: float
 ) -> Split | None:
     """Return a split with less error on the rows that care, or None."""
-    lowest = float(weights[split.branches(rows) != is_right].sum())
+    lowest = task.lost(split)
+    is_right = task.labels > 0
     if lowest == 0.0 or is_right.all() or not is_right.any():
         return None
-    bar = lowest - _LEAST * float(np.sqrt(lowest * weights.mean()))
+    bar = lowest - _LEAST * float(np.sqrt(lowest * task.weights.mean()))
     best: Split | None = None
-    turned = _logistic_axis(split, patterns, rows, is_right, weights, ridge)
+    turned = _logistic_axis(split, patterns, task, ridge)
     for axis in (split.axis, turned):
         if axis is None:
             continue
-        found = _cut_again(axis, split, rows, is_right, weights)
-        error = float(weights[found.branches(rows) != is_right].sum())
-        if error < bar and (np.diff(found.cuts) > 0).all():
+        found = _cut_again(axis, split, patterns, task)
+        error = task.lost(found)
+        if error < bar:
             bar, best = error, found
     return best
 
 
-def _cut_again(
-    axis: Axis, split: Split, rows: FloatArray, is_right: BoolArray, weights: FloatArray
-) -> Split:
+def _cut_again(axis: Axis, split: Split, patterns: Patterns, task: _Task) -> Split:
     """Return the split with new cuts on an axis."""
-    values = axis.values(rows)
-    cuts = smoothed_cuts(values, is_right, weights, two=len(split.cuts) == 2)
-    return Split(axis, settled_cuts(cuts.cuts, values), cuts.owners, split.groups)
+    places = axis.places(task.rows, task.moved)
+    cuts = smoothed_cuts(
+        places, task.labels > 0, task.weights, two=len(split.cuts) == 2
+    )
+    points = axis.settled(cuts.cuts, task.rows, task.moved, patterns.units)
+    return Split(axis, points, cuts.owners, split.groups)
 
 
 def _logistic_axis(
-    split: Split,
-    patterns: Patterns,
-    rows: FloatArray,
-    is_right: BoolArray,
-    weights: FloatArray,
-    ridge: float,
+    split: Split, patterns: Patterns, task: _Task, ridge: float
 ) -> Axis | None:
     """Return the logistic direction over the features of a combination."""
     if not split.axis.is_combined:
         return None
     features = split.axis.features
-    points = (rows[:, features] - patterns.centre[features]) / patterns.scale[features]
-    direction = logistic_direction(points, is_right, weights, ridge)
+    points = task.moved[:, features] - patterns.centre[features]
+    points /= patterns.scale[features]
+    direction = logistic_direction(points, task.labels > 0, task.weights, ridge)
     if direction is None:
         return None
     order = np.argsort(-np.abs(direction * points.std(axis=0)), kind="stable")
-    within = np.cov(points[:, order].T, aweights=weights)
+    within = np.cov(points[:, order].T, aweights=task.weights)
     places = np.searchsorted(patterns.combinable, features)[order]
     return axis_of(patterns, places, direction[order], within)
 

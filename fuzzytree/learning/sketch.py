@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.cuts import settled_cuts
+from fuzzytree.learning.units import Units
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,41 @@ class Axis:
             for part in parts[1:]:
                 total += part
         return total
+
+    def places(self, rows: FloatArray, moved: FloatArray) -> FloatArray:
+        """Return where each row lies in the axis' own unit.
+
+        That of a combination is the table's, for its weights hold the units.
+
+        Args:
+            rows: As in the table.
+            moved: In the columns' units.
+        """
+        if self.is_combined:
+            return self.values(rows)
+        return moved[:, self.features[0]]
+
+    def settled(
+        self, cuts: FloatArray, rows: FloatArray, moved: FloatArray, units: Units
+    ) -> FloatArray:
+        """Return cuts in the table's unit, increasing strictly, between the rows.
+
+        Args:
+            cuts: In the axis' own unit.
+            rows: As in the table.
+            moved: In the columns' units.
+            units: The columns' units.
+        """
+        values, places = self.values(rows), self.places(rows, moved)
+        origin, exponent = 0.0, 0
+        if not self.is_combined:
+            origin = float(units.origins[self.features[0]])
+            exponent = int(units.exponents[self.features[0]])
+        points = settled_cuts(cuts, values, places, origin=origin, exponent=exponent)
+        for k in range(1, len(points)):
+            if points[k] <= points[k - 1]:
+                points[k] = np.nextafter(points[k - 1], np.inf)
+        return points
 
 
 def single(feature: int) -> Axis:

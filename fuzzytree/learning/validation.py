@@ -24,13 +24,9 @@ from fuzzytree.learning.patterns import (
     usable_features,
 )
 from fuzzytree.learning.refinement import refined
+from fuzzytree.learning.sampling import Sample, hashed
 from fuzzytree.learning.settings import Settings
-from fuzzytree.learning.statistics import (
-    Moments,
-    Sample,
-    grouped_moments,
-    hashed,
-)
+from fuzzytree.learning.statistics import Moments, grouped_moments
 
 LADDER = (1, 2, 3, 5, 8, 12, 16)
 """Numbers of patterns that are tried for a class."""
@@ -167,7 +163,7 @@ def patterns_of(
     clusters: dict[int, IntArray] = {}
     refused = 0
     for code, number in enumerate(numbers):
-        rows = sample.rows[borders[code] : borders[code + 1]]
+        rows = sample.moved[borders[code] : borders[code + 1]]
         if number < 2 or len(rows) == 0:
             continue
         if (code, number) not in found:
@@ -204,18 +200,18 @@ class _Fold:
 def _folds(moments: Moments, sample: Sample, seed: int) -> list[_Fold]:
     """Return folds of a bounded part of the sample, with all classes in each part."""
     kept = _thinned(moments, sample)
-    rows, codes = sample.rows[kept], sample.codes[kept]
-    order = np.lexsort((hashed(kept + 1_000_003 * (seed + 1)), codes))
-    rows, codes = rows[order], codes[order]
+    order = np.lexsort((hashed(kept + 1_000_003 * (seed + 1)), sample.codes[kept]))
+    kept = kept[order]
+    codes = sample.codes[kept]
     starts = np.searchsorted(codes, codes, side="left")
     turn = (np.arange(len(codes)) - starts + codes) % _FOLDS
     folds: list[_Fold] = []
     for fold in range(_FOLDS):
-        inside = turn != fold
-        found = grouped_moments(rows[inside], codes[inside], len(moments.counts))
-        if len(usable_features(found)) and (~inside).any():
-            part = Sample(rows[inside], codes[inside])
-            folds.append(_Fold(found, part, rows[~inside], codes[~inside], {}))
+        learnt, asked = sample.at(kept[turn != fold]), kept[turn == fold]
+        found = grouped_moments(learnt.moved, learnt.codes, len(moments.counts))
+        if len(usable_features(found)) and len(asked):
+            rows, answers = sample.rows[asked], sample.codes[asked]
+            folds.append(_Fold(found, learnt, rows, answers, {}))
     return folds
 
 

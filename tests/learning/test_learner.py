@@ -330,7 +330,7 @@ NONE = np.empty((0, 2))
             np.ones((4, 2)),
             [0, 1, 0, 1],
             "cannot learn without a column that varies: every column is constant, or "
-            "so large that its square overflows",
+            "so wide that its range overflows",
         ),
     ],
     ids=["empty", "all missing", "one row", "one class", "constant"],

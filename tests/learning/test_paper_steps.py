@@ -5,7 +5,9 @@ import pytest
 
 from fuzzytree.learning.induction import components, most_powerful, threshold
 from fuzzytree.learning.shapes import fitted_flanks, fitted_sets
-from fuzzytree.learning.statistics import Statistics, window_counts
+from fuzzytree.learning.statistics import Statistics
+from fuzzytree.learning.sums import Totals
+from fuzzytree.learning.windows import window_counts
 
 
 def test_the_threshold_is_the_mean_spread_times_half_the_levels_left() -> None:
@@ -113,9 +115,10 @@ def test_a_spread_keeps_its_digits_far_from_zero(ratio: float) -> None:
 def test_windows_overlap_by_half_and_are_closed_at_both_ends() -> None:
     # M = 0, SD = 2, n = 2: S(k) counts [k - 1, k + 1].
     values = np.array([-2.0, -1.0, 0.0, 0.5, 1.0, 2.0, 3.5])
-    found = window_counts(
-        values, np.zeros(7, np.int64), np.array([0.0]), np.array([2.0]), 2
-    )
+    table = Totals(counts=[3], sums=[0], squares=[8], unit=0)  # -2, 0 and 2
+    half = Totals(table.counts, table.sums, [32], unit=-1)  # the same in halves
+    found = window_counts(values, np.zeros(7, np.int64), half, 2)
+    assert half.spreads() == table.spreads() == 2.0
     assert found.tolist() == [[2, 3, 4, 4, 2]]
 
 

@@ -28,8 +28,9 @@ def test_a_class_keeps_the_moments_of_the_whole_table() -> None:
     values, codes = rng.normal(size=(1000, 2)), np.repeat([0, 1], 500)
     statistics = Statistics(2, 2, rows_per_class=60)
     statistics.update(values, codes)
-    moments, sample = statistics.moments(), statistics.sample()
-    halves = (sample.rows[sample.codes == 1][:, 0] > 0).astype(np.int64)
+    sample = statistics.sample()
+    moments = statistics.moments(sample.units)
+    halves = (sample.moved[sample.codes == 1][:, 0] > 0).astype(np.int64)
     patterns = make_patterns(moments, sample, {1: halves})
     assert patterns.labels.tolist() == [0, 1, 1]
     assert patterns.numbers.tolist() == [1, 1, 2]
@@ -39,8 +40,9 @@ def test_a_class_keeps_the_moments_of_the_whole_table() -> None:
     assert (np.diff(patterns.owners) >= 0).all()
 
 
-def test_constant_and_overflowing_columns_are_not_usable() -> None:
-    statistics = Statistics(2, 3)
-    rows = np.array([[1.0, 5.0, 1e200], [2.0, 5.0, -1e200]])
+def test_columns_that_are_constant_or_whose_range_overflows_are_not_usable() -> None:
+    statistics = Statistics(2, 4)
+    rows = np.array([[1.0, 5.0, 1e308, 1e307], [2.0, 5.0, -1e308, -1e307]])
     statistics.update(rows, np.array([0, 1]))
-    assert usable_features(statistics.moments()).tolist() == [0]
+    moments = statistics.moments(statistics.sample().units)
+    assert usable_features(moments).tolist() == [0, 3]

@@ -1,0 +1,243 @@
+"""A bounded sample of rows that depends on the rows alone, not on their order.
+
+Of each class the distinct rows with the smallest hashes are kept, and how often each
+occurs. Whether a row is among them depends on no other row's place, so any order, any
+chunks and any merging keep the same ones; and a row that is kept at the end was never
+left out before, so its count is exact. The hash looks at the digits of the numbers and
+not at their exponents: columns multiplied by powers of two keep the same rows.
+
+With no more distinct rows than asked for nothing is left to chance at all. Only where
+more rows agree in all digits than may be kept (tables of 1, 2 and 4, say) a second hash
+of the whole numbers decides; there a column multiplied by a power of two may keep
+others. So it may for numbers below 2^-1022, which have fewer digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.sums import runs
+from fuzzytree.learning.units import Units, units_of
+
+Hashes = npt.NDArray[np.uint64]
+
+_DIGITS = np.uint64((1 << 63) | ((1 << 52) - 1))
+_HALF = np.uint64(32)
+_BUFFER = 1 << 16
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Rows of a table, ordered by class and then by the hash of their moved values.
+
+    Attributes:
+        rows: Shape (kept, features).
+        moved: The same rows in the columns' units.
+        codes: Class of each row.
+        units: The columns' units.
+    """
+
+    rows: FloatArray
+    moved: FloatArray
+    codes: IntArray
+    units: Units
+
+    def at(self, chosen: IntArray) -> Sample:
+        """Return some of the rows, ordered by class."""
+        return Sample(
+            self.rows[chosen], self.moved[chosen], self.codes[chosen], self.units
+        )
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Some rows with their class, their hashes and how often they occur."""
+
+    values: FloatArray
+    codes: IntArray
+    digits: Hashes
+    hashes: Hashes
+    copies: IntArray
+
+    def at(self, chosen: IntArray) -> _Rows:
+        """Return some of the rows."""
+        return _Rows(
+            self.values[chosen],
+            self.codes[chosen],
+            self.digits[chosen],
+            self.hashes[chosen],
+            self.copies[chosen],
+        )
+
+
+@dataclass
+class DistinctRows:
+    """Keeps distinct rows of each class, those with the smallest hashes.
+
+    Attributes:
+        classes: How many classes there are.
+        features: How many columns there are.
+        most: How many distinct rows of a class are kept at most.
+    """
+
+    classes: int
+    features: int
+    most: int
+    _parts: list[_Rows] = field(default_factory=list[_Rows], repr=False)
+    _kept: int = 0
+    _settled: int = 0
+    _limits: Hashes = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Start without rows and without limits."""
+        self._limits = np.full(self.classes, np.iinfo(np.uint64).max, np.uint64)
+
+    def offer(self, values: FloatArray, codes: IntArray) -> None:
+        """Offer rows; those that are kept are copied.
+
+        Args:
+            values: Shape (rows, features), finite, without negative zeros.
+            codes: Class of each row.
+        """
+        digits = hashed_digits(values)
+        chosen = np.flatnonzero(digits <= self._limits[codes])
+        if not len(chosen):
+            return
+        kept = values[chosen]
+        ones = np.ones(len(chosen), np.int64)
+        self._parts.append(
+            _Rows(kept, codes[chosen], digits[chosen], hashed_rows(kept), ones)
+        )
+        self._kept += len(chosen)
+        if self._kept > 2 * self._settled + _BUFFER:
+            self._settle()
+
+    def merge(self, other: DistinctRows) -> DistinctRows:
+        """Return the distinct rows of both tables."""
+        joined = DistinctRows(self.classes, self.features, self.most)
+        joined._limits = np.minimum(self._limits, other._limits)
+        joined._parts = [*self._parts, *other._parts]
+        joined._settle()
+        return joined
+
+    def sample(self, lows: FloatArray, highs: FloatArray) -> Sample:
+        """Return `most` rows of each class at most, in a canonical order.
+
+        Where a class has more rows than that, distinct rows have copies in proportion
+        to how often they occur (largest remainders first).
+
+        Args:
+            lows: The smallest value of each column, over the whole table.
+            highs: The largest.
+        """
+        found = self._settle()
+        if found is None:
+            nothing = np.empty((0, self.features))
+            units = units_of(np.zeros((1, self.features)), lows, lows)
+            return Sample(nothing, nothing, np.empty(0, np.int64), units)
+        units = units_of(found.values, lows, highs)
+        order = np.lexsort(
+            (found.hashes, hashed_rows(units.moved(found.values)), found.codes)
+        )
+        found = found.at(order)
+        chosen = np.repeat(np.arange(len(order)), _shares(found, self.most))
+        rows = found.values[chosen]
+        return Sample(rows, units.moved(rows), found.codes[chosen], units)
+
+    def _settle(self) -> _Rows | None:
+        """Join equal rows, and leave out all but the smallest hashes of each class."""
+        if not self._parts:
+            return None
+        if len(self._parts) == 1 and self._kept == self._settled:
+            return self._parts[0]
+        everything = _joined(self._parts)
+        order = np.lexsort((everything.hashes, everything.digits, everything.codes))
+        ordered = everything.at(order)
+        is_new = np.ones(len(order), bool)
+        is_new[1:] = (
+            (np.diff(ordered.codes) != 0)
+            | (ordered.digits[1:] != ordered.digits[:-1])
+            | (ordered.hashes[1:] != ordered.hashes[:-1])
+        )
+        first = np.flatnonzero(is_new)
+        copies = np.add.reduceat(ordered.copies, first)
+        present, starts, counts = runs(ordered.codes[first])
+        rank = np.arange(len(first)) - np.repeat(starts, counts)
+        is_full = counts >= self.most
+        last = first[starts[is_full] + self.most - 1]
+        self._limits[present[is_full]] = ordered.digits[last]
+        is_kept = rank < self.most
+        kept = ordered.at(first[is_kept])
+        kept.copies[:] = copies[is_kept]
+        self._parts = [kept]
+        self._kept = self._settled = len(kept.codes)
+        return kept
+
+
+def _joined(parts: list[_Rows]) -> _Rows:
+    return _Rows(
+        np.concatenate([part.values for part in parts]),
+        np.concatenate([part.codes for part in parts]),
+        np.concatenate([part.digits for part in parts]),
+        np.concatenate([part.hashes for part in parts]),
+        np.concatenate([part.copies for part in parts]),
+    )
+
+
+def _shares(found: _Rows, most: int) -> IntArray:
+    """Return how many copies of each distinct row the sample holds."""
+    copies = found.copies.copy()
+    _, starts, counts = runs(found.codes)
+    totals = np.add.reduceat(found.copies, starts)
+    for start, count, total in zip(starts, counts, totals.tolist(), strict=True):
+        if total <= most:
+            continue
+        mine = slice(start, start + count)
+        wanted = found.copies[mine] * most
+        copies[mine] = wanted // total
+        missing = most - int(copies[mine].sum())
+        largest = np.argsort(-(wanted % total), kind="stable")[:missing]
+        copies[start + largest] += 1
+    return copies
+
+
+def hashed(numbers: npt.NDArray[np.integer]) -> Hashes:
+    """Return a well mixed number for each whole number (splitmix64)."""
+    mixed = numbers.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return mixed ^ (mixed >> np.uint64(31))
+
+
+def hashed_digits(values: FloatArray) -> Hashes:
+    """Return a hash of each row that no power of two in a column changes.
+
+    Signs and mantissas are multiplied by an odd number for each column and added up,
+    their upper halves a second time, for numbers of few digits; zero counts as none.
+
+    Example:
+        >>> rows = np.array([[3.0, 0.7], [-3.0, 0.7]])
+        >>> scaled = rows * [2.0**-300, 1024.0]
+        >>> (hashed_digits(rows) == hashed_digits(scaled)).tolist()
+        [True, True]
+        >>> len(set(hashed_digits(rows).tolist()))
+        2
+    """
+    digits = np.ascontiguousarray(values).view(np.uint64) & _DIGITS
+    digits += digits >> _HALF
+    digits += values != 0
+    return hashed(digits.dot(_odd_numbers(values.shape[1])))
+
+
+def hashed_rows(values: FloatArray) -> Hashes:
+    """Return a hash of the bits of each row."""
+    bits = np.ascontiguousarray(values).view(np.uint64)
+    return hashed(hashed(bits).dot(_odd_numbers(values.shape[1])))
+
+
+def _odd_numbers(count: int) -> Hashes:
+    return hashed(np.arange(1, count + 1)) | np.uint64(1)
