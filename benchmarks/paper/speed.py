@@ -56,20 +56,23 @@ class Carrier(NamedTuple):
 class Bench:
     """The trees, measured one by one, and what had to be left out."""
 
-    def __init__(self, *, rounds: int, seconds: float, tell: Tell) -> None:
+    def __init__(self, *, rounds: int, tell: Tell) -> None:
         self.rounds = rounds
-        self.end = time.monotonic() + seconds
         self.tell = tell
         self.omissions: list[str] = []
         self.timings: list[Timing] = []
         self.given_up: set[str] = set()
         self.taken: dict[tuple[str, Kind, Family], tuple[int, float]] = {}
 
-    def sizes(self, numbers: Sequence[int]) -> Iterator[Size]:
-        """Yield what was measured of each tree, small trees first."""
+    def sizes(self, numbers: Sequence[int], *, seconds: float) -> Iterator[Size]:
+        """Yield what was measured of each tree, small trees first.
+
+        No tree is begun after so many seconds; each gets an even share of what is left.
+        """
+        end = time.monotonic() + seconds
         todo = [(number, family) for number in numbers for family in FAMILIES]
         for place, (number, family) in enumerate(todo):
-            left = self.end - time.monotonic()
+            left = end - time.monotonic()
             if left <= 0:
                 self.omissions.append(
                     f"{family} trees of {number:,} rules: the time was over"

@@ -1,0 +1,578 @@
+"""The page: tables of what was measured, and what follows from them, as text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+
+from fuzzytree.rulebase import Kind
+from paper.inference import wilson
+from paper.judging import (
+    ABOUT,
+    LARGE,
+    LEVEL,
+    NEARLY,
+    PRIMARY,
+    Line,
+    Verdict,
+    counted,
+    first_gain,
+    growth,
+    lines,
+    spread,
+    verdicts,
+)
+from paper.records import Claims, Comparison, Size, Times
+
+WIDTH = 92
+FIRING = ("reference", "native", "onnxruntime float64", "scikit-fuzzy")
+KINDS: tuple[Kind, ...] = ("raw", "relative")
+
+
+def page(claims: Claims) -> str:
+    """Return the page as Markdown.
+
+    The same measurements give the same text.
+    """
+    found = list(lines(claims))
+    blocks = [
+        *_opening(claims),
+        *_in_short(claims, found),
+        *_speed(claims, found),
+        *_reliability(claims),
+        *_search(claims, found),
+        *_method(claims),
+    ]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _opening(claims: Claims) -> Iterator[str]:
+    yield "# The paper's claims about speed and reliability, measured"
+    yield _text(
+        'The paper says that a fuzzy tree "reaches a result about n-times faster than '
+        'its corresponding fuzzy rule-based system", where n is the number of rules, '
+        'and that it is "less reliable". It measures neither. This page does, for raw '
+        "rules, which are the paper's, and for relative rules, which equal their tree."
+    )
+    yield _text(
+        "`python benchmarks/claims.py` measures and writes this page, its pictures and "
+        "[all the numbers](claims.json); what is concluded here is computed from them."
+    )
+    if claims.is_quick:
+        yield "**This is a trial run, with few sizes and rounds.**"
+
+
+def _in_short(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
+    yield "## In short"
+    points = []
+    if claims.sizes:
+        points += [_counted_in_short(claims.sizes), _timed_in_short(found)]
+        points.append(_overhead_in_short(found))
+    if claims.comparisons:
+        points.append(_reliable_in_short(verdicts(claims.comparisons)))
+    points += _search_in_short(found)
+    yield "\n".join(_bullet(point) for point in points)
+
+
+def _counted_in_short(sizes: Sequence[Size]) -> str:
+    alone = [counted(size)[0] / size.rules for size in sizes]
+    last = max(sizes, key=lambda size: size.rules)
+    is_right = all(1 / ABOUT <= share <= ABOUT for share in alone)
+    head = "is right" if is_right else "is not right"
+    return (
+        f'**Counted, "n times" {head}.** The clauses of all rules are {_range(alone)} '
+        "times n the questions that a row meets on its way down the tree. But rules "
+        f"share clauses: at {last.rules:,} rules, computing each different one once is "
+        f"{three(counted(last)[1])} times the tree's questions."
+    )
+
+
+def _timed_in_short(found: Sequence[Line]) -> str:
+    fired = [line for line in found if line.what == "rules" and line.kind == "raw"]
+    right = [line for line in fired if line.is_about_n]
+    wrong = [line for line in fired if not line.is_about_n]
+    parts = ["**Timed, it depends on what executes the rules.**"]
+    if right:
+        names = _listed(f"{_where(line)} ({line.family})" for line in right)
+        parts.append(
+            f"Firing raw rules stays within a factor of {ABOUT:g} of n times the "
+            f"tree's time in {names}."
+        )
+    else:
+        parts.append(
+            f"Nowhere does firing raw rules stay within a factor of {ABOUT:g} of n "
+            "times the tree's time at every n."
+        )
+    if wrong:
+        groups = dict.fromkeys((line.runtime, line.is_batch) for line in wrong)
+        told = []
+        for runtime, is_batch in groups:
+            group = [
+                line
+                for line in wrong
+                if (line.runtime, line.is_batch) == (runtime, is_batch)
+            ]
+            shares = [share for line in group for share in line.shares]
+            told.append(f"{_range(shares)} n in {_where(group[0])}")
+        parts.append("Elsewhere it is " + _listed(told) + ".")
+    return " ".join(parts)
+
+
+def _overhead_in_short(found: Sequence[Line]) -> str:
+    told = [
+        f"{three(line.half)} in {line.runtime}"
+        for line in found
+        if line.family == PRIMARY
+        and (line.what, line.kind, line.is_batch) == ("rules", "raw", False)
+        and line.half is not None
+    ]
+    if not told:
+        return "**Overhead** cannot be told from so few sizes."
+    return (
+        "**For a single row, overhead decides at first.** The fixed cost of a call is "
+        "more than half of the time of firing raw rules up to about this many rules: "
+        f"{_listed(told)}."
+    )
+
+
+def _reliable_in_short(found: Sequence[Verdict]) -> str:
+    tree, raw, is_open = (
+        sum(verdict.winner == name for verdict in found)
+        for name in ("tree", "raw rules", "open")
+    )
+    if tree and not raw:
+        head = '"Less reliable" is not what is seen, rather the opposite.'
+    elif raw and not tree:
+        head = '"Less reliable" is confirmed.'
+    elif tree and raw:
+        head = 'Which is "less reliable" depends on the table.'
+    else:
+        head = '"Less reliable" can neither be confirmed nor denied here.'
+    return (
+        f"**{head}** In {len(found)} comparisons on rows that were held back, the tree "
+        f"is right more often in {tree}, the raw rules in {raw}; {is_open} are open "
+        "(exact McNemar tests, corrected for their number)."
+    )
+
+
+def _search_in_short(found: Sequence[Line]) -> Iterator[str]:
+    chosen = {
+        line.kind: line
+        for line in found
+        if (line.what, line.is_batch, line.family) == ("best-first", True, PRIMARY)
+    }
+    if set(chosen) != set(KINDS):
+        return
+    relative, raw = chosen["relative"], chosen["raw"]
+    price, last = max(relative.ratios), raw.prices[-1]
+    assert last.to_firing  # a search has it
+    head = "is" if max(raw.ratios) <= NEARLY else "is not"
+    yield (
+        f"**Best-first gives the answers of all rules while firing few.** For relative "
+        f"rules its price is the tree's (at most {three(price)} times, in batches). "
+        f"For raw rules it {head} nearly the tree's: {_range(raw.ratios)} times it; at "
+        f"{raw.sizes[-1]:,} rules that is {three(last.to_firing.median)} times faster "
+        "than firing."
+    )
+
+
+def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
+    if not claims.sizes:
+        return
+    yield "## n times faster"
+    yield "![Price of a rule base in units of its tree's](claims-speed.svg)"
+    yield _text(
+        "How many times as long as the tree a rule base takes for a row, in the same "
+        f"runtime. Trees are {PRIMARY}: two to five branches a node, every leaf "
+        "equally likely. scikit-fuzzy runs no trees and stands against `native`; the "
+        "reference answers batches row by row. A dash: not measured, see below."
+    )
+    for is_batch in (False, True):
+        for kind in KINDS:
+            rows = "in a batch" if is_batch else "one row at a time"
+            yield f"**{kind.capitalize()} rules, {rows}:**"
+            yield _ratios(claims, found, kind, is_batch=is_batch)
+    ratios = [p.to_tree for s in claims.sizes for p in s.prices if p.to_tree]
+    yield _text(
+        "Half of these ratios are known to within "
+        f"{spread(ratios):.0%} or better (95 % intervals of the median quotient)."
+    )
+    yield _text(
+        f"**How the ratio grows.** The exponent b of a law n^b, fitted from {LARGE} "
+        "rules on, with its 95 % interval; the ratio divided by n, smallest to largest "
+        "over all sizes; and up to how many rules the fixed cost of a call is more "
+        "than half of the rules' time."
+    )
+    yield _laws(found)
+    yield _growth_text(found)
+    yield _text(
+        "**What is counted.** If rows reach all leaves equally often and every rule "
+        "computes all of its clauses, the work is exactly n times the questions of the "
+        "tree: the clauses of all rules are n times the mean length of a path. What "
+        "is timed differs from it for three reasons: rules share clauses; a raw "
+        "clause is the union of the sets of all patterns below its branch, so it costs "
+        "more the higher it stands; and a call has a price of its own."
+    )
+    yield _counts(claims.sizes)
+
+
+def _ratios(
+    claims: Claims, found: Sequence[Line], kind: Kind, *, is_batch: bool
+) -> str:
+    here = [
+        line
+        for line in found
+        if (line.family, line.kind, line.is_batch) == (PRIMARY, kind, is_batch)
+    ]
+    columns = [
+        (name, what, [f for f in here if (f.runtime, f.what) == (runtime, what)])
+        for name, runtime, what in (
+            *((name, name, "rules") for name in FIRING),
+            ("best-first", "native", "best-first"),
+        )
+    ]
+    columns = [column for column in columns if column[2]]
+    trees = {
+        size.rules: price.ns
+        for size in claims.sizes
+        for price in size.prices
+        if size.family == PRIMARY
+        and (price.what, price.runtime, price.is_batch) == ("tree", "native", is_batch)
+    }
+    rows = []
+    for rules, ns in trees.items():
+        cells = []
+        for _, _, matching in columns:
+            known = dict(zip(matching[0].sizes, matching[0].ratios, strict=True))
+            cells.append(three(known[rules]) if rules in known else "-")
+        rows.append([f"{rules:,}", *cells, _ns(ns)])
+    head = ["n", *(name for name, _, _ in columns), "tree in native, a row"]
+    return _table(head, rows)
+
+
+def _laws(found: Sequence[Line]) -> str:
+    rows = []
+    for line in found:
+        if line.what != "rules":
+            continue
+        law, half = line.law, line.half
+        rows.append(
+            [
+                line.kind,
+                line.runtime,
+                "batch" if line.is_batch else "one row",
+                line.family,
+                f"{law.exponent:.2f} ({law.low:.2f} to {law.high:.2f})" if law else "-",
+                growth(law) if law else "-",
+                _range(line.shares),
+                "-" if half is None else three(half),
+            ]
+        )
+    order = {name: place for place, name in enumerate(FIRING)}
+    rows.sort(key=lambda row: (row[0] != "raw", order[row[1]], row[2] == "batch"))
+    head = [
+        "rules",
+        "runtime",
+        "rows",
+        "trees",
+        "b",
+        "ratio grows",
+        "ratio / n",
+        "overhead up to n",
+    ]
+    return _table(head, rows)
+
+
+def _growth_text(found: Sequence[Line]) -> str:
+    laws = [(line, line.law) for line in found if line.what == "rules"]
+    known = [(line, law) for line, law in laws if law is not None]
+    if not known:
+        return _text("There are too few sizes to fit a law.")
+    kinds = [growth(law) for _, law in known]
+    told = [
+        f"{word} in {kinds.count(word)}"
+        for word in ("like n", "slower than n", "faster than n")
+    ]
+    exponents = [law.exponent for _, law in known]
+    return _text(
+        f"Of these {len(known)} ratios that can be fitted, as many grow "
+        f"{_listed(told)}; b is between {min(exponents):.2f} and {max(exponents):.2f}."
+    )
+
+
+def _counts(sizes: Sequence[Size]) -> str:
+    rows = [
+        [
+            size.family,
+            f"{size.rules:,}",
+            f"{size.path:.2f}",
+            f"{size.clauses:,}",
+            three(counted(size)[0]),
+            f"{size.distinct:,}",
+            three(counted(size)[1]),
+        ]
+        for size in sorted(sizes, key=lambda size: (size.family, size.rules))
+    ]
+    head = [
+        "trees",
+        "n",
+        "questions of a row",
+        "clauses",
+        "times the questions",
+        "different clauses",
+        "times the questions",
+    ]
+    return _table(head, rows)
+
+
+def _reliability(claims: Claims) -> Iterator[str]:
+    found = verdicts(claims.comparisons)
+    if not found:
+        return
+    seeds = len(found[0].comparison.of_seeds)
+    yield "## Less reliable"
+    yield "![Who is right where raw rules and tree differ](claims-agreement.svg)"
+    yield _text(
+        "Each table is cut into ten folds, stratified and shuffled, "
+        f"{'once' if seeds == 1 else f'{seeds} times with different seeds'}; each fold "
+        "is answered by a tree that was learnt from the other nine, and by the raw "
+        "rules of that tree. Accuracies and shares are per cent of all answers. "
+        "*Differ*: both answer, differently (with Wilson's 95 % interval for as many "
+        "trials as the table has rows). *Uncovered*: no raw rule fires; the tree's "
+        "right answers among them in brackets."
+    )
+    yield _comparisons(found)
+    yield _text(
+        "*Votes*: each row counts once, for whoever was right more often over the "
+        "seeds, so that no row is counted as several. p is that of the exact McNemar "
+        f"test on the votes, corrected by Holm's method for all {len(found)} tests; "
+        f"below {LEVEL:g} a winner is named. Rows that one tree answers share its "
+        "luck, which no test of this kind sees."
+    )
+    yield _reliable_text(claims.comparisons, found)
+
+
+def _comparisons(found: Sequence[Verdict]) -> str:
+    head = [
+        "table",
+        "mode",
+        "AND",
+        "leaves",
+        "tree",
+        "raw",
+        "differ",
+        "tree right",
+        "raw right",
+        "both wrong",
+        "uncovered",
+        "votes",
+        "p",
+        "right more often",
+    ]
+    return _table(head, [_comparison_row(verdict) for verdict in found])
+
+
+def _comparison_row(verdict: Verdict) -> list[str]:
+    found = verdict.comparison
+    total = found.answers
+    low, high = wilson(found.differ / total, found.rows)
+    return [
+        found.table,
+        found.mode,
+        found.conjunction,
+        f"{found.leaves:.1f}",
+        _percent(found.tree_right, total),
+        _percent(found.raw_right, total),
+        f"{_percent(found.differ, total)} ({100 * low:.1f} to {100 * high:.1f})",
+        _percent(found.tree_only, total),
+        _percent(found.raw_only, total),
+        _percent(found.both_wrong, total),
+        f"{_percent(found.uncovered, total)} "
+        f"({_percent(found.uncovered_tree_right, total)})",
+        f"{found.votes[0]} : {found.votes[1]}",
+        _p(verdict.corrected),
+        verdict.winner,
+    ]
+
+
+def _reliable_text(comparisons: Sequence[Comparison], found: Sequence[Verdict]) -> str:
+    in_all = verdicts(comparisons, lambda one: one.votes_in_all)
+    changed = sum(a.winner != b.winner for a, b in zip(found, in_all, strict=True))
+    answers = sum(one.answers for one in comparisons)
+    differs = sum(one.relative_differs for one in comparisons)
+    ties = sum(one.ties for one in comparisons)
+    tied = sum(one.ties_that_differ for one in comparisons)
+    apart = sum(one.differ for one in comparisons)
+    verdict = "changes no verdict" if not changed else f"changes {changed} verdicts"
+    by_and = {
+        name: sum(one.raw_right for one in comparisons if one.conjunction == name)
+        for name in ("min", "product")
+    }
+    return _text(
+        f"Counting rows without an answer as wrong {verdict}. The relative rules "
+        f"differ from their tree in {differs:,} of {answers:,} answers. Raw rules are "
+        f"decided by their order among equals in {ties:,} answers, and {tied:,} of these are "
+        f"among the {apart:,} that differ from the tree's. With min, raw rules are "
+        f"right {by_and['min']:,} times, with product {by_and['product']:,} times."
+    )
+
+
+def _search(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
+    chosen = [line for line in found if line.what == "best-first"]
+    if not chosen:
+        return
+    yield "## What best-first makes of the trade"
+    yield _text(
+        "The paper trades reliability for speed: all rules, or one path. Best-first "
+        "need not: a rule is never stronger than its beginning, so what cannot win is "
+        "not fired, and the answer is the rule base's own, tie and all. Below, its "
+        "time over the tree's, and how many times faster it is than firing in "
+        "`native`."
+    )
+    yield _search_table(chosen)
+    yield _search_text(claims, chosen)
+
+
+def _search_table(chosen: Sequence[Line]) -> str:
+    order = [
+        line
+        for kind in KINDS
+        for is_batch in (False, True)
+        for line in chosen
+        if (line.family, line.kind, line.is_batch) == (PRIMARY, kind, is_batch)
+    ]
+    head = ["n"]
+    cells: dict[int, list[str]] = {}
+    for line in order:
+        where = f"{line.kind}, {'batch' if line.is_batch else 'one row'}"
+        head += [f"{where}: of the tree", "faster than firing"]
+        for size, price in zip(line.sizes, line.prices, strict=True):
+            cells.setdefault(size, [f"{size:,}"]).extend(
+                [_median(price.to_tree), _median(price.to_firing)]
+            )
+    rows = [row for row in cells.values() if len(row) == len(head)]
+    return _table(head, rows)
+
+
+def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
+    parts = []
+    for line in chosen:
+        if line.kind != "raw":
+            continue
+        start = first_gain(line)
+        gain = (
+            "is not surely faster than firing at the largest size"
+            if start is None
+            else f"is faster than firing from {start:,} rules on"
+        )
+        parts.append(
+            f"{'in batches' if line.is_batch else 'row by row'} on {line.family} trees "
+            f"it {gain} and takes {_range(line.ratios)} times the tree's time"
+        )
+    checked = sum(size.checked for size in claims.sizes)
+    return _text(
+        f"For raw rules, {_listed(parts)}. On all {checked:,} rows that were compared, "
+        "best-first gave the answers of firing, and relative rules those of the tree."
+    )
+
+
+def _method(claims: Claims) -> Iterator[str]:
+    machine = claims.machine
+    yield "## How it was measured"
+    versions = ", ".join(f"{name} {v}" for name, v in sorted(machine.versions.items()))
+    load = " and ".join(
+        f"{values[0]:.2f} {when}"
+        for values, when in (
+            (machine.load_before, "before"),
+            (machine.load_after, "after"),
+        )
+        if values
+    )
+    stolen = machine.stolen
+    yield _text(
+        f"On {machine.processor}, {machine.cores} cores, {machine.system}, "
+        f"{machine.python}; {versions}. One thread."
+        + (f" Load {load}." if load else "")
+        + (
+            ""
+            if stolen is None
+            else f" For {stolen:.1%} of the time the process was ready and did not run."
+        )
+    )
+    yield _text(
+        "Rows are standard normal in 11 columns; rules are joined by min. *Multiway* "
+        "trees are made to a plan. *Grown* ones are binary and were grown by "
+        "scikit-learn on 100,000 rows of three noisy classes, then carried over. All "
+        "carriers of a size are timed in interleaved rounds, each round in another "
+        "order; a ratio is the median of the quotients of the rounds. One row at a "
+        "time: 64 rows in turn, of firing as many as take 0.02 s. Batches: 10,000 "
+        "rows, of firing as many as make 10 million strengths (1,000 at 10,000 rules), "
+        "and 1,000 in scikit-fuzzy. Laying out the rows is not timed; Python's call "
+        "of each runtime is."
+    )
+    omissions = claims.omissions or ("nothing",)
+    yield "Left out:\n\n" + "\n".join(_bullet(sentence) for sentence in omissions)
+
+
+def three(value: float) -> str:
+    """Return a number of three significant digits at most, as people read it.
+
+    Example:
+        >>> [three(value) for value in (0.08125, 2.0, 56.789, 6220.58)]
+        ['0.0813', '2', '56.8', '6,220']
+    """
+    rounded = float(f"{value:.3g}")
+    if abs(rounded) >= 1000 or rounded.is_integer():
+        return f"{rounded:,.0f}"
+    return f"{rounded:.12f}".rstrip("0").rstrip(".")
+
+
+def _range(values: Iterable[float]) -> str:
+    low, high = three(min(known := list(values))), three(max(known))
+    return low if low == high else f"{low} to {high}"
+
+
+def _median(times: Times | None) -> str:
+    return "-" if times is None else three(times.median)
+
+
+def _ns(value: float) -> str:
+    return f"{three(value / 1e3)} us" if value >= 1e3 else f"{three(value)} ns"
+
+
+def _percent(count: int, total: int) -> str:
+    return f"{100 * count / total:.1f}"
+
+
+def _p(value: float) -> str:
+    if value < 1e-4:
+        return "< 0.0001"
+    return f"{value:.2g}" if value < 0.1 else f"{value:.2f}"
+
+
+def _where(line: Line) -> str:
+    return f"{line.runtime} {'in batches' if line.is_batch else 'row by row'}"
+
+
+def _listed(texts: Iterable[str]) -> str:
+    *others, last = texts
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines_of = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines_of)
+
+
+def _text(sentences: str) -> str:
+    return textwrap.fill(sentences, WIDTH, break_long_words=False)
+
+
+def _bullet(sentences: str) -> str:
+    return textwrap.fill(
+        sentences,
+        WIDTH,
+        initial_indent="- ",
+        subsequent_indent="  ",
+        break_long_words=False,
+    )
