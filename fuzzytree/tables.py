@@ -14,6 +14,7 @@ import difflib
 import io
 import itertools
 import math
+import operator
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 Cells = Sequence[object] | npt.NDArray[np.generic]
+Only = frozenset[str] | None
 
 MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 """The texts, in small letters, that stand for a missing number."""
@@ -54,7 +56,8 @@ class Piece(msgspec.Struct, frozen=True, eq=False):
     Attributes:
         name: What messages call the table.
         columns: The names of all columns.
-        cells: One entry for each column, each with one cell for each row.
+        cells: One entry for each column, each with one cell for each row; empty for
+            a column that was not asked for.
         rows: How many rows these are.
         where: The place of a row of this piece, as messages name it.
         is_named: Whether the names came with the table; if not they are x1, x2, ...
@@ -177,6 +180,7 @@ def batches(
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
     name: str | None = None,
+    with_others: bool = False,
 ) -> Iterator[Batch]:
     """Yield the rows of a table for a model, files piece by piece.
 
@@ -191,6 +195,8 @@ def batches(
         columns: The names of an array's columns.
         delimiter: As in `read_table`.
         name: As in `read_table`.
+        with_others: Whether the pieces hold the other columns' cells as well; unless
+            they do, a Parquet file's are not read and a frame's not converted.
 
     Raises:
         TableError: If a column is absent, stands twice or holds text, or rows have
@@ -199,7 +205,10 @@ def batches(
         TypeError: If the source is no table.
     """
     chosen: list[int] | None = None
-    for piece in pieces(source, columns=columns, delimiter=delimiter, name=name):
+    only = None if with_others else frozenset(inputs)
+    for piece in pieces(
+        source, columns=columns, delimiter=delimiter, name=name, only=only
+    ):
         if chosen is None:
             chosen = _needed_columns(piece, inputs, trained)
         numbers = _Numbers(piece.name, list(inputs))
@@ -216,8 +225,16 @@ def pieces(
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
     name: str | None = None,
+    only: Only = None,
 ) -> Iterator[Piece]:
     """Yield a table in pieces; at least one, of no rows if the table has none.
+
+    Args:
+        source: The table; see the module.
+        columns: The names of an array's columns.
+        delimiter: As in `read_table`.
+        name: As in `read_table`.
+        only: The columns whose cells are wanted; all of them if None.
 
     Raises:
         TableError: If columns have no names of their own, or rows no equal length.
@@ -227,16 +244,16 @@ def pieces(
     match source:
         case str() | os.PathLike():
             path = cast("str | os.PathLike[str]", source)
-            return _file_pieces(path, delimiter, name)
+            return _file_pieces(path, delimiter, name, only)
         case io.TextIOBase():
-            return _csv_pieces(source, name or "the table", delimiter)
+            return _csv_pieces(source, name or "the table", delimiter, only)
         case io.BufferedReader() | io.BytesIO():
-            return _stream_pieces(source, name or "the table", delimiter)
+            return _stream_pieces(source, name or "the table", delimiter, only)
         case np.ndarray():
             array = cast("npt.NDArray[np.generic]", source)
             return iter([_array_piece(array, columns, name or "the array")])
         case _:
-            return iter([_frame_piece(source, name or "the table")])
+            return iter([_frame_piece(source, name or "the table", only=only)])
 
 
 def class_names(cells: Sequence[Cells]) -> list[str | None]:
@@ -449,12 +466,12 @@ def _refuse_repeated(name: str, columns: Sequence[str]) -> None:
 
 
 def _file_pieces(
-    path: str | os.PathLike[str], delimiter: str | None, name: str | None
+    path: str | os.PathLike[str], delimiter: str | None, name: str | None, only: Only
 ) -> Iterator[Piece]:
     title = name or os.fspath(path)
     with _opened(path, title) as stream:
         try:
-            yield from _stream_pieces(stream, title, delimiter)
+            yield from _stream_pieces(stream, title, delimiter, only)
         except OSError as error:
             raise TableError(f"{title}: cannot be read: {reason(error)}") from error
 
@@ -467,22 +484,25 @@ def _opened(path: str | os.PathLike[str], title: str) -> io.BufferedReader:
 
 
 def _stream_pieces(
-    stream: io.BufferedReader | io.BytesIO, name: str, delimiter: str | None
+    stream: io.BufferedReader | io.BytesIO,
+    name: str,
+    delimiter: str | None,
+    only: Only,
 ) -> Iterator[Piece]:
     if isinstance(stream, io.BytesIO):  # which has no peek
         stream = io.BufferedReader(cast("io.RawIOBase", io.BytesIO(stream.read())))
     if stream.peek(4)[:4] == b"PAR1":
-        yield from _parquet_pieces(stream, name)
+        yield from _parquet_pieces(stream, name, only)
         return
     text = io.TextIOWrapper(stream, "utf-8-sig", newline="")
     try:
-        yield from _csv_pieces(text, name, delimiter)
+        yield from _csv_pieces(text, name, delimiter, only)
     finally:
         text.detach()  # the stream belongs to whoever opened it
 
 
 def _csv_pieces(
-    text: io.TextIOBase, name: str, delimiter: str | None
+    text: io.TextIOBase, name: str, delimiter: str | None, only: Only
 ) -> Iterator[Piece]:
     reader = None
     try:
@@ -496,10 +516,10 @@ def _csv_pieces(
         _refuse_repeated(name, columns)
         before, count = reader.line_num, 0
         while rows := list(itertools.islice(reader, PIECE)):
-            yield _csv_piece(name, columns, rows, before)
+            yield _csv_piece(name, columns, rows, before, only)
             before, count = reader.line_num, count + len(rows)
         if not count:
-            yield _csv_piece(name, columns, [], before)
+            yield _csv_piece(name, columns, [], before, only)
     except UnicodeDecodeError as error:
         raise TableError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
     except csv.Error as error:
@@ -520,7 +540,11 @@ def _delimiter(line: str, name: str) -> str:
 
 
 def _csv_piece(
-    name: str, columns: tuple[str, ...], rows: list[list[str]], before: int
+    name: str,
+    columns: tuple[str, ...],
+    rows: list[list[str]],
+    before: int,
+    only: Only,
 ) -> Piece:
     def where(row: int) -> str:
         return f"{name}:{lines[row] + 1 + sum(_breaks(r) for r in full[:row])}"
@@ -536,8 +560,8 @@ def _csv_piece(
                 )
         kept = [row for row, cells in enumerate(rows) if cells]  # not the empty lines
         rows = [rows[row] for row in kept]
-        return _columns_piece(name, columns, rows, lambda row: where(kept[row]))
-    return _columns_piece(name, columns, rows, where)
+        return _columns_piece(name, columns, rows, lambda row: where(kept[row]), only)
+    return _columns_piece(name, columns, rows, where, only)
 
 
 def _columns_piece(
@@ -545,8 +569,16 @@ def _columns_piece(
     columns: tuple[str, ...],
     rows: list[list[str]],
     where: Callable[[int], str],
+    only: Only,
 ) -> Piece:
-    cells = tuple(zip(*rows, strict=True)) if rows else ((),) * len(columns)
+    cells: tuple[Cells, ...] = ((),) * len(columns)
+    if rows and only is None:
+        cells = tuple(zip(*rows, strict=True))
+    elif rows:
+        cells = tuple(
+            tuple(map(operator.itemgetter(k), rows)) if column in (only or ()) else ()
+            for k, column in enumerate(columns)
+        )
     return Piece(name, columns, cells, len(rows), where)
 
 
@@ -559,7 +591,7 @@ def _counted(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
-def _parquet_pieces(stream: BinaryIO, name: str) -> Iterator[Piece]:
+def _parquet_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[Piece]:
     try:
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -571,12 +603,16 @@ def _parquet_pieces(stream: BinaryIO, name: str) -> Iterator[Piece]:
     whole = stream if stream.seekable() else io.BytesIO(stream.read())
     try:
         file = pq.ParquetFile(whole)
+        names = tuple(file.schema_arrow.names)
+        _refuse_repeated(name, names)
+        wanted = [column for column in names if only is None or column in only]
         first = 0
         empty = [pa.Table.from_batches([], file.schema_arrow)]
-        groups = (pa.Table.from_batches([b]) for b in file.iter_batches(PIECE))
+        read = file.iter_batches(PIECE, columns=wanted or None)  # [] has no rows
+        groups = (pa.Table.from_batches([part]) for part in read)
         for group in itertools.chain(groups, empty):
             if group.num_rows or not first:
-                yield _frame_piece(group, name, first)
+                yield _frame_piece(group, name, first, only, names)
             first += group.num_rows
     except pa.ArrowException as error:
         raise TableError(f"{name}: broken Parquet: {error}") from error
@@ -608,7 +644,14 @@ def _array_piece(
     return Piece(name, named, cells, array.shape[0], where, is_named, whole)
 
 
-def _frame_piece(source: object, name: str, first: int = 0) -> Piece:
+def _frame_piece(
+    source: object,
+    name: str,
+    first: int = 0,
+    only: Only = None,
+    named: tuple[str, ...] | None = None,
+) -> Piece:
+    """Return a frame's columns; `named` are those of the table that it is part of."""
     import narwhals as nw
     from narwhals.exceptions import DuplicateError
 
@@ -622,15 +665,23 @@ def _frame_piece(source: object, name: str, first: int = 0) -> Piece:
             f"{type(source).__name__} is no table: pass a path, a pandas, polars or "
             "arrow table, or a numpy array"
         ) from error
-    eager = frame.collect() if isinstance(frame, nw.LazyFrame) else frame
-    columns = tuple(map(str, eager.columns))
+    if isinstance(frame, nw.LazyFrame):
+        names = frame.collect_schema().names()
+        wanted = [column for column in names if only is None or column in only]
+        named = tuple(names)
+        frame = frame.select(wanted or names).collect()
+    columns = named or tuple(map(str, frame.columns))
     _refuse_repeated(name, columns)
+    there = dict(zip(map(str, frame.columns), frame.columns, strict=True))
     cells: list[Cells] = []
-    for column in eager.columns:
-        series = eager.get_column(column)
+    for column in columns:
+        if column not in there or not (only is None or column in only):
+            cells.append(())
+            continue
+        series = frame.get_column(there[column])
         is_number = series.dtype.is_numeric()
         cells.append(series.to_numpy() if is_number else series.to_list())
-    return Piece(name, columns, tuple(cells), len(eager), _row_names(name, first))
+    return Piece(name, columns, tuple(cells), len(frame), _row_names(name, first))
 
 
 def _row_names(name: str, first: int = 0) -> Callable[[int], str]:

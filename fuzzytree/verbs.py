@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.contracts import FloatArray
+    from fuzzytree.timing.records import Study
 
 Carried = Model | OnnxModel | bytes | str | os.PathLike[str]
 """A model, an ONNX file opened or as bytes, or the path of a file of either."""
@@ -339,8 +340,11 @@ class Answering(msgspec.Struct, frozen=True):
         columns: Sequence[str] | None = None,
         delimiter: str | None = None,
         name: str | None = None,
+        with_others: bool = False,
     ) -> Iterator[tuple[Batch, Answers]]:
         """Yield the rows of a table in batches, with the answers to them.
+
+        The arguments are those of `fuzzytree.tables.batches`.
 
         Raises:
             TableError: If a column is absent or holds text.
@@ -352,6 +356,7 @@ class Answering(msgspec.Struct, frozen=True):
             columns=columns,
             delimiter=delimiter,
             name=name,
+            with_others=with_others,
         ):
             rows = batch.values.shape[1]
             starts = range(0, max(rows, 1), _BLOCK)
@@ -479,6 +484,89 @@ def check(
         runtimes=runtimes,
         limit=limit,
     )
+
+
+def bench(
+    model: Model | str | os.PathLike[str],
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    rows: Sequence[int] = (1, 1_000, 1_000_000),
+    threads: Sequence[int] = (1, 2),
+    only: Sequence[str] = (),
+    skip: Sequence[str] = (),
+    error: float | None = None,
+    budget_s: float = 120.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Study:
+    """Measure error against run time for every way of running a model.
+
+    Args:
+        model: A tree or a rule base, or the path of one.
+        data: A table with rows to time and to judge on, repeated where there are too
+            few; rows are made of the model's declared ranges if None.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        rows: Rows in a call: each of them is measured.
+        threads: Threads that a candidate is allowed: each of them is measured.
+        only: Names of candidates, such as `native`, questions, such as `raw rules`,
+            or kinds, such as `peer`: the others are left out.
+        skip: The same, for what is left out.
+        error: The largest error of a strength that is allowed; the advice keeps it.
+        budget_s: About how long it may take, in seconds; half of it at least goes to
+            the timed calls.
+        seed: Of the made rows, and of the order of the rounds.
+        progress: Told what is done and which share of it.
+
+    Returns:
+        The study. After Ctrl-C it holds what was measured by then.
+
+    Raises:
+        ReadError: If the model cannot be read.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a number is out of its range, or a name is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> study = bench(random_tree(1), rows=[9], only=["native"], budget_s=1)
+        >>> [point.question for point in study.points]
+        ['tree', 'relative rules', 'raw rules']
+    """
+    from fuzzytree.timing import study
+
+    plan = study.Plan(
+        tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed
+    )
+    first = load(model) if isinstance(model, str | os.PathLike) else model
+    values = None
+    if data is not None:
+        found = batches(
+            data,
+            first.inputs,
+            trained=first.columns,
+            columns=columns,
+            delimiter=delimiter,
+        )
+        values = np.hstack([batch.values for batch in found])
+        if not values.shape[1]:
+            raise TableError(f"{_data_name(data)} has no rows")
+    return study.bench(
+        first,
+        values=values,
+        data=_data_name(data),
+        only=only,
+        skip=skip,
+        plan=plan,
+        tell=progress,
+    )
+
+
+def _data_name(data: object) -> str:
+    if isinstance(data, str | os.PathLike):
+        return Path(data).name
+    return "the table"
 
 
 def _title(other: Carried, position: int) -> str:

@@ -434,3 +434,44 @@ def test_a_stream_stays_open() -> None:
     stream = io.BufferedReader(io.BytesIO(GRASPS.encode()))
     read_table(stream, target="grip")
     assert not stream.closed
+
+
+def _three_columns(kind: str, folder: Path) -> object:
+    frame = pd.DataFrame({"note": ["a", "b"], "slip": [1.0, 2.0], "force": [3, 4]})
+    if kind == "lazy":
+        return pl.from_pandas(frame).lazy()
+    if kind == "pandas":
+        return frame
+    path = folder / f"rows.{kind}"
+    if kind == "csv":
+        frame.to_csv(path, index=False)
+    else:
+        frame.to_parquet(path, index=False)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "pandas", "lazy"])
+def test_only_the_needed_columns_are_read(kind: str, tmp_path: Path) -> None:
+    source = _three_columns(kind, tmp_path)
+    (batch,) = batches(source, ["force"])
+    assert batch.values.tolist() == [[3.0, 4.0]]
+    assert batch.piece.columns == ("note", "slip", "force")
+    assert batch.extras == 2
+    assert [len(cells) for cells in batch.piece.cells] == [0, 0, 2]
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "pandas", "lazy"])
+def test_all_columns_are_read_where_they_are_wanted(kind: str, tmp_path: Path) -> None:
+    source = _three_columns(kind, tmp_path)
+    (batch,) = batches(source, ["force"], with_others=True)
+    assert [list(cells) for cells in batch.piece.cells[:1]] == [["a", "b"]]
+    assert [len(cells) for cells in batch.piece.cells] == [2, 2, 2]
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "pandas", "lazy"])
+def test_a_model_that_needs_no_column_answers_every_row(
+    kind: str, tmp_path: Path
+) -> None:
+    (batch,) = batches(_three_columns(kind, tmp_path), [])
+    assert batch.values.shape == (0, 2)
+    assert batch.extras == 3

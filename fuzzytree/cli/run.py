@@ -90,7 +90,7 @@ def command(
     name = "standard input" if table == "-" else table
     tally = _Tally(_tells_ties(found))
     with _opened(output) as stream:
-        batches = answer(source, delimiter=delimiter, name=name)
+        batches = answer(source, delimiter=delimiter, name=name, with_others=keep)
         write = _json_writer(stream) if as_json else _csv_writer(stream)
         for batch, answers in batches:
             columns = _kept(batch) if keep else {}
