@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fuzzytree.lowering import rules_from_tree
     from fuzzytree.rulebase import RuleBase
     from fuzzytree.tree import FuzzyTree
-    from fuzzytree.verbs import check, export, learn, load, run, save
+    from fuzzytree.verbs import bench, check, export, learn, load, run, save
 
     __version__: str
 
@@ -29,6 +29,7 @@ __all__ = [
     "FuzzyTreeError",
     "RuleBase",
     "__version__",
+    "bench",
     "check",
     "export",
     "learn",
@@ -45,6 +46,7 @@ _HOMES = {
     "FuzzyTreeClassifier": "fuzzytree.estimator",
     "FuzzyTreeError": "fuzzytree.errors",
     "RuleBase": "fuzzytree.rulebase",
+    "bench": "fuzzytree.verbs",
     "check": "fuzzytree.verbs",
     "export": "fuzzytree.verbs",
     "learn": "fuzzytree.verbs",

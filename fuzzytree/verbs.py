@@ -16,11 +16,11 @@ from fuzzytree.agreement import Agreement
 from fuzzytree.answers import Answers, answers_of, joined
 from fuzzytree.contracts import Format, Model, Run, Written
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, TableError
-from fuzzytree.exporters import find_format
+from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.learning import Learnt, Settings, learn_arrays
 from fuzzytree.rulebase import RuleBase
-from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.tables import Batch, Table, batches, read_table
 from fuzzytree.tree import FuzzyTree
@@ -536,9 +536,7 @@ def bench(
     """
     from fuzzytree.timing import study
 
-    plan = study.Plan(
-        tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed
-    )
+    plan = study.Plan(tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed)
     first = load(model) if isinstance(model, str | os.PathLike) else model
     values = None
     if data is not None:
@@ -567,6 +565,53 @@ def _data_name(data: object) -> str:
     if isinstance(data, str | os.PathLike):
         return Path(data).name
     return "the table"
+
+
+def stability(
+    model: Model | str | os.PathLike[str],
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    only: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> Stability:
+    """Apply the criteria N1 to N10 to a model: is it numerically stable?
+
+    Args:
+        model: A tree or a rule base, or the path of one.
+        data: A table with rows of one's own, beside the probes.
+        columns: The names of an array's columns.
+        only: The codes of criteria, such as `N3`; all unless given.
+        runtimes: The names of the runtimes; all that are installed unless given.
+        progress: Told what is done and which share of it.
+
+    Raises:
+        ReadError: If the file cannot be read.
+        TableError: If a column is absent or holds text.
+        ValueError: If a criterion or a runtime is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> stability(random_tree(1), runtimes=["native"], only=["N3", "N7"]).ok
+        True
+    """
+    from fuzzytree.criteria.suite import examine
+
+    first = load(model) if isinstance(model, str | os.PathLike) else model
+    chosen = all_runtimes() if runtimes is None else tuple(map(find_runtime, runtimes))
+    values = None
+    if data is not None:
+        found = batches(data, first.inputs, trained=first.columns, columns=columns)
+        values = np.hstack([batch.values for batch in found])
+    return examine(
+        first,
+        runtimes=chosen,
+        formats=all_formats(),
+        data=values,
+        only=only,
+        tell=progress or (lambda _text, _share: None),
+    )
 
 
 def _title(other: Carried, position: int) -> str:

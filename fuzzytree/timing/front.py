@@ -98,7 +98,7 @@ def settings(points: Sequence[Point]) -> list[tuple[Question, int, int]]:
     sizes = sorted(
         {(one.rows, one.threads) for point in points for one in point.timings}
     )
-    return [(question, *size) for question in asked for size in sizes]
+    return [(question, rows, threads) for question in asked for rows, threads in sizes]
 
 
 def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...]:
@@ -118,8 +118,11 @@ def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...
     """
     found: list[str] = []
     fewest = min((t.threads for point in points for t in point.timings), default=1)
-    sizes = [(q, rows) for q, rows, threads in settings(points) if threads == fewest]
-    sizes.reverse()
+    sizes: list[tuple[Question, int]] = [
+        (question, rows)
+        for question, rows, threads in reversed(settings(points))
+        if threads == fewest
+    ]
     for question, rows in sorted(sizes, key=lambda size: size[1]):
         known = entries(points, question, rows, fewest)
         wanted = None if question == "tree" else most

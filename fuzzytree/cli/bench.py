@@ -1,0 +1,186 @@
+"""`fuzzytree bench`: what each way of running a model costs, and how exact it is."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    delimiter_option,
+    json_option,
+    progress_bar,
+    quiet_option,
+    say,
+    standard_input,
+    wrong_options,
+)
+from fuzzytree.errors import MissingExtraError
+from fuzzytree.files import check_place, write_atomically
+
+if TYPE_CHECKING:
+    from fuzzytree.timing.records import Study
+
+INTERRUPTED = 130
+_PICTURES = (".svg", ".png")
+
+
+@click.command("bench", short_help="Measure error against run time.")
+@click.argument("model", metavar="MODEL")
+@click.option(
+    "--data", metavar="TABLE", help="Rows of your own; made of the model if none."
+)
+@click.option(
+    "--rows",
+    metavar="N",
+    type=int,
+    multiple=True,
+    default=(1, 1_000, 1_000_000),
+    show_default=True,
+    help="Rows in a call.",
+)
+@click.option(
+    "--threads",
+    metavar="N",
+    type=int,
+    multiple=True,
+    default=(1, 2),
+    show_default=True,
+    help="Threads that a candidate may use.",
+)
+@click.option(
+    "--only",
+    metavar="NAME",
+    multiple=True,
+    help="Measure these only: native, 'raw rules', peer, ...",
+)
+@click.option("--skip", metavar="NAME", multiple=True, help="Leave these out.")
+@click.option(
+    "--budget",
+    metavar="SECONDS",
+    type=float,
+    default=120.0,
+    show_default=True,
+    help="About how long it may take.",
+)
+@click.option(
+    "--error",
+    metavar="E",
+    type=float,
+    help="The largest error of a strength to allow in the advice.",
+)
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    show_default=True,
+    help="Of made rows and of the order of the rounds.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write the study there, as JSON.")
+@click.option(
+    "--plot",
+    "plots",
+    metavar="FILE",
+    multiple=True,
+    help="Draw the study for most rows, as .svg or .png.",
+)
+@delimiter_option
+@json_option
+@quiet_option
+def command(
+    model: str,
+    data: str | None,
+    rows: Sequence[int],
+    threads: Sequence[int],
+    only: Sequence[str],
+    skip: Sequence[str],
+    budget: float,
+    error: float | None,
+    seed: int,
+    output: str | None,
+    plots: Sequence[str],
+    delimiter: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Measure error against run time for every way of running MODEL, a YAML file.
+
+    Runtimes, number types, approximations and programs of others answer the same
+    rows, in interleaved rounds; their errors are those against exact arithmetic. What
+    cannot be run is listed with its reason. Ctrl-C ends it early, keeps what was
+    measured, and exits with 130; exit 1 if an error is larger than certified.
+    """
+    from fuzzytree import verbs
+    from fuzzytree.report.bench import study_lines
+    from fuzzytree.timing.study import faults
+
+    _check_places(output, plots)
+    with (
+        wrong_options(),
+        progress_bar(quiet=quiet) as tell,
+        contextlib.redirect_stdout(sys.stderr),  # libraries of others may print
+    ):
+        found = verbs.bench(
+            model,
+            data=standard_input() if data == "-" else data,
+            delimiter=delimiter,
+            rows=rows,
+            threads=threads,
+            only=only,
+            skip=skip,
+            error=error,
+            budget_s=budget,
+            seed=seed,
+            progress=tell,
+        )
+    answer(found.to_json() if as_json else "\n".join(study_lines(found)))
+    if output:
+        write_atomically(output, found.to_json().encode() + b"\n")
+    _draw(found, plots)
+    for place in (output, *plots):
+        if place:
+            say(f"wrote    {place}", quiet=quiet)
+    if found.is_interrupted:
+        say("interrupted; what was measured by then is told")
+        return INTERRUPTED
+    wrong = [*faults(found.points)]
+    if wrong:
+        say(wrong[-1])
+        return 1
+    say((found.advice or ("nothing was measured",))[-1], quiet=quiet)
+    return 0
+
+
+def _check_places(output: str | None, plots: Sequence[str]) -> None:
+    """Refuse what cannot be written, before minutes of work."""
+    for place in (output, *plots):
+        if place:
+            check_place(place)
+    for place in plots:
+        if Path(place).suffix.lower() not in _PICTURES:
+            known = " or ".join(_PICTURES)
+            raise click.UsageError(f"--plot {place}: a picture ends in {known}")
+    if plots and importlib.util.find_spec("matplotlib") is None:
+        raise MissingExtraError(
+            "fuzzytree bench --plot needs the extra 'plots': "
+            "pip install 'fuzzytree-toolkit[plots]'"
+        )
+
+
+def _draw(found: Study, places: Sequence[str]) -> None:
+    if not places or not found.points:
+        return
+    from fuzzytree import plots
+
+    timings = [timing for point in found.points for timing in point.timings]
+    rows = max(timing.rows for timing in timings)
+    threads = min(timing.threads for timing in timings)
+    figure = plots.work_precision(found, rows=rows, threads=threads)
+    for place in places:
+        plots.save(figure, place)

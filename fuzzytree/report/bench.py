@@ -1,0 +1,169 @@
+"""A study of run times as plain text: a table for each number of rows and threads."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+
+from fuzzytree.report.text import aligned, counted
+from fuzzytree.timing.candidates import DEFAULT, title
+from fuzzytree.timing.clock import CONFIDENCE, times_faster
+from fuzzytree.timing.floors import READING
+from fuzzytree.timing.records import (
+    Machine,
+    Omission,
+    Point,
+    Question,
+    Study,
+    Timing,
+)
+
+_HEAD = (
+    *("time a row", "+-", "speed", "floors"),
+    *("error", "certified", "flips", "at edges"),
+)
+_WIDTH = 96  # of a line of names
+_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
+_LEGEND = (
+    "* nobody is both faster and more exact; +- the 95 % interval of the median;",
+    f"speed: times as fast as {DEFAULT}; floors: times the reading of the columns;",
+    "error: the largest of a strength, observed; certified: the bound of it;",
+    "flips: other classes than exact arithmetic gives, at edges: on rows aimed there",
+)
+
+
+def study_lines(found: Study) -> Iterator[str]:
+    """Yield a study: what and where, the tables, what was left out, the advice."""
+    yield f"{found.model}: error against run time, in {found.seconds:.0f} s"
+    yield from aligned([("rows", found.data), *_machine_rows(found.machine)])
+    for rows, threads in _sizes(found.points):
+        yield ""
+        yield f"{rows:,} row{'' if rows == 1 else 's'}, {counted(threads, 'thread')}"
+        table = [*_table(found, rows, threads)]
+        width = max(map(len, table))
+        yield from aligned([(*row, *[""] * (width - len(row))) for row in table])
+    if found.points:
+        yield ""
+        yield from _LEGEND
+    yield from _section("left out", _grouped(found.omissions))
+    yield from _section("doubtful", found.warnings)
+    yield from _section("advice", found.advice)
+
+
+def _machine_rows(machine: Machine) -> Iterator[tuple[str, str]]:
+    yield (
+        "machine",
+        f"{machine.processor}, {counted(machine.cores, 'core')}, {machine.system}",
+    )
+    versions = [f"{name} {version}" for name, version in machine.versions.items()]
+    yield "with", ", ".join([machine.python, *versions])
+    if machine.load_before and machine.load_after:
+        first, last = machine.load_before[0], machine.load_after[0]
+        load = f"{first:.2f} before, {last:.2f} after"
+        if machine.stolen is not None:
+            load += f"; {machine.stolen:.0%} of the time went to others"
+        yield "load", load
+
+
+def _sizes(points: Iterable[Point]) -> list[tuple[int, int]]:
+    sizes = {(one.rows, one.threads) for point in points for one in point.timings}
+    return sorted(sizes)
+
+
+def _table(found: Study, rows: int, threads: int) -> Iterator[tuple[str, ...]]:
+    """Yield the cells of one table, question by question, the fastest first."""
+    yield ("", *_HEAD)
+    timed = {
+        point.name: (point, timing)
+        for point in found.points
+        for timing in point.timings
+        if (timing.rows, timing.threads) == (rows, threads)
+    }
+    floor = timed[READING][1] if READING in timed else None
+    for point, timing in timed.values():
+        if point.kind == "floor":
+            yield (f"  {point.name}", *_time_cells(timing, None, floor))
+    answers = [one for one in timed.values() if one[0].kind != "floor"]
+    asked: dict[Question, None] = {point.question: None for point, _ in answers}
+    for question in asked:
+        mine = [one for one in answers if one[0].question == question]
+        default = timed.get(title(DEFAULT, question))
+        base = default[1] if default else None
+        best = _best(found, question, rows, threads)
+        yield (question,)
+        for point, timing in sorted(mine, key=lambda one: one[1].median_ns):
+            mark = "*" if point.name in best else " "
+            short = point.name.removesuffix(f": {question}")
+            cells = _time_cells(timing, base, floor)
+            yield (f"{mark} {short}", *cells, *_error_cells(point))
+
+
+def _best(found: Study, question: Question, rows: int, threads: int) -> Sequence[str]:
+    key = (question, rows, threads)
+    for front in found.fronts:
+        if (front.question, front.rows, front.threads) == key:
+            return front.names
+    return ()
+
+
+def _time_cells(
+    timing: Timing, base: Timing | None, floor: Timing | None
+) -> tuple[str, ...]:
+    middle = timing.median_ns
+    reach = max(timing.high_ns - middle, middle - timing.low_ns) / middle
+    sure = "" if timing.confidence >= CONFIDENCE else f" at {timing.confidence:.0%}"
+    ratio = times_faster(base, timing) if base else None
+    return (
+        duration(middle / timing.rows),
+        f"{reach:.0%}{sure}",
+        _digits(ratio.median) if ratio else "",
+        _digits(middle / floor.median_ns) if floor else "",
+    )
+
+
+def _error_cells(point: Point) -> tuple[str, ...]:
+    error = point.error
+    if error is None:
+        return ()
+    edges = point.probes
+    return (
+        "-" if error.largest is None else f"{error.largest:.1e}",
+        "-" if error.bound is None else f"{error.bound:.1e}",
+        f"{error.flips} of {error.rows}",
+        f"{edges.flips} of {edges.rows}" if edges else "",
+    )
+
+
+def duration(ns: float) -> str:
+    """Return a time with three digits and the unit that fits.
+
+    Example:
+        >>> duration(45.31), duration(2069.0), duration(0.0712)
+        ('45.3 ns', '2.07 µs', '0.0712 ns')
+    """
+    for size, unit in _UNITS:
+        if ns >= size:
+            return f"{_digits(ns / size)} {unit}"
+    return f"{_digits(ns)} ns"
+
+
+def _digits(value: float) -> str:
+    """Return a positive number with three digits and no exponent."""
+    return f"{value:.0f}" if value >= 100 else f"{value:#.3g}"
+
+
+def _grouped(omissions: Iterable[Omission]) -> Iterator[str]:
+    """Yield each reason once, with all that were left out for it."""
+    names: dict[str, list[str]] = {}
+    for one in omissions:
+        names.setdefault(one.why, []).append(one.name)
+    for why, who in names.items():
+        yield from textwrap.wrap(f"{', '.join(who)}: {why}", _WIDTH)
+
+
+def _section(name: str, lines: Iterable[str]) -> Iterator[str]:
+    for position, line in enumerate(lines):
+        if not position:
+            yield ""
+            yield name
+        yield f"  {line}"

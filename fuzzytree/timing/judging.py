@@ -1,0 +1,120 @@
+"""How far a candidate's answers are from the exact ones, on data and on edges apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.contracts import Model
+from fuzzytree.numerics.oracle import error_against_exact
+from fuzzytree.probing import probes
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.timing.clock import Clock
+from fuzzytree.timing.records import Candidate, Error, Loaded, Question
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+MOST_ROWS = 2_000
+"""Rows on which errors are observed, of those that are timed."""
+
+MOST_PROBES = 500
+"""Rows aimed at edges; nearly each of them costs the oracle rational arithmetic."""
+
+_FEW = 8  # rows that tell how long a row takes
+_PATIENCE_NS = 3e8  # for the answers of one candidate to one set of rows
+_MOST_STRENGTHS = 2_000_000
+
+
+class Judged(msgspec.Struct, frozen=True):
+    """What is known of a candidate before it is timed.
+
+    Attributes:
+        error: On the rows of the study; None for a floor.
+        probes: On rows aimed at edges and cuts.
+        row_ns: About what a row takes it, in nanoseconds.
+    """
+
+    error: Error | None
+    probes: Error | None
+    row_ns: float
+
+
+class Judge:
+    """Holds answers against the exact ones; it makes the rows for that once."""
+
+    def __init__(
+        self, asked: Mapping[Question, Model], values: FloatArray, clock: Clock
+    ) -> None:
+        self.asked, self.clock = asked, clock
+        most = min(map(_most_rows, asked.values()))
+        self.values = np.ascontiguousarray(values[:, :most])
+        self.edges: dict[Question, FloatArray] = {}
+
+    def judged(self, candidate: Candidate, loaded: Loaded) -> Judged:
+        """Return how far a candidate is from exact, and about what a row costs it.
+
+        A slow one answers fewer rows, in even steps through all of them.
+
+        Raises:
+            Exception: Whatever the candidate raises.
+        """
+        few = self.values[:, :_FEW]
+        loaded.answer(few)  # the first call of many a library does more than others
+        start = self.clock.wall()
+        loaded.call(few)()
+        row_ns = max(self.clock.wall() - start, 1) / few.shape[1]
+        if candidate.kind == "floor":
+            return Judged(None, None, self._row_ns(loaded, row_ns))
+        most = max(int(_PATIENCE_NS // row_ns), _FEW)
+        edges = self._edges(candidate.question)
+        return Judged(
+            self._error(candidate, loaded, _spread(self.values, most)),
+            self._error(candidate, loaded, _spread(edges, most)),
+            self._row_ns(loaded, row_ns),
+        )
+
+    def _row_ns(self, loaded: Loaded, row_ns: float) -> float:
+        """Return what a row takes in a batch as large as there is patience for."""
+        most = max(int(_PATIENCE_NS // row_ns), 1)
+        values = np.ascontiguousarray(self.values[:, :most])
+        call = loaded.call(values)
+        start = self.clock.wall()
+        call()
+        return min(row_ns, max(self.clock.wall() - start, 1) / values.shape[1])
+
+    def _edges(self, question: Question) -> FloatArray:
+        if question not in self.edges:
+            model = self.asked[question]
+            rows = probes(model, limit=min(MOST_PROBES, _most_rows(model)))
+            lines = [[row[name] for row in rows] for name in model.inputs]
+            made = np.array(lines, np.float64)
+            self.edges[question] = made.reshape(len(model.inputs), len(rows))
+        return self.edges[question]
+
+    def _error(self, candidate: Candidate, loaded: Loaded, values: FloatArray) -> Error:
+        found = loaded.answer(values)
+        bound, origin = candidate.bound or (None, "nothing is certified")
+        facts = error_against_exact(
+            self.asked[candidate.question],
+            values,
+            found.labels,
+            found.strengths,
+            bound=bound,
+            origin=origin,
+        )
+        return Error(**facts._asdict())
+
+
+def _most_rows(model: Model) -> int:
+    rules = len(model.rules) if isinstance(model, RuleBase) else 1
+    return max(min(MOST_ROWS, _MOST_STRENGTHS // rules), _FEW)
+
+
+def _spread(values: FloatArray, most: int) -> FloatArray:
+    """Return at most so many rows, in even steps."""
+    step = -(-values.shape[1] // most)
+    return np.ascontiguousarray(values[:, ::step])
