@@ -22,9 +22,10 @@ from paper.judging import (
     spread,
     verdicts,
 )
-from paper.records import Claims, Comparison, Size, Times
+from paper.records import Claims, Comparison, Family, Size, Times
 
 WIDTH = 92
+FAMILIES: tuple[Family, ...] = ("multiway", "grown")
 FIRING = ("reference", "native", "onnxruntime float64", "scikit-fuzzy")
 KINDS: tuple[Kind, ...] = ("raw", "relative")
 
@@ -89,48 +90,47 @@ def _counted_in_short(sizes: Sequence[Size]) -> str:
 
 def _timed_in_short(found: Sequence[Line]) -> str:
     fired = [line for line in found if line.what == "rules" and line.kind == "raw"]
-    right = [line for line in fired if line.is_about_n]
-    wrong = [line for line in fired if not line.is_about_n]
-    parts = ["**Timed, it depends on what executes the rules.**"]
-    if right:
-        names = _listed(f"{_where(line)} ({line.family})" for line in right)
-        parts.append(
-            f"Firing raw rules stays within a factor of {ABOUT:g} of n times the "
-            f"tree's time in {names}."
-        )
+    groups: dict[str, list[Line]] = {}
+    for line in fired:
+        groups.setdefault(_where(line), []).append(line)
+    right = [
+        where
+        for where, members in groups.items()
+        if all(line.is_about_n for line in members)
+    ]
+    if len(right) == len(groups):
+        head = "Timed, it is right as well."
+    elif right:
+        head = f"Timed, it is right in {_listed(right)} alone."
     else:
-        parts.append(
-            f"Nowhere does firing raw rules stay within a factor of {ABOUT:g} of n "
-            "times the tree's time at every n."
-        )
-    if wrong:
-        groups = dict.fromkeys((line.runtime, line.is_batch) for line in wrong)
-        told = []
-        for runtime, is_batch in groups:
-            group = [
-                line
-                for line in wrong
-                if (line.runtime, line.is_batch) == (runtime, is_batch)
-            ]
-            shares = [share for line in group for share in line.shares]
-            told.append(f"{_range(shares)} n in {_where(group[0])}")
-        parts.append("Elsewhere it is " + _listed(told) + ".")
-    return " ".join(parts)
+        head = "Timed, no runtime keeps to it."
+    told = [
+        f"{where} {_range(share for line in members for share in line.shares)} n"
+        for where, members in groups.items()
+    ]
+    return (
+        f"**{head}** Firing raw rules takes so many times the tree's time: "
+        f"{'; '.join(told)}. Right is what stays within a factor of {ABOUT:g} of n at "
+        "every n."
+    )
 
 
 def _overhead_in_short(found: Sequence[Line]) -> str:
-    told = [
-        f"{three(line.half)} in {line.runtime}"
+    known = [
+        line
         for line in found
         if line.family == PRIMARY
         and (line.what, line.kind, line.is_batch) == ("rules", "raw", False)
         and line.half is not None
     ]
-    if not told:
+    if not known:
         return "**Overhead** cannot be told from so few sizes."
+    is_seen = any((line.half or 0.0) > line.sizes[0] for line in known)
+    head = "decides at first" if is_seen else "does not decide"
+    told = [f"{_half(line)} in {_name(line)}" for line in known]
     return (
-        "**For a single row, overhead decides at first.** The fixed cost of a call is "
-        "more than half of the time of firing raw rules up to about this many rules: "
+        f"**For a single row, overhead {head}.** The fixed cost of a call is more than "
+        "half of the time of firing raw rules up to this many rules: "
         f"{_listed(told)}."
     )
 
@@ -164,15 +164,18 @@ def _search_in_short(found: Sequence[Line]) -> Iterator[str]:
     if set(chosen) != set(KINDS):
         return
     relative, raw = chosen["relative"], chosen["raw"]
-    price, last = max(relative.ratios), raw.prices[-1]
+    last = raw.prices[-1]
     assert last.to_firing  # a search has it
-    head = "is" if max(raw.ratios) <= NEARLY else "is not"
+    told = [
+        f"For {line.kind} rules its price {'is' if is_near else 'is not'} nearly the "
+        f"tree's: {_range(line.ratios)} times it in batches"
+        for line in (relative, raw)
+        for is_near in [max(line.ratios) <= NEARLY]
+    ]
     yield (
-        f"**Best-first gives the answers of all rules while firing few.** For relative "
-        f"rules its price is the tree's (at most {three(price)} times, in batches). "
-        f"For raw rules it {head} nearly the tree's: {_range(raw.ratios)} times it; at "
-        f"{raw.sizes[-1]:,} rules that is {three(last.to_firing.median)} times faster "
-        "than firing."
+        "**Best-first gives the answers of all rules while firing few.** "
+        f"{'. '.join(told)}; at {raw.sizes[-1]:,} rules that is "
+        f"{three(last.to_firing.median)} times as fast as firing."
     )
 
 
@@ -199,9 +202,9 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
     )
     yield _text(
         f"**How the ratio grows.** The exponent b of a law n^b, fitted from {LARGE} "
-        "rules on, with its 95 % interval; the ratio divided by n, smallest to largest "
-        "over all sizes; and up to how many rules the fixed cost of a call is more "
-        "than half of the rules' time."
+        "rules on, with its 95 % interval, for both families of trees; the ratio "
+        "divided by n, smallest to largest over all sizes of both; and up to how many "
+        f"rules of {PRIMARY} trees the fixed cost of a call is more than half of the time."
     )
     yield _laws(found)
     yield _growth_text(found)
@@ -251,36 +254,45 @@ def _ratios(
 
 
 def _laws(found: Sequence[Line]) -> str:
-    rows = []
+    groups: dict[tuple[str, str, bool], list[Line]] = {}
     for line in found:
-        if line.what != "rules":
-            continue
-        law, half = line.law, line.half
+        if line.what == "rules":
+            key = (line.kind, line.runtime, line.is_batch)
+            groups.setdefault(key, []).append(line)
+    order = sorted(
+        groups, key=lambda key: (key[0] != "raw", FIRING.index(key[1]), key[2])
+    )
+    rows = []
+    for kind, runtime, is_batch in order:
+        members = {line.family: line for line in groups[kind, runtime, is_batch]}
+        shares = [share for line in members.values() for share in line.shares]
         rows.append(
             [
-                line.kind,
-                line.runtime,
-                "batch" if line.is_batch else "one row",
-                line.family,
-                f"{law.exponent:.2f} ({law.low:.2f} to {law.high:.2f})" if law else "-",
-                growth(law) if law else "-",
-                _range(line.shares),
-                "-" if half is None else three(half),
+                kind,
+                runtime,
+                "batch" if is_batch else "one row",
+                *(_law(members.get(family)) for family in FAMILIES),
+                _range(shares),
+                _half(members.get(PRIMARY)),
             ]
         )
-    order = {name: place for place, name in enumerate(FIRING)}
-    rows.sort(key=lambda row: (row[0] != "raw", order[row[1]], row[2] == "batch"))
-    head = [
-        "rules",
-        "runtime",
-        "rows",
-        "trees",
-        "b",
-        "ratio grows",
-        "ratio / n",
-        "overhead up to n",
-    ]
+    bs = [f"b, {family}" for family in FAMILIES]
+    head = ["rules", "runtime", "rows", *bs, "ratio / n", "overhead up to n"]
     return _table(head, rows)
+
+
+def _law(line: Line | None) -> str:
+    law = line.law if line else None
+    if law is None:
+        return "-"
+    return f"{law.exponent:.2f} ({law.low:.2f} to {law.high:.2f})"
+
+
+def _half(line: Line | None) -> str:
+    half = line.half if line else None
+    if half is None:
+        return "-"
+    return three(half) if half >= 1.0 else "none"
 
 
 def _growth_text(found: Sequence[Line]) -> str:
@@ -288,15 +300,17 @@ def _growth_text(found: Sequence[Line]) -> str:
     known = [(line, law) for line, law in laws if law is not None]
     if not known:
         return _text("There are too few sizes to fit a law.")
-    kinds = [growth(law) for _, law in known]
+    words = [growth(law) for _, law in known]
     told = [
-        f"{word} in {kinds.count(word)}"
+        f"{words.count(word)} grow {word}"
         for word in ("like n", "slower than n", "faster than n")
     ]
     exponents = [law.exponent for _, law in known]
     return _text(
-        f"Of these {len(known)} ratios that can be fitted, as many grow "
-        f"{_listed(told)}; b is between {min(exponents):.2f} and {max(exponents):.2f}."
+        f"As far as these intervals tell, of {len(known)} ratios {_listed(told)}; b is "
+        f"between {min(exponents):.2f} and {max(exponents):.2f}. An interval knows how "
+        "far the points lie off a straight line, not whether the line is in truth a "
+        "curve."
     )
 
 
@@ -361,9 +375,7 @@ def _comparisons(found: Sequence[Verdict]) -> str:
         "tree",
         "raw",
         "differ",
-        "tree right",
-        "raw right",
-        "both wrong",
+        "right there: tree, raw, none",
         "uncovered",
         "votes",
         "p",
@@ -384,9 +396,10 @@ def _comparison_row(verdict: Verdict) -> list[str]:
         _percent(found.tree_right, total),
         _percent(found.raw_right, total),
         f"{_percent(found.differ, total)} ({100 * low:.1f} to {100 * high:.1f})",
-        _percent(found.tree_only, total),
-        _percent(found.raw_only, total),
-        _percent(found.both_wrong, total),
+        ", ".join(
+            _percent(count, total)
+            for count in (found.tree_only, found.raw_only, found.both_wrong)
+        ),
         f"{_percent(found.uncovered, total)} "
         f"({_percent(found.uncovered_tree_right, total)})",
         f"{found.votes[0]} : {found.votes[1]}",
@@ -408,12 +421,17 @@ def _reliable_text(comparisons: Sequence[Comparison], found: Sequence[Verdict]) 
         name: sum(one.raw_right for one in comparisons if one.conjunction == name)
         for name in ("min", "product")
     }
-    return _text(
-        f"Counting rows without an answer as wrong {verdict}. The relative rules "
-        f"differ from their tree in {differs:,} of {answers:,} answers. Raw rules are "
-        f"decided by their order among equals in {ties:,} answers, and {tied:,} of these are "
-        f"among the {apart:,} that differ from the tree's. With min, raw rules are "
-        f"right {by_and['min']:,} times, with product {by_and['product']:,} times."
+    return "\n".join(
+        _bullet(sentence)
+        for sentence in (
+            f"Counting rows without an answer as wrong {verdict}.",
+            f"The relative rules differ from their tree in {differs:,} of {answers:,} "
+            "answers.",
+            f"Raw rules are decided by their order among equals in {ties:,} answers; "
+            f"{tied:,} of these are among the {apart:,} that differ from the tree's.",
+            f"With min, raw rules are right in {by_and['min']:,} answers, with product "
+            f"in {by_and['product']:,}.",
+        )
     )
 
 
@@ -445,7 +463,7 @@ def _search_table(chosen: Sequence[Line]) -> str:
     cells: dict[int, list[str]] = {}
     for line in order:
         where = f"{line.kind}, {'batch' if line.is_batch else 'one row'}"
-        head += [f"{where}: of the tree", "faster than firing"]
+        head += [f"{where}: of the tree", "as fast as firing, times"]
         for size, price in zip(line.sizes, line.prices, strict=True):
             cells.setdefault(size, [f"{size:,}"]).extend(
                 [_median(price.to_tree), _median(price.to_firing)]
@@ -455,25 +473,27 @@ def _search_table(chosen: Sequence[Line]) -> str:
 
 
 def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
-    parts = []
+    told = []
     for line in chosen:
-        if line.kind != "raw":
-            continue
         start = first_gain(line)
         gain = (
-            "is not surely faster than firing at the largest size"
+            "not surely faster than firing at the largest n"
             if start is None
-            else f"is faster than firing from {start:,} rules on"
+            else f"surely faster than firing from {start:,} rules on"
         )
-        parts.append(
-            f"{'in batches' if line.is_batch else 'row by row'} on {line.family} trees "
-            f"it {gain} and takes {_range(line.ratios)} times the tree's time"
+        law = line.law
+        grows = f", which grows like n^{law.exponent:.2f}" if law else ""
+        told.append(
+            f"{line.kind.capitalize()} rules of {line.family} trees, "
+            f"{'in batches' if line.is_batch else 'row by row'}: {gain}; "
+            f"{_range(line.ratios)} times the tree's time{grows}."
         )
     checked = sum(size.checked for size in claims.sizes)
-    return _text(
-        f"For raw rules, {_listed(parts)}. On all {checked:,} rows that were compared, "
-        "best-first gave the answers of firing, and relative rules those of the tree."
+    told.append(
+        f"On all {checked:,} rows that were compared, best-first gave the answers of "
+        "firing, and relative rules those of the tree."
     )
+    return "\n".join(_bullet(sentence) for sentence in told)
 
 
 def _method(claims: Claims) -> Iterator[str]:
@@ -528,8 +548,18 @@ def three(value: float) -> str:
 
 
 def _range(values: Iterable[float]) -> str:
-    low, high = three(min(known := list(values))), three(max(known))
+    low, high = two(min(known := list(values))), two(max(known))
     return low if low == high else f"{low} to {high}"
+
+
+def two(value: float) -> str:
+    """Return a number of two significant digits at most.
+
+    Example:
+        >>> [two(value) for value in (0.08125, 2.0, 56.789, 6220.58)]
+        ['0.081', '2', '57', '6,200']
+    """
+    return three(float(f"{value:.2g}"))
 
 
 def _median(times: Times | None) -> str:
@@ -537,7 +567,7 @@ def _median(times: Times | None) -> str:
 
 
 def _ns(value: float) -> str:
-    return f"{three(value / 1e3)} us" if value >= 1e3 else f"{three(value)} ns"
+    return f"{three(value / 1e3)} µs" if value >= 1e3 else f"{three(value)} ns"
 
 
 def _percent(count: int, total: int) -> str:
@@ -550,8 +580,12 @@ def _p(value: float) -> str:
     return f"{value:.2g}" if value < 0.1 else f"{value:.2f}"
 
 
+def _name(line: Line) -> str:
+    return line.runtime.removesuffix(" float64")
+
+
 def _where(line: Line) -> str:
-    return f"{line.runtime} {'in batches' if line.is_batch else 'row by row'}"
+    return f"{_name(line)} {'in batches' if line.is_batch else 'row by row'}"
 
 
 def _listed(texts: Iterable[str]) -> str:
@@ -565,7 +599,9 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _text(sentences: str) -> str:
-    return textwrap.fill(sentences, WIDTH, break_long_words=False)
+    return textwrap.fill(
+        sentences, WIDTH, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _bullet(sentences: str) -> str:
@@ -575,4 +611,5 @@ def _bullet(sentences: str) -> str:
         initial_indent="- ",
         subsequent_indent="  ",
         break_long_words=False,
+        break_on_hyphens=False,
     )

@@ -78,7 +78,16 @@ def _growth(axis: Axes, chosen: Sequence[Line]) -> None:
     ends = [sizes[0], sizes[-1]]
     axis.plot(ends, ends, color=INK, linewidth=1.0, linestyle=":")
     axis.axhline(1.0, color=FAINT, linewidth=1.0)
-    labels = [(float(sizes[-1]), "n times", INK), (1.0, "the tree", FAINT)]
+    axis.annotate(
+        "the tree",
+        (sizes[0], 1.0),
+        xytext=(0, -3),
+        textcoords="offset points",
+        color=FAINT,
+        fontsize=9,
+        va="top",
+    )
+    labels = [(float(sizes[-1]), "n times", INK)]
     for line in chosen:
         colour = COLOURS[line.runtime]
         is_first = line.family == PRIMARY
@@ -220,9 +229,7 @@ def _share_of_tree(axis: Axes, found: Sequence[Verdict]) -> None:
         axis.plot([100 * low, 100 * high], [row, row], color=colour, linewidth=2.0)
         axis.plot([100 * share], [row], "o", color=colour, markersize=6)
     axis.set_xlim(0, 100)
-    axis.set_xlabel(
-        "per cent, 95 % interval; grey: open   (right of 50: the tree)", color=INK
-    )
+    axis.set_xlabel("per cent, 95 % interval; grey: open", color=INK)
 
 
 def _plain(axis: Axes) -> None:
