@@ -1,0 +1,254 @@
+"""The meaning of a model in rational numbers: nothing is rounded anywhere.
+
+The formulas of `fuzzytree.rulebase` are taken over the real numbers, at the doubles
+that a model and a row hold. Every such double is a fraction, and the formulas need
+nothing but `+ - * /`, comparisons, minima and maxima: so every degree is one, too.
+What a float changes about a formula stays out, with two exceptions that are part of the
+definition and not of its rounding:
+
+- off a plateau a degree is at most `1 - 2**-53`, so that only the plateau has 1;
+- a combination that overflows in its stated chain of doubles is missing, although its
+  exact value is a number: the model says so (`Semantics.missing`), and whether
+  something overflows is a question about doubles. Where the chain does not overflow,
+  its rounded value plays no further part.
+
+This module shares no line with the runtimes; it is what they are judged by.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from functools import lru_cache
+from typing import assert_never
+
+import msgspec
+
+from fuzzytree.contracts import Model
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Variable,
+)
+from fuzzytree.tree import FuzzyTree
+
+DECIDED, TIE, UNCOVERED, MISSING = range(4)
+"""How an answer came about, numbered as in `fuzzytree.contracts.Outcome`."""
+
+CAP = 1 - Fraction(1, 2**53)
+"""The largest degree off a plateau."""
+
+_ZERO, _ONE = Fraction(0), Fraction(1)
+
+
+class Exact(msgspec.Struct, frozen=True):
+    """What a model says about one row, exactly.
+
+    Attributes:
+        rule: The number of the winning rule or leaf, from 1; 0 if there is none.
+        label: The class, or None for "no class".
+        status: `DECIDED`, `TIE`, `UNCOVERED` or `MISSING`.
+        strengths: Of every rule, in order. Empty for a tree and for a missing value.
+        margin: How far the strongest class is ahead of the next; having no rule counts
+            as a class of strength 0. It is 1 where nothing was weighed: for a tree,
+            and where a value is missing.
+    """
+
+    rule: int
+    label: str | None
+    status: int
+    strengths: tuple[Fraction, ...]
+    margin: Fraction
+
+
+def exact_answer(model: Model, row: Mapping[str, float]) -> Exact:
+    """Return what a rule base or a tree says about a row.
+
+    Raises:
+        KeyError: If an input has no value.
+
+    Example:
+        >>> from fuzzytree.rulebase import Rule, Term
+        >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 4.0)))
+        >>> rules = RuleBase(
+        ...     "grip", ("soft",), (Variable("force", (low,)),),
+        ...     (Rule((Clause("force", ("low",)),), "soft"),),
+        ... )
+        >>> exact_answer(rules, {"force": 2.0}).strengths
+        (Fraction(2, 3),)
+    """
+    if any(is_missing(variable, row) for variable in model.variables):
+        return Exact(0, model.semantics.missing, MISSING, (), _ONE)
+    if isinstance(model, RuleBase):
+        return _fired(model, row)
+    return _descended(model, row)
+
+
+def is_missing(variable: Variable, row: Mapping[str, float]) -> bool:
+    """Return whether a variable has no finite value, by the chain that defines it."""
+    if not variable.parts:
+        return not math.isfinite(row[variable.name])
+    first, *others = variable.parts
+    total = first.weight * (float(row[first.input]) - first.centre)
+    for part in others:
+        total += part.weight * (float(row[part.input]) - part.centre)
+    return not math.isfinite(total)
+
+
+def exact_axis(variable: Variable, row: Mapping[str, float]) -> Fraction:
+    """Return the value of a variable: the input, or the exact sum of exact products.
+
+    Raises:
+        KeyError: If an input has no value.
+        ValueError: If a value is not finite.
+
+    Example:
+        >>> from fuzzytree.rulebase import Part
+        >>> mix = Variable("mix", parts=(Part("a", 1e16), Part("b", 1.0)))
+        >>> exact_axis(mix, {"a": 1.0, "b": 1.0}) - 10**16
+        Fraction(1, 1)
+    """
+    if not variable.parts:
+        return _fraction(variable.name, row)
+    parts = (
+        Fraction(p.weight) * (_fraction(p.input, row) - Fraction(p.centre))
+        for p in variable.parts
+    )
+    return sum(parts, start=_ZERO)
+
+
+def _fraction(name: str, row: Mapping[str, float]) -> Fraction:
+    value = float(row[name])
+    if not math.isfinite(value):
+        raise ValueError(f"{name!r} has no exact value: it is {value!r}")
+    return Fraction(value)
+
+
+def exact_degree(shape: Shape, value: Fraction) -> Fraction:
+    """Return how far a value belongs to a shape, in [0, 1].
+
+    Example:
+        >>> exact_degree(Band(0.0, 1.0, right=Flank(1.0, 4.0)), Fraction(3))
+        Fraction(1, 3)
+    """
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            if low is not None and value <= low:
+                return _ZERO if left is None else _flank_degree(left, value)
+            if high is not None and value > high:
+                return _ZERO if right is None else _flank_degree(right, value)
+            return _ONE
+        case LR(mean=mean, left=left, right=right):
+            distance = value - Fraction(mean)
+            return min(_side_degree(left, -distance), _side_degree(right, distance))
+        case Points():
+            return _points_degree(shape, value)
+    assert_never(shape)
+
+
+def _flank_degree(flank: Flank, value: Fraction) -> Fraction:
+    end = Fraction(flank.end)
+    position = _clipped((value - end) / (Fraction(flank.start) - end), _ONE)
+    return _clipped(position * _polynomial(flank.curve, position), CAP)
+
+
+def _side_degree(side: Side, distance: Fraction) -> Fraction:
+    reach = Fraction(side.reach)
+    u = _clipped(distance / Fraction(side.spread), reach)
+    t = min(u, _ONE)
+    body = _clipped(1 - t * _polynomial(side.curve, 2 * t - 1), _ONE)
+    return body * _clipped((reach - u) / (reach - 1), _ONE) ** 4
+
+
+def _points_degree(points: Points, value: Fraction) -> Fraction:
+    after = bisect_left(points.values, value)
+    if after in (0, len(points.values)):
+        return Fraction(points.degrees[after and -1])
+    (a, b), (p, r) = (
+        map(Fraction, pair[after - 1 : after + 1])
+        for pair in (points.values, points.degrees)
+    )
+    return r + (value - b) / (a - b) * (p - r)
+
+
+def _clipped(value: Fraction, high: Fraction) -> Fraction:
+    return min(max(value, _ZERO), high)
+
+
+def _polynomial(curve: tuple[float, ...], x: Fraction) -> Fraction:
+    """Return c0 + x (c1 + x (c2 + ...)), in integers: one division, at the end."""
+    coefficients, common = _integers(curve)
+    top, bottom = x.numerator, x.denominator
+    total, power = 0, 1
+    for position, coefficient in enumerate(reversed(coefficients)):
+        power = power * bottom if position else 1
+        total = total * top + coefficient * power
+    return Fraction(total, common * power)
+
+
+@lru_cache(maxsize=1 << 14)
+def _integers(curve: tuple[float, ...]) -> tuple[tuple[int, ...], int]:
+    """Return coefficients over a common denominator, and the denominator."""
+    ratios = [coefficient.as_integer_ratio() for coefficient in curve]
+    common = max(bottom for _, bottom in ratios)  # all are powers of two
+    return tuple(top * (common // bottom) for top, bottom in ratios), common
+
+
+def _clause_degree(
+    clause: Clause, shapes: Mapping[tuple[str, str], Shape], value: Fraction
+) -> Fraction:
+    degrees = (exact_degree(shapes[clause.variable, t], value) for t in clause.terms)
+    highest = max(degrees)
+    return 1 - highest if clause.negated else highest
+
+
+def _fired(rules: RuleBase, row: Mapping[str, float]) -> Exact:
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
+    variables = {v.name: v for v in rules.variables}
+    asked = dict.fromkeys(clause.variable for clause in clauses)
+    axes = {name: exact_axis(variables[name], row) for name in asked}
+    degrees = {c: _clause_degree(c, shapes, axes[c.variable]) for c in clauses}
+    is_product = rules.semantics.conjunction == "product"
+    strengths = tuple(
+        _joined((degrees[c] for c in rule.when), is_product=is_product)
+        for rule in rules.rules
+    )
+    best = max(strengths)
+    if best == 0:
+        return Exact(0, rules.semantics.uncovered, UNCOVERED, strengths, _ZERO)
+    winner = strengths.index(best)
+    strongest = {rules.rules[k].then for k, s in enumerate(strengths) if s == best}
+    rivals = (
+        strength
+        for rule, strength in zip(rules.rules, strengths, strict=True)
+        if rule.then not in strongest
+    )
+    margin = _ZERO if len(strongest) > 1 else best - max(rivals, default=_ZERO)
+    status = TIE if strengths.count(best) > 1 else DECIDED
+    return Exact(winner + 1, rules.rules[winner].then, status, strengths, margin)
+
+
+def _joined(degrees: Iterable[Fraction], *, is_product: bool) -> Fraction:
+    return math.prod(degrees, start=_ONE) if is_product else min(degrees, default=_ONE)
+
+
+def _descended(tree: FuzzyTree, row: Mapping[str, float]) -> Exact:
+    variables = {v.name: v for v in tree.variables}
+    node, leaf = (1, None) if tree.nodes else (None, 1)
+    while node is not None:
+        asked = tree.nodes[node - 1]
+        value = exact_axis(variables[asked.variable], row)
+        interval = sum(1 for cut in asked.cuts if value > cut)
+        branch = asked.branches[asked.owners[interval]]
+        node, leaf = branch.node, branch.leaf
+    number = leaf or 0
+    return Exact(number, tree.leaves[number - 1].label, DECIDED, (), _ONE)

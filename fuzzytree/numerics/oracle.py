@@ -1,0 +1,489 @@
+"""The exact answers of a model, for one row or for many.
+
+`exact_answer` computes one row in fractions. `decide` first encloses every strength of
+every row in an interval (`fuzzytree.numerics.enclosures`, where the proof is) and gives
+to fractions what the intervals leave open:
+
+- The strongest rules are among those whose upper end reaches the largest lower end. If
+  there is one, it wins. If all intervals there are points, the first of them wins.
+- No rule fires if all upper ends are 0, and some rule does if a lower end is above 0.
+- Under the minimum, rules of a tree often tie because they share their weakest clause.
+  Where all the strongest have the same term as their weakest, for sure, they are equal
+  in exact arithmetic too, whatever its degree is.
+- A tree takes the same path exactly as in doubles wherever no value that a node asks is
+  as close to one of its cuts as its slack.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.contracts import Model
+from fuzzytree.numerics.enclosures import (
+    Enclosure,
+    U,
+    Value,
+    axis_value,
+    clause_enclosure,
+    degree_enclosure,
+    strength_enclosure,
+)
+from fuzzytree.numerics.exact import (
+    CAP,
+    DECIDED,
+    MISSING,
+    TIE,
+    UNCOVERED,
+    Exact,
+    exact_answer,
+    exact_axis,
+    exact_degree,
+)
+from fuzzytree.rulebase import Clause, RuleBase
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray, IntArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+__all__ = [
+    "CAP",
+    "DECIDED",
+    "MISSING",
+    "SHARPENED",
+    "TIE",
+    "UNCOVERED",
+    "Decided",
+    "Exact",
+    "decide",
+    "exact_answer",
+    "exact_axis",
+    "exact_degree",
+    "outwards",
+    "strength_errors",
+]
+
+_NUMBERS = 1 << 21  # of a chunk's intervals: 32 MB for both ends
+_FEWEST, _MOST = 64, 1 << 13  # rows of a chunk
+
+
+class Decided(msgspec.Struct, frozen=True):
+    """The exact answers to many rows.
+
+    Attributes:
+        rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
+        label: The number of its class; -1 for no class.
+        status: `DECIDED`, `TIE`, `UNCOVERED` or `MISSING`.
+        strengths: Shape (rules, rows): doubles near the exact strengths; NaN in rows
+            with missing values. None for a tree, or if not asked for.
+        doubt: At most so far is any strength of a row from the exact one.
+        margin: At least so far the strongest class is ahead of the next (see `Exact`).
+        margin_high: At most so far.
+        by_fractions: How many rows needed fractions.
+    """
+
+    rule: IntArray
+    label: IntArray
+    status: IntArray
+    strengths: FloatArray | None
+    doubt: FloatArray
+    margin: FloatArray
+    margin_high: FloatArray
+    by_fractions: int
+
+
+def decide(model: Model, values: FloatArray, *, with_strengths: bool = True) -> Decided:
+    """Return the exact answer to each row: what is left open is settled by fractions.
+
+    Args:
+        model: A rule base or a tree.
+        values: Shape (inputs, rows), in the order of the model's inputs.
+        with_strengths: Whether to keep the strengths, which take most of the memory.
+
+    Raises:
+        ValueError: If the values have another shape.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> found = decide(rules_from_tree(random_tree(0)), np.zeros((4, 2)))
+        >>> found.rule.tolist(), found.by_fractions
+        ([2, 2], 0)
+    """
+    width = len(model.inputs)
+    if values.ndim != 2 or values.shape[0] != width:
+        raise ValueError(f"values must have shape ({width}, rows), not {values.shape}")
+    parts: list[Decided] = []
+    for part in _chunks(model, values.shape[1]):
+        if isinstance(model, RuleBase):
+            found = _decide_rules(model, values[:, part])
+            if not with_strengths:
+                found = msgspec.structs.replace(found, strengths=None)
+        else:
+            found = _decide_tree(model, values[:, part])
+        parts.append(found)
+    return _concatenated(parts)
+
+
+def _chunks(model: Model, rows: int) -> Iterator[slice]:
+    """Yield parts of the rows, at least one, that need a bounded memory each."""
+    size = len(model.variables) + 1
+    if isinstance(model, RuleBase):
+        clauses = {clause for rule in model.rules for clause in rule.when}
+        size += len(model.rules) + sum(len(clause.terms) + 1 for clause in clauses)
+    step = min(max(_NUMBERS // size, _FEWEST), _MOST)
+    for start in range(0, max(rows, 1), step):
+        yield slice(start, start + step)
+
+
+def _concatenated(parts: Sequence[Decided]) -> Decided:
+    strengths = [part.strengths for part in parts if part.strengths is not None]
+    return Decided(
+        np.concatenate([part.rule for part in parts]),
+        np.concatenate([part.label for part in parts]),
+        np.concatenate([part.status for part in parts]),
+        np.hstack(strengths) if strengths else None,
+        np.concatenate([part.doubt for part in parts]),
+        np.concatenate([part.margin for part in parts]),
+        np.concatenate([part.margin_high for part in parts]),
+        sum(part.by_fractions for part in parts),
+    )
+
+
+# --- rules
+
+
+class _Enclosed(msgspec.Struct, frozen=True):
+    """Rows in intervals: degrees of terms and clauses, strengths of rules."""
+
+    missing: BoolArray
+    terms: dict[tuple[str, str], Enclosure]
+    clauses: dict[Clause, Enclosure]
+    rules: Enclosure
+
+
+def _decide_rules(rules: RuleBase, values: FloatArray) -> Decided:
+    with np.errstate(all="ignore"):
+        enclosed = _enclosed(rules, values)
+        low, high = enclosed.rules
+        best = low.max(axis=0)
+        contends = high >= best
+        is_tie = contends.sum(axis=0) > 1
+        is_bare = high.max(axis=0) == 0.0
+        is_open = ~is_bare & (is_tie | (best == 0.0)) & ~enclosed.missing
+        is_open &= (contends & (low < high)).any(axis=0)
+        is_open &= ~_share_weakest(rules, enclosed, contends, is_open)
+        rule = np.where(is_bare, 0, contends.argmax(axis=0) + 1)
+        margin, margin_high = _margins(rules, low, high, rule)
+        strengths = low + (high - low) * 0.5
+        doubt = ((high - low) * 0.5 + U * (high > low)).max(axis=0)
+    status = np.where(is_bare, UNCOVERED, np.where(is_tie, TIE, DECIDED))
+    gone = enclosed.missing
+    rule[gone], status[gone] = 0, MISSING
+    strengths[:, gone], doubt[gone] = np.nan, 0.0
+    margin[gone] = margin_high[gone] = 1.0
+    rows = np.flatnonzero(is_open)
+    for row in rows.tolist():
+        named = dict(zip(rules.inputs, values[:, row].tolist(), strict=True))
+        answer = exact_answer(rules, named)
+        rule[row], status[row] = answer.rule, answer.status
+        strengths[:, row] = [float(strength) for strength in answer.strengths]
+        doubt[row] = U
+        margin[row], margin_high[row] = outwards(answer.margin)
+    label = _labels(rules, [r.then for r in rules.rules], rule, status)
+    return Decided(
+        rule, label, status, strengths, doubt, margin, margin_high, len(rows)
+    )
+
+
+def outwards(number: Fraction) -> tuple[float, float]:
+    """Return the doubles between which a number lies; itself twice if it is one.
+
+    Example:
+        >>> outwards(Fraction(1, 4))
+        (0.25, 0.25)
+        >>> low, high = outwards(Fraction(1, 3))
+        >>> low < Fraction(1, 3) < high
+        True
+    """
+    near = float(number)
+    low = near if near <= number else math.nextafter(near, -math.inf)
+    high = near if near >= number else math.nextafter(near, math.inf)
+    return low, high
+
+
+def _axes(model: Model, values: FloatArray) -> tuple[dict[str, Value], BoolArray]:
+    """Return the value of each variable, and which rows miss one."""
+    named = dict(zip(model.inputs, values, strict=True))
+    axes = {v.name: axis_value(v, named) for v in model.variables}
+    missing: BoolArray = np.zeros(values.shape[1], np.bool_)
+    for value in axes.values():
+        missing |= ~np.isfinite(value.x)
+    return axes, missing
+
+
+def _enclosed(rules: RuleBase, values: FloatArray) -> _Enclosed:
+    axes, missing = _axes(rules, values)
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
+    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    terms = {key: degree_enclosure(shapes[key], axes[key[0]]) for key in keys}
+    degrees = {
+        c: clause_enclosure(c, [terms[c.variable, term] for term in c.terms])
+        for c in clauses
+    }
+    count = values.shape[1]
+    low, high = (np.empty((len(rules.rules), count)) for _ in range(2))
+    for position, found in enumerate(_strengths(rules, degrees, count)):
+        low[position], high[position] = found
+    return _Enclosed(missing, terms, degrees, Enclosure(low, high))
+
+
+def _strengths(
+    rules: RuleBase, degrees: Mapping[Clause, Enclosure], rows: int
+) -> Iterator[Enclosure]:
+    """Yield the strength of each rule; what it shares with the last one is kept."""
+    is_product = rules.semantics.conjunction == "product"
+    path: list[Clause] = []
+    stack = [Enclosure(np.ones(rows), np.ones(rows))]
+    for rule in rules.rules:
+        shared = 0
+        for old, new in zip(path, rule.when, strict=False):
+            if old != new:
+                break
+            shared += 1
+        del stack[shared + 1 :]
+        path = list(rule.when)
+        for clause in rule.when[shared:]:
+            found = strength_enclosure(
+                stack[-1], degrees[clause], is_product=is_product
+            )
+            stack.append(found)
+        yield stack[-1]
+
+
+def _margins(
+    rules: RuleBase, low: FloatArray, high: FloatArray, rule: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return bounds of how far the winner's class is ahead of any other."""
+    numbers = {label: number for number, label in enumerate(rules.classes)}
+    owner = np.array([-1, *(numbers[r.then] for r in rules.rules)])
+    count = low.shape[1]
+    lows, highs = (np.zeros((len(rules.classes), count)) for _ in range(2))
+    for position, number in enumerate(owner[1:]):
+        np.maximum(lows[number], low[position], out=lows[number])
+        np.maximum(highs[number], high[position], out=highs[number])
+    winner, every = owner[rule], np.arange(count)
+    best_low, best_high = lows[winner, every], highs[winner, every]
+    lows[winner, every] = highs[winner, every] = 0.0
+    next_low, next_high = lows.max(axis=0), highs.max(axis=0)
+    is_tied = (next_high >= best_low) | (rule == 0)
+    least = _difference(best_low, next_high, 0.0)
+    most = _difference(best_high, next_low, 2.0)
+    return np.where(is_tied, 0.0, least), np.where(is_tied, 0.0, most)
+
+
+def _difference(a: FloatArray, b: FloatArray, towards: float) -> FloatArray:
+    """Return a - b, moved towards a number unless it is exact."""
+    found = a - b
+    is_exact = (b == 0.0) | (a <= 2.0 * b)  # the latter by Sterbenz, for a >= b
+    return np.where(is_exact, found, np.nextafter(found, towards))
+
+
+def _share_weakest(
+    rules: RuleBase, enclosed: _Enclosed, contends: BoolArray, is_open: BoolArray
+) -> BoolArray:
+    """Return in which open rows all the strongest rules have one weakest term."""
+    found = np.zeros_like(is_open)
+    if rules.semantics.conjunction == "product" or not is_open.any():
+        return found
+    rows = np.flatnonzero(is_open)
+    sources = _Sources(enclosed, rows)
+    strongest = contends[:, rows]
+    weakest = np.full(strongest.shape, -1)
+    for position in np.flatnonzero(strongest.any(axis=1)).tolist():
+        weakest[position] = sources.weakest(rules.rules[position].when)
+    first = np.take_along_axis(weakest, strongest.argmax(axis=0)[np.newaxis], axis=0)
+    is_same = (first >= 0) & ((weakest == first) | ~strongest).all(axis=0)
+    found[rows] = is_same[0]
+    return found
+
+
+class _Sources:
+    """Which term gives a clause its degree, and a rule its strength, for sure."""
+
+    def __init__(self, enclosed: _Enclosed, rows: IntArray) -> None:
+        self.enclosed = enclosed
+        self.rows = rows
+        self.number = {key: 2 * k for k, key in enumerate(enclosed.terms)}
+        start = 2 * len(self.number)
+        self.joined = {clause: start + k for k, clause in enumerate(enclosed.clauses)}
+        self.known: dict[Clause, IntArray] = {}
+
+    def weakest(self, when: Sequence[Clause]) -> IntArray:
+        """Return the source of the smallest degree of some clauses; -1 if unsure."""
+        if not when:
+            return np.full(self.rows.shape, -1)
+        low, high = self._ends([self.enclosed.clauses[clause] for clause in when])
+        source = np.stack([self.of(clause) for clause in when])
+        top, mine = self._at(high.argmin(axis=0), high, source)
+        is_sure = ((low >= top) | (source == mine)).all(axis=0)
+        return np.where(is_sure, mine, -1)
+
+    def of(self, clause: Clause) -> IntArray:
+        """Return the number of the largest of a clause's terms, or of the clause."""
+        if clause not in self.known:
+            keys = [(clause.variable, term) for term in clause.terms]
+            low, high = self._ends([self.enclosed.terms[key] for key in keys])
+            numbers = np.array([[self.number[key] + clause.negated] for key in keys])
+            bottom, mine = self._at(low.argmax(axis=0), low, numbers + 0 * self.rows)
+            is_sure = ((high <= bottom) | (numbers == mine)).all(axis=0)
+            self.known[clause] = np.where(is_sure, mine, self.joined[clause])
+        return self.known[clause]
+
+    def _ends(self, parts: Sequence[Enclosure]) -> tuple[FloatArray, FloatArray]:
+        low = np.stack([part.low[self.rows] for part in parts])
+        return low, np.stack([part.high[self.rows] for part in parts])
+
+    def _at(
+        self, place: IntArray, ends: FloatArray, sources: IntArray
+    ) -> tuple[FloatArray, IntArray]:
+        every = np.arange(len(self.rows))
+        return ends[place, every], sources[place, every]
+
+
+def _labels(
+    model: Model, ends: Sequence[str], rule: IntArray, status: IntArray
+) -> IntArray:
+    numbers: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
+    numbers[None] = -1
+    label = np.array([-1, *(numbers[end] for end in ends)])[rule]
+    label[status == UNCOVERED] = numbers[model.semantics.uncovered]
+    label[status == MISSING] = numbers[model.semantics.missing]
+    return label
+
+
+# --- trees
+
+
+def _decide_tree(tree: FuzzyTree, values: FloatArray) -> Decided:
+    with np.errstate(all="ignore"):
+        axes, missing = _axes(tree, values)
+        rule, is_open = _followed(tree, axes, missing)
+    rows = np.flatnonzero(is_open)
+    for row in rows.tolist():
+        named = dict(zip(tree.inputs, values[:, row].tolist(), strict=True))
+        rule[row] = exact_answer(tree, named).rule
+    status = np.where(missing, MISSING, DECIDED)
+    label = _labels(tree, [leaf.label for leaf in tree.leaves], rule, status)
+    sure = np.ones(len(rule))
+    return Decided(rule, label, status, None, 0.0 * sure, sure, sure, len(rows))
+
+
+def _followed(
+    tree: FuzzyTree, axes: Mapping[str, Value], missing: BoolArray
+) -> tuple[IntArray, BoolArray]:
+    """Return each row's leaf by doubles, and where they may err on the way."""
+    leaf = np.zeros(missing.shape, np.int64)
+    is_open: BoolArray = np.zeros_like(missing)
+    known = np.flatnonzero(~missing)
+    if not tree.nodes:
+        leaf[known] = 1
+        return leaf, is_open
+    waiting: dict[int, IntArray] = {1: known}
+    for number, node in enumerate(tree.nodes, 1):  # a node stands before those below
+        rows = waiting.pop(number)
+        x, slack = axes[node.variable]
+        interval = np.searchsorted(node.cuts, x[rows], side="left")
+        if slack is not None:
+            near, far = x[rows] - slack[rows], x[rows] + slack[rows]
+            first = np.searchsorted(node.cuts, near, side="left")
+            is_open[rows] |= first < np.searchsorted(node.cuts, far, side="right")
+        taken = np.array(node.owners)[interval]
+        for position, branch in enumerate(node.branches):
+            here = rows[taken == position]
+            if branch.node is not None:
+                waiting[branch.node] = here
+            else:
+                leaf[here] = branch.leaf or 0
+    return leaf, is_open
+
+
+# --- strengths that somebody computed
+
+
+SHARPENED = 256
+"""The most rows in which `strength_errors` takes fractions."""
+
+
+def strength_errors(
+    model: RuleBase, values: FloatArray, strengths: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return how far given strengths are from the exact ones, in each row.
+
+    Args:
+        model: The rule base.
+        values: Shape (inputs, rows).
+        strengths: Shape (rules, rows); NaN where a value is missing.
+
+    Returns:
+        A lower and an upper end of the largest distance in each row, by intervals. The
+        `SHARPENED` rows of the largest upper ends that are more than a hundredth above
+        their lower ends are computed in fractions, so that these two are next to each
+        other. A row that is missing on one side alone is 1 off.
+
+    Raises:
+        ValueError: If the values or the strengths have another shape.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules, values = rules_from_tree(random_tree(0)), np.zeros((4, 1))
+        >>> given = decide(rules, values).strengths + 2.0**-30
+        >>> low, high = strength_errors(rules, values, given)
+        >>> bool(low[0] <= 2.0**-30 <= high[0] < 2.0**-29)
+        True
+    """
+    expected = (len(model.rules), values.shape[-1])
+    if strengths.shape != expected:
+        raise ValueError(f"strengths must have shape {expected}, not {strengths.shape}")
+    parts = [
+        _errors(model, values[:, part], strengths[:, part])
+        for part in _chunks(model, values.shape[1])
+    ]
+    low, high = (np.concatenate(ends) for ends in zip(*parts, strict=True))
+    vague = np.flatnonzero(high > 1.01 * low)
+    for row in vague[np.argsort(-high[vague], kind="stable")][:SHARPENED].tolist():
+        named = dict(zip(model.inputs, values[:, row].tolist(), strict=True))
+        exact = exact_answer(model, named).strengths
+        if exact:
+            given = map(Fraction, strengths[:, row].tolist())
+            gaps = (abs(a - b) for a, b in zip(given, exact, strict=True))
+            low[row], high[row] = outwards(max(gaps))
+    return low, high
+
+
+def _errors(
+    model: RuleBase, values: FloatArray, strengths: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    with np.errstate(all="ignore"):
+        enclosed = _enclosed(model, values)
+        low, high = enclosed.rules
+        outside = np.maximum(low - strengths, strengths - high)
+        farthest = np.maximum(high - strengths, strengths - low)
+        least = np.maximum(outside * (1.0 - 2 * U), 0.0).max(axis=0)
+        most = (farthest * (1.0 + 2 * U)).max(axis=0)
+    missing = np.isnan(strengths).any(axis=0)
+    is_one_sided = missing != enclosed.missing
+    least[missing | enclosed.missing] = most[missing | enclosed.missing] = 0.0
+    least[is_one_sided] = most[is_one_sided] = 1.0
+    return least, most
