@@ -17,7 +17,16 @@ if TYPE_CHECKING:
     from fuzzytree.lowering import rules_from_tree
     from fuzzytree.rulebase import RuleBase
     from fuzzytree.tree import FuzzyTree
-    from fuzzytree.verbs import bench, check, export, learn, load, run, save
+    from fuzzytree.verbs import (
+        bench,
+        check,
+        export,
+        learn,
+        load,
+        run,
+        save,
+        stability,
+    )
 
     __version__: str
 
@@ -37,6 +46,7 @@ __all__ = [
     "rules_from_tree",
     "run",
     "save",
+    "stability",
 ]
 
 _HOMES = {
@@ -54,6 +64,7 @@ _HOMES = {
     "rules_from_tree": "fuzzytree.lowering",
     "run": "fuzzytree.verbs",
     "save": "fuzzytree.verbs",
+    "stability": "fuzzytree.verbs",
 }
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.contracts import FloatArray
+    from fuzzytree.criteria.results import Stability
     from fuzzytree.timing.records import Study
 
 Carried = Model | OnnxModel | bytes | str | os.PathLike[str]

@@ -1,5 +1,7 @@
 """The JSON Schemas of our YAML files, from the records that the reader uses.
 
+Those of what `--json` prints are made by `of_result` from the records of each result.
+
 `python -m fuzzytree.schemas.generation` rewrites the files beside this module.
 """
 
@@ -13,6 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+import msgspec
 from msgspec import inspect
 
 from fuzzytree.readers.layout import Record, RuleBaseFile, TreeFile
@@ -45,6 +48,40 @@ def generate(name: str) -> bytes:
         del whole["description"]
         head |= whole
     head["$defs"] = {key: definitions[key] for key in sorted(definitions)}
+    return (json.dumps(head, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def of_result(kind: type[msgspec.Struct], **added: Json) -> bytes:
+    """Return the JSON Schema (draft 2020-12) of a result as its `to_json` writes it.
+
+    Args:
+        kind: The record: every field of it is always written, and nothing else.
+        added: Schemas of what `to_json` writes beside the fields.
+
+    Example:
+        >>> class Sum(msgspec.Struct):
+        ...     "What two numbers make."
+        ...
+        ...     total: int
+        >>> json.loads(of_result(Sum, ok={"type": "boolean"}))["required"]
+        ['ok', 'total']
+    """
+    found: dict[str, dict[str, Json]] = msgspec.json.schema(kind)["$defs"]
+    for name, one in found.items():
+        properties = one["properties"]
+        own = properties if isinstance(properties, dict) else {}
+        one["properties"] = {**added, **own} if name == kind.__name__ else own
+        one["required"] = [*added, *own] if name == kind.__name__ else [*own]
+        one["additionalProperties"] = False
+        one["description"] = python.cleandoc(str(one["description"]))
+    whole = found.pop(kind.__name__)
+    head: Definitions = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **whole,
+        "title": str(whole["description"]).partition("\n")[0],
+    }
+    if found:
+        head["$defs"] = {name: found[name] for name in sorted(found)}
     return (json.dumps(head, indent=2, ensure_ascii=False) + "\n").encode()
 
 

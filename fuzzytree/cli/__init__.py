@@ -20,7 +20,17 @@ from fuzzytree.cli.talk import say
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
 
-VERBS = ("learn", "show", "export", "run", "check", "bench", "formats", "doctor")
+VERBS = (
+    "learn",
+    "show",
+    "export",
+    "run",
+    "check",
+    "bench",
+    "stability",
+    "formats",
+    "doctor",
+)
 """Each verb is the `command` of the module `fuzzytree.cli.VERB`."""
 
 

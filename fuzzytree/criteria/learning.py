@@ -198,8 +198,9 @@ def rational_counts(values: Sequence[float], n: int, *, delta: int = 1) -> list[
         [1, 2, 1]
     """
     exact = [Fraction(value) for value in values]
-    mean = sum(exact) / len(exact)
-    variance = sum((x - mean) ** 2 for x in exact) / (len(exact) - delta)
+    mean = sum(exact, Fraction(0)) / len(exact)
+    squares = sum(((x - mean) * (x - mean) for x in exact), Fraction(0))
+    variance = squares / (len(exact) - delta)
     steps = [((x - mean) * n) * abs((x - mean) * n) for x in exact]
 
     def at_most(step: Fraction, k: int) -> bool:

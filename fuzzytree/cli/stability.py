@@ -1,0 +1,77 @@
+"""`fuzzytree stability`: is a model numerically stable, and what would float32 cost?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    json_option,
+    progress_bar,
+    quiet_option,
+    say,
+    standard_input,
+    wrong_options,
+)
+
+
+@click.command("stability", short_help="Is a model numerically stable?")
+@click.argument("model", metavar="MODEL")
+@click.option("--data", metavar="TABLE", help="Rows of your own, beside the probes.")
+@click.option(
+    "--only",
+    metavar="CODE",
+    multiple=True,
+    help="Apply these criteria only, such as N3; all if none.",
+)
+@click.option(
+    "--runtime",
+    "runtimes",
+    metavar="NAME",
+    multiple=True,
+    help="Run these only; all that are installed if none.",
+)
+@click.option(
+    "--rows", "is_full", is_flag=True, help="Tell all that was left out, too."
+)
+@json_option
+@quiet_option
+def command(
+    model: str,
+    data: str | None,
+    only: Sequence[str],
+    runtimes: Sequence[str],
+    is_full: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Apply the criteria N1 to N10 to MODEL, a YAML file with a tree or a rule base.
+
+    They ask for equal bits in other units, orders and batches, for exact edges, for
+    errors within the certified bounds, and for curves that can be evaluated. Each
+    input is told with what float32 would cost it. Exit 1 if a criterion fails.
+    """
+    from fuzzytree import verbs
+    from fuzzytree.report.stability import stability_lines
+
+    with wrong_options(), progress_bar(quiet=quiet) as tell:
+        found = verbs.stability(
+            model,
+            data=standard_input() if data == "-" else data,
+            only=only,
+            runtimes=runtimes or None,
+            progress=tell,
+        )
+    if as_json:
+        answer(found.to_json())
+    else:
+        answer("\n".join(stability_lines(found, is_full=is_full)))
+    failed = [one.code for one in found.criteria if one.verdict == "FAILS"]
+    if failed:
+        say(f"{', '.join(failed)} {'fails' if len(failed) == 1 else 'fail'}")
+        return 1
+    held = sum(one.verdict == "holds" for one in found.criteria)
+    say(f"{held} of {len(found.criteria)} criteria hold, and none fails", quiet=quiet)
+    return 0
