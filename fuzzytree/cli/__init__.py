@@ -27,6 +27,7 @@ VERBS = (
     "run",
     "check",
     "bench",
+    "needs",
     "stability",
     "formats",
     "doctor",

@@ -1,0 +1,115 @@
+"""`fuzzytree needs`: what a model needs, and what leaving out the rest saves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    json_option,
+    progress_bar,
+    quiet_option,
+    say,
+    say_rows,
+    standard_input,
+    wrong_options,
+)
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, Model
+    from fuzzytree.pruning import Use
+
+
+@click.command("needs", short_help="Tell what a model needs, and leave out the rest.")
+@click.argument("model", metavar="MODEL")
+@click.option("--data", metavar="TABLE", help="Rows of your own, beside the probes.")
+@click.option(
+    "-o", "--output", metavar="FILE", help="Write the pruned model, if it is proved."
+)
+@click.option(
+    "--for",
+    "uses",
+    type=click.Choice(["tree", "relative", "raw"]),
+    multiple=True,
+    help="What a tree serves; its path and its relative rules if none.",
+)
+@click.option(
+    "--drop",
+    type=click.Choice(["inputs", "rules"]),
+    multiple=True,
+    help="Leave out inputs that nothing asks, or rules that never fire, too.",
+)
+@click.option(
+    "--time",
+    "seconds",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="SECONDS",
+    help="Measure for so long what opening, answering and reading cost.",
+)
+@json_option
+@quiet_option
+def command(
+    model: str,
+    data: str | None,
+    output: str | None,
+    uses: Sequence[Use],
+    drop: Sequence[str],
+    seconds: float | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Tell what MODEL, a YAML file, needs, and what leaving out the rest saves.
+
+    The pruned model is held against MODEL, by proof and by running both. Exit 1 if
+    they differ in a way that was not asked for; nothing is written then.
+    """
+    from fuzzytree import savings, verbs
+    from fuzzytree.pruning import pruned
+    from fuzzytree.report.needs import report_lines
+
+    first = verbs.load(model)
+    wanted = tuple(uses) or ("tree", "relative")
+    with wrong_options():
+        found = pruned(
+            first, uses=wanted, inputs="inputs" in drop, rules="rules" in drop
+        )
+    rows = None if data is None else _rows(data, first)
+    with progress_bar(quiet=quiet) as tell:
+        told = savings.report(
+            first,
+            found,
+            uses=wanted,
+            data=rows,
+            table=None if data == "-" else data,
+            seconds=seconds or 0.0,
+            tell=tell,
+        )
+    answer(told.to_json() if as_json else "\n".join(report_lines(told)))
+    if not told.proof.ok:
+        wrong = sum(c.verdict == "DISAGREES" for c in told.proof.comparisons)
+        say(f"the pruned model differs in {wrong} ways; nothing is written")
+        return 1
+    if output is not None:
+        verbs.save(found.model, output)
+        say_rows(("wrote", output, _next(model, output, found.is_same)), quiet=quiet)
+    return 0
+
+
+def _rows(data: str, model: Model) -> FloatArray:
+    import numpy as np
+
+    from fuzzytree.tables import batches
+
+    source = standard_input() if data == "-" else data
+    found = batches(source, model.inputs, trained=model.columns)
+    return np.hstack([batch.values for batch in found])
+
+
+def _next(model: str, output: str, is_same: bool) -> str:
+    import shlex
+
+    check = shlex.join(["fuzzytree", "check", output])
+    return f"next: {check}" if is_same else f"not for all rows the answers of {model}"
