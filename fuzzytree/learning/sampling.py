@@ -6,10 +6,12 @@ chunks and any merging keep the same ones; and a row that is kept at the end was
 left out before, so its count is exact. The hash looks at the digits of the numbers and
 not at their exponents: columns multiplied by powers of two keep the same rows.
 
-With no more distinct rows than asked for nothing is left to chance at all. Only where
-more rows agree in all digits than may be kept (tables of 1, 2 and 4, say) a second hash
-of the whole numbers decides; there a column multiplied by a power of two may keep
-others. So it may for numbers below 2^-1022, which have fewer digits.
+Rows that agree in all digits (1, 2 and 4, say) are kept together or not at all, so a
+class may have a few rows less than it may have. Only where they alone are more than
+half of what may be kept, a hash of the whole numbers decides between them; there a
+column multiplied by a power of two may keep others. So it may for numbers below
+2^-1022, which have fewer digits. With no more distinct rows than asked for all are
+kept.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ Hashes = npt.NDArray[np.uint64]
 
 _DIGITS = np.uint64((1 << 63) | ((1 << 52) - 1))
 _HALF = np.uint64(32)
+_ONE = np.uint64(1)
 _BUFFER = 1 << 16
 
 
@@ -91,10 +94,16 @@ class DistinctRows:
     _kept: int = 0
     _settled: int = 0
     _limits: Hashes = field(init=False, repr=False)
+    _refused: Hashes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Start without rows and without limits."""
+        """Start without rows and without limits.
+
+        `_limits` are the largest hashes of digits that may be kept, by class, and
+        `_refused` the smallest that are known to be too many, with those below them.
+        """
         self._limits = np.full(self.classes, np.iinfo(np.uint64).max, np.uint64)
+        self._refused = self._limits.copy()
 
     def offer(self, values: FloatArray, codes: IntArray) -> None:
         """Offer rows; those that are kept are copied.
@@ -120,6 +129,7 @@ class DistinctRows:
         """Return the distinct rows of both tables."""
         joined = DistinctRows(self.classes, self.features, self.most)
         joined._limits = np.minimum(self._limits, other._limits)
+        joined._refused = np.minimum(self._refused, other._refused)
         joined._parts = [*self._parts, *other._parts]
         joined._settle()
         return joined
@@ -154,28 +164,33 @@ class DistinctRows:
             return None
         if len(self._parts) == 1 and self._kept == self._settled:
             return self._parts[0]
-        everything = _joined(self._parts)
-        order = np.lexsort((everything.hashes, everything.digits, everything.codes))
-        ordered = everything.at(order)
-        is_new = np.ones(len(order), bool)
-        is_new[1:] = (
-            (np.diff(ordered.codes) != 0)
-            | (ordered.digits[1:] != ordered.digits[:-1])
-            | (ordered.hashes[1:] != ordered.hashes[:-1])
-        )
-        first = np.flatnonzero(is_new)
-        copies = np.add.reduceat(ordered.copies, first)
-        present, starts, counts = runs(ordered.codes[first])
-        rank = np.arange(len(first)) - np.repeat(starts, counts)
-        is_full = counts >= self.most
-        last = first[starts[is_full] + self.most - 1]
-        self._limits[present[is_full]] = ordered.digits[last]
-        is_kept = rank < self.most
-        kept = ordered.at(first[is_kept])
-        kept.copies[:] = copies[is_kept]
+        found = _distinct(_joined(self._parts))
+        kept = found.at(self._kept_of(found))
         self._parts = [kept]
         self._kept = self._settled = len(kept.codes)
         return kept
+
+    def _kept_of(self, found: _Rows) -> IntArray:
+        """Return which distinct rows, ordered by class and hashes, are kept.
+
+        The first digits that are too many with all before them are refused for good:
+        more rows cannot make them fewer. They fill up what is left where less than
+        half has been kept, by their second hash.
+        """
+        codes, digits = found.codes, found.digits
+        present, starts, counts = runs(codes)
+        rank = np.arange(len(codes)) - np.repeat(starts, counts)
+        is_last = np.ones(len(codes), bool)
+        is_last[:-1] = (np.diff(codes) != 0) | (digits[1:] != digits[:-1])
+        is_much = is_last & (rank >= self.most)
+        np.minimum.at(self._refused, codes[is_much], digits[is_much])
+        is_before = digits < self._refused[codes]
+        before = np.bincount(codes[is_before], minlength=self.classes)
+        is_few = 2 * before < self.most
+        refused = self._refused[present]
+        self._limits[present] = np.where(is_few[present], refused, refused - _ONE)
+        fills = is_few[codes] & (digits == self._refused[codes]) & (rank < self.most)
+        return np.flatnonzero(is_before | fills)
 
 
 def _joined(parts: list[_Rows]) -> _Rows:
@@ -186,6 +201,24 @@ def _joined(parts: list[_Rows]) -> _Rows:
         np.concatenate([part.hashes for part in parts]),
         np.concatenate([part.copies for part in parts]),
     )
+
+
+def _distinct(found: _Rows) -> _Rows:
+    """Return rows ordered by class and hashes, equal ones joined.
+
+    Rows are equal if 127 bits of their hashes are.
+    """
+    ordered = found.at(np.lexsort((found.hashes, found.digits, found.codes)))
+    is_new = np.ones(len(ordered.codes), bool)
+    is_new[1:] = (
+        (np.diff(ordered.codes) != 0)
+        | (ordered.digits[1:] != ordered.digits[:-1])
+        | (ordered.hashes[1:] != ordered.hashes[:-1])
+    )
+    first = np.flatnonzero(is_new)
+    distinct = ordered.at(first)
+    distinct.copies[:] = np.add.reduceat(ordered.copies, first)
+    return distinct
 
 
 def _shares(found: _Rows, most: int) -> IntArray:
@@ -218,6 +251,7 @@ def hashed_digits(values: FloatArray) -> Hashes:
 
     Signs and mantissas are multiplied by an odd number for each column and added up,
     their upper halves a second time, for numbers of few digits; zero counts as none.
+    It has 63 bits.
 
     Example:
         >>> rows = np.array([[3.0, 0.7], [-3.0, 0.7]])
@@ -230,7 +264,7 @@ def hashed_digits(values: FloatArray) -> Hashes:
     digits = np.ascontiguousarray(values).view(np.uint64) & _DIGITS
     digits += digits >> _HALF
     digits += values != 0
-    return hashed(digits.dot(_odd_numbers(values.shape[1])))
+    return hashed(digits.dot(_odd_numbers(values.shape[1]))) >> _ONE
 
 
 def hashed_rows(values: FloatArray) -> Hashes:

@@ -1,0 +1,277 @@
+"""What must not change a tree: units, offsets, the order of rows, chunks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+import pytest
+from sklearn import datasets
+
+from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.reference import descend
+from fuzzytree.tree import FuzzyTree
+
+Mode = Literal["default", "paper"]
+MODES: tuple[Mode, ...] = ("default", "paper")
+Table = tuple[FloatArray, IntArray]
+
+
+def public(name: str) -> Table:
+    values, labels = getattr(datasets, f"load_{name}")(return_X_y=True)
+    return values, labels
+
+
+def blobs(rows: int, *, step: float = 0.0, seed: int = 0) -> Table:
+    """Return three overlapping classes, rounded to a step if there is one."""
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(0, 3, rows)
+    values = rng.normal(size=(rows, 4)) + 1.5 * rng.normal(size=(3, 4))[labels]
+    return np.round(values / step) * step if step else values, labels
+
+
+TABLES: dict[str, Callable[[], Table]] = {
+    "iris": lambda: public("iris"),
+    "wine": lambda: public("wine"),
+    "sampled": lambda: blobs(3_000),
+    "sampled whole numbers": lambda: blobs(3_000, step=1.0),
+}
+ROWS_PER_CLASS = 300
+"""Fewer than the rows of a class in the tables that are sampled."""
+
+
+def learner(table: Table, settings: Settings | None = None) -> Learner:
+    values, labels = table
+    columns = [f"x{k}" for k in range(values.shape[1])]
+    classes = [f"c{k}" for k in range(int(labels.max()) + 1)]
+    return Learner(columns, classes, settings=settings or Settings())
+
+
+def learn(table: Table, settings: Settings | None = None) -> Learnt:
+    empty = learner(table, settings)
+    return learn_arrays(
+        *table,
+        columns=empty.columns,
+        classes=empty.classes,
+        settings=empty.settings,
+    )
+
+
+class Unit(msgspec.Struct, frozen=True):
+    """Another unit of a column: x becomes `x * 2**exponent + offset`."""
+
+    exponent: int = 0
+    offset: float = 0.0
+
+    def value(self, x: float) -> float:
+        return float(Fraction(x) * Fraction(2) ** self.exponent + Fraction(self.offset))
+
+    def length(self, x: float) -> float:
+        return math.ldexp(x, self.exponent)
+
+
+def in_units(tree: FuzzyTree, units: dict[str, Unit]) -> FuzzyTree:
+    """Return a tree whose numbers in the unit of a column are in another unit."""
+    plain: Any = msgspec.to_builtins(tree)
+    for variable in plain["variables"]:
+        unit = units.get(variable["name"], Unit())
+        for part in variable.get("parts", ()):
+            own = units[part["input"]]
+            part["weight"] = math.ldexp(part["weight"], -own.exponent)
+            part["centre"] = own.value(part.get("centre", 0.0))
+        _convert(variable, ("low", "high"), unit.value)
+        for term in variable["terms"]:
+            _convert(term["shape"], ("low", "high"), unit.value)
+            for side in ("left", "right"):
+                flank = term["shape"].get(side)
+                if flank is not None:
+                    _convert(flank, ("start", "end"), unit.value)
+    for node in plain["nodes"]:
+        unit = units.get(node["variable"], Unit())
+        node["cuts"] = [unit.value(cut) for cut in node["cuts"]]
+    for sets in plain["sets"]:
+        unit = units.get(sets["variable"], Unit())
+        for term in sets["terms"]:
+            _convert(term["shape"], ("mean",), unit.value)
+            for side in ("left", "right"):
+                _convert(term["shape"][side], ("spread",), unit.length)
+    return msgspec.convert(plain, FuzzyTree)
+
+
+def _convert(
+    holder: dict[str, Any], names: tuple[str, ...], turn: Callable[[float], float]
+) -> None:
+    for name in names:
+        if holder.get(name) is not None:
+            holder[name] = turn(holder[name])
+
+
+def numbers(value: Any) -> list[float]:
+    """Return all floats of a tree in order."""
+    if isinstance(value, dict):
+        return [n for part in value.values() for n in numbers(part)]
+    if isinstance(value, list | tuple):
+        return [n for part in value for n in numbers(part)]
+    return [value] if isinstance(value, float) else []
+
+
+def labels_of(tree: FuzzyTree, values: FloatArray) -> list[str | None]:
+    return [
+        descend(tree, dict(zip(tree.columns, row, strict=True))).label
+        for row in values.tolist()
+    ]
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", TABLES)
+def test_a_column_times_a_power_of_two_gives_the_tree_in_that_unit(
+    name: str, mode: Mode
+) -> None:
+    values, labels = TABLES[name]()
+    settings = Settings(mode=mode, rows_per_class=ROWS_PER_CLASS)
+    base = learn((values, labels), settings)
+    exponents = np.random.default_rng(1).integers(-200, 201, values.shape[1])
+    found = learn((np.ldexp(values, exponents), labels), settings)
+    units = {
+        column: Unit(int(k))
+        for column, k in zip(base.tree.columns, exponents, strict=True)
+    }
+    assert found.tree == in_units(base.tree, units)
+    assert found.report == base.report
+
+
+@pytest.mark.parametrize("exponent", [-1000, -600, 600, 1000])
+def test_a_unit_near_the_ends_of_the_floats_keeps_the_questions_of_one_column(
+    exponent: int,
+) -> None:
+    values, labels = public("iris")
+    settings = Settings(mode="paper")
+    base = learn((values, labels), settings).tree
+    found = learn((np.ldexp(values, exponent), labels), settings).tree
+    units = {column: Unit(exponent) for column in base.columns}
+    assert found == in_units(base, units)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", TABLES)
+def test_neither_order_nor_chunks_nor_merging_change_a_bit(
+    name: str, mode: Mode
+) -> None:
+    values, labels = TABLES[name]()
+    settings = Settings(mode=mode, rows_per_class=ROWS_PER_CLASS)
+    base = learn((values, labels), settings)
+    rng = np.random.default_rng(2)
+    order = rng.permutation(len(labels))
+    shuffled = values[order], labels[order]
+    assert learn(shuffled, settings) == base
+    borders = np.sort(rng.integers(0, len(labels), 9))
+    parts: list[Learner] = []
+    in_chunks = learner(shuffled, settings)
+    for rows, codes in zip(*(np.split(a, borders) for a in shuffled), strict=True):
+        in_chunks.partial_fit(rows, codes)
+        parts.append(learner(shuffled, settings))
+        parts[-1].partial_fit(rows, codes)
+    assert in_chunks.finish() == base
+    joined = parts[7]
+    for other in [*parts[:7][::-1], *parts[8:]]:
+        joined = other.merge(joined)
+    assert joined.finish() == base
+
+
+def test_one_row_at_a_time_gives_the_same_bits() -> None:
+    values, labels = public("iris")
+    single = learner((values, labels))
+    for row, label in zip(values[::-1], labels[::-1], strict=True):
+        single.partial_fit(row[None], np.array([label]))
+    assert single.finish() == learn((values, labels))
+
+
+def test_a_negative_zero_is_zero() -> None:
+    values, labels = blobs(500, step=1.0)
+    negative = np.where(values == 0, -0.0, values)
+    positive = np.where(values == 0, 0.0, values)
+    assert np.signbit(negative).sum() > np.signbit(positive).sum()
+    found = msgspec.json.encode(learn((negative, labels)))
+    assert found == msgspec.json.encode(learn((positive, labels)))
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("power", [3, 13, 27, 40])
+def test_a_column_moved_by_an_offset_gives_the_moved_tree(
+    power: int, mode: Mode
+) -> None:
+    assert_an_offset_moves_the_tree(blobs(400, step=2.0**-10), power, mode)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("power", range(1, 42))  # SD / mean from 1 to 5e-13
+def test_all_offsets_move_the_tree(power: int, mode: Mode) -> None:
+    assert_an_offset_moves_the_tree(blobs(600, step=2.0**-10, seed=5), power, mode)
+
+
+def assert_an_offset_moves_the_tree(table: Table, power: int, mode: Mode) -> None:
+    """Learn a table at an offset; only what is stored there is rounded there."""
+    values, labels = table
+    offset = 2.0**power
+    settings = Settings(mode=mode)
+    base = learn((values, labels), settings).tree
+    moved = values + offset
+    assert (moved - offset == values).all()
+    found = learn((moved, labels), settings).tree
+    expected = in_units(base, {c: Unit(0, offset) for c in base.columns})
+    pairs = zip(
+        numbers(msgspec.to_builtins(found)),
+        numbers(msgspec.to_builtins(expected)),
+        strict=True,
+    )
+    assert all(abs(a - b) <= math.ulp(b) for a, b in pairs)
+    # The decisions are the same ones, bit for bit.
+    assert [n.cuts for n in found.nodes] == [n.cuts for n in expected.nodes]
+    assert [n.owners for n in found.nodes] == [n.owners for n in expected.nodes]
+    assert found.inputs == expected.inputs
+    parts = [[v.parts for v in t.variables if v.parts] for t in (found, expected)]
+    assert parts[0] == parts[1]
+    assert labels_of(found, moved[:200]) == labels_of(base, values[:200])
+
+
+def test_a_column_at_1e12_with_a_spread_of_1_is_as_good_as_one_at_0() -> None:
+    values, labels = blobs(600)
+    far = values + 1e12
+    near = far - 1e12  # exact: what is left of the digits
+    assert (near + 1e12 == far).all()
+    found, base = learn((far, labels)).tree, learn((near, labels)).tree
+    assert labels_of(found, far) == labels_of(base, near)
+    assert [len(n.cuts) for n in found.nodes] == [len(n.cuts) for n in base.nodes]
+
+
+def test_columns_twenty_decades_apart_are_combined_as_if_they_were_alike() -> None:
+    values, labels = blobs(600)
+    base = learn((values, labels)).tree
+    exponents = [-66, 66, 0, 33]
+    found = learn((np.ldexp(values, exponents), labels)).tree
+    units = {c: Unit(k) for c, k in zip(base.columns, exponents, strict=True)}
+    assert any(v.parts for v in base.variables)
+    assert found == in_units(base, units)
+
+
+def test_a_table_taken_twice_counts_twice_and_keeps_means_and_ends() -> None:
+    values, labels = public("iris")
+    settings = Settings(mode="paper")
+    base = learn((values, labels), settings).tree
+    twice = learn((np.tile(values, (2, 1)), np.tile(labels, 2)), settings).tree
+    assert [leaf.support for leaf in twice.leaves] == [
+        2 * (leaf.support or 0) for leaf in base.leaves
+    ]
+    for mine, other in zip(base.sets, twice.sets, strict=True):
+        for a, b in zip(mine.terms, other.terms, strict=True):
+            plain_a, plain_b = map(msgspec.to_builtins, (a.shape, b.shape))
+            assert plain_a["mean"] == plain_b["mean"]
+            # n - 1 of n = 50 becomes 2n - 1: the variance is 98 / 99 of what it was.
+            ratio = plain_b["left"]["spread"] / plain_a["left"]["spread"]
+            assert ratio == pytest.approx(math.sqrt(98 / 99), rel=1e-15)
