@@ -111,5 +111,5 @@ def _rows(data: str, model: Model) -> FloatArray:
 def _next(model: str, output: str, is_same: bool) -> str:
     import shlex
 
-    check = shlex.join(["fuzzytree", "check", output])
+    check = shlex.join(["fuzzytree", "check", model, output])
     return f"next: {check}" if is_same else f"not for all rows the answers of {model}"
