@@ -11,12 +11,22 @@ twice the bound of a strength, both number types decide alike.
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from fuzzytree.contracts import Dtype
-from fuzzytree.rulebase import LR, Band, Flank, RuleBase, Shape, Side, Variable
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Variable,
+)
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -131,6 +141,8 @@ def degree_bound(shape: Shape, dtype: Dtype) -> DegreeBound:
                 bounds.append(DegreeBound(1.0, 0.0))
         case LR(mean=mean, left=below, right=above):
             bounds = [_side_bound(side, mean, dtype) for side in (below, above)]
+        case Points():
+            bounds = [_points_bound(shape, dtype)]
     return DegreeBound(
         min(max((bound.fixed for bound in bounds), default=0.0), 1.0),
         max((bound.per_unit for bound in bounds), default=0.0),
@@ -160,3 +172,28 @@ def _side_bound(side: Side, mean: float, dtype: Dtype) -> DegreeBound:
     reach = abs(mean) + side.reach * side.spread
     position = 5 * UNIT * side.reach + 4 * UNIT * reach / side.spread
     return DegreeBound(slope * position + rounding, slope / side.spread)
+
+
+def _points_bound(points: Points, dtype: Dtype) -> DegreeBound:
+    """Return the bound of lines between points.
+
+    Rounded degrees move a line by one unit at most, and its sum costs another; the
+    quotient, the difference and the product cost one each, of the line's height.
+    Rounded values of points and of x move a place by four units of the largest: along a
+    line, or, at worst, across every step.
+    """
+    lines = [
+        (b - a, abs(r - p))
+        for (a, p), (b, r) in itertools.pairwise(
+            zip(points.values, points.degrees, strict=True)
+        )
+    ]
+    height = max((height for width, height in lines if width > 0), default=0.0)
+    if dtype == "mixed":
+        return DegreeBound(UNIT * (2.0 + 3.0 * height), 0.0)
+    slope = max((height / width for width, height in lines if width > 0), default=0.0)
+    jumps = sum(height for width, height in lines if width == 0)
+    moved = 4.0 * UNIT * max(map(abs, points.values))
+    rounding = UNIT * (2.0 + 6.0 * height)
+    slope = min(slope, 1e300)  # times 0 it is 0
+    return DegreeBound(slope * moved + jumps + rounding, slope)
