@@ -2,12 +2,16 @@
 
 *all columns* looks at every column of the table that it was learnt from, as a model
 does that declares them all; *as it is* is the model; *pruned* is what is left of it.
+
+`python -m fuzzytree.savings` rewrites the JSON Schema of a report.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
+from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -26,6 +30,7 @@ from fuzzytree.pruning import Pruned, Removed, Use
 from fuzzytree.rulebase import Variable
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.schemas.generation import of_result
 from fuzzytree.tables import batches
 from fuzzytree.timing.clock import measure
 from fuzzytree.timing.records import Timing
@@ -35,6 +40,8 @@ if TYPE_CHECKING:
     from fuzzytree.timing.clock import Call, Tell
 
 ALL_COLUMNS, AS_IT_IS, PRUNED = "all columns", "as it is", "pruned"
+
+SCHEMA = "needs.schema.json"
 
 BATCH = 10_000
 """Rows of the larger of the two timed calls."""
@@ -162,6 +169,11 @@ def report(
         prove(model, found, uses=uses, data=data),
         (*omissions, *untimed),
     )
+
+
+def schema() -> bytes:
+    """Return the JSON Schema of what `Report.to_json` writes."""
+    return of_result(Report, ok={"type": "boolean"})
 
 
 def stages(model: Model, left: Model) -> dict[str, Model]:
@@ -338,3 +350,7 @@ def _plain_rows(model: Model, count: int) -> FloatArray:
 
 def _is_plain(value: float) -> bool:
     return value == 0.0 or 1.0 / _LARGEST_VALUE < math.fabs(value) < _LARGEST_VALUE
+
+
+if __name__ == "__main__":
+    (Path(str(files("fuzzytree.schemas"))) / SCHEMA).write_bytes(schema())

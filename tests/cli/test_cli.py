@@ -65,8 +65,7 @@ def test_an_unknown_verb_is_a_sentence_with_a_guess(call: Call) -> None:
     assert call("chekc") == (
         2,
         "",
-        "no verb 'chekc'; there is learn, show, export, run, check, formats, doctor "
-        "(did you mean 'check'?)\n"
+        f"no verb 'chekc'; there is {', '.join(VERBS)} (did you mean 'check'?)\n"
         "  fuzzytree --help tells more\n",
     )
 
