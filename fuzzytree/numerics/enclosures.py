@@ -16,7 +16,7 @@ the exact one, 0 included.
   coefficients. All of this is a multiple of q but what comes from x: near the end of a
   flank the interval is as narrow as the degree is small.
 - **Side.** u as q above; t and v = 2 t - 1 pass on 4 U and 9 U. `t Q(v)` costs
-  t ((2 n + 6) sum |c_k| + 9 sum k |c_k|) U, and 1 minus it one rounding more. The tail's
+  t ((2 n + 6) sum |c_k| + 9 sum k |c_k|) U, and 1 minus it one more. The tail's
   base w is off by 4 U w and by what u is off by over `reach - 1`; its ends are raised
   to the fourth power, in three roundings. It is exactly 1 where u is below 1 for sure.
 - **Points.** The quotient and the product make 4 U |p - r|, the sum one rounding more;
