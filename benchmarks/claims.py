@@ -28,7 +28,7 @@ from fuzzytree.timing.machine import after, machine
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("matplotlib", "onnx", "onnxruntime", "scikit-fuzzy", "scikit-learn")
-SEEDS = 10
+SEEDS = 5
 QUICK_SIZES = (7, 50, 300)
 SHARE = 0.4  # of the time for the data sets
 

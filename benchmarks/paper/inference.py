@@ -42,7 +42,10 @@ def mcnemar(first: int, second: int) -> float:
         0.21875
     """
     total, few = first + second, min(first, second)
-    tail = sum(math.comb(total, count) for count in range(few + 1))
+    tail = ways = 1  # to choose at most so many rows, and to choose exactly so many
+    for count in range(few):
+        ways = ways * (total - count) // (count + 1)
+        tail += ways
     # Whole numbers are divided exactly, however many rows there are.
     return min(1.0, 2 * tail / (1 << total))
 

@@ -73,6 +73,12 @@ class Line(NamedTuple):
         """Whether the ratio is within `ABOUT` of n, at every size."""
         return all(1.0 / ABOUT <= share <= ABOUT for share in self.shares)
 
+    @property
+    def is_near_tree(self) -> bool:
+        """Whether no price is surely more than `NEARLY` times the tree's."""
+        times = [price.to_tree for price in self.prices if price.to_tree]
+        return all(one.low <= NEARLY for one in times)
+
 
 def lines(claims: Claims) -> Iterator[Line]:
     """Yield all lines, in the order of the records."""

@@ -6,12 +6,12 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 
 from fuzzytree.rulebase import Kind
+from fuzzytree.timing.machine import noise
 from paper.inference import wilson
 from paper.judging import (
     ABOUT,
     LARGE,
     LEVEL,
-    NEARLY,
     PRIMARY,
     Line,
     Verdict,
@@ -59,6 +59,8 @@ def _opening(claims: Claims) -> Iterator[str]:
         "`python benchmarks/claims.py` measures and writes this page, its pictures and "
         "[all the numbers](claims.json); what is concluded here is computed from them."
     )
+    for warning in noise(claims.machine, ()):
+        yield _text(f"**Beware:** {warning}.")
     if claims.is_quick:
         yield "**This is a trial run, with few sizes and rounds.**"
 
@@ -104,14 +106,19 @@ def _timed_in_short(found: Sequence[Line]) -> str:
         head = f"Timed, it is right in {_listed(right)} alone."
     else:
         head = "Timed, no runtime keeps to it."
-    told = [
-        f"{where} {_range(share for line in members for share in line.shares)} n"
-        for where, members in groups.items()
-    ]
+    told = []
+    for is_batch, rows in ((False, "One row at a time"), (True, "In batches")):
+        ranges = [
+            f"{_range(share for line in members for share in line.shares)} n in "
+            f"{_name(members[0])}"
+            for members in groups.values()
+            if members[0].is_batch == is_batch
+        ]
+        if ranges:
+            told.append(f"{rows} it takes {_listed(ranges)}.")
     return (
-        f"**{head}** Firing raw rules takes so many times the tree's time: "
-        f"{'; '.join(told)}. Right is what stays within a factor of {ABOUT:g} of n at "
-        "every n."
+        f"**{head}** Firing raw rules should take n times the tree's time, within a "
+        f"factor of {ABOUT:g} at every n. {' '.join(told)}"
     )
 
 
@@ -167,10 +174,9 @@ def _search_in_short(found: Sequence[Line]) -> Iterator[str]:
     last = raw.prices[-1]
     assert last.to_firing  # a search has it
     told = [
-        f"For {line.kind} rules its price {'is' if is_near else 'is not'} nearly the "
-        f"tree's: {_range(line.ratios)} times it in batches"
+        f"For {line.kind} rules its price {'is' if line.is_near_tree else 'is not'} "
+        f"nearly the tree's: {_range(line.ratios)} times it in batches"
         for line in (relative, raw)
-        for is_near in [max(line.ratios) <= NEARLY]
     ]
     yield (
         "**Best-first gives the answers of all rules while firing few.** "
@@ -204,7 +210,7 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
         f"**How the ratio grows.** The exponent b of a law n^b, fitted from {LARGE} "
         "rules on, with its 95 % interval, for both families of trees; the ratio "
         "divided by n, smallest to largest over all sizes of both; and up to how many "
-        f"rules of {PRIMARY} trees the fixed cost of a call is more than half of the time."
+        f"rules of {PRIMARY} trees a call's fixed cost is more than half of its time."
     )
     yield _laws(found)
     yield _growth_text(found)
@@ -444,7 +450,7 @@ def _search(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
         "The paper trades reliability for speed: all rules, or one path. Best-first "
         "need not: a rule is never stronger than its beginning, so what cannot win is "
         "not fired, and the answer is the rule base's own, tie and all. Below, its "
-        "time over the tree's, and how many times faster it is than firing in "
+        "time over the tree's, and how many times as fast it is as firing in "
         "`native`."
     )
     yield _search_table(chosen)
@@ -489,11 +495,26 @@ def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
             f"{_range(line.ratios)} times the tree's time{grows}."
         )
     checked = sum(size.checked for size in claims.sizes)
+    told.append(_trade(claims))
     told.append(
         f"On all {checked:,} rows that were compared, best-first gave the answers of "
         "firing, and relative rules those of the tree."
     )
     return "\n".join(_bullet(sentence) for sentence in told)
+
+
+def _trade(claims: Claims) -> str:
+    """Return what is left of the trade of reliability for speed."""
+    winners = {verdict.winner for verdict in verdicts(claims.comparisons)}
+    if "raw rules" in winners:
+        return (
+            "Where raw rules are right more often, this is the price of their answers."
+        )
+    return (
+        "On no table above are raw rules surely right more often than the tree, so "
+        "there is no reliability to buy; what the search buys is the strengths' own "
+        "answer, where raw rules are wanted for another reason."
+    )
 
 
 def _method(claims: Claims) -> Iterator[str]:

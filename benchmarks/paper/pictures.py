@@ -26,7 +26,7 @@ COLOURS = {
     "scikit-fuzzy": "#009E73",
 }
 TREE, RAW, WRONG, NONE = "#0072B2", "#E69F00", "#8c959f", "#d0d7de"
-GAP = 0.13  # between labels at the end of lines, in decades
+GAP = 0.24  # between labels at the end of lines, in decades
 PANELS = tuple((kind, is_batch) for kind in ("raw", "relative") for is_batch in (0, 1))
 
 
@@ -77,7 +77,7 @@ def _growth(axis: Axes, chosen: Sequence[Line]) -> None:
     sizes = sorted({size for line in chosen for size in line.sizes}) or [1]
     ends = [sizes[0], sizes[-1]]
     axis.plot(ends, ends, color=INK, linewidth=1.0, linestyle=":")
-    axis.axhline(1.0, color=FAINT, linewidth=1.0)
+    axis.plot(ends, [1.0, 1.0], color=FAINT, linewidth=1.0)
     axis.annotate(
         "the tree",
         (sizes[0], 1.0),
@@ -113,6 +113,8 @@ def _growth(axis: Axes, chosen: Sequence[Line]) -> None:
     for (_, name, colour), height in zip(labels, heights, strict=True):
         _label(axis, (sizes[-1], height), name, colour)
     axis.set_xlim(sizes[0] / 1.3, sizes[-1] * 12)
+    ratios = [ratio for line in chosen for ratio in line.ratios]
+    axis.set_ylim(0.25, 3.0 * max([*ratios, sizes[-1]]))
 
 
 def _bars(axis: Axes, line: Line, colour: str) -> None:
