@@ -21,8 +21,11 @@ import numpy as np
 from fuzzytree.learning.arrays import BoolArray, FloatArray, IntArray
 from fuzzytree.learning.sums import Totals, whole
 
-_SLACK = 16.0
-"""How many units of the last place the steps may be wrong by; they are by fewer."""
+_SLACK = 16 * 2.0**-52
+"""What a step may be wrong by, relative to what it is made of; it is by less."""
+
+_SMALLEST = 2.0**-900
+"""A spread below this, in units of the largest value, has lost digits."""
 
 
 def window_counts(
@@ -64,20 +67,26 @@ def window_counts(
 def _steps(
     values: FloatArray, groups: IntArray, totals: Totals, n: int
 ) -> tuple[IntArray, BoolArray]:
-    """Return the floor of each value's step, and whether the step is whole."""
-    means, spreads = totals.means(), totals.spreads()
-    mean, spread = means[groups], spreads[groups]
-    is_equal = ~(spread > 0)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        steps = np.where(is_equal, 0.0, (values - mean) / spread * n)
-        doubt = np.finfo(np.float64).eps * _SLACK * n * (np.abs(mean) / spread)
-    doubt = doubt + np.finfo(np.float64).eps * _SLACK * np.abs(steps)
-    near = np.rint(np.clip(steps, -n - 3, n + 3))
-    floors: IntArray = np.floor(np.clip(steps, -n - 3, n + 3)).astype(np.int64)
-    is_whole = is_equal.copy()
-    asked = np.flatnonzero(~is_equal & ~(np.abs(steps - near) > doubt))
+    """Return the floor of each value's step, and whether the step is whole.
+
+    A step is off by a few units of the last place of M / SD (mean and difference are
+    rounded) and of its own; where a whole number is that near, integers decide.
+    """
+    exponent = math.frexp(float(np.abs(values).max(initial=0.0)))[1]
+    mean = totals.means(exponent=exponent)[groups]
+    spread = totals.spreads(exponent)[groups]
+    is_equal = np.array([totals.variance(g) == 0 for g in range(len(totals.counts))])
+    is_clear = ~is_equal[groups] & (spread >= _SMALLEST)
+    safe = np.where(is_clear, spread, 1.0)
+    moved = np.where(is_clear, np.ldexp(values, -exponent) - mean, 0.0)
+    with np.errstate(over="ignore"):
+        steps = np.clip(moved / safe * n, -n - 3.5, n + 3.5)
+        doubt = _SLACK * (np.abs(mean) / safe * n + np.abs(steps))
+    floors: IntArray = np.floor(steps).astype(np.int64)
+    is_whole = is_equal[groups]
+    is_clear &= np.abs(steps - np.rint(steps)) > doubt
     known: dict[tuple[int, float], tuple[int, bool]] = {}
-    for row in asked.tolist():
+    for row in np.flatnonzero(~is_clear & ~is_whole).tolist():
         key = int(groups[row]), float(values[row])
         if key not in known:
             known[key] = _exact_step(key[1], key[0], totals, n)

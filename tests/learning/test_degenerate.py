@@ -1,0 +1,216 @@
+"""Tables at the edge of what can be learnt from: what is promised of each.
+
+Warnings are errors in all tests, so each of these is learnt without one.
+"""
+
+from __future__ import annotations
+
+import itertools
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from fuzzytree.errors import LearningError
+from fuzzytree.learning import Learnt, Settings, learn_arrays
+from fuzzytree.learning.arrays import FloatArray, IntArray
+from fuzzytree.learning.combination import fisher_direction, node_view
+from fuzzytree.learning.patterns import Patterns, make_patterns
+from fuzzytree.learning.statistics import Statistics
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import degree, descend, evaluate
+from fuzzytree.tree import FuzzyTree
+
+Mode = Literal["default", "paper"]
+MODES: tuple[Mode, ...] = ("default", "paper")
+PLACES = [0.0, 1.0, -0.3, 1e12, 1e-300, -1e300, 3e-310]
+
+
+def learn(values: FloatArray, labels: list[int], mode: Mode) -> Learnt:
+    return learn_arrays(
+        values,
+        np.array(labels, np.int64),
+        columns=[f"x{k}" for k in range(values.shape[1])],
+        classes=[f"c{k}" for k in range(max(labels) + 1)],
+        settings=Settings(mode=mode),
+    )
+
+
+def labels_of(tree: FuzzyTree, values: FloatArray) -> list[str | None]:
+    rows = [dict(zip(tree.columns, row, strict=True)) for row in values.tolist()]
+    found = [descend(tree, row).label for row in rows]
+    relative = rules_from_tree(tree)
+    assert found == [evaluate(relative, row).label for row in rows]
+    return found
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("place", PLACES)
+def test_two_rows_of_two_classes_are_told_apart_and_have_degree_1(
+    place: float, mode: Mode
+) -> None:
+    other = place + max(abs(place), 1e-310)
+    values = np.array([[place], [other]])
+    found = learn(values, [0, 1], mode)
+    assert labels_of(found.tree, values) == ["c0", "c1"]
+    assert found.report.single_rows == found.report.zero_spreads == 2
+    (sets,) = found.tree.sets
+    for term, value in zip(sets.terms, (place, other), strict=True):
+        assert degree(term.shape, value) == 1.0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_neighbouring_floats_are_told_apart(mode: Mode) -> None:
+    for place in (0.1, 1e12, -7e200, 0.0):
+        values = np.array([[place], [np.nextafter(place, np.inf)]])
+        found = learn(values, [0, 1], mode)
+        assert labels_of(found.tree, values) == ["c0", "c1"]
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("place", PLACES)
+def test_equal_rows_of_a_class_keep_degree_1(place: float, mode: Mode) -> None:
+    other = place + max(abs(place), 1e-310)
+    values = np.array([[place]] * 9 + [[other]] * 4)
+    found = learn(values, [0] * 9 + [1] * 4, mode)
+    assert labels_of(found.tree, values) == ["c0"] * 9 + ["c1"] * 4
+    assert found.report.zero_spreads == 2
+    assert found.report.single_rows == 0
+    (sets,) = found.tree.sets
+    for term, value in zip(sets.terms, (place, other), strict=True):
+        assert degree(term.shape, value) == 1.0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_two_valued_columns_are_learnt(mode: Mode) -> None:
+    values = np.array(list(itertools.product([0.0, 1.0], repeat=3)) * 4)
+    labels = [int(row[1]) for row in values]
+    found = learn(values, labels, mode)
+    assert labels_of(found.tree, values) == [f"c{label}" for label in labels]
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("constant", [0.0, 0.1, 1e12, -1e300, 5e-324])
+def test_a_constant_column_is_ignored_and_changes_nothing(
+    constant: float, mode: Mode
+) -> None:
+    rng = np.random.default_rng(0)
+    labels = [0] * 30 + [1] * 30
+    values = rng.normal(size=(60, 2)) + 3.0 * np.array(labels)[:, None]
+    base = learn(values, labels, mode)
+    wider = np.column_stack([values, np.full(60, constant)])
+    found = learn(wider, labels, mode)
+    assert found.report.features_ignored == ("x2",)
+    assert found.tree.nodes == base.tree.nodes
+    assert found.tree.variables == base.tree.variables
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_column_whose_range_overflows_is_ignored_and_one_that_fits_is_not(
+    mode: Mode,
+) -> None:
+    labels = [0] * 5 + [1] * 5
+    ends = np.where(np.array(labels) == 0, -1.0, 1.0) * (1.0 - np.arange(10) / 64)
+    found = learn(np.column_stack([ends * 1.7e308, ends * 8e307]), labels, mode)
+    assert found.report.features_ignored == ("x0",)
+    assert found.tree.inputs == ("x1",)
+    assert found.tree.nodes[0].cuts[0] == pytest.approx(0.0, abs=3e307)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_class_without_rows_is_named_and_never_answers(mode: Mode) -> None:
+    found = learn(np.array([[1.0], [2.0], [8.0], [9.0]]), [0, 0, 2, 2], mode)
+    assert found.report.classes_without_rows == ("c1",)
+    assert found.tree.classes == ("c0", "c1", "c2")
+    assert {leaf.label for leaf in found.tree.leaves} == {"c0", "c2"}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_one_class_is_refused_though_its_rows_differ(mode: Mode) -> None:
+    with pytest.raises(LearningError, match="cannot learn from one class"):
+        learn(np.array([[1.0], [2.0]]), [0, 0], mode)
+
+
+def patterns_of(values: FloatArray, labels: IntArray) -> Patterns:
+    statistics = Statistics(int(labels.max()) + 1, values.shape[1])
+    statistics.update(values, labels)
+    sample = statistics.sample()
+    return make_patterns(statistics.moments(sample.units), sample, {})
+
+
+@pytest.mark.parametrize("noise", [0.0, 2.0**-40, 2.0**-20, 2.0**-10])
+def test_nearly_equal_columns_get_no_weights_out_of_proportion(noise: float) -> None:
+    rng = np.random.default_rng(0)
+    labels = np.repeat([0, 1], 200)
+    first = rng.normal(size=400) + labels
+    second = first + noise * rng.normal(size=400)
+    other = rng.normal(size=400) + labels
+    values = np.column_stack([first, second, other])
+    tree = learn_arrays(
+        values, labels, columns=["a", "b", "c"], classes=["0", "1"]
+    ).tree
+    (combination,) = [v for v in tree.variables if v.parts]
+    # Within a class each column has a spread of 1: no weight needs to exceed 2.
+    assert all(abs(part.weight) < 2.0 for part in combination.parts)
+    right = np.array(labels_of(tree, values)) == labels.astype(str)
+    assert right.mean() > 0.7
+
+
+def test_a_difference_that_tells_all_is_found_beside_what_hides_it() -> None:
+    rng = np.random.default_rng(1)
+    labels = np.repeat([0, 1], 200)
+    first = rng.normal(size=400)
+    for power in (0, 5, 10):
+        small = np.ldexp(labels + 0.1 * rng.normal(size=400), -power)
+        values = np.column_stack([first, first + small])
+        tree = learn_arrays(values, labels, columns=["a", "b"], classes=["0", "1"]).tree
+        right = np.array(labels_of(tree, values)) == labels.astype(str)
+        assert right.mean() > 0.99, power
+
+
+@pytest.mark.parametrize("shrinkage", [1e-3, 1e-8])
+@pytest.mark.parametrize("offset", [0.0, 2.0**40])
+@pytest.mark.parametrize("noise", [0.0, 2.0**-9, 2.0**-3])
+def test_directions_over_nearly_equal_columns_are_those_of_exact_arithmetic(
+    noise: float, offset: float, shrinkage: float
+) -> None:
+    rng = np.random.default_rng(0)
+    labels = np.repeat([0, 1], 40)
+    first = np.round(rng.normal(size=80) * 1024) / 1024 + labels
+    second = first + np.round(rng.normal(size=80)) * noise
+    patterns = patterns_of(np.column_stack([first, second]) + offset, labels)
+    view = node_view(patterns, np.array([0, 1]), shrinkage)
+    found = fisher_direction(view, np.array([False, True]))
+    exact = exact_direction(patterns, Fraction(shrinkage))
+    largest = max(abs(float(weight)) for weight in exact)
+    # Solving loses as many digits as 1 / shrinkage has; 16 - 3 or 16 - 8 are left.
+    allowed = 64 * 2.0**-52 / shrinkage * largest
+    assert np.abs(found - [float(weight) for weight in exact]).max() <= allowed
+
+
+def exact_direction(patterns: Patterns, shrinkage: Fraction) -> list[Fraction]:
+    """Return W^-1 (m1 - m0) of two patterns and columns in rational numbers."""
+    scales = [Fraction(v) for v in patterns.scale.tolist()]
+    groups = [
+        [
+            [Fraction(v) / s for v, s in zip(row, scales, strict=True)]
+            for row in patterns.moved[patterns.members(np.array([k]))].tolist()
+        ]
+        for k in (0, 1)
+    ]
+    means = [[sum(c) / len(c) for c in zip(*g, strict=True)] for g in groups]
+
+    def covariance(i: int, j: int) -> Fraction:
+        products = sum(
+            (row[i] - mean[i]) * (row[j] - mean[j])
+            for group, mean in zip(groups, means, strict=True)
+            for row in group
+        )
+        shrunk = 1 if i == j else 1 - shrinkage
+        return Fraction(products) / (len(groups[0]) + len(groups[1]) - 2) * shrunk
+
+    (a, b), d = (covariance(0, 0), covariance(0, 1)), covariance(1, 1)
+    u, v = means[1][0] - means[0][0], means[1][1] - means[0][1]
+    determinant = a * d - b * b
+    return [(d * u - b * v) / determinant, (a * v - b * u) / determinant]
