@@ -498,7 +498,7 @@ def bench(
     only: Sequence[str] = (),
     skip: Sequence[str] = (),
     error: float | None = None,
-    budget_s: float = 120.0,
+    budget_s: float = 300.0,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Study:

@@ -65,7 +65,7 @@ _PICTURES = (".svg", ".png")
     "--budget",
     metavar="SECONDS",
     type=float,
-    default=120.0,
+    default=300.0,
     show_default=True,
     help="About how long it may take.",
 )
@@ -90,6 +90,9 @@ _PICTURES = (".svg", ".png")
     multiple=True,
     help="Draw the study for most rows, as .svg or .png.",
 )
+@click.option(
+    "--full", "is_full", is_flag=True, help="List variants that are beaten, too."
+)
 @delimiter_option
 @json_option
 @quiet_option
@@ -105,6 +108,7 @@ def command(
     seed: int,
     output: str | None,
     plots: Sequence[str],
+    is_full: bool,
     delimiter: str | None,
     as_json: bool,
     quiet: bool,
@@ -139,7 +143,9 @@ def command(
             seed=seed,
             progress=tell,
         )
-    answer(found.to_json() if as_json else "\n".join(study_lines(found)))
+    answer(
+        found.to_json() if as_json else "\n".join(study_lines(found, is_full=is_full))
+    )
     if output:
         write_atomically(output, found.to_json().encode() + b"\n")
     _draw(found, plots)

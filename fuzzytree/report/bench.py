@@ -22,6 +22,9 @@ _HEAD = (
     *("time a row", "+-", "speed", "floors"),
     *("error", "certified", "flips", "at edges"),
 )
+Timed = dict[str, tuple[Point, Timing]]
+"""What was measured at one number of rows and threads, by name."""
+
 _WIDTH = 96  # of a line of names
 _UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
 _LEGEND = (
@@ -32,14 +35,20 @@ _LEGEND = (
 )
 
 
-def study_lines(found: Study) -> Iterator[str]:
-    """Yield a study: what and where, the tables, what was left out, the advice."""
+def study_lines(found: Study, *, is_full: bool = False) -> Iterator[str]:
+    """Yield a study: what and where, the tables, what was left out, the advice.
+
+    Args:
+        found: The study.
+        is_full: Whether to list variants too that something beats in both run time
+            and error.
+    """
     yield f"{found.model}: error against run time, in {found.seconds:.0f} s"
     yield from aligned([("rows", found.data), *_machine_rows(found.machine)])
     for rows, threads in _sizes(found.points):
         yield ""
         yield f"{rows:,} row{'' if rows == 1 else 's'}, {counted(threads, 'thread')}"
-        table = [*_table(found, rows, threads)]
+        table = [*_table(found, rows, threads, is_full=is_full)]
         width = max(map(len, table))
         yield from aligned([(*row, *[""] * (width - len(row))) for row in table])
     if found.points:
@@ -70,32 +79,49 @@ def _sizes(points: Iterable[Point]) -> list[tuple[int, int]]:
     return sorted(sizes)
 
 
-def _table(found: Study, rows: int, threads: int) -> Iterator[tuple[str, ...]]:
+def _table(
+    found: Study, rows: int, threads: int, *, is_full: bool
+) -> Iterator[tuple[str, ...]]:
     """Yield the cells of one table, question by question, the fastest first."""
     yield ("", *_HEAD)
-    timed = {
+    timed: Timed = {
         point.name: (point, timing)
         for point in found.points
         for timing in point.timings
         if (timing.rows, timing.threads) == (rows, threads)
     }
-    floor = timed[READING][1] if READING in timed else None
+    asked: dict[Question, None] = {}
     for point, timing in timed.values():
         if point.kind == "floor":
-            yield (f"  {point.name}", *_time_cells(timing, None, floor))
-    answers = [one for one in timed.values() if one[0].kind != "floor"]
-    asked: dict[Question, None] = {point.question: None for point, _ in answers}
+            yield (f"  {point.name}", *_time_cells(timing, timed))
+        else:
+            asked[point.question] = None
     for question in asked:
-        mine = [one for one in answers if one[0].question == question]
-        default = timed.get(title(DEFAULT, question))
-        base = default[1] if default else None
         best = _best(found, question, rows, threads)
-        yield (question,)
-        for point, timing in sorted(mine, key=lambda one: one[1].median_ns):
-            mark = "*" if point.name in best else " "
-            short = point.name.removesuffix(f": {question}")
-            cells = _time_cells(timing, base, floor)
-            yield (f"{mark} {short}", *cells, *_error_cells(point))
+        yield from _rows(question, timed, best, is_full=is_full)
+
+
+def _rows(
+    question: Question, timed: Timed, best: Sequence[str], *, is_full: bool
+) -> Iterator[tuple[str, ...]]:
+    """Yield the cells of one question; beaten variants as a count, unless asked for."""
+    yield (question,)
+    beaten = 0
+    for point, timing in sorted(timed.values(), key=lambda one: one[1].median_ns):
+        if point.question != question or point.kind == "floor":
+            continue
+        if point.kind == "variant" and point.name not in best and not is_full:
+            beaten += 1
+            continue
+        mark = "*" if point.name in best else " "
+        short = point.name.removesuffix(f": {question}")
+        yield (
+            f"{mark} {short}",
+            *_time_cells(timing, timed, question),
+            *_errors(point),
+        )
+    if beaten:
+        yield (f"  and {counted(beaten, 'variant')} that something beats",)
 
 
 def _best(found: Study, question: Question, rows: int, threads: int) -> Sequence[str]:
@@ -107,21 +133,24 @@ def _best(found: Study, question: Question, rows: int, threads: int) -> Sequence
 
 
 def _time_cells(
-    timing: Timing, base: Timing | None, floor: Timing | None
+    timing: Timing, timed: Timed, question: Question | None = None
 ) -> tuple[str, ...]:
+    """Return time, spread, and the ratios to the default and to reading the columns."""
     middle = timing.median_ns
     reach = max(timing.high_ns - middle, middle - timing.low_ns) / middle
     sure = "" if timing.confidence >= CONFIDENCE else f" at {timing.confidence:.0%}"
-    ratio = times_faster(base, timing) if base else None
+    base = timed.get(title(DEFAULT, question)) if question else None
+    ratio = times_faster(base[1], timing) if base else None
+    floor = timed.get(READING)
     return (
         duration(middle / timing.rows),
         f"{reach:.0%}{sure}",
         _digits(ratio.median) if ratio else "",
-        _digits(middle / floor.median_ns) if floor else "",
+        _digits(middle / floor[1].median_ns) if floor else "",
     )
 
 
-def _error_cells(point: Point) -> tuple[str, ...]:
+def _errors(point: Point) -> tuple[str, ...]:
     error = point.error
     if error is None:
         return ()

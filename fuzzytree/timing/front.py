@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from fuzzytree.timing.candidates import DEFAULT, title
-from fuzzytree.timing.clock import times_faster
+from fuzzytree.timing.clock import CONFIDENCE, times_faster
 from fuzzytree.timing.records import Front, Point, Question, Timing
 
 _LEVELS = (0.0, *(10.0**power for power in range(-16, 1)))
@@ -159,7 +159,9 @@ def _sentences(
 
 def _is_surely_faster(one: Entry, other: Entry) -> bool:
     ratio = times_faster(other.timing, one.timing)
-    return one.name != other.name and ratio is not None and ratio.low > 1.0
+    if one.name == other.name or ratio is None:
+        return False
+    return ratio.low > 1.0 and ratio.confidence >= CONFIDENCE
 
 
 def _sentence(
@@ -177,16 +179,15 @@ def _sentence(
     ratio = times_faster(other.timing, best.timing)
     if ratio is None:
         return f"{head}; {other.short} shares no round with it"
-    if ratio.low <= 1.0:
-        return (
-            f"{head}; {other.short} is as fast, as far as can be told "
-            f"({_percent(ratio.confidence)} CI of the quotient "
-            f"{ratio.low:.2f} to {ratio.high:.2f})"
-        )
-    return (
-        f"{head}: {_times(ratio.median)} times faster than {other.short} "
-        f"({_percent(ratio.confidence)} CI {_times(ratio.low)} to {_times(ratio.high)})"
-    )
+    ends = f"{_times(ratio.low)} to {_times(ratio.high)}"
+    if ratio.confidence < CONFIDENCE:
+        ends = f"{ends} in too few rounds to be sure"
+    elif ratio.low <= 1.0:
+        ends = f"quotient {ratio.low:.2f} to {ratio.high:.2f}, 95 % CI"
+        return f"{head}; {other.short} is as fast, as far as can be told ({ends})"
+    else:
+        ends = f"95 % CI {ends}"
+    return f"{head}: {_times(ratio.median)} times faster than {other.short} ({ends})"
 
 
 def _what(best: Entry) -> str:
@@ -213,10 +214,6 @@ def _level(best: Entry, level: float) -> str:
         seen += f" (but {edges.flips} of {edges.rows} probes at its cuts)"
     changed = "no class" if level == 0.0 else f"at most {level:.2%} of classes"
     return f"{changed} changed {seen}"
-
-
-def _percent(confidence: float) -> str:
-    return "95 %" if confidence >= 0.95 else f"{confidence:.0%}".replace("%", " %")
 
 
 def _times(ratio: float) -> str:

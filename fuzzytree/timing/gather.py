@@ -10,7 +10,9 @@ from fuzzytree.numerics.bounds import certify
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.timing.candidates import Bound, Bounds, Layouts, own, questions
 from fuzzytree.timing.floors import floors
+from fuzzytree.timing.peers import peers
 from fuzzytree.timing.records import Candidate, Omission
+from fuzzytree.timing.variants import variants
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -26,15 +28,18 @@ def gather(model: Model, values: FloatArray) -> tuple[list[Candidate], list[Omis
     layouts = Layouts()
     main = next(iter(questions(model)))
     found, omitted = floors(main)
-    mine, absent = own(model, _bounds(values), layouts)
-    return [*found, *mine], [*omitted, *absent]
+    bounds = _bounds(values)
+    mine, absent = own(model, bounds, layouts)
+    others, missing = peers(model, bounds)
+    changed, left = variants(model, bounds, layouts)
+    return [*found, *mine, *others, *changed], [*omitted, *absent, *missing, *left]
 
 
 def foreign(model: Model) -> list[Candidate]:
     """Return the candidates that a child process tries; see `trial`."""
     main = next(iter(questions(model)))
     mine = own(model, lambda _rules, _dtype: None, Layouts())[0]
-    return [*floors(main)[0], *mine]
+    return [*floors(main)[0], *mine, *peers(model)[0]]
 
 
 def chosen(
@@ -91,10 +96,10 @@ def _groups(one: Candidate) -> tuple[str, str]:
 
 def _bounds(values: FloatArray) -> Bounds:
     """Return what certifies rule bases on these rows, each but once."""
-    known: dict[tuple[int, Dtype], Bound | None] = {}
+    known: dict[tuple[RuleBase, Dtype], Bound | None] = {}
 
     def bounds(rules: RuleBase, dtype: Dtype) -> Bound | None:
-        key = (id(rules), dtype)
+        key = (rules, dtype)
         if key not in known:
             found = certify(rules, dtype, values)
             known[key] = None if found.delta is None else (found.delta, found.origin)

@@ -70,10 +70,14 @@ class Judge:
         if candidate.kind == "floor":
             return Judged(None, None, self._row_ns(loaded, row_ns))
         most = max(int(_PATIENCE_NS // row_ns), _FEW)
-        edges = self._edges(candidate.question)
+        question = candidate.question
+        rows, edges = _spread(self.values, most), _spread(self._edges(question), most)
+        certified = loaded.bound or candidate.bound
+        bound, origin = certified or (None, "nothing is certified")
+        beyond = "the bound holds on the rows, and these may lie beyond them"
         return Judged(
-            self._error(candidate, loaded, _spread(self.values, most)),
-            self._error(candidate, loaded, _spread(edges, most)),
+            self._error(question, loaded, rows, bound, origin),
+            self._error(question, loaded, edges, None, beyond),
             self._row_ns(loaded, row_ns),
         )
 
@@ -95,11 +99,17 @@ class Judge:
             self.edges[question] = made.reshape(len(model.inputs), len(rows))
         return self.edges[question]
 
-    def _error(self, candidate: Candidate, loaded: Loaded, values: FloatArray) -> Error:
+    def _error(
+        self,
+        question: Question,
+        loaded: Loaded,
+        values: FloatArray,
+        bound: float | None,
+        origin: str,
+    ) -> Error:
         found = loaded.answer(values)
-        bound, origin = candidate.bound or (None, "nothing is certified")
         facts = error_against_exact(
-            self.asked[candidate.question],
+            self.asked[question],
             values,
             found.labels,
             found.strengths,

@@ -37,11 +37,13 @@ class Loaded(msgspec.Struct, frozen=True):
         call: Lays out the same values as the candidate wants them, outside the timed
             part, and returns the call that is timed.
         bytes: The size of the file or code that runs, if there is one.
+        bound: The certified bound, where it is known only once it is loaded.
     """
 
     answer: Callable[[FloatArray], Found]
     call: Callable[[FloatArray], Callable[[], object]]
     bytes: int | None = None
+    bound: tuple[float, str] | None = None
 
 
 class Candidate(msgspec.Struct, frozen=True):

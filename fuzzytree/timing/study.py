@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 ROWS = (1, 1_000, 1_000_000)
 THREADS = (1, 2)
-BUDGET_S = 120.0
+BUDGET_S = 300.0
 
 _MADE = 100_000  # rows that are made where there is no table; more are these again
 _TRIED = 16  # rows that a child process answers
@@ -328,15 +328,15 @@ class _Run:
         return size > _MOST_BYTES
 
     def _fitting(self, names: Sequence[str], rows: int, seconds: float) -> list[str]:
-        """Leave out whom one call and one sample would cost more than an even share."""
+        """Leave out who cannot have six samples in an even share of the time."""
         costs = {name: self.drafts[name].row_ns * rows for name in names}
         kept = fitting(costs, seconds * 1e9, self.plan.rounds)
         for name in names:
             if name not in kept:
                 self.omit(
                     name,
-                    f"{rows:,} rows: a call takes about {costs[name] / 1e9:.2g} s, "
-                    "more than its share of the time; a larger budget helps",
+                    f"{rows:,} rows: {min(_SURE, self.plan.rounds)} calls take more "
+                    "than its share of the time; a larger budget helps",
                 )
         return [name for name in names if name in kept]
 
@@ -400,7 +400,7 @@ class _Run:
 
 
 def fitting(costs: Mapping[str, float], left: float, rounds: int) -> set[str]:
-    """Return whose warm-up and first sample fit an even share of the time.
+    """Return whose warm-up and first six samples fit an even share of the time.
 
     Args:
         costs: What one call of each is likely to cost.
@@ -408,14 +408,15 @@ def fitting(costs: Mapping[str, float], left: float, rounds: int) -> set[str]:
         rounds: How often each is called beside the warm-up, if there is time.
 
     Example:
-        >>> sorted(fitting({"fast": 1.0, "slow": 40.0, "slower": 50.0}, 100.0, 5))
+        >>> sorted(fitting({"fast": 1.0, "slow": 8.0, "slower": 20.0}, 150.0, 9))
         ['fast', 'slow']
     """
     kept: set[str] = set()
+    least = 1 + min(rounds, _SURE)
     todo = sorted(costs, key=costs.__getitem__)
     for position, name in enumerate(todo):
         even = left / (len(todo) - position)
-        if 2 * costs[name] <= even:
+        if least * costs[name] <= even:
             kept.add(name)
             left -= min((rounds + 1) * costs[name], even)
     return kept
@@ -448,14 +449,14 @@ def faults(points: Sequence[Point]) -> Iterator[str]:
         points: Of a study.
     """
     for point in points:
-        for where, error in (("rows", point.error), ("probes", point.probes)):
-            if error is None or error.bound is None or error.largest is None:
-                continue
-            if error.largest > error.bound:
-                yield (
-                    f"{point.name}: an error of {error.largest:.2g} on the {where} is "
-                    f"larger than the certified {error.bound:.2g}; this is a fault"
-                )
+        error = point.error
+        if error is None or error.bound is None or error.largest is None:
+            continue
+        if error.largest > error.bound:
+            yield (
+                f"{point.name}: an error of {error.largest:.2g} is larger than the "
+                f"certified {error.bound:.2g}; this is a fault"
+            )
 
 
 def _unsure(points: Sequence[Point]) -> Iterator[str]:

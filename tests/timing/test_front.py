@@ -103,7 +103,7 @@ def test_equal_times_are_called_equal() -> None:
     (sentence,) = advice([NATIVE, other])
     assert sentence == (
         "rules, 1,000 rows: for an error of at most 1e-15, use native; other is as "
-        "fast, as far as can be told (95 % CI of the quotient 1.00 to 1.00)"
+        "fast, as far as can be told (quotient 1.00 to 1.00, 95 % CI)"
     )
 
 
