@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,8 +64,8 @@ def scaling(
             cases += count
             faults += [fault] if fault else []
     facts = [
-        f"{u.carrier} in {u.dtype}: from 2**{u.lowest} to 2**{u.highest}"
-        for u in usable.values()
+        f"{name}: nothing is lost from 2**{low} to 2**{high}"
+        for name, low, high in _together(tuple(usable.values()))
     ]
     criterion = judged(
         "N1", cases, faults, facts=facts, advice=_ADVICE, skipped=skipped
@@ -98,6 +98,15 @@ def decades(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Cr
         cases += count
         faults += [fault] if fault else []
     return judged("N2b", cases, faults, advice=_ADVICE, skipped=skipped)
+
+
+def _together(usable: Sequence[Usable]) -> Iterator[tuple[str, int, int]]:
+    """Yield the range that all forms share, for double axes and for float32."""
+    for name, kinds in (("double", ("float64", "mixed")), ("float32", ("float32",))):
+        found = [one for one in usable if one.dtype in kinds]
+        if found:
+            lowest, highest = (one.lowest for one in found), (u.highest for u in found)
+            yield name, max(lowest), min(highest)
 
 
 def _apart(inputs: Sequence[str], low: int, high: int, seed: int) -> dict[str, int]:

@@ -122,7 +122,9 @@ def examine(
         rows.shape[1],
         tuple(runtime.name for runtime in runtimes if is_installed(runtime)),
         tuple(found),
-        stiffness(model, values),
+        stiffness(
+            model, rows if rows.shape[1] else probes, is_data=bool(rows.shape[1])
+        ),
         faults,
         usable,
         costs,

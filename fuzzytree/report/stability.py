@@ -16,6 +16,11 @@ from fuzzytree.report.text import aligned, counted, number
 _CURVES_TOLD = 10
 _SKIPPED_TOLD = 3
 
+_CRITERION = ("code", "criterion", "cases", "worst", "verdict")
+_STIFF = ("input", "spread/size", "float32 costs", "observed", "flips", "advice")
+_OFFSET = ("form", "spread/size", "float32", "mixed", "double", "flips in float32")
+_CURVE = ("curve", "form", "size", "leaves [0, 1]", "rises", "advice")
+
 
 def stability_lines(found: Stability, *, is_full: bool = False) -> Iterator[str]:
     """Yield a study: criteria, stiff inputs, offsets, curves, and what to do.
@@ -28,22 +33,19 @@ def stability_lines(found: Stability, *, is_full: bool = False) -> Iterator[str]
     yield f"{found.model}: {counted(found.probes, 'probe')}{rows}"
     yield f"run by   {', '.join(found.runtimes) or 'nothing'}"
     yield ""
-    heads = ("code", "criterion", "cases", "worst", "verdict")
-    yield from aligned([heads, *map(_criterion_row, found.criteria)])
+    yield from aligned([_CRITERION, *map(_criterion_row, found.criteria)])
     for one in found.criteria:
         yield from _detail(one, is_full=is_full)
     if found.stiff:
         yield ""
-        heads = ("input", "spread/size", "float32 costs", "observed", "flips", "advice")
-        yield from aligned([heads, *map(_stiff_row, found.stiff)])
+        yield from aligned([_STIFF, *map(_stiff_row, found.stiff)])
     if found.offsets:
         yield ""
         yield from _offset_lines(found.offsets)
     if found.curves:
         yield ""
         shown = found.curves if is_full else found.curves[:_CURVES_TOLD]
-        heads = ("curve", "form", "size", "leaves [0, 1]", "rises", "advice")
-        yield from aligned([heads, *map(_curve_row, shown)])
+        yield from aligned([_CURVE, *map(_curve_row, shown)])
         if len(shown) < len(found.curves):
             yield f"and {len(found.curves) - len(shown)} more; --rows tells all"
     todo = tuple(advice(found))
@@ -91,7 +93,6 @@ def _stiff_row(one: Stiff) -> tuple[str, ...]:
 
 
 def _offset_lines(costs: tuple[OffsetCost, ...]) -> Iterator[str]:
-    heads = ("rules", "spread/size", "float32", "mixed", "double", "flips in float32")
     rows = [
         (
             one.carrier,
@@ -104,7 +105,7 @@ def _offset_lines(costs: tuple[OffsetCost, ...]) -> Iterator[str]:
         )
         for one in costs
     ]
-    yield from aligned([heads, *rows])
+    yield from aligned([_OFFSET, *rows])
 
 
 def _curve_row(one: CurveFault) -> tuple[str, ...]:
