@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.contracts import Model
-from fuzzytree.numerics.oracle import error_against_exact
+from fuzzytree.numerics.oracle import Decided, decide, error_against_exact
 from fuzzytree.probing import probes
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.timing.clock import Clock
@@ -43,6 +43,14 @@ class Judged(msgspec.Struct, frozen=True):
     row_ns: float
 
 
+class _Sample(msgspec.Struct, frozen=True):
+    """Rows to judge on, and the exact answers to them."""
+
+    model: Model
+    values: FloatArray
+    exact: Decided
+
+
 class Judge:
     """Holds answers against the exact ones; it makes the rows for that once."""
 
@@ -52,7 +60,7 @@ class Judge:
         self.asked, self.clock = asked, clock
         most = min(map(_most_rows, asked.values()))
         self.values = np.ascontiguousarray(values[:, :most])
-        self.edges: dict[Question, FloatArray] = {}
+        self.samples: dict[Question, tuple[_Sample, _Sample]] = {}
 
     def judged(self, candidate: Candidate, loaded: Loaded) -> Judged:
         """Return how far a candidate is from exact, and about what a row costs it.
@@ -70,14 +78,13 @@ class Judge:
         if candidate.kind == "floor":
             return Judged(None, None, self._row_ns(loaded, row_ns))
         most = max(int(_PATIENCE_NS // row_ns), _FEW)
-        question = candidate.question
-        rows, edges = _spread(self.values, most), _spread(self._edges(question), most)
+        rows, edges = self._samples(candidate.question)
         certified = loaded.bound or candidate.bound
         bound, origin = certified or (None, "nothing is certified")
         beyond = "the bound holds on the rows, and these may lie beyond them"
         return Judged(
-            self._error(question, loaded, rows, bound, origin),
-            self._error(question, loaded, edges, None, beyond),
+            _error(loaded, _part(rows, most), bound, origin),
+            _error(loaded, _part(edges, most), None, beyond),
             self._row_ns(loaded, row_ns),
         )
 
@@ -90,41 +97,47 @@ class Judge:
         call()
         return min(row_ns, max(self.clock.wall() - start, 1) / values.shape[1])
 
-    def _edges(self, question: Question) -> FloatArray:
-        if question not in self.edges:
+    def _samples(self, question: Question) -> tuple[_Sample, _Sample]:
+        """Return the rows of the study, and rows aimed at the model's edges."""
+        if question not in self.samples:
             model = self.asked[question]
-            rows = probes(model, limit=min(MOST_PROBES, _most_rows(model)))
-            lines = [[row[name] for row in rows] for name in model.inputs]
-            made = np.array(lines, np.float64)
-            self.edges[question] = made.reshape(len(model.inputs), len(rows))
-        return self.edges[question]
+            edges = _edges(model)
+            self.samples[question] = (
+                _Sample(model, self.values, decide(model, self.values)),
+                _Sample(model, edges, decide(model, edges)),
+            )
+        return self.samples[question]
 
-    def _error(
-        self,
-        question: Question,
-        loaded: Loaded,
-        values: FloatArray,
-        bound: float | None,
-        origin: str,
-    ) -> Error:
-        found = loaded.answer(values)
-        facts = error_against_exact(
-            self.asked[question],
-            values,
-            found.labels,
-            found.strengths,
-            bound=bound,
-            origin=origin,
-        )
-        return Error(**facts._asdict())
+
+def _edges(model: Model) -> FloatArray:
+    rows = probes(model, limit=min(MOST_PROBES, _most_rows(model)))
+    lines = [[row[name] for row in rows] for name in model.inputs]
+    return np.array(lines, np.float64).reshape(len(model.inputs), len(rows))
+
+
+def _error(loaded: Loaded, sample: _Sample, bound: float | None, origin: str) -> Error:
+    found = loaded.answer(sample.values)
+    facts = error_against_exact(
+        sample.model,
+        sample.values,
+        found.labels,
+        found.strengths,
+        bound=bound,
+        origin=origin,
+        exact=sample.exact,
+    )
+    return Error(**facts._asdict())
+
+
+def _part(sample: _Sample, most: int) -> _Sample:
+    """Return at most so many rows, in even steps."""
+    step = -(-sample.values.shape[1] // most)
+    if step <= 1:
+        return sample
+    values = np.ascontiguousarray(sample.values[:, ::step])
+    return _Sample(sample.model, values, decide(sample.model, values))
 
 
 def _most_rows(model: Model) -> int:
     rules = len(model.rules) if isinstance(model, RuleBase) else 1
     return max(min(MOST_ROWS, _MOST_STRENGTHS // rules), _FEW)
-
-
-def _spread(values: FloatArray, most: int) -> FloatArray:
-    """Return at most so many rows, in even steps."""
-    step = -(-values.shape[1] // most)
-    return np.ascontiguousarray(values[:, ::step])
