@@ -142,9 +142,9 @@ def exact_degree(shape: Shape, value: Fraction) -> Fraction:
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             if low is not None and value <= low:
-                return _ZERO if left is None else _flank_degree(left, value)
+                return _ZERO if left is None else exact_flank(left, value)
             if high is not None and value > high:
-                return _ZERO if right is None else _flank_degree(right, value)
+                return _ZERO if right is None else exact_flank(right, value)
             return _ONE
         case LR(mean=mean, left=left, right=right):
             distance = value - Fraction(mean)
@@ -154,7 +154,8 @@ def exact_degree(shape: Shape, value: Fraction) -> Fraction:
     assert_never(shape)
 
 
-def _flank_degree(flank: Flank, value: Fraction) -> Fraction:
+def exact_flank(flank: Flank, value: Fraction) -> Fraction:
+    """Return the degree that a flank gives a value, on the plateau's side as well."""
     end = Fraction(flank.end)
     position = _clipped((value - end) / (Fraction(flank.start) - end), _ONE)
     return _clipped(position * _polynomial(flank.curve, position), CAP)
@@ -252,3 +253,19 @@ def _descended(tree: FuzzyTree, row: Mapping[str, float]) -> Exact:
         node, leaf = branch.node, branch.leaf
     number = leaf or 0
     return Exact(number, tree.leaves[number - 1].label, DECIDED, (), _ONE)
+
+
+def outwards(number: Fraction) -> tuple[float, float]:
+    """Return the doubles between which a number lies; itself twice if it is one.
+
+    Example:
+        >>> outwards(Fraction(1, 4))
+        (0.25, 0.25)
+        >>> low, high = outwards(Fraction(1, 3))
+        >>> low < Fraction(1, 3) < high
+        True
+    """
+    near = float(number)
+    low = near if near <= number else math.nextafter(near, -math.inf)
+    high = near if near >= number else math.nextafter(near, math.inf)
+    return low, high

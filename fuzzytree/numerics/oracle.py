@@ -44,6 +44,7 @@ from fuzzytree.numerics.exact import (
     exact_answer,
     exact_axis,
     exact_degree,
+    outwards,
 )
 from fuzzytree.rulebase import Clause, RuleBase
 from fuzzytree.tree import FuzzyTree
@@ -119,7 +120,7 @@ def decide(model: Model, values: FloatArray, *, with_strengths: bool = True) -> 
         >>> from fuzzytree.testing import random_tree
         >>> found = decide(rules_from_tree(random_tree(0)), np.zeros((4, 2)))
         >>> found.rule.tolist(), found.by_fractions
-        ([2, 2], 0)
+        ([1, 1], 0)
     """
     width = len(model.inputs)
     if values.ndim != 2 or values.shape[0] != width:
@@ -205,22 +206,6 @@ def _decide_rules(rules: RuleBase, values: FloatArray) -> Decided:
     return Decided(
         rule, label, status, strengths, doubt, margin, margin_high, len(rows)
     )
-
-
-def outwards(number: Fraction) -> tuple[float, float]:
-    """Return the doubles between which a number lies; itself twice if it is one.
-
-    Example:
-        >>> outwards(Fraction(1, 4))
-        (0.25, 0.25)
-        >>> low, high = outwards(Fraction(1, 3))
-        >>> low < Fraction(1, 3) < high
-        True
-    """
-    near = float(number)
-    low = near if near <= number else math.nextafter(near, -math.inf)
-    high = near if near >= number else math.nextafter(near, math.inf)
-    return low, high
 
 
 def _axes(model: Model, values: FloatArray) -> tuple[dict[str, Value], BoolArray]:
