@@ -7,9 +7,11 @@ from fuzzytree.rulebase import (
     Clause,
     Flank,
     Part,
+    Points,
     Rule,
     RuleBase,
     Semantics,
+    Shape,
     Side,
     Term,
     Variable,
@@ -146,9 +148,42 @@ def test_all_mistakes_of_a_rule_base_are_told_at_once() -> None:
             LR(float("inf"), Side(1.0, (0.4,)), Side(1.0, (0.4,))),
             "the mean must be finite, not inf",
         ),
+        (Points((), ()), "a shape needs 1 to 4096 points, not 0"),
+        (
+            Points(tuple(map(float, range(4097))), (0.5,) * 4097),
+            "a shape needs 1 to 4096 points, not 4097",
+        ),
+        (
+            Points((0.0, 1.0), (0.5,)),
+            "2 values of points need as many degrees, not 1",
+        ),
+        (
+            Points((0.0, float("inf")), (0.0, 1.0)),
+            "the values of points must be finite, not inf",
+        ),
+        (
+            Points((0.0, 2.0, 1.5), (0.0, 1.0, 0.0)),
+            "the values of points must not decrease: 1.5 stands behind 2.0",
+        ),
+        (
+            Points((2.0, 2.0, 2.0), (0.0, 1.0, 0.0)),
+            "three points at 2.0; two make a step",
+        ),
+        (
+            Points((-1e308, 1e308), (0.0, 1.0)),
+            "the points at -1e+308 and 1e+308 are too far apart",
+        ),
+        (
+            Points((0.0, 1.0), (0.0, 1.5)),
+            "the degree at 1.0 must lie in [0, 1], not 1.5",
+        ),
+        (
+            Points((0.0, 1.0), (float("nan"), 1.0)),
+            "the degree at 0.0 must lie in [0, 1], not nan",
+        ),
     ],
 )
-def test_an_impossible_shape_is_refused(shape: Band | LR, sentence: str) -> None:
+def test_an_impossible_shape_is_refused(shape: Shape, sentence: str) -> None:
     variable = Variable("force", (Term("low", shape),))
     rules = (Rule((Clause("force", ("low",)),), "soft"),)
     with pytest.raises(InvalidModelError) as caught:

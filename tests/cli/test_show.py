@@ -9,7 +9,7 @@ import pytest
 
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.report.text import model_lines, shape_text
-from fuzzytree.rulebase import LR, Band, Flank, Side, fingerprint
+from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side, fingerprint
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree, Leaf
 from tests.cli.conftest import Call, grip
@@ -125,7 +125,12 @@ def test_every_leaf_and_rule_of_a_tree_is_shown(seed: int) -> None:
             LR(1.0, Side(2.0, (0.5,)), Side(3.0, (0.5,), reach=4.0)),
             "1 at 1, spread 2 (0 from 5 spreads) below, 3 (0 from 4 spreads) above",
         ),
+        (Points((0.0, 1.5), (0.0, 1.0)), "line through (0, 0), (1.5, 1)"),
+        (
+            Points(tuple(map(float, range(9))), (0.5,) * 9),
+            "9 points from (0, 0.5) to (8, 0.5)",
+        ),
     ],
 )
-def test_a_curve_is_told_in_words(shape: Band | LR, text: str) -> None:
+def test_a_curve_is_told_in_words(shape: Shape, text: str) -> None:
     assert shape_text(shape) == text

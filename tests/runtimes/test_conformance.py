@@ -31,7 +31,7 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.reference import load as load_reference
-from fuzzytree.testing import probes, random_tree
+from fuzzytree.testing import probes, random_tree, with_points
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -121,7 +121,13 @@ def models() -> list[Model]:
             rules_from_tree(tree, "raw"),
             rules_from_tree(tree, "raw", conjunction="product"),
         ]
-    return [*found, *(random_rules(seed) for seed in range(12))]
+    found += [random_rules(seed) for seed in range(12)]
+    pointed = [
+        rules_from_tree(trees()[2], "relative"),
+        rules_from_tree(trees()[3], "raw", conjunction="product"),
+        *(random_rules(seed) for seed in range(4)),
+    ]
+    return [*found, *(with_points(rules, 7) for rules in pointed)]
 
 
 def name_of(model: Model) -> str:

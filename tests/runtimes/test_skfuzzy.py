@@ -12,6 +12,7 @@ from fuzzytree.rulebase import (
     Band,
     Clause,
     Flank,
+    Points,
     Rule,
     RuleBase,
     Shape,
@@ -30,6 +31,8 @@ SHAPES: list[Shape] = [
     Band(0.0, 1.0),
     LR(0.0, Side(1.0, (0.4, 0.3, -0.2), 1.5), Side(3.0, (2.0, 0.5))),
     LR(1e6, Side(1e-3, (0.4,)), Side(1e-3, (0.4,))),
+    LR(0.0, Side(4.0, (0.1,)), Side(0.1, (0.9,))),  # its left tail bends most
+    Points((-3.0, 0.0, 0.0, 2.0, 5.0), (0.0, 0.3, 1.0, 1.0, 0.5)),
 ]
 
 
