@@ -6,6 +6,7 @@ import doctest
 import importlib.metadata
 import itertools
 import math
+import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -188,6 +189,18 @@ def test_no_further_seed_begins_when_the_time_is_over() -> None:
     assert all(one.relative_differs == 0 for one in found)
 
 
+def test_an_interrupted_comparison_keeps_its_whole_seeds() -> None:
+    def interrupt(text: str) -> None:
+        if text == "iris, paper mode, seed 1":
+            raise KeyboardInterrupt
+
+    found = agreement.comparisons(["iris"], 5, seconds=600.0, tell=interrupt)
+    seeds = [len(next(found).of_seeds) for _ in range(4)]
+    assert seeds == [1] * 4
+    with pytest.raises(KeyboardInterrupt):
+        next(found)
+
+
 # Trees and times.
 
 
@@ -268,11 +281,11 @@ def test_a_carrier_with_other_answers_stops_the_measurement(
 
 def _size(rules: int, ratios: dict[str, float], *, is_batch: bool = False) -> Size:
     """Return a size at which runtimes fire raw rules so many times as slowly."""
-    prices = [Price("tree", None, "native", is_batch, 1, 1.0, 1.0, 1.0)]
+    prices = [Price("tree", None, "native", is_batch, 1, 1.0, 1.0, 1.0, 9)]
     for name, ratio in ratios.items():
         times = Times(ratio, ratio, ratio)
         prices.append(
-            Price("rules", "raw", name, is_batch, 1, ratio, ratio, ratio, times)
+            Price("rules", "raw", name, is_batch, 1, ratio, ratio, ratio, 9, times)
         )
     return Size("multiway", rules, 2.0, 2 * rules, rules, 10, tuple(prices))
 
@@ -358,7 +371,7 @@ def test_counted_work_is_told_alone_and_shared() -> None:
 def test_a_search_gains_from_where_every_larger_size_gains() -> None:
     def searched(rules: int, low: float) -> Size:
         times = Times(2.0, low, 3.0)
-        price = Price("best-first", "raw", "native", True, 1, 1, 1, 1, times, times)
+        price = Price("best-first", "raw", "native", True, 1, 1, 1, 1, 9, times, times)
         return Size("multiway", rules, 1.0, 1, 1, 1, (price,))
 
     lows = {7: 1.5, 20: 0.9, 50: 1.1, 100: 1.2}
@@ -456,6 +469,18 @@ def test_page_and_pictures_are_made_again_without_measuring_and_alike(
         picture = (tmp_path / f"claims-{name}.svg").read_bytes()
         assert picture == pictures.svg(getattr(pictures, name)(_stored()))
         assert ET.fromstring(picture).tag == "{http://www.w3.org/2000/svg}svg"
+
+
+@pytest.mark.heavy
+def test_a_trial_run_measures_and_writes_a_page_that_says_so(tmp_path: Path) -> None:
+    command_line = [sys.executable, str(ROOT / "benchmarks" / "claims.py"), "--quick"]
+    subprocess.run([*command_line, "--folder", str(tmp_path)], check=True, cwd=tmp_path)
+    claims = from_json((tmp_path / "claims.json").read_bytes())
+    assert [size.rules for size in claims.sizes] == [7, 7, 50, 50, 300, 300]
+    assert {one.table for one in claims.comparisons} == {"iris", "wine"}
+    text = (tmp_path / "claims.md").read_text("utf-8")
+    assert text == page(claims)
+    assert "**This is a trial run, with few sizes and rounds.**" in text
 
 
 def test_a_budget_of_nothing_is_refused(

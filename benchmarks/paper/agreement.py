@@ -59,23 +59,45 @@ def comparisons(
         seeds: How many times each table is cut into ten folds, with seeds from 0.
         seconds: No further seed begins after so long; one is always whole.
         tell: Told what is done.
+
+    Raises:
+        KeyboardInterrupt: If the user ended it, after yielding what whole seeds gave.
     """
-    seen: dict[Case, list[Seen]] = {}
+    seen: list[dict[Case, Seen]] = []
     leaves: dict[tuple[str, Mode], list[int]] = {}
     begin = time.monotonic()
-    for seed in range(seeds):
-        if seed and time.monotonic() - begin > seconds * seed / (seed + 1):
-            break
-        for table in tables:
-            values, labels = LOADERS[table](return_X_y=True)
-            for mode in MODES:
-                tell(f"{table}, {mode} mode, seed {seed}")
-                found, sizes = _cross_validated(values, labels, mode, seed)
-                leaves.setdefault((table, mode), []).extend(sizes)
-                for conjunction, facts in found.items():
-                    seen.setdefault((table, mode, conjunction), []).append(facts)
-    for case, all_facts in seen.items():
-        yield compared(case, float(np.mean(leaves[case[:2]])), all_facts)
+    is_interrupted = False
+    try:
+        for seed in range(seeds):
+            if seed and time.monotonic() - begin > seconds * seed / (seed + 1):
+                break
+            facts, sizes = _all_tables(tables, seed, tell)
+            seen.append(facts)
+            for key, found in sizes.items():
+                leaves.setdefault(key, []).extend(found)
+    except KeyboardInterrupt:
+        is_interrupted = True
+    for case in seen[0] if seen else ():
+        mean = float(np.mean(leaves[case[:2]]))
+        yield compared(case, mean, [facts[case] for facts in seen])
+    if is_interrupted:
+        raise KeyboardInterrupt
+
+
+def _all_tables(
+    tables: Sequence[str], seed: int, tell: Tell
+) -> tuple[dict[Case, Seen], dict[tuple[str, Mode], list[int]]]:
+    """Return what is seen with one seed, and the leaves of the trees."""
+    facts: dict[Case, Seen] = {}
+    leaves: dict[tuple[str, Mode], list[int]] = {}
+    for table in tables:
+        values, labels = LOADERS[table](return_X_y=True)
+        for mode in MODES:
+            tell(f"{table}, {mode} mode, seed {seed}")
+            found, leaves[table, mode] = _cross_validated(values, labels, mode, seed)
+            for conjunction, seen in found.items():
+                facts[table, mode, conjunction] = seen
+    return facts, leaves
 
 
 def _cross_validated(

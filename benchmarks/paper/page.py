@@ -25,6 +25,7 @@ from paper.judging import (
 from paper.records import Claims, Comparison, Family, Size, Times
 
 WIDTH = 92
+ENOUGH = 6  # samples of which the smallest and largest enclose the median with 95 %
 FAMILIES: tuple[Family, ...] = ("multiway", "grown")
 FIRING = ("reference", "native", "onnxruntime float64", "scikit-fuzzy")
 KINDS: tuple[Kind, ...] = ("raw", "relative")
@@ -201,10 +202,14 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
             rows = "in a batch" if is_batch else "one row at a time"
             yield f"**{kind.capitalize()} rules, {rows}:**"
             yield _ratios(claims, found, kind, is_batch=is_batch)
-    ratios = [p.to_tree for s in claims.sizes for p in s.prices if p.to_tree]
+    prices = [price for size in claims.sizes for price in size.prices if price.to_tree]
+    few = sum(price.rounds < ENOUGH for price in prices)
     yield _text(
-        "Half of these ratios are known to within "
-        f"{spread(ratios):.0%} or better (95 % intervals of the median quotient)."
+        "Half of all ratios are known to within "
+        f"{spread([price.to_tree for price in prices if price.to_tree]):.0%} or better "
+        "(95 % intervals of the median quotient). For "
+        f"{few} of {len(prices)} there was time for fewer than {ENOUGH} rounds; their "
+        "intervals, from the smallest quotient to the largest, promise less."
     )
     yield _text(
         f"**How the ratio grows.** The exponent b of a law n^b, fitted from {LARGE} "
@@ -364,7 +369,8 @@ def _reliability(claims: Claims) -> Iterator[str]:
     yield _comparisons(found)
     yield _text(
         "*Votes*: each row counts once, for whoever was right more often over the "
-        "seeds, so that no row is counted as several. p is that of the exact McNemar "
+        "seeds, so that no row is counted as several; the tree's share of them, in per "
+        "cent, is given as Wilson's 95 % interval. p is that of the exact McNemar "
         f"test on the votes, corrected by Holm's method for all {len(found)} tests; "
         f"below {LEVEL:g} a winner is named. Rows that one tree answers share its "
         "luck, which no test of this kind sees."
@@ -383,7 +389,8 @@ def _comparisons(found: Sequence[Verdict]) -> str:
         "differ",
         "right there: tree, raw, none",
         "uncovered",
-        "votes",
+        "votes, tree : raw",
+        "tree's share",
         "p",
         "right more often",
     ]
@@ -394,6 +401,8 @@ def _comparison_row(verdict: Verdict) -> list[str]:
     found = verdict.comparison
     total = found.answers
     low, high = wilson(found.differ / total, found.rows)
+    tree, raw = found.votes
+    shares = wilson(tree / max(tree + raw, 1), tree + raw)
     return [
         found.table,
         found.mode,
@@ -408,7 +417,8 @@ def _comparison_row(verdict: Verdict) -> list[str]:
         ),
         f"{_percent(found.uncovered, total)} "
         f"({_percent(found.uncovered_tree_right, total)})",
-        f"{found.votes[0]} : {found.votes[1]}",
+        f"{tree} : {raw}",
+        f"{100 * shares[0]:.0f} to {100 * shares[1]:.0f}" if tree + raw else "-",
         _p(verdict.corrected),
         verdict.winner,
     ]

@@ -40,6 +40,7 @@ class Price(msgspec.Struct, frozen=True):
         ns: Nanoseconds a row: the median of the samples.
         low: Lower end of its 95 % confidence interval.
         high: Upper end of it.
+        rounds: How many samples there are.
         to_tree: Against the tree in the same runtime; in `native` where that runs no
             tree. None for the tree itself.
         to_firing: Of firing against this; for best-first only.
@@ -53,6 +54,7 @@ class Price(msgspec.Struct, frozen=True):
     ns: float
     low: float
     high: float
+    rounds: int
     to_tree: Times | None = None
     to_firing: Times | None = None
 

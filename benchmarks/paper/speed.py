@@ -275,6 +275,7 @@ def _price(
         ns=timing.median_ns / rows,
         low=timing.low_ns / rows,
         high=timing.high_ns / rows,
+        rounds=len(timing.samples_ns),
         to_tree=against(carrier.name, tree),
         to_firing=against(firing, carrier.name) if is_search else None,
     )
