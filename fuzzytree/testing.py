@@ -99,7 +99,7 @@ def with_points(rules: RuleBase, seed: int, *, share: float = 0.6) -> RuleBase:
     """Return a rule base some of whose terms are points, made from a seed.
 
     The points lie about where the term was: ramps, steps, plateaus, single points, and
-    now and then more than a few of them.
+    now and then more than a few of them. So the rules equal no tree any more.
 
     Args:
         rules: Any rule base.
@@ -117,7 +117,7 @@ def with_points(rules: RuleBase, seed: int, *, share: float = 0.6) -> RuleBase:
         replace(variable, terms=tuple(map(changed, variable.terms)))
         for variable in rules.variables
     )
-    return replace(rules, variables=variables)
+    return replace(rules, variables=variables, kind=None)
 
 
 def _points(chance: random.Random, shape: Shape) -> Points:
