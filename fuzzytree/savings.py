@@ -305,6 +305,9 @@ def costs(
             tell=tell,
         )
         found += [Cost(*named[name], timing) for name, timing in timings.items()]
+        omissions += [
+            f"{name}: the time was over" for name in named if name not in timings
+        ]
     return tuple(found), tuple(dict.fromkeys(omissions))
 
 
