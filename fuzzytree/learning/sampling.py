@@ -30,7 +30,7 @@ Hashes = npt.NDArray[np.uint64]
 _DIGITS = np.uint64((1 << 63) | ((1 << 52) - 1))
 _HALF = np.uint64(32)
 _ONE = np.uint64(1)
-_BUFFER = 1 << 16
+_BUFFER = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class DistinctRows:
             _Rows(kept, codes[chosen], digits[chosen], hashed_rows(kept), ones)
         )
         self._kept += len(chosen)
-        if self._kept > 2 * self._settled + _BUFFER:
+        if self._kept > self._settled + self._settled // 2 + _BUFFER:
             self._settle()
 
     def merge(self, other: DistinctRows) -> DistinctRows:
@@ -164,20 +164,25 @@ class DistinctRows:
             return None
         if len(self._parts) == 1 and self._kept == self._settled:
             return self._parts[0]
-        found = _distinct(_joined(self._parts))
-        kept = found.at(self._kept_of(found))
+        found = _joined(self._parts)
+        self._parts = []
+        order = np.lexsort((found.hashes, found.digits, found.codes))
+        first, copies = _distinct(found, order)
+        order = order[first]
+        chosen = self._chosen(found.codes[order], found.digits[order])
+        kept = found.at(order[chosen])
+        kept.copies[:] = copies[chosen]
         self._parts = [kept]
         self._kept = self._settled = len(kept.codes)
         return kept
 
-    def _kept_of(self, found: _Rows) -> IntArray:
+    def _chosen(self, codes: IntArray, digits: Hashes) -> IntArray:
         """Return which distinct rows, ordered by class and hashes, are kept.
 
         The first digits that are too many with all before them are refused for good:
         more rows cannot make them fewer. They fill up what is left where less than
         half has been kept, by their second hash.
         """
-        codes, digits = found.codes, found.digits
         present, starts, counts = runs(codes)
         rank = np.arange(len(codes)) - np.repeat(starts, counts)
         is_last = np.ones(len(codes), bool)
@@ -203,22 +208,18 @@ def _joined(parts: list[_Rows]) -> _Rows:
     )
 
 
-def _distinct(found: _Rows) -> _Rows:
-    """Return rows ordered by class and hashes, equal ones joined.
+def _distinct(found: _Rows, order: IntArray) -> tuple[IntArray, IntArray]:
+    """Return where each distinct row begins in an order by hashes, and its copies.
 
     Rows are equal if 127 bits of their hashes are.
     """
-    ordered = found.at(np.lexsort((found.hashes, found.digits, found.codes)))
-    is_new = np.ones(len(ordered.codes), bool)
-    is_new[1:] = (
-        (np.diff(ordered.codes) != 0)
-        | (ordered.digits[1:] != ordered.digits[:-1])
-        | (ordered.hashes[1:] != ordered.hashes[:-1])
-    )
+    is_new = np.zeros(len(order), bool)
+    is_new[0] = True
+    for key in (found.codes, found.digits, found.hashes):
+        ordered = key[order]
+        is_new[1:] |= ordered[1:] != ordered[:-1]
     first = np.flatnonzero(is_new)
-    distinct = ordered.at(first)
-    distinct.copies[:] = np.add.reduceat(ordered.copies, first)
-    return distinct
+    return first, np.add.reduceat(found.copies[order], first)
 
 
 def _shares(found: _Rows, most: int) -> IntArray:
