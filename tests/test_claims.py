@@ -15,14 +15,15 @@ from types import ModuleType
 import claims as command
 import msgspec
 import numpy as np
-import paper.page
+import paper.text
 import pytest
 from paper import agreement, inference, pictures, speed
 from paper.agreement import Seen, answered, compared
 from paper.inference import holm, mcnemar, overhead, power, wilson
 from paper.judging import counted, first_gain, growth, lines, verdicts
-from paper.page import page, three
+from paper.page import page
 from paper.records import Claims, Comparison, Price, Size, Times, from_json
+from paper.text import three
 from trees import multiway_tree
 
 from fuzzytree.lowering import rules_from_tree
@@ -116,7 +117,7 @@ def test_overhead_is_the_part_of_the_time_that_stays() -> None:
         overhead([10, 10], [1.0, 2.0])
 
 
-@pytest.mark.parametrize("module", [inference, paper.page])
+@pytest.mark.parametrize("module", [inference, paper.text])
 def test_the_examples_of_the_benchmark_give_what_they_show(module: ModuleType) -> None:
     failed, tried = doctest.testmod(module)
     assert (failed, tried > 0) == (0, True)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from fuzzytree.rulebase import Kind
 from fuzzytree.timing.machine import noise
 from paper.inference import wilson
 from paper.judging import (
-    ABOUT,
     LARGE,
     LEVEL,
     PRIMARY,
@@ -22,13 +20,25 @@ from paper.judging import (
     spread,
     verdicts,
 )
-from paper.records import Claims, Comparison, Family, Size, Times
+from paper.records import Claims, Comparison, Family, Size
+from paper.summary import KINDS, in_short
+from paper.text import (
+    bullet,
+    duration,
+    listed,
+    middle,
+    p_value,
+    paragraph,
+    percent,
+    spanned,
+    table,
+    three,
+    told_half,
+)
 
-WIDTH = 92
 ENOUGH = 6  # samples of which the smallest and largest enclose the median with 95 %
 FAMILIES: tuple[Family, ...] = ("multiway", "grown")
 FIRING = ("reference", "native", "onnxruntime float64", "scikit-fuzzy")
-KINDS: tuple[Kind, ...] = ("raw", "relative")
 
 
 def page(claims: Claims) -> str:
@@ -39,7 +49,7 @@ def page(claims: Claims) -> str:
     found = list(lines(claims))
     blocks = [
         *_opening(claims),
-        *_in_short(claims, found),
+        *in_short(claims, found),
         *_speed(claims, found),
         *_reliability(claims),
         *_search(claims, found),
@@ -50,140 +60,20 @@ def page(claims: Claims) -> str:
 
 def _opening(claims: Claims) -> Iterator[str]:
     yield "# The paper's claims about speed and reliability, measured"
-    yield _text(
+    yield paragraph(
         'The paper says that a fuzzy tree "reaches a result about n-times faster than '
         'its corresponding fuzzy rule-based system", where n is the number of rules, '
         'and that it is "less reliable". It measures neither. This page does, for raw '
         "rules, which are the paper's, and for relative rules, which equal their tree."
     )
-    yield _text(
+    yield paragraph(
         "`python benchmarks/claims.py` measures and writes this page, its pictures and "
         "[all the numbers](claims.json); what is concluded here is computed from them."
     )
     for warning in noise(claims.machine, ()):
-        yield _text(f"**Beware:** {warning}.")
+        yield paragraph(f"**Beware:** {warning}.")
     if claims.is_quick:
         yield "**This is a trial run, with few sizes and rounds.**"
-
-
-def _in_short(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
-    yield "## In short"
-    points = []
-    if claims.sizes:
-        points += [_counted_in_short(claims.sizes), _timed_in_short(found)]
-        points.append(_overhead_in_short(found))
-    if claims.comparisons:
-        points.append(_reliable_in_short(verdicts(claims.comparisons)))
-    points += _search_in_short(found)
-    yield "\n".join(_bullet(point) for point in points)
-
-
-def _counted_in_short(sizes: Sequence[Size]) -> str:
-    alone = [counted(size)[0] / size.rules for size in sizes]
-    last = max(sizes, key=lambda size: size.rules)
-    is_right = all(1 / ABOUT <= share <= ABOUT for share in alone)
-    head = "is right" if is_right else "is not right"
-    return (
-        f'**Counted, "n times" {head}.** The clauses of all rules are {_range(alone)} '
-        "times n the questions that a row meets on its way down the tree. But rules "
-        f"share clauses: at {last.rules:,} rules, computing each different one once is "
-        f"{three(counted(last)[1])} times the tree's questions."
-    )
-
-
-def _timed_in_short(found: Sequence[Line]) -> str:
-    fired = [line for line in found if line.what == "rules" and line.kind == "raw"]
-    groups: dict[str, list[Line]] = {}
-    for line in fired:
-        groups.setdefault(_where(line), []).append(line)
-    right = [
-        where
-        for where, members in groups.items()
-        if all(line.is_about_n for line in members)
-    ]
-    if len(right) == len(groups):
-        head = "Timed, it is right as well."
-    elif right:
-        head = f"Timed, it is right in {_listed(right)} alone."
-    else:
-        head = "Timed, no runtime keeps to it."
-    told = []
-    for is_batch, rows in ((False, "One row at a time"), (True, "In batches")):
-        ranges = [
-            f"{_range(share for line in members for share in line.shares)} n in "
-            f"{_name(members[0])}"
-            for members in groups.values()
-            if members[0].is_batch == is_batch
-        ]
-        if ranges:
-            told.append(f"{rows} it takes {_listed(ranges)}.")
-    return (
-        f"**{head}** Firing raw rules should take n times the tree's time, within a "
-        f"factor of {ABOUT:g} at every n. {' '.join(told)}"
-    )
-
-
-def _overhead_in_short(found: Sequence[Line]) -> str:
-    known = [
-        line
-        for line in found
-        if line.family == PRIMARY
-        and (line.what, line.kind, line.is_batch) == ("rules", "raw", False)
-        and line.half is not None
-    ]
-    if not known:
-        return "**Overhead** cannot be told from so few sizes."
-    is_seen = any((line.half or 0.0) > line.sizes[0] for line in known)
-    head = "decides at first" if is_seen else "does not decide"
-    told = [f"{_half(line)} in {_name(line)}" for line in known]
-    return (
-        f"**For a single row, overhead {head}.** The fixed cost of a call is more than "
-        "half of the time of firing raw rules up to this many rules: "
-        f"{_listed(told)}."
-    )
-
-
-def _reliable_in_short(found: Sequence[Verdict]) -> str:
-    tree, raw, is_open = (
-        sum(verdict.winner == name for verdict in found)
-        for name in ("tree", "raw rules", "open")
-    )
-    if tree and not raw:
-        head = '"Less reliable" is not what is seen, rather the opposite.'
-    elif raw and not tree:
-        head = '"Less reliable" is confirmed.'
-    elif tree and raw:
-        head = 'Which is "less reliable" depends on the table.'
-    else:
-        head = '"Less reliable" can neither be confirmed nor denied here.'
-    return (
-        f"**{head}** In {len(found)} comparisons on rows that were held back, the tree "
-        f"is right more often in {tree}, the raw rules in {raw}; {is_open} are open "
-        "(exact McNemar tests, corrected for their number)."
-    )
-
-
-def _search_in_short(found: Sequence[Line]) -> Iterator[str]:
-    chosen = {
-        line.kind: line
-        for line in found
-        if (line.what, line.is_batch, line.family) == ("best-first", True, PRIMARY)
-    }
-    if set(chosen) != set(KINDS):
-        return
-    relative, raw = chosen["relative"], chosen["raw"]
-    last = raw.prices[-1]
-    assert last.to_firing  # a search has it
-    told = [
-        f"For {line.kind} rules its price {'is' if line.is_near_tree else 'is not'} "
-        f"nearly the tree's: {_range(line.ratios)} times it in batches"
-        for line in (relative, raw)
-    ]
-    yield (
-        "**Best-first gives the answers of all rules while firing few.** "
-        f"{'. '.join(told)}; at {raw.sizes[-1]:,} rules that is "
-        f"{three(last.to_firing.median)} times as fast as firing."
-    )
 
 
 def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
@@ -191,7 +81,7 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
         return
     yield "## n times faster"
     yield "![Price of a rule base in units of its tree's](claims-speed.svg)"
-    yield _text(
+    yield paragraph(
         "How many times as long as the tree a rule base takes for a row, in the same "
         f"runtime. Trees are {PRIMARY}: two to five branches a node, every leaf "
         "equally likely. scikit-fuzzy runs no trees and stands against `native`; the "
@@ -202,24 +92,9 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
             rows = "in a batch" if is_batch else "one row at a time"
             yield f"**{kind.capitalize()} rules, {rows}:**"
             yield _ratios(claims, found, kind, is_batch=is_batch)
-    prices = [price for size in claims.sizes for price in size.prices if price.to_tree]
-    few = sum(price.rounds < ENOUGH for price in prices)
-    yield _text(
-        "Half of all ratios are known to within "
-        f"{spread([price.to_tree for price in prices if price.to_tree]):.0%} or better "
-        "(95 % intervals of the median quotient). For "
-        f"{few} of {len(prices)} there was time for fewer than {ENOUGH} rounds; their "
-        "intervals, from the smallest quotient to the largest, promise less."
-    )
-    yield _text(
-        f"**How the ratio grows.** The exponent b of a law n^b, fitted from {LARGE} "
-        "rules on, with its 95 % interval, for both families of trees; the ratio "
-        "divided by n, smallest to largest over all sizes of both; and up to how many "
-        f"rules of {PRIMARY} trees a call's fixed cost is more than half of its time."
-    )
-    yield _laws(found)
-    yield _growth_text(found)
-    yield _text(
+    yield _certainty(claims.sizes)
+    yield from _growth(found)
+    yield paragraph(
         "**What is counted.** If rows reach all leaves equally often and every rule "
         "computes all of its clauses, the work is exactly n times the questions of the "
         "tree: the clauses of all rules are n times the mean length of a path. What "
@@ -228,6 +103,29 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
         "more the higher it stands; and a call has a price of its own."
     )
     yield _counts(claims.sizes)
+
+
+def _certainty(sizes: Sequence[Size]) -> str:
+    prices = [price for size in sizes for price in size.prices if price.to_tree]
+    few = sum(price.rounds < ENOUGH for price in prices)
+    return paragraph(
+        "Half of all ratios are known to within "
+        f"{spread([price.to_tree for price in prices if price.to_tree]):.0%} or better "
+        "(95 % intervals of the median quotient). For "
+        f"{few} of {len(prices)} there was time for fewer than {ENOUGH} rounds; their "
+        "intervals, from the smallest quotient to the largest, promise less."
+    )
+
+
+def _growth(found: Sequence[Line]) -> Iterator[str]:
+    yield paragraph(
+        f"**How the ratio grows.** The exponent b of a law n^b, fitted from {LARGE} "
+        "rules on, with its 95 % interval, for both families of trees; the ratio "
+        "divided by n, smallest to largest over all sizes of both; and up to how many "
+        f"rules of {PRIMARY} trees a call's fixed cost is more than half of its time."
+    )
+    yield _laws(found)
+    yield _growth_text(found)
 
 
 def _ratios(
@@ -259,9 +157,9 @@ def _ratios(
         for _, _, matching in columns:
             known = dict(zip(matching[0].sizes, matching[0].ratios, strict=True))
             cells.append(three(known[rules]) if rules in known else "-")
-        rows.append([f"{rules:,}", *cells, _ns(ns)])
+        rows.append([f"{rules:,}", *cells, duration(ns)])
     head = ["n", *(name for name, _, _ in columns), "tree in native, a row"]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _laws(found: Sequence[Line]) -> str:
@@ -283,13 +181,13 @@ def _laws(found: Sequence[Line]) -> str:
                 runtime,
                 "batch" if is_batch else "one row",
                 *(_law(members.get(family)) for family in FAMILIES),
-                _range(shares),
-                _half(members.get(PRIMARY)),
+                spanned(shares),
+                told_half(members.get(PRIMARY)),
             ]
         )
     bs = [f"b, {family}" for family in FAMILIES]
     head = ["rules", "runtime", "rows", *bs, "ratio / n", "overhead up to n"]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _law(line: Line | None) -> str:
@@ -299,26 +197,19 @@ def _law(line: Line | None) -> str:
     return f"{law.exponent:.2f} ({law.low:.2f} to {law.high:.2f})"
 
 
-def _half(line: Line | None) -> str:
-    half = line.half if line else None
-    if half is None:
-        return "-"
-    return three(half) if half >= 1.0 else "none"
-
-
 def _growth_text(found: Sequence[Line]) -> str:
     laws = [(line, line.law) for line in found if line.what == "rules"]
     known = [(line, law) for line, law in laws if law is not None]
     if not known:
-        return _text("There are too few sizes to fit a law.")
+        return paragraph("There are too few sizes to fit a law.")
     words = [growth(law) for _, law in known]
     told = [
         f"{words.count(word)} grow {word}"
         for word in ("like n", "slower than n", "faster than n")
     ]
     exponents = [law.exponent for _, law in known]
-    return _text(
-        f"As far as these intervals tell, of {len(known)} ratios {_listed(told)}; b is "
+    return paragraph(
+        f"As far as these intervals tell, of {len(known)} ratios {listed(told)}; b is "
         f"between {min(exponents):.2f} and {max(exponents):.2f}. An interval knows how "
         "far the points lie off a straight line, not whether the line is in truth a "
         "curve."
@@ -347,7 +238,7 @@ def _counts(sizes: Sequence[Size]) -> str:
         "different clauses",
         "times the questions",
     ]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _reliability(claims: Claims) -> Iterator[str]:
@@ -357,7 +248,7 @@ def _reliability(claims: Claims) -> Iterator[str]:
     seeds = len(found[0].comparison.of_seeds)
     yield "## Less reliable"
     yield "![Who is right where raw rules and tree differ](claims-agreement.svg)"
-    yield _text(
+    yield paragraph(
         "Each table is cut into ten folds, stratified and shuffled, "
         f"{'once' if seeds == 1 else f'{seeds} times with different seeds'}; each fold "
         "is answered by a tree that was learnt from the other nine, and by the raw "
@@ -367,7 +258,7 @@ def _reliability(claims: Claims) -> Iterator[str]:
         "right answers among them in brackets."
     )
     yield _comparisons(found)
-    yield _text(
+    yield paragraph(
         "*Votes*: each row counts once, for whoever was right more often over the "
         "seeds, so that no row is counted as several; the tree's share of them, in per "
         "cent, is given as Wilson's 95 % interval. p is that of the exact McNemar "
@@ -394,7 +285,7 @@ def _comparisons(found: Sequence[Verdict]) -> str:
         "p",
         "right more often",
     ]
-    return _table(head, [_comparison_row(verdict) for verdict in found])
+    return table(head, [_comparison_row(verdict) for verdict in found])
 
 
 def _comparison_row(verdict: Verdict) -> list[str]:
@@ -408,18 +299,18 @@ def _comparison_row(verdict: Verdict) -> list[str]:
         found.mode,
         found.conjunction,
         f"{found.leaves:.1f}",
-        _percent(found.tree_right, total),
-        _percent(found.raw_right, total),
-        f"{_percent(found.differ, total)} ({100 * low:.1f} to {100 * high:.1f})",
+        percent(found.tree_right, total),
+        percent(found.raw_right, total),
+        f"{percent(found.differ, total)} ({100 * low:.1f} to {100 * high:.1f})",
         ", ".join(
-            _percent(count, total)
+            percent(count, total)
             for count in (found.tree_only, found.raw_only, found.both_wrong)
         ),
-        f"{_percent(found.uncovered, total)} "
-        f"({_percent(found.uncovered_tree_right, total)})",
+        f"{percent(found.uncovered, total)} "
+        f"({percent(found.uncovered_tree_right, total)})",
         f"{tree} : {raw}",
         f"{100 * shares[0]:.0f} to {100 * shares[1]:.0f}" if tree + raw else "-",
-        _p(verdict.corrected),
+        p_value(verdict.corrected),
         verdict.winner,
     ]
 
@@ -438,7 +329,7 @@ def _reliable_text(comparisons: Sequence[Comparison], found: Sequence[Verdict]) 
         for name in ("min", "product")
     }
     return "\n".join(
-        _bullet(sentence)
+        bullet(sentence)
         for sentence in (
             f"Counting rows without an answer as wrong {verdict}.",
             f"The relative rules differ from their tree in {differs:,} of {answers:,} "
@@ -456,7 +347,7 @@ def _search(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
     if not chosen:
         return
     yield "## What best-first makes of the trade"
-    yield _text(
+    yield paragraph(
         "The paper trades reliability for speed: all rules, or one path. Best-first "
         "need not: a rule is never stronger than its beginning, so what cannot win is "
         "not fired, and the answer is the rule base's own, tie and all. Below, its "
@@ -482,10 +373,10 @@ def _search_table(chosen: Sequence[Line]) -> str:
         head += [f"{where}: of the tree", "as fast as firing, times"]
         for size, price in zip(line.sizes, line.prices, strict=True):
             cells.setdefault(size, [f"{size:,}"]).extend(
-                [_median(price.to_tree), _median(price.to_firing)]
+                [middle(price.to_tree), middle(price.to_firing)]
             )
     rows = [row for row in cells.values() if len(row) == len(head)]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
@@ -502,7 +393,7 @@ def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
         told.append(
             f"{line.kind.capitalize()} rules of {line.family} trees, "
             f"{'in batches' if line.is_batch else 'row by row'}: {gain}; "
-            f"{_range(line.ratios)} times the tree's time{grows}."
+            f"{spanned(line.ratios)} times the tree's time{grows}."
         )
     checked = sum(size.checked for size in claims.sizes)
     told.append(_trade(claims))
@@ -510,7 +401,7 @@ def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
         f"On all {checked:,} rows that were compared, best-first gave the answers of "
         "firing, and relative rules those of the tree."
     )
-    return "\n".join(_bullet(sentence) for sentence in told)
+    return "\n".join(bullet(sentence) for sentence in told)
 
 
 def _trade(claims: Claims) -> str:
@@ -540,7 +431,7 @@ def _method(claims: Claims) -> Iterator[str]:
         if values
     )
     stolen = machine.stolen
-    yield _text(
+    yield paragraph(
         f"On {machine.processor}, {machine.cores} cores, {machine.system}, "
         f"{machine.python}; {versions}. One thread."
         + (f" Load {load}." if load else "")
@@ -550,7 +441,7 @@ def _method(claims: Claims) -> Iterator[str]:
             else f" For {stolen:.1%} of the time the process was ready and did not run."
         )
     )
-    yield _text(
+    yield paragraph(
         "Rows are standard normal in 11 columns; rules are joined by min. *Multiway* "
         "trees are made to a plan. *Grown* ones are binary and were grown by "
         "scikit-learn on 100,000 rows of three noisy classes, then carried over. All "
@@ -562,85 +453,4 @@ def _method(claims: Claims) -> Iterator[str]:
         "of each runtime is."
     )
     omissions = claims.omissions or ("nothing",)
-    yield "Left out:\n\n" + "\n".join(_bullet(sentence) for sentence in omissions)
-
-
-def three(value: float) -> str:
-    """Return a number of three significant digits at most, as people read it.
-
-    Example:
-        >>> [three(value) for value in (0.08125, 2.0, 56.789, 6220.58)]
-        ['0.0813', '2', '56.8', '6,220']
-    """
-    rounded = float(f"{value:.3g}")
-    if abs(rounded) >= 1000 or rounded.is_integer():
-        return f"{rounded:,.0f}"
-    return f"{rounded:.12f}".rstrip("0").rstrip(".")
-
-
-def _range(values: Iterable[float]) -> str:
-    low, high = two(min(known := list(values))), two(max(known))
-    return low if low == high else f"{low} to {high}"
-
-
-def two(value: float) -> str:
-    """Return a number of two significant digits at most.
-
-    Example:
-        >>> [two(value) for value in (0.08125, 2.0, 56.789, 6220.58)]
-        ['0.081', '2', '57', '6,200']
-    """
-    return three(float(f"{value:.2g}"))
-
-
-def _median(times: Times | None) -> str:
-    return "-" if times is None else three(times.median)
-
-
-def _ns(value: float) -> str:
-    return f"{three(value / 1e3)} µs" if value >= 1e3 else f"{three(value)} ns"
-
-
-def _percent(count: int, total: int) -> str:
-    return f"{100 * count / total:.1f}"
-
-
-def _p(value: float) -> str:
-    if value < 1e-4:
-        return "< 0.0001"
-    return f"{value:.2g}" if value < 0.1 else f"{value:.2f}"
-
-
-def _name(line: Line) -> str:
-    return line.runtime.removesuffix(" float64")
-
-
-def _where(line: Line) -> str:
-    return f"{_name(line)} {'in batches' if line.is_batch else 'row by row'}"
-
-
-def _listed(texts: Iterable[str]) -> str:
-    *others, last = texts
-    return f"{', '.join(others)} and {last}" if others else last
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines_of = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines_of)
-
-
-def _text(sentences: str) -> str:
-    return textwrap.fill(
-        sentences, WIDTH, break_long_words=False, break_on_hyphens=False
-    )
-
-
-def _bullet(sentences: str) -> str:
-    return textwrap.fill(
-        sentences,
-        WIDTH,
-        initial_indent="- ",
-        subsequent_indent="  ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+    yield "Left out:\n\n" + "\n".join(bullet(sentence) for sentence in omissions)

@@ -1,0 +1,136 @@
+"""The page's first part: what follows from all numbers, in a sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from fuzzytree.rulebase import Kind
+from paper.judging import ABOUT, PRIMARY, Line, Verdict, counted, verdicts
+from paper.records import Claims, Size
+from paper.text import bullet, listed, place, short_name, spanned, three, told_half
+
+KINDS: tuple[Kind, ...] = ("raw", "relative")
+
+
+def in_short(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
+    """Yield the blocks of the summary; conclusions hang on the numbers alone."""
+    yield "## In short"
+    points = []
+    if claims.sizes:
+        points += [_counted_in_short(claims.sizes), _timed_in_short(found)]
+        points.append(_overhead_in_short(found))
+    if claims.comparisons:
+        points.append(_reliable_in_short(verdicts(claims.comparisons)))
+    points += _search_in_short(found)
+    yield "\n".join(bullet(point) for point in points)
+
+
+def _counted_in_short(sizes: Sequence[Size]) -> str:
+    alone = [counted(size)[0] / size.rules for size in sizes]
+    last = max(sizes, key=lambda size: size.rules)
+    is_right = all(1 / ABOUT <= share <= ABOUT for share in alone)
+    head = "is right" if is_right else "is not right"
+    return (
+        f'**Counted, "n times" {head}.** The clauses of all rules are {spanned(alone)} '
+        "times n the questions that a row meets on its way down the tree. But rules "
+        f"share clauses: at {last.rules:,} rules, computing each different one once is "
+        f"{three(counted(last)[1])} times the tree's questions."
+    )
+
+
+def _timed_in_short(found: Sequence[Line]) -> str:
+    fired = [line for line in found if line.what == "rules" and line.kind == "raw"]
+    groups: dict[str, list[Line]] = {}
+    for line in fired:
+        groups.setdefault(place(line), []).append(line)
+    right = [
+        where
+        for where, members in groups.items()
+        if all(line.is_about_n for line in members)
+    ]
+    if len(right) == len(groups):
+        head = "Timed, it is right as well."
+    elif right:
+        head = f"Timed, it is right in {listed(right)} alone."
+    else:
+        head = "Timed, no runtime keeps to it."
+    told = []
+    for is_batch, rows in ((False, "One row at a time"), (True, "In batches")):
+        ranges = [
+            f"{spanned(share for line in members for share in line.shares)} n in "
+            f"{short_name(members[0])}"
+            for members in groups.values()
+            if members[0].is_batch == is_batch
+        ]
+        if ranges:
+            told.append(f"{rows} it takes {listed(ranges)}.")
+    return (
+        f"**{head}** Firing raw rules should take n times the tree's time, within a "
+        f"factor of {ABOUT:g} at every n. {' '.join(told)}"
+    )
+
+
+def _overhead_in_short(found: Sequence[Line]) -> str:
+    known = [
+        line
+        for line in found
+        if line.family == PRIMARY
+        and (line.what, line.kind, line.is_batch) == ("rules", "raw", False)
+        and line.half is not None
+    ]
+    if not known:
+        return "**Overhead** cannot be told from so few sizes."
+    is_seen = any((line.half or 0.0) > line.sizes[0] for line in known)
+    head = "decides at first" if is_seen else "does not decide"
+    told = [f"{told_half(line)} in {short_name(line)}" for line in known]
+    return (
+        f"**For a single row, overhead {head}.** The fixed cost of a call is more than "
+        "half of the time of firing raw rules up to this many rules: "
+        f"{listed(told)}."
+    )
+
+
+def _reliable_in_short(found: Sequence[Verdict]) -> str:
+    tree, raw, is_open = (
+        sum(verdict.winner == name for verdict in found)
+        for name in ("tree", "raw rules", "open")
+    )
+    if tree and not raw:
+        head = '"Less reliable" is not what is seen, rather the opposite.'
+    elif raw and not tree:
+        head = '"Less reliable" is confirmed.'
+    elif tree and raw:
+        head = 'Which is "less reliable" depends on the table.'
+    else:
+        head = '"Less reliable" can neither be confirmed nor denied here.'
+    return (
+        f"**{head}** In {len(found)} comparisons on rows that were held back, the tree "
+        f"is right more often in {tree}, the raw rules in {raw}; {is_open} are open "
+        "(exact McNemar tests, corrected for their number)."
+    )
+
+
+def _search_in_short(found: Sequence[Line]) -> Iterator[str]:
+    chosen = {
+        line.kind: line
+        for line in found
+        if (line.what, line.is_batch, line.family) == ("best-first", True, PRIMARY)
+    }
+    if set(chosen) != set(KINDS):
+        return
+    relative, raw = chosen["relative"], chosen["raw"]
+    last = raw.prices[-1]
+    told = [
+        f"For {line.kind} rules its price {'is' if line.is_near_tree else 'is not'} "
+        f"nearly the tree's: {spanned(line.ratios)} times it in batches"
+        for line in (relative, raw)
+    ]
+    if last.to_firing:
+        told.append(
+            f"At {raw.sizes[-1]:,} raw rules that is {three(last.to_firing.median)} "
+            "times as fast as firing"
+        )
+    yield (
+        "**Best-first gives the answers of all rules while firing few.** "
+        f"{'. '.join(told)}."
+    )
