@@ -61,6 +61,7 @@ _REFITS = 6  # of a clipped curve
 _TRIES = 12  # of placing points before the bound counts as out of reach
 _SHORT = math.sqrt(0.5)  # the length of a line with an end on the curve
 _ROUNDING = 1.0 + 2.0**-40
+_TOO_MANY = f"it would need more than {MOST_POINTS} points"
 
 
 class TermError(msgspec.Struct, frozen=True):
@@ -131,7 +132,7 @@ def by_points(model: RuleBase, tolerance: float) -> Approximated:
             return None
         return points_of(shape, tolerance)
 
-    return _approximated(model, change, "lines between points")
+    return _approximated(model, change, f"lines within {tolerance!r} of the curves")
 
 
 def points_of(shape: Band | LR, tolerance: float) -> tuple[Points, float]:
@@ -150,13 +151,9 @@ def points_of(shape: Band | LR, tolerance: float) -> tuple[Points, float]:
         peak = [(shape.mean, 1.0)]
     points = [*left.points, *peak, *reversed(right.points)]
     if len(points) > MOST_POINTS:
-        raise _too_many(len(points))
+        raise LossError(_TOO_MANY)
     values, degrees = zip(*points, strict=True)
     return Points(values, degrees), max(left.bound, right.bound)
-
-
-def _too_many(count: int) -> LossError:
-    return LossError(f"{count} points are more than the {MOST_POINTS} of a shape")
 
 
 class _Half(NamedTuple):
@@ -238,7 +235,7 @@ def _joined(
         if bound <= tolerance:
             return points, bound
         share *= 0.95
-    raise LossError(f"the doubles around {ends[1]!r} are too far apart for the bound")
+    raise LossError(f"doubles around {ends[1]!r} are too coarse for them")
 
 
 def _knots(stretch: Stretch) -> list[float]:
@@ -250,7 +247,7 @@ def _knots(stretch: Stretch) -> list[float]:
     first, last = float(stretch.first), float(stretch.last)
     p = np.polynomial.Polynomial(stretch.coefficients)
     roots = [r for q in (p, p - stretch.top, p.deriv(2)) for r in _real_roots(q)]
-    near = 2.0**-20 * abs(last - first)
+    near = 2.0**-45 * abs(last - first)  # roots that rounding has split
     low, high = min(first, last) + near, max(first, last) - near
     inner = sorted(root for root in roots if low < root < high)
     apart = [b for a, b in zip([-1.0, *inner], inner, strict=False) if b - a > near]
@@ -287,7 +284,7 @@ def _placed(
             needed = np.append(0.0, np.cumsum(steps))
             room = 1.0 if needed[-1] <= _SHORT else _room(float(needed[-1]))
             if room > MOST_POINTS:
-                raise _too_many(math.ceil(room))
+                raise LossError(_TOO_MANY)
             share = float(needed[-1]) / room
             marks = np.arange(_SHORT, room, 1.0) * share if room > 1.0 else inner
             inner = np.interp(marks, needed, grid)
