@@ -66,13 +66,17 @@ def command(
     The pruned model is held against MODEL, by proof and by running both. Exit 1 if
     they differ in a way that was not asked for; nothing is written then.
     """
+    from pathlib import Path
+
     from fuzzytree import savings, verbs
+    from fuzzytree.exporters import find_format
     from fuzzytree.pruning import pruned
     from fuzzytree.report.needs import report_lines
 
     first = verbs.load(model)
     wanted = tuple(uses) or ("tree", "relative")
     with wrong_options():
+        find_format(Path(output or "").suffix or "yaml")  # before any work
         found = pruned(
             first, uses=wanted, inputs="inputs" in drop, rules="rules" in drop
         )

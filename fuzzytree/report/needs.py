@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from fuzzytree.agreement import Agreement
 from fuzzytree.needs import Because, Graph, Needs
 from fuzzytree.pruning import Removed
 from fuzzytree.report.text import agreement_lines, aligned, counted
@@ -23,7 +24,7 @@ def report_lines(found: Report) -> Iterator[str]:
     if more:
         yield from _removed_lines("left in, and could go on request", more)
     yield ""
-    yield from agreement_lines(found.proof)
+    yield from _proof_lines(found.proof)
     if found.needs.graphs:
         yield ""
         yield from _graph_lines(found.needs.graphs)
@@ -61,6 +62,15 @@ def _removed_lines(title: str, removed: Sequence[Removed]) -> Iterator[str]:
     yield from aligned(rows)
     if len(removed) > _MOST:
         yield f"and {len(removed) - _MOST} more"
+
+
+def _proof_lines(proof: Agreement) -> Iterator[str]:
+    rows = [c.rows for c in proof.comparisons if c.basis == "rows"]
+    data = max(rows, default=0) - proof.probes
+    text = f"held against the model: {counted(proof.probes, 'probe')}"
+    yield text + (f", {counted(data, 'row')} of data" if data > 0 else "")
+    _, *lines = agreement_lines(proof)
+    yield from lines
 
 
 # --- graphs

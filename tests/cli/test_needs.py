@@ -1,0 +1,173 @@
+"""`fuzzytree needs` tells what a model needs, and writes what is left."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import fuzzytree as ft
+from fuzzytree import needs
+from fuzzytree.pruning import Pruned, pruned
+from fuzzytree.rulebase import Band, Term, Variable
+from fuzzytree.testing import random_tree
+from tests.cli.conftest import Call, grip
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    pass
+
+
+def test_a_tree_tells_its_inputs_its_proof_and_its_sizes(call: Call) -> None:
+    code, out, err = call("needs", "grip.yaml", "--data", "grasps.csv")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[:5] == [
+        "grip: fuzzy tree, 3 leaves, 4 terms",
+        "needs    2 of 3 columns: force, slip",
+        "",
+        "left out: nothing",
+        "",
+    ]
+    assert lines[5].startswith("held against the model: ")
+    assert lines[5].endswith(" probes, 4 rows of data")
+    assert "pruned                           the model       proof  2" in out
+    assert "size                         all columns      as it is" in out
+    assert "columns read                 3                2                2" in out
+
+
+def test_a_pruned_file_is_written_and_checks(call: Call) -> None:
+    ft.save(random_tree(4, leaves=5), "tree.yaml")
+    code, _, err = call("needs", "tree.yaml", "-o", "left.yaml")
+    assert code == 0
+    assert err == "wrote    left.yaml next: fuzzytree check tree.yaml left.yaml\n"
+    assert ft.load("left.yaml") == pruned(random_tree(4, leaves=5)).model
+    code, out, _ = call(
+        "check", "tree.yaml", "left.yaml", "--runtime", "native", "--limit", "200"
+    )
+    assert code == 0
+    (line,) = (one for one in out.splitlines() if "path and relative rules" in one)
+    assert line.split()[0] == "left.yaml"
+    assert line.split()[-5:] == ["proof", "1", "0", "0", "agrees"]
+
+
+def test_a_tree_for_its_path_alone_keeps_its_cuts(call: Call) -> None:
+    code, out, _ = call("needs", "grip.yaml", "--for", "tree", "-o", "path.yaml")
+    assert code == 0
+    words = " ".join(out.split())
+    assert "the flanks of term 'low' of 'force' only relative rules need them" in words
+    assert ft.run("path.yaml", "grasps.csv").classes == ["soft", "firm", "loose", None]
+
+
+def test_what_is_dropped_on_request_is_said(call: Call) -> None:
+    idle = Variable("heat")
+    rules = ft.rules_from_tree(grip())
+    wide = type(rules)(
+        rules.name, rules.classes, (*rules.variables, idle), rules.rules
+    )  # fmt: skip
+    ft.save(wide, "wide.yaml")
+    code, out, _ = call("needs", "wide.yaml")
+    assert code == 0
+    assert "guards   heat (nothing asks them)" in out
+    assert "left in, and could go on request" in out
+    code, out, err = call("needs", "wide.yaml", "--drop", "inputs", "-o", "less.yaml")
+    assert code == 0
+    assert "differs by design" in out
+    assert err == "wrote    less.yaml not for all rows the answers of wide.yaml\n"
+
+
+def test_json_tells_the_same_facts(call: Call) -> None:
+    code, out, err = call("needs", "grip.yaml", "--json", "--time", "0.2")
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert facts["ok"] is True
+    assert facts["needs"]["inputs"] == ["force", "slip"]
+    assert [size["stage"] for size in facts["sizes"]] == [
+        "all columns",
+        "as it is",
+        "pruned",
+    ]
+
+
+def test_a_pruned_model_that_differs_is_not_written(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def planted(*_model: object, **_options: object) -> Pruned:
+        tree = grip()
+        cut = 2.0000000000000004
+        low = Term("low", Band(high=cut))
+        high = Term("high", Band(low=cut))
+        node = tree.nodes[0]
+        moved = type(node)(node.variable, (cut,), node.owners, node.branches)
+        return Pruned(
+            type(tree)(
+                tree.name,
+                tree.classes,
+                (Variable("force", (low, high)), tree.variables[1]),
+                (moved, tree.nodes[1]),
+                tree.leaves,
+                columns=tree.columns,
+            ),
+            (),
+        )
+
+    monkeypatch.setattr("fuzzytree.pruning.pruned", planted)
+    code, out, err = call("needs", "grip.yaml", "-o", "left.yaml")
+    assert code == 1
+    assert "node 1 is another node" in out
+    assert err == "the pruned model differs in 3 ways; nothing is written\n"
+    assert not Path("left.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("needs", "grip.yaml", "--for", "raw"),
+            "uses: tree 'grip' carries no fitted sets, so it has no raw rules\n"
+            "  fuzzytree needs --help tells more\n",
+        ),
+        (("needs", "no.yaml"), "no.yaml: cannot be read: no such file or directory\n"),
+        (
+            ("needs", "grip.onnx"),
+            "grip.onnx: a file in the format onnx is not read back as a model; "
+            "keep the YAML file beside it\n",
+        ),
+        (
+            ("needs", "grip.yaml", "--data", "no.csv"),
+            "no.csv: cannot be read: no such file or directory\n",
+        ),
+        (
+            ("needs", "grip.yaml", "-o", "left.doc"),
+            "no format '.doc'; there is yaml, onnx, python\n"
+            "  fuzzytree needs --help tells more\n",
+        ),
+        (
+            ("needs", "grip.yaml", "--time", "0"),
+            "invalid value for '--time': 0.0 is not in the range x>0.0\n"
+            "  fuzzytree needs --help tells more\n",
+        ),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(
+    call: Call, words: tuple[str, ...], message: str
+) -> None:
+    assert call(*words) == (2, "", message)
+
+
+def test_without_onnx_the_rest_is_told(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from fuzzytree.errors import MissingExtraError
+
+    def missing(*_model: object, **_options: object) -> object:
+        raise MissingExtraError("writing onnx needs the extra 'onnx'")
+
+    monkeypatch.setattr(needs, "write_onnx", missing)
+    monkeypatch.setattr("fuzzytree.savings.write_onnx", missing)
+    code, out, _ = call("needs", "grip.yaml")
+    assert code == 0
+    assert "not told: tree in float64: writing onnx needs the extra 'onnx'" in out
+    assert "tree yaml" in out
