@@ -1,1 +1,0 @@
-"""Pictures of results: one function for each, which returns a figure."""

@@ -1,0 +1,8 @@
+"""Pictures of results: one function for each, which returns a figure."""
+
+from __future__ import annotations
+
+from fuzzytree.plots.precision import work_precision
+from fuzzytree.plots.saving import SUFFIXES, save
+
+__all__ = ["SUFFIXES", "save", "work_precision"]
