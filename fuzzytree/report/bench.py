@@ -19,7 +19,7 @@ from fuzzytree.timing.records import (
 )
 
 _HEAD = (
-    *("time a row", "+-", "speed", "floors"),
+    *("time a row", "+-", "speed", "floor x"),
     *("error", "certified", "flips", "at edges"),
 )
 Timed = dict[str, tuple[Point, Timing]]
@@ -29,7 +29,7 @@ _WIDTH = 96  # of a line of names
 _UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
 _LEGEND = (
     "* nobody is both faster and more exact; +- the 95 % interval of the median;",
-    f"speed: times as fast as {DEFAULT}; floors: times the reading of the columns;",
+    f"speed: times as fast as {DEFAULT}; floor x: as long as reading the columns;",
     "error: the largest of a strength, observed; certified: the bound of it;",
     "flips: other classes than exact arithmetic gives, at edges: on rows aimed there",
 )
@@ -177,7 +177,7 @@ def duration(ns: float) -> str:
 
 
 def _digits(value: float) -> str:
-    """Return a positive number with three digits and no exponent."""
+    """Return a positive number with three digits; no exponent from 100 on."""
     return f"{value:.0f}" if value >= 100 else f"{value:#.3g}"
 
 

@@ -102,7 +102,8 @@ def _bounds(values: FloatArray) -> Bounds:
         key = (rules, dtype)
         if key not in known:
             found = certify(rules, dtype, values)
-            known[key] = None if found.delta is None else (found.delta, found.origin)
+            delta = None if found.unbounded else found.delta
+            known[key] = None if delta is None else (delta, found.origin)
         return known[key]
 
     return bounds

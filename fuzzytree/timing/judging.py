@@ -92,10 +92,10 @@ class Judge:
         """Return what a row takes in a batch as large as there is patience for."""
         most = max(int(_PATIENCE_NS // row_ns), 1)
         values = np.ascontiguousarray(self.values[:, :most])
-        call = loaded.call(values)
+        call, count = loaded.call(values), int(values.shape[1])
         start = self.clock.wall()
         call()
-        return min(row_ns, max(self.clock.wall() - start, 1) / values.shape[1])
+        return min(row_ns, max(self.clock.wall() - start, 1) / count)
 
     def _samples(self, question: Question) -> tuple[_Sample, _Sample]:
         """Return the rows of the study, and rows aimed at the model's edges."""

@@ -45,7 +45,8 @@ def made_rows(model: Model, count: int, *, seed: int = 0) -> tuple[FloatArray, s
     what = f"made from the model's declared ranges, seed {seed}"
     if guessed:
         shown = ", ".join(map(repr, guessed[:4])) + (", ..." if guessed[4:] else "")
-        what += f"; {shown} declare none: from their terms, or their combinations"
+        verb = "declares" if len(guessed) == 1 else "declare"
+        what += f"; {shown} {verb} none: from terms or combinations"
     return values, what
 
 

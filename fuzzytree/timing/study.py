@@ -125,11 +125,14 @@ def bench(
     plan = plan or Plan()
     if values is None:
         count = min(max(plan.rows), _MADE)
-        values, data = made_rows(model, count, seed=plan.seed)
-    _check(model, values)
+        values, made = made_rows(model, count, seed=plan.seed)
+        text = _data_text(f"{_rows(count)} {made}", count, plan)
+    else:
+        _check(model, values)
+        count = values.shape[1]
+        text = _data_text(f"{data or 'a table'}, {_rows(count)}", count, plan)
     found, omitted = gather(model, values)
     kept, left = chosen(found, only, skip)
-    text = _data_text(data, values.shape[1], plan)
     return run_study(
         model,
         kept,
@@ -149,8 +152,11 @@ def _check(model: Model, values: FloatArray) -> None:
         raise ValueError("there are no rows to answer; give at least one")
 
 
-def _data_text(data: str, count: int, plan: Plan) -> str:
-    text = f"{data or 'rows given'}, {count:,} row{'' if count == 1 else 's'}"
+def _rows(count: int) -> str:
+    return f"{count:,} row{'' if count == 1 else 's'}"
+
+
+def _data_text(text: str, count: int, plan: Plan) -> str:
     more = [f"{rows:,}" for rows in sorted(plan.rows) if rows > count]
     return f"{text}, repeated to make {' and '.join(more)}" if more else text
 
@@ -366,7 +372,7 @@ class _Run:
         if len(found.timings) + len(found.failures) < count:
             self.is_complete = False
             self.warnings.append(
-                f"the time was over at {rows:,} rows, {threads} "
+                f"the time was over at {_rows(rows)}, {threads} "
                 f"thread{'' if threads == 1 else 's'}: {len(found.timings)} of {count} "
                 "candidates have a time there"
             )

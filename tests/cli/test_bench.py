@@ -1,0 +1,213 @@
+"""`fuzzytree bench` measures, tells, writes, and survives what users do."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from fuzzytree import verbs
+from fuzzytree.report.bench import duration, study_lines
+from fuzzytree.timing.records import Study
+from tests.cli.conftest import Call
+from tests.timing.studies import error, point, study, timing
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "bench"
+FAST = ("--rows", "8", "--threads", "1", "--budget", "1", "--only", "native")
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    pass
+
+
+def made() -> Study:
+    """Return a study with everything that a table can show."""
+    return study(
+        point("floor: the columns read once", 500.0, None, kind="floor"),
+        point(
+            "native",
+            200_000.0,
+            error(2e-16, 1e-15),
+            probes=error(None, flips=2, rows=50),
+            more=(timing(9_000.0, rows=1),),
+        ),
+        point("onnxruntime mixed", 100_000.0, error(8e-8, 3e-7)),
+        point("native, points 1e-01", 150_000.0, error(0.08, 0.09), kind="variant"),
+        point("a peer", 4e9, error(None, flips=3), kind="peer"),
+    )
+
+
+def test_the_report_says_all_that_was_found() -> None:
+    expected = (GOLDEN / "report.txt").read_text("utf-8")
+    assert "\n".join(study_lines(made())) + "\n" == expected
+
+
+def test_all_variants_are_told_when_asked_for() -> None:
+    lines = [*study_lines(made(), is_full=True)]
+    assert any(line.startswith("  native, points 1e-01") for line in lines)
+    assert not any("something beats" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("ns", "text"),
+    [
+        (0.02, "0.0200 ns"),
+        (999.0, "999 ns"),
+        (1000.0, "1.00 µs"),
+        (123_456.0, "123 µs"),
+        (5e6, "5.00 ms"),
+        (2.5e9, "2.50 s"),
+    ],
+)
+def test_a_time_has_three_digits_and_a_unit(ns: float, text: str) -> None:
+    assert duration(ns) == text
+
+
+def test_a_study_goes_to_stdout_and_its_advice_to_stderr(call: Call) -> None:
+    code, out, err = call("bench", "grip.yaml", "--data", "grasps.csv", *FAST)
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0].startswith("grip: error against run time, in ")
+    assert lines[1] == "rows     grasps.csv, 4 rows, repeated to make 8"
+    assert "8 rows, 1 thread" in lines
+    assert [line for line in lines if line in ("tree", "relative rules")]
+    last = err.splitlines()[-1]
+    assert last.startswith("tree, 8 rows: for no class changed in 4 rows")
+    assert lines[-1] == f"  {last}"
+
+
+def test_without_data_rows_are_made_and_that_is_said(call: Call) -> None:
+    _, out, _ = call("bench", "rules.yaml", "--seed", "5", *FAST)
+    assert out.splitlines()[1] == (
+        "rows     8 rows made from the model's declared ranges, seed 5; "
+        "'slip' declares none: from terms or combinations"
+    )
+
+
+def test_json_goes_to_stdout_and_to_a_file(call: Call) -> None:
+    code, out, err = call("bench", "grip.yaml", "--json", "-o", "study.json", *FAST)
+    assert code == 0
+    facts = json.loads(out)
+    assert [point["question"] for point in facts["points"]] == [
+        "tree",
+        "relative rules",
+    ]
+    assert json.loads(Path("study.json").read_bytes()) == facts
+    assert "wrote    study.json" in err.splitlines()
+
+
+def test_quiet_says_nothing_but_the_study(call: Call) -> None:
+    code, out, err = call("bench", "grip.yaml", "--quiet", *FAST)
+    assert (code, err) == (0, "")
+    assert out
+
+
+def test_a_wanted_error_is_in_the_advice(call: Call) -> None:
+    _, out, _ = call("bench", "rules.yaml", "--error", "1e-4", *FAST)
+    assert "for an error of at most 0.0001, use native" in out.splitlines()[-1]
+
+
+def test_an_interrupted_study_is_told_and_exits_with_130(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import msgspec
+
+    found = msgspec.structs.replace(made(), is_interrupted=True, is_complete=False)
+    monkeypatch.setattr(verbs, "bench", lambda *_, **__: found)
+    code, out, err = call("bench", "grip.yaml", "-o", "study.json")
+    assert code == 130
+    assert out.startswith("grip: error against run time")
+    assert json.loads(Path("study.json").read_bytes())["is_interrupted"] is True
+    assert err.splitlines()[-1] == "interrupted; what was measured by then is told"
+
+
+def test_an_error_beyond_the_certified_one_exits_with_1(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = study(point("native", 9.0, error(1e-3, 1e-6)))
+    monkeypatch.setattr(verbs, "bench", lambda *_, **__: found)
+    code, _, err = call("bench", "grip.yaml")
+    assert code == 1
+    assert err == (
+        "native: rules: an error of 0.001 is larger than the certified 1e-06; "
+        "this is a fault\n"
+    )
+
+
+def test_what_libraries_print_is_no_part_of_the_answer(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def talkative(*_: object, **__: object) -> Study:
+        sys.stdout.write("welcome to a library\n")
+        return made()
+
+    monkeypatch.setattr(verbs, "bench", talkative)
+    _, out, err = call("bench", "grip.yaml", "--json")
+    assert json.loads(out)["model"] == "grip"
+    assert err.startswith("welcome to a library\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--rows", "0"), "rows: 1 is the least, not 0"),
+        (("--threads", "-1"), "threads: 1 is the least, not -1"),
+        (("--budget", "-5"), "the budget must be more than 0 seconds, not -5"),
+        (("--error", "2"), "an error of a strength lies in [0, 1], not at 2"),
+        (("--plot", "a.pdf"), "--plot a.pdf: a picture ends in .svg or .png"),
+    ],
+)
+def test_an_option_that_cannot_be_is_one_sentence(
+    call: Call, words: tuple[str, ...], message: str
+) -> None:
+    expected = f"{message}\n  fuzzytree bench --help tells more\n"
+    assert call("bench", "grip.yaml", *words) == (2, "", expected)
+
+
+def test_an_unknown_candidate_is_one_sentence(call: Call) -> None:
+    code, out, err = call("bench", "grip.yaml", "--only", "nativ")
+    assert (code, out) == (2, "")
+    assert err.startswith("no candidate 'nativ'; there is floor: the columns read once")
+    assert "or all of tree, floor, " in err
+
+
+def test_a_table_without_rows_is_one_sentence(call: Call) -> None:
+    Path("none.csv").write_text("slip,force\n", "utf-8")
+    expected = (2, "", "none.csv has no rows\n")
+    assert call("bench", "grip.yaml", "--data", "none.csv", *FAST) == expected
+
+
+def test_a_place_that_cannot_be_written_is_told_before_any_work(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(verbs, "bench", None)
+    message = "no/such.json: cannot be written: no such file or directory\n"
+    assert call("bench", "grip.yaml", "-o", "no/such.json") == (2, "", message)
+    code, _, err = call("bench", "grip.yaml", "--plot", "no/such.svg")
+    assert (code, err) == (2, message.replace("json", "svg"))
+
+
+def test_a_missing_extra_for_pictures_is_named(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util,
+        "find_spec",
+        lambda name, *rest: None if name == "matplotlib" else real(name, *rest),
+    )
+    message = (
+        "fuzzytree bench --plot needs the extra 'plots': "
+        "pip install 'fuzzytree-toolkit[plots]'\n"
+    )
+    assert call("bench", "grip.yaml", "--plot", "a.svg") == (2, "", message)
+
+
+def test_a_model_that_is_no_yaml_is_one_sentence(call: Call) -> None:
+    code, out, err = call("bench", "grip.onnx", *FAST)
+    assert (code, out) == (2, "")
+    assert "is not read back as a model; keep the YAML file" in err
