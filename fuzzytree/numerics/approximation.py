@@ -56,6 +56,7 @@ if TYPE_CHECKING:
 
 _GRID = 512  # places on a curve at which its bend is looked at
 _EXCHANGES = 200  # of places in a fit, at most
+_MOST = 1e6  # of a fit's coefficients together; see `rulebase.Flank`
 _OVER = 0.25  # how far a fit first follows a curve beyond its limits
 _REFITS = 6  # of a clipped curve
 _TRIES = 12  # of placing points before the bound counts as out of reach
@@ -351,7 +352,6 @@ def by_degree(model: RuleBase, degree: int) -> Approximated:
 
     Raises:
         ValueError: If the degree is not from 1 to 8.
-        LossError: If a fitted curve needs coefficients beyond +-1e6.
 
     Example:
         >>> from fuzzytree.lowering import rules_from_tree
@@ -390,7 +390,6 @@ def _lower_flank(
     last = float(stretch.last) or 1.0
     fitted = lower_curve(p, degree, last, BELOW_ONE)
     curve = tuple(fitted[1:].tolist())
-    _check_size(curve)
     bound = _curve_error(p, fitted, last, BELOW_ONE)
     error = None if flank.error is None else flank.error + bound
     return Flank(flank.start, flank.end, curve, error), bound
@@ -405,15 +404,9 @@ def _lower_side(side: Side, degree: int) -> tuple[Side, float]:
     fitted = lower_curve(fall, degree, 1.0, 1.0)
     inner = np.polynomial.Polynomial(fitted[1:])(np.polynomial.Polynomial([0.5, 0.5]))
     curve = tuple(inner.coef.tolist())
-    _check_size(curve)
     lowered = np.array([float(c) for c in body_coefficients(curve)])
     bound = _curve_error(body, lowered, 1.0, 1.0)
     return Side(side.spread, curve, side.reach), bound
-
-
-def _check_size(curve: Sequence[float]) -> None:
-    if not all(abs(c) <= 1e6 for c in curve):
-        raise LossError("its coefficients would lie beyond +-1e6")
 
 
 def _curve_error(p: FloatArray, r: FloatArray, last: float, top: float) -> float:
@@ -455,7 +448,7 @@ def lower_curve(p: FloatArray, degree: int, last: float, top: float) -> FloatArr
                 found = risen
             reached = powers[:, :degree] @ found[1:]
             error = float(np.abs(np.clip(reached, 0.0, top) - goal).max())
-            if error < least:
+            if error < least and np.abs(found).sum() <= _MOST:
                 best, least = found, error
         if is_plain:
             break
@@ -567,8 +560,8 @@ def _approximated(model: RuleBase, change: Change, what: str) -> Approximated:
         for v in model.variables
     )
     if reasons:
-        listed = "\n".join(reasons)
-        raise LossError(f"cannot approximate {model.name} by {what}: {listed}")
+        listed = "\n  ".join([f"cannot approximate {model.name} by {what}:", *reasons])
+        raise LossError(listed)
     bound = _strength_bound(model, errors)
     is_product = model.semantics.conjunction == "product"
     how = "summed" if is_product else "largest"

@@ -1,0 +1,398 @@
+"""Models of points and of lower degrees: bounds that hold, decisions that stay."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from fuzzytree.cells import free_axes, grid, grid_size
+from fuzzytree.contracts import Dtype
+from fuzzytree.errors import LossError
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.numerics.approximation import (
+    by_degree,
+    by_points,
+    lower_curve,
+    points_of,
+)
+from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.reference import degree, evaluate
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Conjunction,
+    Flank,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Shape,
+    Side,
+    Term,
+    Variable,
+)
+from fuzzytree.runtimes.native import load
+from fuzzytree.testing import probes, random_tree, with_points
+
+SMOOTH = (0.0, 3.0, -2.0)  # q**2 (3 - 2 q): level at both ends
+SHAPES: dict[str, Band | LR] = {
+    "smooth": Band(0.0, 1.0, Flank(0.0, -1.0, SMOOTH), Flank(1.0, 3.0, SMOOTH)),
+    "clipped": Band(
+        0.0, 1.0, Flank(0.0, -1.0, (2.0, -1.5, 0.6)), Flank(1.0, 2.0, (4.0,))
+    ),
+    "waves": Band(
+        0.0, 1.0, Flank(0.0, -1.0, (9.0, -60.0, 80.0)), Flank(1.0, 3.0, (-1.0,))
+    ),
+    "steep": Band(0.0, 1.0, right=Flank(1.0, 3.0, (-1e6, 1e6, 1e6, -1e6))),
+    "short of the edge": Band(
+        0.0, 1.0, Flank(2.0, -1.0, SMOOTH), Flank(0.5, 3.0, SMOOTH)
+    ),
+    "far": Band(0.0, 1.0, Flank(-2.0, -3.0, (0.5,)), Flank(-4.0, 0.5, SMOOTH)),
+    "steps": Band(-2.0, 1.0),
+    "open": Band(high=3.0, right=Flank(3.0, 4.0, (0.0,) * 7 + (1.0,))),
+    "everywhere": Band(),
+    "at 1e12": Band(1e12, 1e12 + 64, Flank(1e12, 1e12 - 64, SMOOTH)),
+    "set": LR(0.3, Side(0.1, (0.4, 0.2, -0.1)), Side(0.7, (0.6, 0.1))),
+    "set with a roof": LR(0.0, Side(1.0, (-0.2, 0.9)), Side(1.0, (0.0,))),
+    "set that ends early": LR(0.0, Side(1.0, (3.0, -8.0, 2.0)), Side(2.0, (1.0,))),
+    "set of wild sides": LR(0.0, Side(1.0, (1e6, -1e6, 1e6)), Side(1.0, (9.0,) * 8)),
+    "set with a long tail": LR(0.0, Side(1.0, (0.5,), 1e300), Side(1.0, (0.5,), 1.01)),
+    "set at 1e9": LR(1e9, Side(1.0, (0.4, 0.1)), Side(1 / 3, (0.4,))),
+}
+CONJUNCTIONS: tuple[Conjunction, ...] = ("min", "product")
+DTYPES: tuple[Dtype, ...] = ("float64", "mixed")
+TOLERANCES = (0.1, 1e-3, 1e-5)
+CASES = [
+    pytest.param(shape, tolerance, id=f"{name} {tolerance}")
+    for name, shape in SHAPES.items()
+    for tolerance in TOLERANCES
+    if not (name.startswith("at") and tolerance < 1e-4)
+]
+
+
+def places(shape: Points, seed: int = 0) -> list[Fraction]:
+    """Return the points, the doubles beside them, and places all over the lines.
+
+    Of a long list of lines some are drawn; the first and last stay.
+    """
+    chance = random.Random(seed)
+    lines = list(itertools.pairwise(shape.values))
+    if len(lines) > 40:
+        lines = [*lines[:8], *chance.sample(lines, 24), *lines[-8:]]
+    found: list[Fraction] = []
+    for a, b in lines:
+        start, width = Fraction(a), Fraction(b) - Fraction(a)
+        shares = [*range(17), Fraction(chance.random()) * 16, Fraction(1, 10**9)]
+        found += [start + width * Fraction(share) / 16 for share in shares]
+        for end in (a, b):
+            near = math.nextafter(end, -math.inf), math.nextafter(end, math.inf)
+            found += [Fraction(one) for one in near if math.isfinite(one)]
+    return [*found, Fraction(10) ** 320, -(Fraction(10) ** 320), *map(Fraction, (0, 1))]
+
+
+def largest_error(found: Shape, shape: Shape, at: list[Fraction]) -> Fraction:
+    return max(abs(exact_degree(found, x) - exact_degree(shape, x)) for x in at)
+
+
+def model_of(*shapes: Shape, conjunction: Conjunction = "min") -> RuleBase:
+    """Return a rule that asks a variable for each shape."""
+    variables = tuple(
+        Variable(f"x{number}", (Term("t", shape),))
+        for number, shape in enumerate(shapes)
+    )
+    clauses = tuple(Clause(variable.name, ("t",)) for variable in variables)
+    rules = (Rule(clauses, "a"),)
+    return RuleBase("one", ("a",), variables, rules, Semantics(conjunction))
+
+
+@pytest.mark.parametrize(("shape", "tolerance"), CASES)
+def test_no_degree_is_further_off_than_certified(
+    shape: Band | LR, tolerance: float
+) -> None:
+    found, bound = points_of(shape, tolerance)
+    assert largest_error(found, shape, places(found)) <= Fraction(bound)
+    assert bound <= tolerance
+
+
+@pytest.mark.parametrize("name", ["smooth", "clipped", "set", "set at 1e9"])
+def test_a_bound_is_close_to_the_error_that_occurs(name: str) -> None:
+    shape = SHAPES[name]
+    found, bound = points_of(shape, 1e-3)
+    assert largest_error(found, shape, places(found)) >= Fraction(bound) * Fraction(
+        19, 20
+    )
+
+
+@pytest.mark.parametrize("name", ["smooth", "set", "set at 1e9"])
+def test_a_point_that_moved_breaks_the_bound(name: str) -> None:
+    shape = SHAPES[name]
+    found, bound = points_of(shape, 1e-3)
+    for position in range(1, len(found.values) - 1, 3):
+        degrees = list(found.degrees)
+        degrees[position] += 3e-3 if degrees[position] < 0.5 else -3e-3
+        moved = Points(found.values, tuple(degrees))
+        at = [Fraction(found.values[position])]
+        assert largest_error(moved, shape, at) > Fraction(bound)
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_doubles_of_degree_zero_and_one_stay(name: str, tolerance: float) -> None:
+    if name == "at 1e12" and tolerance < 1e-4:
+        return
+    shape = SHAPES[name]
+    found, _ = points_of(shape, tolerance)
+    ends = [found.values[0], found.values[-1]]
+    if isinstance(shape, Band):
+        ends += [end for end in (shape.low, shape.high) if end is not None]
+    else:
+        ends.append(shape.mean)
+    near = {math.nextafter(end, far) for end in ends for far in (-math.inf, math.inf)}
+    for x in map(Fraction, {*ends, *near}):
+        kept, given = exact_degree(found, x), exact_degree(shape, x)
+        if isinstance(shape, Band):  # a set may round to 1 beside its mean
+            assert (kept == 1) == (given == 1)
+        if given > Fraction(2, 2**53):
+            assert kept > 0
+        if given == 0:
+            assert kept <= Fraction(2, 2**53)
+
+
+def test_a_band_ends_in_two_steps_of_points() -> None:
+    found, bound = points_of(Band(1.0, 2.0, Flank(1.0, 0.0), None), 0.1)
+    below_one = 1.0 - 2.0**-53
+    assert found == Points((0.0, 1.0, 1.0, 2.0, 2.0), (0.0, below_one, 1.0, 1.0, 0.0))
+    assert bound < 1e-14
+
+
+def test_a_straight_flank_short_of_its_edge_stays_level_up_to_it() -> None:
+    found, _ = points_of(Band(3.0, None, Flank(2.0, 0.0, (0.5,))), 0.1)
+    assert found == Points((0.0, 2.0, 3.0, 3.0), (0.0, 0.5, 0.5, 1.0))
+
+
+def test_a_set_is_one_at_its_mean_only() -> None:
+    found, _ = points_of(SHAPES["set"], 1e-4)
+    assert found.values[found.degrees.index(1.0)] == 0.3
+    assert found.degrees.count(1.0) == 1
+
+
+# Lines that are nearly as far from a curve as they may be, on either side of it, need
+# half the research's points on each side of a set: it had 9 to 11, 28 to 38, 92 to 126
+# and 269 to 384.
+@pytest.mark.parametrize(
+    ("tolerance", "most"), [(1e-2, 8), (1e-3, 20), (1e-4, 60), (1e-5, 190)]
+)
+def test_few_points_do_for_a_side_of_a_set(tolerance: float, most: int) -> None:
+    found = by_points(rules_from_tree(random_tree(3), "raw"), tolerance)
+    counts = [term.points for term in found.terms if term.points is not None]
+    assert len(counts) == len(found.terms) > 20
+    assert max(counts) / 2 <= most
+
+
+def test_ten_times_the_accuracy_costs_about_three_times_the_points() -> None:
+    counts = [
+        len(points_of(SHAPES["set"], tolerance)[0].values)
+        for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+    ]
+    for few, many in itertools.pairwise(counts[1:]):
+        assert 2.5 < many / few < 3.3
+
+
+@pytest.mark.parametrize("tolerance", [0.3, 1e-2, 1e-4])
+@pytest.mark.parametrize("seed", range(4))
+def test_relative_rules_of_points_decide_like_their_tree_in_every_cell(
+    seed: int, tolerance: float
+) -> None:
+    whole = random_tree(seed, leaves=6)
+    tree = free_axes(whole)
+    assert grid_size(whole) < 200_000
+    for conjunction in CONJUNCTIONS:
+        rules = rules_from_tree(tree, conjunction=conjunction)
+        found = by_points(rules, tolerance)
+        lower = by_degree(rules, 1)
+        assert found.model.kind == lower.model.kind == "relative"
+        for values in grid(whole):
+            expected = load(tree)(values)
+            for model in (found.model, lower.model):
+                for dtype in DTYPES:
+                    answers = load(model, dtype)(values)
+                    assert np.array_equal(answers.rule, expected.rule)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
+@pytest.mark.parametrize("seed", range(3))
+def test_relative_rules_of_points_have_degree_one_where_they_had_it(
+    seed: int, dtype: Dtype
+) -> None:
+    rules = rules_from_tree(random_tree(seed))
+    found = by_points(rules, 1e-2).model
+    rows = probes(rules, limit=1000)
+    values = np.array([[row[name] for row in rows] for name in rules.inputs])
+    before, after = load(rules, dtype)(values), load(found, dtype)(values)
+    assert np.array_equal(before.rule, after.rule)
+    assert np.array_equal(before.status, after.status)
+    assert before.strengths is not None
+    assert after.strengths is not None
+    assert np.array_equal(before.strengths == 1.0, after.strengths == 1.0)
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_no_strength_is_further_off_than_certified(conjunction: Conjunction) -> None:
+    sets = [SHAPES["set"], SHAPES["set with a roof"], SHAPES["clipped"]]
+    rules = model_of(*sets, conjunction=conjunction)
+    for found in (by_points(rules, 1e-2), by_degree(rules, 1)):
+        worst = 0.0
+        for row in probes(rules, limit=3000):
+            one = evaluate(rules, row).strengths[0]
+            other = evaluate(found.model, row).strengths[0]
+            if not math.isnan(one):
+                worst = max(worst, abs(one - other))
+        assert worst <= found.bound
+        assert found.bound <= worst * 3.0
+
+
+def test_the_bound_of_a_product_is_the_sum_over_a_rule() -> None:
+    pair = [SHAPES["smooth"], SHAPES["set"]]
+    least = by_points(model_of(*pair), 1e-3)
+    summed = by_points(model_of(*pair, conjunction="product"), 1e-3)
+    bounds = [term.bound for term in summed.terms]
+    assert summed.bound == pytest.approx(sum(bounds))
+    assert least.bound == max(bounds)
+    assert least.origin == (
+        "largest certified error of a degree: lines within 0.001 of the curves"
+    )
+    assert summed.origin == (
+        "summed certified error of a degree: lines within 0.001 of the curves"
+    )
+
+
+def test_points_that_are_there_stay_as_they_are() -> None:
+    rules = with_points(rules_from_tree(random_tree(1), "raw"), 1, share=1.0)
+    for found in (by_points(rules, 1e-9), by_degree(rules, 1)):
+        assert (found.model, found.terms, found.bound) == (rules, (), 0.0)
+
+
+def test_a_model_that_needs_too_many_points_is_refused() -> None:
+    with pytest.raises(LossError) as caught:
+        by_points(model_of(SHAPES["smooth"], SHAPES["set"], Band(0.0, 1.0)), 1e-9)
+    assert str(caught.value) == (
+        "cannot approximate one by lines within 1e-09 of the curves:\n"
+        "  term 't' of 'x0': it would need more than 4096 points\n"
+        "  term 't' of 'x1': it would need more than 4096 points"
+    )
+
+
+def test_a_set_between_doubles_that_are_far_apart_is_refused() -> None:
+    shape = LR(1e12, Side(1e-3, (0.4,)), Side(1e-3, (0.4,)))
+    with pytest.raises(LossError) as caught:
+        by_points(model_of(shape), 1e-3)
+    assert str(caught.value) == (
+        "cannot approximate one by lines within 0.001 of the curves:\n"
+        "  term 't' of 'x0': doubles around 999999999999.999 are too coarse for them"
+    )
+
+
+def test_a_set_beyond_the_largest_double_is_refused() -> None:
+    shape = LR(0.0, Side(1e308, (0.4,)), Side(1.0, (0.4,)))
+    with pytest.raises(LossError, match="it reaches beyond the largest double"):
+        by_points(model_of(shape), 0.1)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf])
+def test_a_tolerance_must_be_above_zero(tolerance: float) -> None:
+    with pytest.raises(ValueError, match="the tolerance must be above 0, not"):
+        by_points(model_of(Band(0.0, 1.0)), tolerance)
+
+
+@pytest.mark.parametrize("wanted", [0, 9, -1])
+def test_a_degree_must_be_from_one_to_eight(wanted: int) -> None:
+    with pytest.raises(ValueError, match=f"must be from 1 to 8, not {wanted}"):
+        by_degree(model_of(Band(0.0, 1.0)), wanted)
+
+
+LONG: dict[str, Band | LR] = {
+    **SHAPES,
+    "seven": Band(
+        0.0, 1.0, Flank(0.0, -1.0, (0.3, 0.1, 0.2, 0.1, 0.05, 0.1, 0.1, 0.05))
+    ),
+    "overshoots": Band(0.0, None, Flank(0.0, -1.0, (0.5, 2.0, 1.5, -1.0, 0.2)), None),
+    "sides": LR(
+        1.0, Side(1.0, (0.6, 0.2, 0.1, 0.05)), Side(2.0, (0.9, -0.3, 0.2, 0.1))
+    ),
+}
+
+
+def around(shape: Shape) -> list[Fraction]:
+    marks = [Fraction(number, 64) for number in range(-320, 321)]
+    if isinstance(shape, LR):
+        return [Fraction(shape.mean) + Fraction(shape.left.spread) * x for x in marks]
+    return [*marks, *map(Fraction, (1e12, 1e12 - 1, 1e12 + 1))]
+
+
+@pytest.mark.parametrize("wanted", [1, 2, 4, 7])
+@pytest.mark.parametrize("name", LONG)
+def test_no_lower_curve_is_further_off_than_certified(name: str, wanted: int) -> None:
+    shape = LONG[name]
+    found = by_degree(model_of(shape), wanted)
+    (term,) = found.model.variables[0].terms
+    assert largest_error(term.shape, shape, around(shape)) <= Fraction(found.bound)
+    for error in found.terms:
+        assert error.degree is not None
+        assert error.degree <= wanted
+
+
+@pytest.mark.parametrize("name", ["seven", "overshoots", "sides", "smooth", "clipped"])
+def test_a_higher_degree_is_never_further_off(name: str) -> None:
+    bounds = [by_degree(model_of(LONG[name]), wanted).bound for wanted in range(1, 8)]
+    for low, high in itertools.pairwise(bounds):
+        assert high <= low * 1.02
+
+
+@pytest.mark.parametrize("wanted", range(1, 5))
+@pytest.mark.parametrize("name", ["seven", "overshoots", "sides", "smooth"])
+def test_a_lower_curve_keeps_its_ends_and_never_falls(name: str, wanted: int) -> None:
+    shape = LONG[name]
+    (term,) = by_degree(model_of(shape), wanted).model.variables[0].terms
+    lowered = term.shape
+    if isinstance(shape, LR):
+        assert degree(lowered, shape.mean) == 1.0
+        left = [shape.mean - shape.left.spread * n / 500 for n in range(2500, 0, -1)]
+    else:
+        assert isinstance(lowered, Band)
+        assert (lowered.low, lowered.high) == (shape.low, shape.high)
+        left = [-n / 1000 for n in range(1000, -1, -1)]
+        assert degree(lowered, -1.0) == 0.0
+    heights = [exact_degree(lowered, Fraction(x)) for x in left]
+    assert heights == sorted(heights)
+    assert all(0 <= height < 1 for height in heights)
+
+
+def test_a_square_is_best_followed_by_a_line_of_slope_two_root_two_less_two() -> None:
+    # max |q**2 - c q| is least where c**2 / 4 = 1 - c: c = 2 sqrt(2) - 2.
+    slope = 2.0 * math.sqrt(2.0) - 2.0
+    found = lower_curve(np.array([0.0, 0.0, 1.0]), 1, 1.0, 1.0)
+    assert found.tolist() == pytest.approx([0.0, slope], abs=1e-4)
+    square = Band(0.0, None, Flank(0.0, -1.0, (0.0, 1.0)))
+    assert by_degree(model_of(square), 1).bound == pytest.approx(1 - slope, rel=0.01)
+
+
+def test_curves_that_are_short_enough_stay_as_they_are() -> None:
+    rules = model_of(SHAPES["smooth"], SHAPES["set"])
+    found = by_degree(rules, 3)
+    assert (found.model, found.terms, found.bound) == (rules, (), 0.0)
+    assert [term.variable for term in by_degree(rules, 2).terms] == ["x0", "x1"]
+
+
+def test_a_fit_error_that_was_known_grows_by_the_bound() -> None:
+    flank = Flank(0.0, -1.0, SMOOTH, 0.25)
+    found = by_degree(model_of(Band(0.0, None, flank)), 2)
+    lowered = found.model.variables[0].terms[0].shape
+    assert isinstance(lowered, Band)
+    assert lowered.left is not None
+    assert lowered.left.error == 0.25 + found.bound
