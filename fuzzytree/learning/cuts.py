@@ -332,16 +332,27 @@ def settled_cuts(
 
 
 def _tidy(cut: Fraction, low: float, high: float) -> float:
+    """Return the roundest number near a cut, a quarter of the gap from its ends."""
     gap = Fraction(high) - Fraction(low)
-    inner_low, inner_high = Fraction(low) + gap / 4, Fraction(high) - gap / 4
-    cut = min(max(cut, inner_low), inner_high)
+    ends = Fraction(low) + gap / 4, Fraction(high) - gap / 4
+    near = min(max(cut, ends[0]), ends[1])
+    # All denominators are powers of two: the largest one makes all of them whole.
+    scale = max(near.denominator, ends[0].denominator, ends[1].denominator)
+    place, first, last = (int(number * scale) for number in (near, *ends))
     highest = math.frexp(max(abs(low), abs(high)))[1]
     for exponent in range(highest, max(highest - 54, -1075), -1):
-        unit = Fraction(2) ** exponent
-        shown = round(cut / unit) * unit
-        if inner_low <= shown <= inner_high:
-            return float(shown)
+        step = scale << exponent if exponent >= 0 else scale >> -exponent
+        shown = _nearest_multiple(place, max(step, 1))
+        if first <= shown <= last:
+            return shown / scale
     return low
+
+
+def _nearest_multiple(value: int, step: int) -> int:
+    """Return the nearest multiple of a step; of two the even one."""
+    times, rest = divmod(value, step)
+    is_up = 2 * rest > step or (2 * rest == step and times % 2 == 1)
+    return (times + is_up) * step
 
 
 def rounded_to(value: float, exponent: int) -> float:
