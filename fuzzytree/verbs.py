@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING, Literal, cast
 import msgspec
 import numpy as np
 
-from fuzzytree import checking
 from fuzzytree.agreement import Agreement
 from fuzzytree.answers import Answers, answers_of, joined
 from fuzzytree.contracts import Format, Model, Run, Written
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, TableError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded, write_atomically
-from fuzzytree.learning import Learnt, Settings, learn_arrays
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
@@ -30,6 +28,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.contracts import FloatArray
     from fuzzytree.criteria.results import Stability
+    from fuzzytree.learning import Learnt, Settings
     from fuzzytree.timing.records import Study
 
 Carried = Model | OnnxModel | bytes | str | os.PathLike[str]
@@ -106,6 +105,8 @@ def learn(
         >>> run(tree, np.array([[2.0], [7.0]])).classes
         ['soft', 'firm']
     """
+    from fuzzytree.learning import Settings
+
     settings = Settings(
         mode=mode,
         alpha=alpha,
@@ -148,6 +149,8 @@ def learn_table(
         TableError: If a unit is given for a column that is not there.
         LearningError: If nothing can be learnt from the table.
     """
+    from fuzzytree.learning import learn_arrays
+
     absent = [column for column in units if column not in table.columns]
     if absent:
         known = ", ".join(table.columns)
@@ -468,6 +471,8 @@ def check(
         >>> check(random_tree(1), runtimes=["native"], limit=100).ok
         True
     """
+    from fuzzytree import checking
+
     first = load(model) if isinstance(model, str | os.PathLike) else model
     titles = [
         names[k] if k < len(names) else _title(other, k)
