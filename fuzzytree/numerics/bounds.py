@@ -1,64 +1,73 @@
-"""How far float32 can take a degree, a strength or an axis from its double.
+"""How far rounding can take a strength, and which decisions it leaves open.
 
-Every bound is a priori: it follows from the coefficients, the widths and the values, by
-the usual model of rounding, fl(a op b) = (a op b)(1 + e) with |e| <= u and u = 2**-24
-for float32. Terms of order u**2 and the doubles' own rounding (2**-53) are covered by
-the factor `_SECOND_ORDER`.
+`fuzzytree.numerics.rounding` bounds the error of each degree in a number type. The
+minimum and the maximum pass the largest error of their operands on; a product at most
+adds the errors of its factors and a rounding for each multiplication, for
+|a b - a' b'| <= |a - a'| + |b - b'| in [0, 1]. The result is delta, the largest error
+of a strength, and with it the statement for which all this is made:
 
-The use of such a bound: where the margin between the two strongest classes exceeds
-twice the bound of a strength, both number types decide alike.
+**Where the margin between the two strongest classes exceeds 2 delta, no decision can
+differ.** For each of the two strengths has moved by at most delta, so their order is
+the same as in exact arithmetic.
+
+A tree weighs nothing. It takes the exact path wherever each value that it asks is
+farther from the cuts than its own rounding and that of the cuts.
 """
 
 from __future__ import annotations
 
-import itertools
-from typing import TYPE_CHECKING, NamedTuple
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
-from fuzzytree.contracts import Dtype
-from fuzzytree.rulebase import (
-    LR,
-    Band,
-    Flank,
-    Points,
-    RuleBase,
-    Shape,
-    Side,
-    Variable,
+from fuzzytree.contracts import Carrier, Dtype, Model
+from fuzzytree.numerics.enclosures import axis_value
+from fuzzytree.numerics.rounding import (
+    FLOAT32_MAX,
+    MORE,
+    TYPES,
+    UNIT,
+    DegreeBound,
+    axis_errors,
+    degree_bound,
+    degree_errors,
+    value_error,
 )
+from fuzzytree.rulebase import Clause, RuleBase, Variable
+from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from fuzzytree.contracts import FloatArray
+    from fuzzytree.numerics.rounding import Reals
 
-UNIT = 2.0**-24
-"""The unit roundoff of float32."""
+    BoolArray = npt.NDArray[np.bool_]
 
-FLOAT32_MAX = 3.4028234663852886e38
-"""The largest float32."""
+__all__ = [
+    "FLOAT32_MAX",
+    "UNIT",
+    "Certificate",
+    "DegreeBound",
+    "TermBound",
+    "ValueBound",
+    "axis_errors",
+    "certify",
+    "degree_bound",
+    "open_paths",
+    "strength_bounds",
+]
 
-_SECOND_ORDER = 1.0 + 2.0**-10
-
-
-class DegreeBound(NamedTuple):
-    """The largest error of a degree: `fixed + per_unit * (error of the value)`.
-
-    Attributes:
-        fixed: What the shape's own arithmetic costs.
-        per_unit: What an error of the value costs, per unit of the variable.
-    """
-
-    fixed: float
-    per_unit: float
+_BLOCK = 1 << 13  # rows that are bounded together
 
 
 def strength_bounds(
     rules: RuleBase, dtype: Dtype, values: FloatArray
 ) -> tuple[FloatArray, str]:
-    """Return the largest difference of any strength from its double, for each row.
-
-    Min passes the largest error of a degree on; a product at most adds the errors of
-    its factors, and a rounding for each multiplication.
+    """Return the largest difference of any strength from the exact one, for each row.
 
     Args:
         rules: The rule base.
@@ -67,133 +76,418 @@ def strength_bounds(
 
     Returns:
         The bounds, each at most 1, and a sentence that says where they come from. The
-        bound is 1 where a value is beyond the type's range.
+        bound is 1 where there is none: at a value that is beyond the type's range, or
+        so close to a step that rounding can put it on the other side. Rows with
+        missing values have the bound 0: there is nothing to compute.
     """
-    rows = values.shape[1]
-    worst = np.zeros(rows)
-    if dtype == "float64":
-        return worst, "the same operations in the same type"
-    for variable in rules.variables:
-        if variable.terms:
-            bounds = [degree_bound(term.shape, dtype) for term in variable.terms]
-            fixed = max(bound.fixed for bound in bounds)
-            per_unit = max(bound.per_unit for bound in bounds)
-            worst = np.maximum(worst, fixed)
-            if per_unit and variable.parts:
-                slack = axis_errors(variable, rules.inputs, values)
-                with np.errstate(over="ignore"):
-                    worst = np.maximum(worst, fixed + per_unit * slack)
-    if any(clause.negated for rule in rules.rules for clause in rule.when):
-        worst = worst + UNIT
-    longest = max(len(rule.when) for rule in rules.rules)
-    how = "largest"
+    bounds = _term_bounds(rules, dtype)
+    found = np.zeros(values.shape[1])
+    with np.errstate(all="ignore"):
+        for start in range(0, len(found), _BLOCK):
+            part = slice(start, start + _BLOCK)
+            errors = _term_errors(rules, dtype, bounds, values[:, part])
+            found[part] = _joined(rules, dtype, errors)
+    found[(np.abs(values) > TYPES[dtype].largest).any(axis=0)] = 1.0
+    found[~np.isfinite(values).all(axis=0)] = 0.0
+    return found, _origin(rules, dtype)
+
+
+def _origin(rules: RuleBase, dtype: Dtype) -> str:
     if rules.semantics.conjunction == "product":
-        worst = longest * (worst + UNIT)
-        how = f"{longest} times the largest"
-    worst = np.minimum(worst * _SECOND_ORDER, 1.0)
-    if dtype == "float32":
-        worst[~(np.abs(values) <= FLOAT32_MAX).all(axis=0)] = 1.0
-    return worst, f"{how} derived error of a degree in {dtype}"
+        return f"largest sum of derived errors of a rule's degrees in {dtype}"
+    return f"largest derived error of a degree in {dtype}"
 
 
-def axis_errors(
-    variable: Variable, inputs: tuple[str, ...], values: FloatArray
-) -> FloatArray:
-    """Return how far each value of a variable in float32 can be from its double.
+Key = tuple[str, str]
 
-    An input is rounded once. A combination rounds inputs, centres, differences,
-    products and sums: at most (number of parts + 3) roundings of each summand.
+
+def _term_bounds(rules: RuleBase, dtype: Dtype) -> dict[Key, DegreeBound]:
+    """Return the bound of each term that a rule names."""
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    clauses = (clause for rule in rules.rules for clause in rule.when)
+    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    return {key: degree_bound(shapes[key], dtype) for key in keys}
+
+
+def _term_errors(
+    rules: RuleBase,
+    dtype: Dtype,
+    bounds: Mapping[Key, DegreeBound],
+    values: FloatArray,
+) -> dict[Key, Reals]:
+    """Return the largest error of each term's degree in each row."""
+    named = dict(zip(rules.inputs, values, strict=True))
+    ranges = {name: (line, line) for name, line in named.items()}
+    asked = {variable for variable, _ in bounds}
+    variables = {v.name: v for v in rules.variables if v.name in asked}
+    axes = {
+        name: (axis_value(v, named).x, value_error(v, dtype, ranges))
+        for name, v in variables.items()
+    }
+    return {
+        key: degree_errors(bound, *axes[key[0]], is_input=not variables[key[0]].parts)
+        for key, bound in bounds.items()
+    }
+
+
+def _joined(rules: RuleBase, dtype: Dtype, errors: Mapping[Key, Reals]) -> Reals:
+    """Return the largest error of a strength from those of the terms' degrees."""
+    unit = TYPES[dtype].degree
+    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
+    if not clauses:
+        return np.zeros(())
+    degrees = {c: _clause_error(c, unit, errors) for c in clauses}
+    if rules.semantics.conjunction == "min":
+        worst = _largest(degrees.values())
+    else:
+        paths = dict.fromkeys(rule.when for rule in rules.rules if rule.when)
+        worst = _largest(_summed(degrees[c] + unit for c in when) for when in paths)
+    return np.minimum(worst * MORE, 1.0)
+
+
+def _clause_error(clause: Clause, unit: float, errors: Mapping[Key, Reals]) -> Reals:
+    worst = _largest(errors[clause.variable, term] for term in clause.terms)
+    return worst + unit if clause.negated else worst
+
+
+def _largest(parts: Iterable[Reals]) -> Reals:
+    return functools.reduce(np.maximum, parts)
+
+
+def _summed(parts: Iterable[Reals]) -> Reals:
+    return functools.reduce(np.add, parts)
+
+
+# --- certificates
+
+
+class TermBound(msgspec.Struct, frozen=True):
+    """The largest error of the degree of a term.
+
+    Attributes:
+        variable: The variable.
+        term: The term.
+        degree: What the arithmetic on the curve can cost.
+        from_value: What the rounding of the value can cost besides.
+    """
+
+    variable: str
+    term: str
+    degree: float
+    from_value: float
+
+
+class ValueBound(msgspec.Struct, frozen=True):
+    """The largest error of the value of a variable, in its unit."""
+
+    variable: str
+    error: float
+
+
+class Certificate(msgspec.Struct, frozen=True):
+    """What a number type can change about a model's answers, at most.
+
+    Attributes:
+        dtype: The number type.
+        carrier: `rules` or `tree`.
+        delta: The largest error of a strength; None for a tree, and where there is no
+            bound below 1.
+        origin: What it is derived from, and for which values it holds.
+        terms: The largest error of each term's degree.
+        values: The largest error of each value that is rounded at all.
+        reasons: Why there is no bound, or none in some of the rows, in sentences.
+        rows: How many rows it holds for; None if for every value in the ranges.
+        unbounded: In how many rows a strength has no bound.
+    """
+
+    dtype: Dtype
+    carrier: Carrier
+    delta: float | None
+    origin: str
+    terms: tuple[TermBound, ...] = ()
+    values: tuple[ValueBound, ...] = ()
+    reasons: tuple[str, ...] = ()
+    rows: int | None = None
+    unbounded: int = 0
+
+    @property
+    def sentence(self) -> str:
+        """Return what it says about decisions, for people."""
+        if self.carrier == "tree":
+            return self._of_paths()
+        if self.delta is None:
+            return f"no bound: {'; '.join(self.reasons)}"
+        if self.delta >= 0.5:
+            return f"no decision is certain: a strength can be off by {self.delta:.1e}"
+        text = (
+            "no decision can differ where the margin exceeds "
+            f"2 x {short_above(self.delta)}"
+        )
+        return "; ".join([text, *self.reasons])
+
+    def _of_paths(self) -> str:
+        if self.reasons:
+            return f"no bound: {'; '.join(self.reasons)}"
+        if not self.values:
+            return "no path can differ: no value is rounded before it meets a cut"
+        worst = max(self.values, key=lambda value: value.error)
+        return (
+            "no path can differ where each value is farther from the cuts than its "
+            f"rounding, at most {short_above(worst.error)} ({worst.variable})"
+        )
+
+
+def short_above(value: float) -> str:
+    """Return a number with two digits that is not below it.
+
+    Example:
+        >>> short_above(1.21e-6), short_above(0.0)
+        ('1.3e-06', '0')
+    """
+    if value == 0.0:
+        return "0"
+    for step in range(2):
+        text = f"{value * (1.0 + 0.05 * step):.1e}"
+        if float(text) >= value:
+            return text
+    return f"{value * 1.1:.1e}"
+
+
+def certify(
+    model: Model, dtype: Dtype, values: FloatArray | None = None
+) -> Certificate:
+    """Return how far a number type can take a model from its exact answers.
 
     Args:
-        variable: An input or a combination.
-        inputs: The names of the rows of `values`.
-        values: Shape (inputs, rows).
+        model: A rule base or a tree.
+        dtype: The number type.
+        values: Rows for which it shall hold, of shape (inputs, rows). Without them it
+            holds for all values within the declared ranges of the inputs. Inputs that
+            no combination needs may go without a range.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(0, combinations=0))
+        >>> certify(rules, "mixed").sentence
+        'no decision can differ where the margin exceeds 2 x 1.7e-06'
     """
-    absolute = dict(zip(inputs, np.abs(values), strict=True))
-    unit = UNIT * _SECOND_ORDER
-    total: FloatArray = np.zeros(values.shape[1])
-    if not variable.parts:
-        total += unit * absolute[variable.name]
-    with np.errstate(over="ignore"):
-        for part in variable.parts:
-            size = absolute[part.input] + abs(part.centre)
-            total += unit * (len(variable.parts) + 3) * abs(part.weight) * size
-    return total
+    if isinstance(model, FuzzyTree):
+        return _certify_tree(model, dtype, values)
+    if values is None:
+        return _certify_ranges(model, dtype)
+    return _certify_rows(model, dtype, values)
 
 
-def degree_bound(shape: Shape, dtype: Dtype) -> DegreeBound:
-    """Return the largest difference of a degree from its double.
-
-    Args:
-        shape: The shape.
-        dtype: `mixed` rounds the position on a flank; `float32` also rounds the value,
-            the shape's numbers and their difference. A degree that steps can be wrong
-            by 1 in float32, for a value may round across the step.
-    """
-    if dtype == "float64":
-        return DegreeBound(0.0, 0.0)
-    match shape:
-        case Band(low=low, high=high, left=left, right=right):
-            flanks = [flank for flank in (left, right) if flank is not None]
-            bounds = [_flank_bound(flank, dtype) for flank in flanks]
-            edges = (low is not None) + (high is not None)
-            if dtype == "float32" and edges > len(flanks):
-                bounds.append(DegreeBound(1.0, 0.0))
-        case LR(mean=mean, left=below, right=above):
-            bounds = [_side_bound(side, mean, dtype) for side in (below, above)]
-        case Points():
-            bounds = [_points_bound(shape, dtype)]
-    return DegreeBound(
-        min(max((bound.fixed for bound in bounds), default=0.0), 1.0),
-        max((bound.per_unit for bound in bounds), default=0.0),
+def _certify_rows(rules: RuleBase, dtype: Dtype, values: FloatArray) -> Certificate:
+    allowed, origin = strength_bounds(rules, dtype, values)
+    is_bound = allowed < 1.0
+    known = np.isfinite(values).all(axis=0)
+    count, unbounded = values.shape[1], int((~is_bound).sum())
+    delta = float(allowed[is_bound].max(initial=0.0)) if is_bound.any() else None
+    kept = values[:, is_bound & known]
+    terms: dict[Key, float] = dict.fromkeys(_term_bounds(rules, dtype), 0.0)
+    for start in range(0, kept.shape[1], _BLOCK):
+        part = kept[:, start : start + _BLOCK]
+        found = _term_errors(rules, dtype, _term_bounds(rules, dtype), part)
+        terms = {k: max(e, float(found[k].max(initial=0.0))) for k, e in terms.items()}
+    reason = (
+        f"no bound in {unbounded} of {count} rows: a value is beyond {dtype}, or "
+        "rounding can put it on the other side of a step"
+    )
+    return Certificate(
+        dtype,
+        "rules",
+        delta,
+        f"{origin}, in {count} rows",
+        _term_texts(rules, dtype, terms),
+        _value_bounds(rules, dtype, _spans(kept, rules.inputs)),
+        (reason,) if unbounded else (),
+        count,
+        unbounded,
     )
 
 
-def _flank_bound(flank: Flank, dtype: Dtype) -> DegreeBound:
-    size = sum(map(abs, flank.curve))
-    slope = sum(power * abs(c) for power, c in enumerate(flank.curve, 1))
-    rounding = UNIT * (size * (2 * len(flank.curve) + 2) + 1.0)
-    if dtype == "mixed":
-        return DegreeBound(slope * UNIT + rounding, 0.0)
-    span = abs(flank.start - flank.end)
-    reach = max(abs(flank.start), abs(flank.end))
-    position = 4 * UNIT + 4 * UNIT * reach / span
-    jump = abs(1.0 - sum(flank.curve))  # a value may round across the edge
-    return DegreeBound(slope * position + rounding + jump, slope / span)
+def _certify_ranges(rules: RuleBase, dtype: Dtype) -> Certificate:
+    ranges = _declared(rules)
+    variables = {v.name: v for v in rules.variables}
+    terms: dict[Key, float] = {}
+    reasons: list[str] = []
+    for key, bound in _term_bounds(rules, dtype).items():
+        variable = variables[key[0]]
+        lost = [part.input for part in variable.parts if part.input not in ranges]
+        if lost:
+            reasons.append(
+                f"input {lost[0]!r} of {variable.name!r} has no declared range"
+            )
+            continue
+        terms[key] = _worst_on(variable, dtype, bound, ranges)
+        if terms[key] >= 1.0:
+            reasons.append(_why(variable, key[1], bound, dtype))
+    delta = None
+    if not reasons:
+        errors = {key: np.array(error) for key, error in terms.items()}
+        delta = float(_joined(rules, dtype, errors))
+    return Certificate(
+        dtype,
+        "rules",
+        delta if delta is not None and delta < 1.0 else None,
+        f"{_origin(rules, dtype)}, for values in the declared ranges",
+        _term_texts(rules, dtype, terms),
+        _value_bounds(rules, dtype, ranges),
+        tuple(dict.fromkeys(reasons)) or _too_long(delta),
+    )
 
 
-def _side_bound(side: Side, mean: float, dtype: Dtype) -> DegreeBound:
-    size = sum(map(abs, side.curve))
-    bend = sum(2 * power * abs(c) for power, c in enumerate(side.curve))
-    slope = size + bend + 4.0 / (side.reach - 1.0)
-    rounding = UNIT * (size * (2 * len(side.curve) + 2) + 12.0)
-    if dtype == "mixed":
-        return DegreeBound(slope * UNIT * side.reach + rounding, 0.0)
-    reach = abs(mean) + side.reach * side.spread
-    position = 5 * UNIT * side.reach + 4 * UNIT * reach / side.spread
-    return DegreeBound(slope * position + rounding, slope / side.spread)
+def _too_long(delta: float | None) -> tuple[str, ...]:
+    if delta is None or delta < 1.0:
+        return ()
+    return ("the errors of a rule's degrees add up to 1",)
 
 
-def _points_bound(points: Points, dtype: Dtype) -> DegreeBound:
-    """Return the bound of lines between points.
+Ranges = Mapping[str, "tuple[Reals, Reals]"]
 
-    Rounded degrees move a line by one unit at most, and its sum costs another; the
-    quotient, the difference and the product cost one each, of the line's height.
-    Rounded values of points and of x move a place by four units of the largest: along a
-    line, or, at worst, across every step.
-    """
-    lines = [
-        (b - a, abs(r - p))
-        for (a, p), (b, r) in itertools.pairwise(
-            zip(points.values, points.degrees, strict=True)
+
+def _declared(model: Model) -> dict[str, tuple[Reals, Reals]]:
+    """Return the range of each input that declares one."""
+    return {
+        v.name: (np.array(v.low), np.array(v.high))
+        for v in model.variables
+        if not v.parts and v.low is not None and v.high is not None
+    }
+
+
+def _spans(values: FloatArray, inputs: Sequence[str]) -> dict[str, tuple[Reals, Reals]]:
+    """Return the range of each input in some rows; none without rows."""
+    if not values.shape[1]:
+        return {}
+    ends = zip(values.min(axis=1), values.max(axis=1), strict=True)
+    return {
+        name: (np.array(low), np.array(high))
+        for name, (low, high) in zip(inputs, ends, strict=True)
+    }
+
+
+def _worst_on(
+    variable: Variable, dtype: Dtype, bound: DegreeBound, ranges: Ranges
+) -> float:
+    """Return the largest error of a degree for all values in the declared ranges."""
+    everywhere = (np.array(0.0), np.array(FLOAT32_MAX))
+    off = value_error(variable, dtype, {variable.name: everywhere, **ranges})
+    places = np.array([*bound.steps.places, np.nan])  # and a place far from all steps
+    if not variable.parts and variable.name in ranges:
+        low, high = ranges[variable.name]
+        near = (0.0 if off is None else off) + bound.steps.blur
+        places = places[~((places < low - near) | (places > high + near))]
+    offs = None if off is None else np.full(places.shape, off)
+    is_input = not variable.parts
+    return float(degree_errors(bound, places, offs, is_input=is_input).max())
+
+
+def _why(variable: Variable, term: str, bound: DegreeBound, dtype: Dtype) -> str:
+    where = f"term {term!r} of {variable.name!r}"
+    if not 2.0 * bound.active < TYPES[dtype].largest:
+        return f"{where} has numbers as large as {dtype} can hold"
+    moved = bound.fixed + bound.per_unit * bound.steps.blur
+    if moved < 0.5 and bound.steps.places:
+        step = bound.steps.places[int(np.argmax(bound.steps.heights))]
+        return f"{where} steps at {step!r}, and a value can round across it"
+    return f"{where} is not wider than the rounding of its values"
+
+
+def _term_texts(
+    rules: RuleBase, dtype: Dtype, errors: Mapping[Key, float]
+) -> tuple[TermBound, ...]:
+    bounds = _term_bounds(rules, dtype)
+    return tuple(
+        TermBound(*key, bounds[key].fixed, max(error - bounds[key].fixed, 0.0))
+        for key, error in errors.items()
+    )
+
+
+def _value_bounds(model: Model, dtype: Dtype, ranges: Ranges) -> tuple[ValueBound, ...]:
+    """Return the errors of the asked variables whose range is known."""
+    found: list[ValueBound] = []
+    for variable in model.variables:
+        needed = [part.input for part in variable.parts] or [variable.name]
+        if variable.terms and all(name in ranges for name in needed):
+            error = value_error(variable, dtype, ranges)
+            if error is not None:
+                found.append(ValueBound(variable.name, float(error)))
+    return tuple(found)
+
+
+# --- trees
+
+
+def _certify_tree(
+    tree: FuzzyTree, dtype: Dtype, values: FloatArray | None
+) -> Certificate:
+    asked = {node.variable for node in tree.nodes}
+    if values is None:
+        ranges, where, rows = _declared(tree), "for values in the declared ranges", None
+    else:
+        rows = values.shape[1]
+        known = values[:, np.isfinite(values).all(axis=0)]
+        ranges, where = _spans(known, tree.inputs), f"in {rows} rows"
+    largest = {
+        v.name: max(
+            abs(cut) for n in tree.nodes if n.variable == v.name for cut in n.cuts
         )
+        for v in tree.variables
+        if v.name in asked
+    }
+    stored = TYPES[dtype].stored
+    found = tuple(
+        ValueBound(value.variable, value.error + stored * largest[value.variable])
+        for value in _value_bounds(tree, dtype, ranges)
+        if value.variable in asked
+    )
+    lost = [
+        f"input {name!r} has no declared range"
+        for v in tree.variables
+        if v.name in asked and (v.parts or stored)
+        for name in ([part.input for part in v.parts] or [v.name])
+        if name not in ranges and rows != 0
     ]
-    height = max((height for width, height in lines if width > 0), default=0.0)
-    if dtype == "mixed":
-        return DegreeBound(UNIT * (2.0 + 3.0 * height), 0.0)
-    slope = max((height / width for width, height in lines if width > 0), default=0.0)
-    jumps = sum(height for width, height in lines if width == 0)
-    moved = 4.0 * UNIT * max(map(abs, points.values))
-    rounding = UNIT * (2.0 + 6.0 * height)
-    slope = min(slope, 1e300)  # times 0 it is 0
-    return DegreeBound(slope * moved + jumps + rounding, slope)
+    lost += [
+        f"{value.variable!r} is beyond {dtype}"
+        for value in found
+        if not np.isfinite(value.error)
+    ]
+    origin = f"largest derived error of a value in {dtype}, {where}"
+    reasons = tuple(dict.fromkeys(lost))
+    return Certificate(
+        dtype, "tree", None, origin, values=found, reasons=reasons, rows=rows
+    )
+
+
+def open_paths(tree: FuzzyTree, dtype: Dtype, values: FloatArray) -> BoolArray:
+    """Return the rows in which rounding can change the path of a tree.
+
+    There a value lies no farther from a cut than its rounding and the cut's, or it is
+    beyond the number type.
+
+    Args:
+        tree: The tree.
+        dtype: In what values and cuts are compared.
+        values: Shape (inputs, rows).
+    """
+    kind = TYPES[dtype]
+    named = dict(zip(tree.inputs, values, strict=True))
+    ranges = {name: (line, line) for name, line in named.items()}
+    found: BoolArray = np.zeros(values.shape[1], np.bool_)
+    with np.errstate(all="ignore"):
+        for variable in tree.variables:
+            off = value_error(variable, dtype, ranges)
+            if off is None:
+                continue
+            found |= ~np.isfinite(off)
+            x = axis_value(variable, named).x
+            for node in tree.nodes:
+                for cut in node.cuts if node.variable == variable.name else ():
+                    blur = kind.stored * abs(cut) + kind.least
+                    found |= np.abs(x - cut) <= (off + blur) * MORE
+        if kind.stored:
+            found |= (np.abs(values) > kind.largest).any(axis=0)
+    return found & np.isfinite(values).all(axis=0)

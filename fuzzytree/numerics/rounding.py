@@ -1,0 +1,350 @@
+"""How far rounding can take a value or a degree from the exact one.
+
+Every bound is a priori: it follows from the coefficients, the widths and the values, by
+the standard model of rounding, fl(a op b) = (a op b)(1 + e) with |e| <= u, and u is
+2**-53 for double and 2**-24 for float32. It holds for the stated sequence of operations
+(`fuzzytree.rulebase`) in each of three number types: `float64`; `float32`, where every
+number of the model and every value is rounded first; and `mixed`, which finds the place
+on a curve in double, casts it, and goes on in float32.
+
+A degree is off by at most `fixed + per_unit * s` where its value is off by s, and where
+s reaches across a step also by the step's height:
+
+- **Flank** q (c0 + q (c1 + ...)). Difference, width, quotient and cast make 3 or 4 u of
+  q; float32 moves the end by u |end|, which the width divides. The curve turns this
+  into at most its steepest slope times it. Coefficient k goes through 2 k + 2 roundings
+  of Horner's rule (and its own, in float32), which makes sum (2 k + 2) |c_k| u. At the
+  plateau's edge the flank ends at 1 or it does not: what is missing is a step.
+- **Side.** The same for 1 - t Q(2 t - 1); the tail w**4 is 4 times as steep as w, whose
+  place is off by (u-relative error) * reach / (reach - 1) at most, and costs 15
+  roundings.
+- **Points.** Rounded values move the points and x, which is as if x alone moved twice
+  as far; a line turns this into its slope times it. Lines narrower than that are steps.
+
+`MORE` covers terms of second order and the rounding of these sums themselves.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple, assert_never
+
+import numpy as np
+
+from fuzzytree.contracts import Dtype
+from fuzzytree.numerics.enclosures import U
+from fuzzytree.numerics.exact import exact_flank, outwards
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Flank,
+    Points,
+    Shape,
+    Side,
+    Variable,
+)
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+    Reals = FloatArray
+
+UNIT = 2.0**-24
+"""The unit roundoff of float32."""
+
+FLOAT32_MAX = 3.4028234663852886e38
+"""The largest float32."""
+
+MORE = 1.0 + 2.0**-10
+"""A factor that covers terms of second order."""
+
+_MOST = 1e300  # of a slope: finite, so that nothing times it is nothing
+
+
+class Type(NamedTuple):
+    """What rounding costs in a number type.
+
+    Attributes:
+        axis: The unit roundoff of values, differences and quotients.
+        degree: That of everything after the quotient.
+        stored: That of the model's own numbers on the axis, and of the input: 0 where
+            they stay what they are.
+        cast: What it costs to take a place on a curve to the degrees' type.
+        curve: What it costs to take a coefficient to the degrees' type.
+        least: An error that underflow can make of a number on the axis.
+        largest: The largest number on the axis.
+        tiny: More than what underflow can make of a degree.
+    """
+
+    axis: float
+    degree: float
+    stored: float
+    cast: float
+    curve: float
+    least: float
+    largest: float
+    tiny: float
+
+
+_DOUBLE_MAX = float(np.finfo(np.float64).max)
+
+TYPES: Mapping[Dtype, Type] = {
+    "float64": Type(U, U, 0.0, 0.0, 0.0, 2.0**-1074, _DOUBLE_MAX, 2.0**-900),
+    "mixed": Type(U, UNIT, 0.0, UNIT, UNIT, 2.0**-1074, _DOUBLE_MAX, 2.0**-100),
+    "float32": Type(UNIT, UNIT, UNIT, 0.0, UNIT, 2.0**-149, FLOAT32_MAX, 2.0**-100),
+}
+
+
+class Steps(NamedTuple):
+    """Places where a degree jumps, in ascending order.
+
+    Attributes:
+        places: Where, in the variable's unit.
+        heights: By how much.
+        blur: How far rounding can move such a place.
+    """
+
+    places: tuple[float, ...] = ()
+    heights: tuple[float, ...] = ()
+    blur: float = 0.0
+
+
+class DegreeBound(NamedTuple):
+    """The largest error of a degree: `fixed + per_unit * (error of the value)`.
+
+    Attributes:
+        fixed: What the shape's own arithmetic costs.
+        per_unit: What an error of the value costs, per unit of the variable.
+        steps: What it costs besides where the value is as near to a step as its error.
+        active: Beyond this size of the value, in either direction, the degree is level.
+    """
+
+    fixed: float
+    per_unit: float
+    steps: Steps = Steps()
+    active: float = 0.0
+
+
+def degree_bound(shape: Shape, dtype: Dtype) -> DegreeBound:
+    """Return the largest difference of a degree from the exact one.
+
+    Args:
+        shape: The shape.
+        dtype: The number type.
+
+    Example:
+        >>> ramp = Band(high=1.0, right=Flank(1.0, 3.0))
+        >>> bound = degree_bound(ramp, "float32")
+        >>> f"{bound.fixed:.1e}, and {bound.per_unit:.1g} for each unit of the value"
+        '5.1e-07, and 0.5 for each unit of the value'
+    """
+    kind = TYPES[dtype]
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            edges = [
+                _edge_bound(edge, flank, kind)
+                for edge, flank in ((low, left), (high, right))
+                if edge is not None
+            ]
+            found = _together(edges)
+        case LR(mean=mean, left=left, right=right):
+            found = _together([_side_bound(s, mean, kind) for s in (left, right)])
+        case Points():
+            found = _points_bound(shape, kind)
+        case _:
+            assert_never(shape)
+    if not 2.0 * found.active < kind.largest:
+        return found._replace(fixed=1.0)
+    return found._replace(fixed=min(found.fixed * MORE, 1.0))
+
+
+def _together(parts: Sequence[DegreeBound]) -> DegreeBound:
+    """Return the bound of the smallest of some degrees."""
+    return DegreeBound(
+        max((part.fixed for part in parts), default=0.0),
+        max((part.per_unit for part in parts), default=0.0),
+        Steps(
+            tuple(place for part in parts for place in part.steps.places),
+            tuple(height for part in parts for height in part.steps.heights),
+            max((part.steps.blur for part in parts), default=0.0),
+        ),
+        max((part.active for part in parts), default=0.0),
+    )
+
+
+def _edge_bound(edge: float, flank: Flank | None, kind: Type) -> DegreeBound:
+    blur = kind.stored * abs(edge) + kind.least * bool(kind.stored)
+    if flank is None:
+        return DegreeBound(0.0, 0.0, Steps((edge,), (1.0,), blur), abs(edge))
+    span = abs(flank.start - flank.end)
+    slope = steepest(flank.curve)
+    moved = kind.stored * abs(flank.end) + 2 * kind.least
+    place = 3 * kind.axis + kind.cast + moved / span
+    rounds = sum(
+        ((2 * k + 2) * kind.degree + kind.curve) * abs(c)
+        for k, c in enumerate(flank.curve)
+    )
+    per_unit = min(slope / span * MORE, _MOST)
+    gap = float(1 - exact_flank(flank, Fraction(edge)))
+    return DegreeBound(
+        slope * place + rounds + kind.curve + kind.tiny,
+        per_unit,
+        Steps((edge,), (gap * MORE + per_unit * blur,), blur),
+        max(abs(edge), abs(flank.start), abs(flank.end)),
+    )
+
+
+def _side_bound(side: Side, mean: float, kind: Type) -> DegreeBound:
+    """Bound one side: within a spread by its curve, beyond by its tail."""
+    curve, reach = side.curve, side.reach
+    length = reach - 1.0
+    slope = sum(k * abs(a + b) for k, (a, b) in enumerate(_pairs(curve), 1))
+    rounds = sum(
+        ((2 * k + 2 + k) * kind.degree + kind.curve) * abs(c)
+        for k, c in enumerate(curve)
+    )
+    rounds += kind.degree + kind.tiny
+    relative = 3 * kind.axis + kind.cast + kind.least / side.spread
+    moved = (kind.stored * abs(mean) + kind.least) / side.spread
+    shift = (
+        abs(float(np.float32(min(reach, FLOAT32_MAX))) - reach) if kind.curve else 0.0
+    )
+    last = min(max(1.0 - sum(curve) + sum(map(abs, curve)) * 2.0**-40, 0.0), 1.0)
+    w = min(0.75 * reach / length, 1.0)  # where u-relative errors weigh most
+    peak = max(w**3 * (reach - w * length), 1.0)
+    tail = 4.0 * (moved + relative * peak + shift) / length + 16 * kind.degree
+    within = slope * (moved + relative) + rounds
+    if shift:
+        within += 4.0 * shift / length + 16 * kind.degree
+    return DegreeBound(
+        max(within, last * tail + rounds),
+        min(max(slope, last * 4.0 / length) / side.spread * MORE, _MOST),
+        active=abs(mean) + reach * side.spread,
+    )
+
+
+def _pairs(curve: Sequence[float]) -> Iterator[tuple[float, float]]:
+    return itertools.pairwise((*curve, 0.0))
+
+
+def _points_bound(points: Points, kind: Type) -> DegreeBound:
+    """Bound lines between points; what is narrower than rounding counts as a step."""
+    active = max(map(abs, points.values))
+    moved = kind.stored * active + kind.least * bool(kind.stored)
+    slope = height = narrow = 0.0
+    places: list[float] = []
+    heights: list[float] = []
+    joined = zip(points.values, points.degrees, strict=True)
+    for (a, p), (b, r) in itertools.pairwise(joined):
+        if b - a > 4 * moved:
+            slope = max(slope, abs(r - p) / (b - a))
+        elif p != r:
+            places.append(a)
+            heights.append(abs(r - p))
+            narrow = max(narrow, b - a)
+        height = max(height, abs(r - p))
+    rounds = height * (3 * kind.axis + kind.cast + 2 * kind.degree)
+    rounds += kind.degree + 2 * kind.curve + kind.tiny
+    per_unit = min(slope * MORE, _MOST)
+    steps = Steps(tuple(places), tuple(heights), 2 * moved + narrow)
+    return DegreeBound(per_unit * 2 * moved + rounds, per_unit, steps, active)
+
+
+@functools.lru_cache(maxsize=1 << 12)
+def steepest(curve: tuple[float, ...]) -> float:
+    """Return a bound of the slope of q (c0 + q (c1 + ...)) on [0, 1].
+
+    The largest Bernstein coefficient of the derivative, in fractions, rounded up.
+
+    Example:
+        >>> steepest((3.0, -3.0, 1.0))  # 1 - (1 - q)**3
+        3.0
+    """
+    slopes = [power * Fraction(c) for power, c in enumerate(curve, 1)]
+    degree = len(slopes) - 1
+    sizes: list[Fraction] = []
+    for i in range(degree + 1):
+        shares = (Fraction(math.comb(i, k), math.comb(degree, k)) for k in range(i + 1))
+        terms = (share * slope for share, slope in zip(shares, slopes, strict=False))
+        sizes.append(abs(sum(terms, start=Fraction(0))))
+    return outwards(max(sizes))[1]
+
+
+# --- values
+
+
+def value_error(
+    variable: Variable, dtype: Dtype, ranges: Mapping[str, tuple[Reals, Reals]]
+) -> Reals | None:
+    """Return how far a value can be from the exact one; None if it is exact.
+
+    An input is rounded once, in float32. Of n parts, each carries the rounding of its
+    input, centre and weight in float32, and n + 2 others in any type.
+
+    Args:
+        variable: An input or a combination.
+        dtype: The number type.
+        ranges: For each input, its lowest and its highest value, or its value twice.
+    """
+    kind = TYPES[dtype]
+    if not variable.parts:
+        if not kind.stored:
+            return None
+        return kind.stored * _size(*ranges[variable.name]) + kind.least
+    total: Reals = np.zeros(())
+    whole: Reals = np.zeros(())
+    for part in variable.parts:
+        low, high = ranges[part.input]
+        size, weight = _size(low, high), abs(part.weight)
+        away = _size(low - part.centre, high - part.centre)
+        total = total + weight * away * (kind.axis * (len(variable.parts) + 2))
+        total = total + kind.stored * weight * (size + abs(part.centre))
+        total = total + kind.least * (weight + away + 1.0)
+        whole = whole + (weight + 1.0) * (size + abs(part.centre))
+    return np.where(whole < kind.largest, total * MORE, np.inf)
+
+
+def _size(low: Reals, high: Reals) -> Reals:
+    return np.maximum(np.abs(low), np.abs(high))
+
+
+def axis_errors(
+    variable: Variable, inputs: tuple[str, ...], values: FloatArray
+) -> FloatArray:
+    """Return how far each value of a variable in float32 can be from the exact one.
+
+    Args:
+        variable: An input or a combination.
+        inputs: The names of the rows of `values`.
+        values: Shape (inputs, rows).
+    """
+    named = dict(zip(inputs, zip(values, values, strict=True), strict=True))
+    with np.errstate(all="ignore"):
+        found = value_error(variable, "float32", named)
+    return np.zeros(values.shape[1]) if found is None else found
+
+
+def degree_errors(
+    bound: DegreeBound, x: Reals, off: Reals | None, *, is_input: bool
+) -> Reals:
+    """Return the largest error of a degree at each value, which is off by so much.
+
+    An input's own rounding is relative: beyond `active` it changes nothing.
+    """
+    blur = bound.steps.blur
+    if off is None:
+        return np.full(x.shape, bound.fixed)
+    felt = np.minimum(off, UNIT * bound.active * MORE + blur) if is_input else off
+    found = bound.fixed + felt * bound.per_unit
+    if bound.steps.places:
+        near = off * MORE + blur
+        places = np.array(bound.steps.places)
+        first = np.searchsorted(places, x - near, side="left")
+        last = np.searchsorted(places, x + near, side="right")
+        sums = np.append(0.0, np.cumsum(bound.steps.heights))
+        found = found + (sums[last] - sums[first])
+    return np.where(np.isfinite(off), np.minimum(found * MORE, 1.0), 1.0)
