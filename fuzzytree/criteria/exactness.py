@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from fuzzytree.contracts import Model, Runtime
 from fuzzytree.criteria.carriers import ready
-from fuzzytree.criteria.judging import observed
+from fuzzytree.criteria.judging import Observed, observed
 from fuzzytree.criteria.results import Criterion, judged
 from fuzzytree.numerics.oracle import Decided, decide
 
@@ -34,36 +34,37 @@ def exactness(
     faults: list[str] = []
     skipped: list[str] = []
     exact: dict[tuple[str, int], Decided] = {}
-    worst: dict[str, tuple[float, float, int]] = {}
+    seen: dict[str, list[Observed]] = {}
     cases = 0
     for one in ready(model, runtimes, skipped):
         rows = one.some(values)
         key = (one.carrier, rows.shape[1])
         if key not in exact:
             exact[key] = decide(one.model, rows)
-        seen = observed(one, rows, exact[key])
-        cases += seen.rows
-        faults += seen.faults
-        before = worst.get(one.runtime.dtype, (0.0, 0.0, 0))
-        flips = before[2] + seen.flips
-        if one.runtime.bound is None and seen.worst >= before[0]:
-            worst[one.runtime.dtype] = (seen.worst, seen.allowed, flips)
-        else:
-            worst[one.runtime.dtype] = (*before[:2], flips)
-        if seen.unbounded:
-            skipped.append(f"{one.title}: no bound in {seen.unbounded} rows")
-    facts = [
-        f"{dtype}: strengths off by at most {error:.2g}, {allowed:.2g} allowed there; "
-        f"{flips} classes flip, all within the band"
-        for dtype, (error, allowed, flips) in worst.items()
-        if not faults
-    ]
+        found = observed(one, rows, exact[key])
+        cases += found.rows
+        faults += found.faults
+        own = f" in {one.runtime.name}" if one.runtime.bound is not None else ""
+        seen.setdefault(f"{one.runtime.dtype}{own}", []).append(found)
+    errors = [one.worst for found in seen.values() for one in found]
+    facts = [_fact(name, found) for name, found in seen.items()]
     return judged(
         "N8",
         cases,
         faults,
-        worst=max((error for error, _, _ in worst.values()), default=None),
+        worst=max(errors, default=None),
         facts=facts,
         advice=_ADVICE,
         skipped=skipped,
     )
+
+
+def _fact(name: str, found: Sequence[Observed]) -> str:
+    worst = max(found, key=lambda one: one.worst)
+    flips = max(one.flips for one in found)
+    text = f"{name}: strengths off by at most {worst.worst:.2g}"
+    text += f" where {worst.allowed:.2g} is allowed; other classes in {flips} rows"
+    unbounded = max(one.unbounded for one in found)
+    if unbounded:
+        text += f"; no bound in {unbounded} rows, within rounding of a step"
+    return text

@@ -1,12 +1,9 @@
 """A runtime's answers held against the exact ones, within a bound for each row.
 
-The bound adds two proved ones: of the runtime's number type against the same operations
-in double (`numerics.bounds`), and of those against the exact strengths. The latter is
-the width of the oracle's intervals (`numerics.enclosures`): they are laid around what
-the operations give in double, so they hold those strengths beside the exact ones.
-
-A class may differ where the exact margin is at most twice the bound, and nowhere else;
-the path of a tree only in rows within rounding of a cut.
+The bound is `numerics.bounds.strength_bounds`, for the runtime's number type; a runtime
+with a bound of its own adds that to the one of double. A class may differ where the
+exact margin is at most twice the bound, and nowhere else; the path of a tree only in
+rows within rounding of a cut.
 """
 
 from __future__ import annotations
@@ -17,16 +14,9 @@ import numpy as np
 
 from fuzzytree.comparing import Answers, labels
 from fuzzytree.contracts import Dtype, Model, Outcome
-from fuzzytree.criteria.carriers import Ready, answered, row_text
+from fuzzytree.criteria.carriers import Ready, row_text
 from fuzzytree.criteria.specials import missing_rows
-from fuzzytree.numerics.bounds import UNIT, axis_errors, strength_bounds
-from fuzzytree.numerics.enclosures import (
-    Enclosure,
-    axis_value,
-    clause_enclosure,
-    degree_enclosure,
-    strength_enclosure,
-)
+from fuzzytree.numerics.bounds import UNIT, strength_bounds, value_error
 from fuzzytree.numerics.oracle import Decided, decide, strength_errors
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.axes import axis_lines, plan_axes
@@ -35,8 +25,6 @@ from fuzzytree.tree import FuzzyTree
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
     from fuzzytree.criteria.carriers import BoolArray
-
-_DOUBLE = 2.0**-29  # a rounding of double, in roundings of float32
 
 
 class Observed(NamedTuple):
@@ -74,7 +62,7 @@ def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Ob
         exact: The exact answers to these rows, if they are known already.
     """
     truth = decide(one.model, values) if exact is None else exact
-    found, warning = answered(one, values)
+    found = one.run(values)
     dtype = one.runtime.dtype
     known = ~missing_rows(one.model, values, dtype)
     allowed = allowed_errors(one, values)
@@ -90,9 +78,7 @@ def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Ob
         low[~known] = 0.0
         wrong |= low > allowed
     bounded = np.where(allowed < 1.0, low, 0.0)
-    faults = [f"{one.title}: it warns: {warning}"] if warning else []
-    if wrong.any():
-        faults.append(_fault(one, values, found, wrong, low, allowed))
+    faults = [_fault(one, values, found, wrong, low, allowed)] if wrong.any() else []
     worst = int(np.argmax(bounded)) if low.size else 0
     return Observed(
         values.shape[1],
@@ -109,44 +95,12 @@ def allowed_errors(one: Ready, values: FloatArray) -> FloatArray:
     """Return by how much a strength may differ from the exact one, for each row."""
     if not isinstance(one.model, RuleBase):
         return np.zeros(values.shape[1])
-    allowed = double_errors(one.model, values)
-    if one.runtime.bound is not None:
-        allowed = allowed + one.runtime.bound(one.model)[0]
-    else:
-        allowed = allowed + strength_bounds(one.model, one.runtime.dtype, values)[0]
-    return np.minimum(allowed, 1.0)
-
-
-def double_errors(rules: RuleBase, values: FloatArray) -> FloatArray:
-    """Return by how much a strength in double may differ from the exact one, by row.
-
-    Example:
-        >>> from fuzzytree.lowering import rules_from_tree
-        >>> from fuzzytree.testing import random_tree
-        >>> rules = rules_from_tree(random_tree(0))
-        >>> bool(double_errors(rules, np.zeros((4, 1)))[0] < 1e-13)
-        True
-    """
-    named = dict(zip(rules.inputs, values, strict=True))
-    widest: FloatArray = np.zeros(values.shape[1])
-    start = Enclosure(np.ones_like(widest), np.ones_like(widest))
-    is_product = rules.semantics.conjunction == "product"
-    with np.errstate(all="ignore"):
-        axes = {v.name: axis_value(v, named) for v in rules.variables}
-        terms = {
-            (v.name, t.name): degree_enclosure(t.shape, axes[v.name])
-            for v in rules.variables
-            for t in v.terms
-        }
-        for rule in rules.rules:
-            found = start
-            for clause in rule.when:
-                degrees = [terms[clause.variable, name] for name in clause.terms]
-                found = strength_enclosure(
-                    found, clause_enclosure(clause, degrees), is_product=is_product
-                )
-            np.fmax(widest, found.high - found.low, out=widest)
-    return widest * (1.0 + 2.0**-50)
+    own = one.runtime.bound
+    dtype: Dtype = one.runtime.dtype if own is None else "float64"
+    allowed, _ = strength_bounds(one.model, dtype, values)
+    if own is not None:
+        allowed = np.minimum(allowed + own(one.model)[0], 1.0)
+    return allowed
 
 
 def near_cut(tree: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
@@ -156,16 +110,16 @@ def near_cut(tree: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
         return near
     plan = plan_axes(tree.variables)
     variables = {variable.name: variable for variable in tree.variables}
-    unit = 1.0 if dtype == "float32" else _DOUBLE
+    named = dict(zip(tree.inputs, zip(values, values, strict=True), strict=True))
+    unit = UNIT if dtype == "float32" else 0.0  # a cut is rounded in float32
     with np.errstate(all="ignore"):
         lines = axis_lines(plan, values)
         for node in tree.nodes:
-            variable = variables[node.variable]
-            if not variable.parts and dtype != "float32":
+            slack = value_error(variables[node.variable], dtype, named)
+            if slack is None:
                 continue  # nothing is rounded before the comparison
-            slack = axis_errors(variable, tree.inputs, values) * unit
             for cut in node.cuts:
-                reach = slack + 2.0 * UNIT * unit * abs(cut) + 2.0**-149 * unit
+                reach = 2.0 * slack + 2.0 * unit * abs(cut)
                 near |= np.abs(lines[plan.line[node.variable]] - cut) <= reach
     return near
 

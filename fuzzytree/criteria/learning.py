@@ -62,7 +62,7 @@ def learner_scaling(
     """Multiply columns by 2**k; demand the tree in those units, bit for bit (N1)."""
     tree = learn(values, classes)
     width = values.shape[1]
-    plans = [[k] * width for k in _EXPONENTS]
+    plans: list[list[int]] = [[k] * width for k in _EXPONENTS]
     plans.append([(-1) ** column * 17 * (column + 1) for column in range(width)])
     faults: list[str] = []
     for ks in plans:
@@ -81,8 +81,9 @@ def learner_order(
     faults: list[str] = []
     orders = [np.arange(len(values))[::-1], np.argsort(values[:, 0], kind="stable")]
     orders += [np.random.default_rng(s).permutation(len(values)) for s in range(4)]
+    labels = np.array(classes, np.str_)
     for order in orders:
-        if learn(values[order], [classes[k] for k in order.tolist()]) != tree:
+        if learn(values[order], labels[order].tolist()) != tree:
             faults.append("the same rows in another order give another tree")
     return judged("N3", len(orders), faults, advice="make the sums exact")
 

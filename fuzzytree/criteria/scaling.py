@@ -25,6 +25,7 @@ _ADVICE = (
     "the runtime compares with a fixed number somewhere, or leaves the number range "
     "in between; use one whose steps are differences, quotients and comparisons"
 )
+_NO_INPUT = "the model has no input"
 _LIMITS: Mapping[Dtype, tuple[int, int]] = {
     "float64": (-1021, 1022),
     "mixed": (-1021, 1022),
@@ -48,6 +49,8 @@ def scaling(
     Returns:
         The criterion, and the range of k for each form and number type.
     """
+    if not model.inputs:
+        return judged("N1", 0, (), skipped=(_NO_INPUT,)), ()
     faults: list[str] = []
     skipped: list[str] = []
     usable: dict[tuple[str, Dtype], Usable] = {}

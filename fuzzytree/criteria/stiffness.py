@@ -80,7 +80,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
             after = decide(form, changed)
             flips = max(flips, int((after.label != before.label).sum()))
             gap = max(gap, _gap(before, after))
-        predicted = min(scale.slope * scale.location * UNIT, 1.0)
+        predicted = scale.slope * scale.location * UNIT
         offset = _offset(scale)
         is_safe = predicted <= SAFE and not (is_data and flips)
         ratio = scale.spread / scale.location if scale.location else math.inf
@@ -90,7 +90,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
                 scale.spread,
                 scale.location,
                 ratio,
-                predicted,
+                min(predicted, 1.0),
                 gap,
                 flips,
                 near.shape[1],

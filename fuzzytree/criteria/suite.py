@@ -114,6 +114,7 @@ def examine(
             case _:
                 one = _work_precision()
         found.append(one)
+    has_data = rows.shape[1] > 0
     tell("stiffness of the inputs", len(wanted) / (len(wanted) + 1))
     return Stability(
         model.name,
@@ -122,9 +123,7 @@ def examine(
         rows.shape[1],
         tuple(runtime.name for runtime in runtimes if is_installed(runtime)),
         tuple(found),
-        stiffness(
-            model, rows if rows.shape[1] else probes, is_data=bool(rows.shape[1])
-        ),
+        stiffness(model, rows if has_data else probes, is_data=has_data),
         faults,
         usable,
         costs,

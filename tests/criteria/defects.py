@@ -94,7 +94,9 @@ BATCH_MEAN = on_values(lambda v: (v - _means(v)) + _means(v))
 NAN_IS_ZERO = on_values(lambda v: np.where(np.isnan(v), 0.0, v))
 """Takes a missing value for 0."""
 
-SINGLE = on_values(lambda v: v.astype(np.float32).astype(np.float64))
+SINGLE = on_values(
+    lambda v: np.where(np.abs(v) < 1e38, v.astype(np.float32).astype(np.float64), v)
+)
 """Reads its inputs as float32 and calls itself double."""
 
 

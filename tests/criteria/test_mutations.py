@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import msgspec
+import numpy as np
 import pytest
 
+from fuzzytree.contracts import Model, Runtime
 from fuzzytree.criteria import learning
 from fuzzytree.criteria.carriers import probe_values
 from fuzzytree.criteria.curves import curves
 from fuzzytree.criteria.degenerate import degenerate
+from fuzzytree.criteria.edges import edges
+from fuzzytree.criteria.exactness import exactness
+from fuzzytree.criteria.offsets import offsets
 from fuzzytree.criteria.order import order
 from fuzzytree.criteria.roundtrips import roundtrips
 from fuzzytree.criteria.scaling import decades, scaling
 from fuzzytree.criteria.specials import specials
 from fuzzytree.exporters import find_format
 from fuzzytree.rulebase import LR, Band, Flank, Side, Term
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.testing import random_tree
 from tests.criteria import defects
 
 if TYPE_CHECKING:
@@ -57,7 +65,7 @@ def test_n3_finds_a_runtime_that_sums_over_the_batch(rows: FloatArray) -> None:
     ids=["warns", "no spread"],
 )
 def test_n4_finds_a_runtime_that_divides_by_nothing(
-    rows: FloatArray, defect: defects.Runtime, said: str
+    rows: FloatArray, defect: Runtime, said: str
 ) -> None:
     found = degenerate(RULES, [defect], rows)
     assert found.verdict == "FAILS"
@@ -66,11 +74,62 @@ def test_n4_finds_a_runtime_that_divides_by_nothing(
         assert degenerate(RULES, [sound], rows).verdict == "holds"
 
 
+def test_n2_finds_a_runtime_that_evaluates_in_raw_values() -> None:
+    none = np.empty((2, 0))
+    found, _ = offsets(RULES, [defects.RAW_POWERS], none)
+    assert found.verdict == "FAILS"
+    assert "are beyond the bound: strengths off by" in found.detail[0]
+    assert offsets(RULES, [defects.PLAIN], none)[0].verdict == "holds"
+
+
+@pytest.mark.parametrize(
+    ("defect", "said"),
+    [
+        (defects.SWAPPED_EDGE, "a is low at 1.0: degree 0.7499999999999999, not one"),
+        (defects.SOFT_ZERO, "degree 1e-17, not zero"),
+    ],
+    ids=["<= as <", "soft zero"],
+)
+def test_n5_finds_a_runtime_whose_edges_are_not_exact(
+    defect: Runtime, said: str
+) -> None:
+    found = edges(RULES, [defect])
+    assert found.verdict == "FAILS"
+    assert said in " ".join(found.detail)
+    assert edges(RULES, [defects.PLAIN]).verdict == "holds"
+
+
 def test_n6_finds_a_runtime_that_takes_nan_for_0(rows: FloatArray) -> None:
     found = specials(RULES, [defects.NAN_IS_ZERO], rows)
     assert found.verdict == "FAILS"
     assert "break the policy on missing values" in found.detail[0]
     assert specials(RULES, [defects.NATIVE], rows).verdict == "holds"
+
+
+def test_n8_finds_a_runtime_that_is_narrower_than_it_says(rows: FloatArray) -> None:
+    found = exactness(RULES, [defects.SINGLE], rows)
+    assert found.verdict == "FAILS"
+    assert "strengths off by" in found.detail[0]
+    assert exactness(RULES, [defects.NATIVE], rows).verdict == "holds"
+
+
+def test_n8_finds_a_bound_that_is_too_small(rows: FloatArray) -> None:
+    def tiny(_: Model) -> tuple[float, str]:
+        return 1e-18, "a guess"
+
+    narrow = find_runtime("native float32")
+    claimed = msgspec.structs.replace(narrow, bound=tiny)
+    assert exactness(RULES, [claimed], rows).verdict == "FAILS"
+    assert exactness(RULES, [narrow], rows).verdict == "holds"
+
+
+def test_n8_finds_a_tree_that_turns_at_another_value() -> None:
+    tree = random_tree(3, leaves=6, combinations=0.0)
+    values = probe_values(tree, 400)
+    shifted = defects.on_values(lambda v: np.nextafter(v, np.inf))
+    found = exactness(tree, [shifted], values)
+    assert found.verdict == "FAILS"
+    assert exactness(tree, [defects.NATIVE], values).verdict == "holds"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,80 @@
+"""`fuzzytree stability` tells what holds, and exits with 1 if something does not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.rulebase import LR, Side, Term
+from tests.cli.conftest import Call
+from tests.criteria.defects import one_rule
+
+NATIVE = ("--runtime", "native", "--runtime", "native float32")
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    pass
+
+
+def test_a_sound_model_holds(call: Call) -> None:
+    code, out, err = call("stability", "grip.yaml", "--data", "grasps.csv", *NATIVE)
+    assert code == 0, out
+    assert out.splitlines()[0].endswith(" probes, 4 rows of data")
+    assert out.splitlines()[1] == "run by   native, native float32"
+    assert "FAILS" not in out
+    assert err == "10 of 11 criteria hold, and none fails\n"
+
+
+def test_a_bulging_curve_fails(call: Call) -> None:
+    bulge = LR(0.0, Side(1.0, (1.0,)), Side(1.0, (0.0, 1.5)))
+    ft.save(one_rule(Term("odd", bulge)), "odd.yaml")
+    code, out, err = call("stability", "odd.yaml", "--only", "N7", *NATIVE)
+    assert code == 1
+    assert out.splitlines()[-1].startswith("what to do: N7: learn with fewer points")
+    assert "rules: a odd (right): the polynomial leaves [0, 1] by" in out
+    assert err == "N7 fails\n"
+
+
+def test_json_tells_the_same_facts(call: Call) -> None:
+    words = ("stability", "rules.yaml", "--json", "--quiet", "--only", "N3", *NATIVE)
+    code, out, err = call(*words)
+    facts = json.loads(out)
+    assert (code, err) == (0, "")
+    assert facts["ok"] is True
+    assert [one["code"] for one in facts["criteria"]] == ["N3"]
+    assert facts["runtimes"] == ["native", "native float32"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--only", "N99"),
+            "no criterion 'N99'; there is N1, N2, N2b, N3, N4, N5, N6, N7, N8, N9, N10",
+        ),
+        (("--runtime", "no"), "no runtime 'no'; there is reference, native"),
+    ],
+)
+def test_a_wrong_option_cannot_run(
+    call: Call, words: tuple[str, ...], said: str
+) -> None:
+    code, out, err = call("stability", "grip.yaml", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith(said)
+
+
+def test_a_missing_file_cannot_be_examined(call: Call) -> None:
+    code, _, err = call("stability", "none.yaml")
+    assert code == 2
+    assert err.startswith("none.yaml: cannot be read")
+
+
+def test_a_table_without_the_columns_cannot_be_tried(call: Call) -> None:
+    Path("other.csv").write_text("a,b\n1,2\n", "utf-8")
+    code, _, err = call("stability", "grip.yaml", "--data", "other.csv", *NATIVE)
+    assert code == 2
+    assert "force" in err

@@ -1,0 +1,195 @@
+"""All criteria hold for our runtimes, on generated models and on the wine table."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
+import numpy as np
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.contracts import Model
+from fuzzytree.criteria.learning import learner_criteria, window_counts
+from fuzzytree.criteria.results import TITLES, Stability
+from fuzzytree.criteria.schema import FILE, generate
+from fuzzytree.criteria.stiffness import stiffness
+from fuzzytree.criteria.suite import examine
+from fuzzytree.exporters import all_formats
+from fuzzytree.learning.sums import totals_of
+from fuzzytree.learning.windows import window_counts as counted
+from fuzzytree.rulebase import Band, Flank, Points, RuleBase, Semantics, Term
+from fuzzytree.runtimes import all_runtimes, find_runtime
+from fuzzytree.testing import random_tree
+from fuzzytree.tree import FuzzyTree
+from tests.criteria.defects import learning_table, one_rule, small_rules
+
+ROOT = Path(__file__).resolve().parents[2]
+FAST = [find_runtime(name) for name in ("native", "native float32", "best-first")]
+
+
+@cache
+def wine() -> FuzzyTree:
+    table = ROOT / "examples" / "wine" / "wine.csv"
+    return ft.learn(str(table), target="cultivar", entry=25)
+
+
+def verdicts(found: Stability) -> dict[str, str]:
+    return {one.code: one.verdict for one in found.criteria}
+
+
+def failures(found: Stability) -> list[str]:
+    return [
+        text for one in found.criteria if one.verdict == "FAILS" for text in one.detail
+    ]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_all_criteria_hold_for_generated_trees(seed: int) -> None:
+    tree = random_tree(seed, leaves=2 + 2 * seed, inputs=2 + seed)
+    found = examine(tree, runtimes=FAST, formats=all_formats())
+    assert failures(found) == []
+    assert found.ok
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(3, 9))
+def test_all_criteria_hold_in_every_runtime_for_generated_trees(seed: int) -> None:
+    semantics = Semantics("product" if seed % 2 else "min")
+    tree = random_tree(seed, leaves=3 + seed, combinations=0.5, semantics=semantics)
+    found = examine(tree, runtimes=all_runtimes(), formats=all_formats())
+    assert failures(found) == []
+
+
+@pytest.mark.parametrize("kind", ["tree", "raw"])
+def test_all_criteria_hold_for_the_wine_tree_and_its_raw_rules(kind: str) -> None:
+    model: Model = wine() if kind == "tree" else ft.rules_from_tree(wine(), "raw")
+    found = examine(model, runtimes=FAST, formats=all_formats())
+    assert failures(found) == []
+    assert verdicts(found)["N10"] == "not applicable"
+
+
+@pytest.mark.heavy
+def test_all_criteria_hold_in_every_runtime_for_the_wine_tree() -> None:
+    found = ft.stability(wine(), data=str(ROOT / "examples" / "wine" / "wine.csv"))
+    assert failures(found) == []
+    assert found.rows == 178
+
+
+def test_rules_of_every_kind_of_term_hold() -> None:
+    assert failures(examine(small_rules(), runtimes=FAST, formats=all_formats())) == []
+    ramp = Points((0.0, 1.0, 1.0, 4.0), (0.0, 1.0, 0.5, 0.5))
+    found = examine(
+        one_rule(Term("ramp", ramp), Term("step", Band(low=1.0))),
+        runtimes=FAST,
+        formats=all_formats(),
+    )
+    assert failures(found) == []
+    assert verdicts(found)["N7"] == "not applicable"
+
+
+def test_a_tree_of_one_leaf_can_be_examined() -> None:
+    found = examine(random_tree(0, leaves=1), runtimes=FAST, formats=all_formats())
+    assert failures(found) == []
+
+
+def test_a_model_without_inputs_can_be_examined() -> None:
+    from fuzzytree.rulebase import Rule
+
+    rules = RuleBase("always", ("yes",), (), (Rule((), "yes"),))
+    assert failures(examine(rules, runtimes=FAST, formats=all_formats())) == []
+
+
+def test_only_what_was_asked_for_is_applied() -> None:
+    found = examine(small_rules(), runtimes=FAST, formats=(), only=["n3", "N2"])
+    assert [one.code for one in found.criteria] == ["N2", "N2b", "N3"]
+    assert set(TITLES) >= {one.code for one in found.criteria}
+
+
+def test_an_unknown_criterion_is_refused() -> None:
+    with pytest.raises(ValueError, match="no criterion") as caught:
+        examine(small_rules(), runtimes=FAST, formats=(), only=["N11"])
+    assert str(caught.value) == (
+        "no criterion 'N11'; there is N1, N2, N2b, N3, N4, N5, N6, N7, N8, N9, N10"
+    )
+
+
+def test_data_of_another_width_are_refused() -> None:
+    with pytest.raises(ValueError, match="shape") as caught:
+        examine(small_rules(), runtimes=FAST, formats=(), data=np.zeros((5, 2)))
+    assert str(caught.value) == "data must have shape (2, rows), not (5, 2)"
+
+
+def test_the_same_model_gives_the_same_report() -> None:
+    first = examine(small_rules(), runtimes=FAST, formats=all_formats())
+    assert first == examine(small_rules(), runtimes=FAST, formats=all_formats())
+
+
+def test_the_json_fits_the_schema() -> None:
+    schema = json.loads((ROOT / "schemas" / FILE).read_bytes())
+    assert (ROOT / "schemas" / FILE).read_bytes() == generate()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    found = examine(wine(), runtimes=FAST[:2], formats=all_formats())
+    jsonschema.validate(json.loads(found.to_json()), schema)
+
+
+# --- stiffness
+
+
+def far_away(distance: float) -> RuleBase:
+    term = Term("low", Band(high=distance, right=Flank(distance, distance + 1.0)))
+    return one_rule(term)
+
+
+def test_an_input_near_zero_is_safe_in_float32() -> None:
+    values = np.linspace(0.0, 4.0, 50)[np.newaxis]
+    (found,) = stiffness(far_away(2.0), values, is_data=True)
+    assert found.advice == "float32 is safe"
+    assert found.ratio == pytest.approx(1.0 / 3.0)
+
+
+def test_an_input_far_from_zero_is_told_what_to_subtract() -> None:
+    values = 1e9 + np.linspace(-1.0, 2.0, 50)[np.newaxis]
+    (found,) = stiffness(far_away(1e9), values, is_data=True)
+    assert found.advice == f"use mixed, or subtract {found.offset!r} first"
+    assert found.offset is not None
+    assert abs(found.offset - 1e9) <= 2.0
+    assert found.predicted == 1.0
+    assert found.observed > 0.1
+
+
+def test_what_rounding_costs_is_never_above_what_was_predicted() -> None:
+    for seed in range(6):
+        tree = random_tree(seed, leaves=5, combinations=0.0)
+        values = np.random.default_rng(seed).normal(size=(len(tree.inputs), 500))
+        for one in stiffness(tree, values, is_data=True):
+            assert one.observed <= one.predicted or one.flips
+
+
+def test_a_distance_at_which_doubles_are_too_coarse_is_told() -> None:
+    values = 1e14 + np.arange(4.0)[np.newaxis]
+    (found,) = stiffness(far_away(1e14), values, is_data=True)
+    assert found.advice == f"subtract {found.offset!r} first"
+
+
+# --- the learner of this package
+
+
+@pytest.mark.parametrize("number", range(4), ids=["N1", "N2", "N3", "N4"])
+def test_the_learner_holds(number: int) -> None:
+    def learn(values: np.ndarray, classes: object) -> FuzzyTree:  # type: ignore[type-arg]
+        return ft.learn(values, target=list(classes))  # type: ignore[call-overload]
+
+    found = learner_criteria(learn, *learning_table())[number]
+    assert (found.verdict, found.detail[:0]) == ("holds", ())
+
+
+def test_the_learner_counts_windows_exactly() -> None:
+    def count(values: np.ndarray, n: int) -> list[int]:  # type: ignore[type-arg]
+        groups = np.zeros(len(values), np.int64)
+        totals = totals_of(values, groups, 1)
+        return [int(k) for k in counted(values, groups, totals, n)[0]]
+
+    assert window_counts(count).verdict == "holds"
