@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from fuzzytree.timing.records import Study
 
 INTERRUPTED = 130
-_PICTURES = (".svg", ".png")
 
 
 @click.command("bench", short_help="Measure error against run time.")
@@ -148,29 +147,33 @@ def command(
     )
     if output:
         write_atomically(output, found.to_json().encode() + b"\n")
-    _draw(found, plots)
-    for place in (output, *plots):
-        if place:
-            say(f"wrote    {place}", quiet=quiet)
+    drawn = _draw(found, plots)
+    for place in (*([output] if output else []), *drawn):
+        say(f"wrote    {place}", quiet=quiet)
     if found.is_interrupted:
         say("interrupted; what was measured by then is told")
         return INTERRUPTED
+    if not found.points:
+        say("nothing could be measured")
+        return 2
     wrong = [*faults(found.points)]
     if wrong:
         say(wrong[-1])
         return 1
-    say((found.advice or ("nothing was measured",))[-1], quiet=quiet)
+    say(found.advice[-1] if found.advice else "measured", quiet=quiet)
     return 0
 
 
 def _check_places(output: str | None, plots: Sequence[str]) -> None:
     """Refuse what cannot be written, before minutes of work."""
+    from fuzzytree.plots import SUFFIXES
+
     for place in (output, *plots):
         if place:
             check_place(place)
     for place in plots:
-        if Path(place).suffix.lower() not in _PICTURES:
-            known = " or ".join(_PICTURES)
+        if Path(place).suffix.lower() not in SUFFIXES:
+            known = " or ".join(SUFFIXES)
             raise click.UsageError(f"--plot {place}: a picture ends in {known}")
     if plots and importlib.util.find_spec("matplotlib") is None:
         raise MissingExtraError(
@@ -179,9 +182,10 @@ def _check_places(output: str | None, plots: Sequence[str]) -> None:
         )
 
 
-def _draw(found: Study, places: Sequence[str]) -> None:
+def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
+    """Draw the study for most rows; return which files were written."""
     if not places or not found.points:
-        return
+        return ()
     from fuzzytree import plots
 
     timings = [timing for point in found.points for timing in point.timings]
@@ -190,3 +194,4 @@ def _draw(found: Study, places: Sequence[str]) -> None:
     figure = plots.work_precision(found, rows=rows, threads=threads)
     for place in places:
         plots.save(figure, place)
+    return places

@@ -181,6 +181,28 @@ def test_a_table_without_rows_is_one_sentence(call: Call) -> None:
     assert call("bench", "grip.yaml", "--data", "none.csv", *FAST) == expected
 
 
+def test_pictures_are_drawn_for_most_rows(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(verbs, "bench", lambda *_, **__: made())
+    code, _, err = call("bench", "grip.yaml", "--plot", "a.svg", "--plot", "a.png")
+    assert code == 0
+    assert err.splitlines()[:2] == ["wrote    a.svg", "wrote    a.png"]
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+    assert Path("a.svg").read_text("utf-8").startswith("<?xml")
+
+
+def test_a_study_of_nothing_draws_nothing(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(verbs, "bench", lambda *_, **__: study())
+    code, out, err = call("bench", "grip.yaml", "--plot", "a.svg")
+    assert (code, err) == (2, "nothing could be measured\n")
+    assert out.endswith("not installed (extra 'peers')\n")
+    assert not Path("a.svg").exists()
+
+
 def test_a_place_that_cannot_be_written_is_told_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
