@@ -430,16 +430,10 @@ def _method(claims: Claims) -> Iterator[str]:
         )
         if values
     )
-    stolen = machine.stolen
     yield paragraph(
         f"On {machine.processor}, {machine.cores} cores, {machine.system}, "
-        f"{machine.python}; {versions}. One thread."
-        + (f" Load {load}." if load else "")
-        + (
-            ""
-            if stolen is None
-            else f" For {stolen:.1%} of the time the process was ready and did not run."
-        )
+        f"{machine.python}; {versions}. One thread, and its own time, which does not "
+        "run while a neighbour has the core." + (f" Load {load}." if load else "")
     )
     yield paragraph(
         "Rows are standard normal in 11 columns; rules are joined by min. *Multiway* "

@@ -16,8 +16,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import Kind, RuleBase
 from fuzzytree.runtimes import find_runtime, is_installed
-from fuzzytree.timing.clock import Interval, Timed, time_calls, times_faster
-from fuzzytree.timing.records import Timing
+from fuzzytree.timing.clock import Clock, Interval, Timed, time_calls, times_faster
 from fuzzytree.tree import FuzzyTree
 from paper.records import Family, Price, Size, Times, What
 
@@ -37,6 +36,12 @@ SINGLES = 64  # rows given one at a time: they take paths of all lengths
 SAMPLE_S = 0.02  # firing takes as long for every row, so few of them do
 PATIENCE_S = 20.0  # what preparing one rule base may take
 SHORT_S = 2.0  # preparing that took less says nothing of larger ones
+
+OWN_TIME = Clock(time.thread_time_ns, None)
+"""The thread's time, which does not run while a neighbour has the core.
+
+Everything that is timed runs in this thread alone.
+"""
 
 
 class Carrier(NamedTuple):
@@ -60,7 +65,6 @@ class Bench:
         self.rounds = rounds
         self.tell = tell
         self.omissions: list[str] = []
-        self.timings: list[Timing] = []
         self.given_up: set[str] = set()
         self.taken: dict[tuple[str, Kind, Family], tuple[int, float]] = {}
 
@@ -171,12 +175,13 @@ class Bench:
         for carrier in chosen:
             prepare = _batch if is_batch else _singles
             counts[carrier.name], calls[carrier.name] = prepare(carrier, rows)
-        timed = time_calls(calls, rows=1, rounds=self.rounds, seconds=seconds)
+        timed = time_calls(
+            calls, rows=1, rounds=self.rounds, seconds=seconds, clock=OWN_TIME
+        )
         if timed.is_interrupted:
             raise KeyboardInterrupt
         for error in timed.failures.values():
             raise error
-        self.timings.extend(timed.timings.values())
         for carrier in chosen:
             if carrier.name in timed.timings:
                 yield _price(carrier, timed, counts, is_batch=is_batch)
