@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Outcome, Run
-from fuzzytree.rulebase import Band, Clause, RuleBase, Shape
+from fuzzytree.rulebase import LR, Band, Clause, Points, RuleBase, Shape
 from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
 from fuzzytree.runtimes.descent import Split, plan_descent
 from fuzzytree.runtimes.envelope import (
@@ -248,22 +248,49 @@ def _plateaus(
 
     None if they do not follow one another from end to end of one axis.
     """
-    bands: list[tuple[float, Band, int]] = []
+    found: list[tuple[float, float | None, int]] = []
     for clause, target in zip(fork.clauses, fork.targets, strict=True):
         if clause.negated or clause.variable != fork.clauses[0].variable:
             return None
         for term in clause.terms:
-            shape = shapes[clause.variable, term]
-            if not isinstance(shape, Band):
+            ends = _plateau(shapes[clause.variable, term])
+            if ends is None:
                 return None
-            low = -np.inf if shape.low is None else shape.low
-            bands.append((low, shape, target))
-    bands.sort(key=lambda band: band[0])
-    ends = [None, *(band.high for _, band, _ in bands)]
-    starts = [*(band.low for _, band, _ in bands), None]
-    if ends != starts or len({low for low, _, _ in bands}) < len(bands):
+            found.append((-np.inf if ends[0] is None else ends[0], ends[1], target))
+    found.sort(key=lambda plateau: plateau[0])
+    starts = [low for low, _, _ in found]
+    if [-np.inf, *(high for _, high, _ in found)] != [*starts, None]:
         return None
-    return [(band.high, target) for _, band, target in bands]
+    return [(high, target) for _, high, target in found]
+
+
+def _plateau(shape: Shape) -> tuple[float | None, float | None] | None:
+    """Return the ends of `low < x <= high` if a degree is 1 there and nowhere else.
+
+    Points do that which reach 1 once, and by steps: a line up to 1 is rounded to it
+    somewhat earlier.
+    """
+    match shape:
+        case Band(low=low, high=high):
+            return low, high
+        case LR():
+            return None
+        case Points(values=values, degrees=degrees):
+            at_one = [place for place, degree in enumerate(degrees) if degree == 1.0]
+            if not at_one:
+                return None
+            first, last = at_one[0], at_one[-1]
+            is_step = (
+                last - first + 1 == len(at_one)
+                and values[first] == values[max(first - 1, 0)]
+                and values[last] == values[min(last + 1, len(values) - 1)]
+            )
+            if not is_step:
+                return None
+            return (
+                values[first] if first > 0 else None,
+                values[last] if last < len(values) - 1 else None,
+            )
 
 
 def _net(rules: RuleBase, forks: Sequence[Fork], at_line: dict[str, int]) -> Net:

@@ -45,7 +45,7 @@ from fuzzytree.rulebase import (
     Side,
 )
 from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS
-from fuzzytree.runtimes.polylines import join
+from fuzzytree.runtimes.polylines import halved, join
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -280,7 +280,8 @@ def _degrees(shapes: Shapes, shape: IntArray, x: FloatArray) -> FloatArray:
     found[mine] = _edge_degrees(shapes.edges, bands, x.take(mine))
     mine = np.flatnonzero(is_joined)
     points = shape.take(mine) - shapes.points_from
-    found[mine] = join(shapes.lines, points, x.take(mine))
+    values = x.take(mine)
+    found[mine] = join(shapes.lines, halved(shapes.lines, points, values), values)
     return found
 
 
@@ -524,7 +525,9 @@ def _line_bounds(
     ends = (np.maximum(ends[0], -_LARGEST), np.minimum(ends[1], _LARGEST))
     for row, place in enumerate(points.tolist()):
         number, shape = np.array(place), shapes.points[place]
-        here, there = (join(shapes.lines, number, end) for end in ends)
+        here, there = (
+            join(shapes.lines, halved(shapes.lines, number, end), end) for end in ends
+        )
         low[row], high[row] = np.minimum(here, there), np.maximum(here, there)
         first, last = (np.searchsorted(shape.values, end) for end in ends)
         inside = np.append(shape.degrees, 0.0)

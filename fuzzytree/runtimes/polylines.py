@@ -1,8 +1,9 @@
 """Degrees of points joined by lines, for many values.
 
-The line of a value is found by halving, without a branch: from a shape's first line the
-place moves on by half of the room that is left wherever the value is above the point
-there. The operations on one number, and their order, are those of
+First the line of each value is found: `counted` compares it with every point, which is
+best for few points; `halved` moves on from the shape's first line, by half of the room
+that is left, wherever the value is above the point there. Then `join` computes the
+degree; the operations on one number, and their order, are those of
 `fuzzytree.reference`.
 """
 
@@ -17,15 +18,14 @@ if TYPE_CHECKING:
     from fuzzytree.numerics.segments import Reals, Segments
 
 
-def join(lines: Segments, shape: IntArray, x: Reals) -> Reals:
-    """Return the degree of each value in a shape.
+def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
+    """Return the degree of each value on its line.
 
     Args:
         lines: The lines of all shapes.
-        shape: Numbers of shapes, in a form that broadcasts to that of the values.
+        place: The place of each value's line.
         x: Finite values, in the lines' type.
     """
-    place = _places(lines, shape, x)
     position = _taken(lines.right, place)
     np.subtract(x, position, out=position)
     position /= _taken(lines.width, place)
@@ -38,8 +38,36 @@ def join(lines: Segments, shape: IntArray, x: Reals) -> Reals:
     return found
 
 
-def _places(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
-    """Return the place of the line on which each value lies."""
+def counted(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
+    """Return the place of the line on which each value lies, by comparisons.
+
+    Args:
+        lines: The lines of all shapes.
+        shape: The number of each line of values' shape, of shape (lines, 1); the
+            shapes have equally much room.
+        x: Of shape (lines, rows).
+    """
+    first = lines.first.take(shape)
+    points = 2 * int(lines.room.take(shape[0, 0])) - 1
+    below = np.zeros(x.shape, np.int8)
+    is_above = np.empty(x.shape, np.bool_)
+    for number in range(points):
+        limit = lines.values.take(first + number)
+        if np.isinf(limit).all():
+            break
+        np.greater(x, limit, out=is_above)
+        below += is_above.view(np.int8)
+    return first + below
+
+
+def halved(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
+    """Return the place of the line on which each value lies, by halving.
+
+    Args:
+        lines: The lines of all shapes.
+        shape: Numbers of shapes, in a form that broadcasts to that of the values.
+        x: The values.
+    """
     place = np.empty(x.shape, np.int64)
     place[:] = lines.first.take(shape)
     room = lines.room.take(shape)
