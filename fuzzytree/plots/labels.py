@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 SIZE = 8.0
 """Of letters, in points."""
+
+_HALO = 2.0  # points of white around letters, so that lines under them do no harm
+_WEIGHTS = (20.0, 1.0)  # of covering markers and words, and of covering lines
 
 _DISTANCES = (7.0, 12.0, 18.0, 26.0, 36.0, 48.0, 62.0, 80.0, 100.0)  # in points
 _SIDES = tuple(
@@ -38,7 +41,7 @@ class Label(NamedTuple):
         x: Of the point, in its data.
         y: The same.
         colour: Of the words.
-        is_needed: Whether it is placed even where it covers something.
+        is_needed: Whether it is placed even where it covers a marker or a label.
     """
 
     text: str
@@ -56,38 +59,38 @@ class Spot(NamedTuple):
         across: From the point to the middle.
         above: The same, upwards.
         box: Left, bottom, right, top.
-        is_far: Whether a line must tie it to its point.
+        leader: Boxes along the line that ties it to its point; none if it is near.
     """
 
     across: float
     above: float
     box: npt.NDArray[np.float64]
-    is_far: bool
+    leader: Boxes
 
 
 def place(figure: Figure, labels: Sequence[Label], taken: Boxes) -> None:
     """Write labels beside their points; those that find no room are left out.
 
     Greedy: the labels come in their order, and each tries eight sides at growing
-    distances and takes the first place that covers no marker and no label. Of a
-    needed label that finds none, the place that covers least is taken.
+    distances and takes the place that covers least, the nearest of equal ones. Lines
+    may be covered where it must be; markers and words by needed labels only.
 
     Args:
         figure: Whose layout is final.
         labels: The most important first.
-        taken: Boxes that must stay free, shape (boxes, 4): left, bottom, right, top
+        taken: Boxes of markers and words, shape (boxes, 4): left, bottom, right, top
             in pixels.
     """
     canvas: Any = figure.canvas
     renderer = canvas.get_renderer()
     scale = figure.dpi / 72.0
-    dots = np.array([_dot(label, scale) for label in labels]).reshape(-1, 4)
-    boxes = np.concatenate([taken, dots])
+    lines = {axes: lines_of(axes, scale) for axes in figure.axes}
     for label in labels:
         width, height = _extent(label, renderer)
-        spot = _best_spot(label, width, height, boxes, scale)
+        spots = _spots(label, width, height, scale)
+        spot = _best_spot(label, spots, taken, lines[label.axes])
         if spot is not None:
-            boxes = np.concatenate([boxes, spot.box[None]])
+            taken = np.concatenate([taken, spot.box[None], spot.leader])
             _write(label, spot, scale)
 
 
@@ -100,35 +103,49 @@ def dots_of(axes: Axes, points: Boxes, scale: float) -> Boxes:
     return np.concatenate([middle - half, middle + half], axis=1)
 
 
-def _dot(label: Label, scale: float) -> npt.NDArray[np.float64]:
-    point = np.array([[label.x, label.y]])
-    box: npt.NDArray[np.float64] = dots_of(label.axes, point, scale)[0]
-    return box
+def lines_of(axes: Axes, scale: float) -> Boxes:
+    """Return thin boxes around all lines of axes; they are level or upright."""
+    paths = [
+        line.get_transform().transform_path(line.get_path())
+        for line in axes.lines
+        if line.get_linestyle() != "None"
+    ]
+    for bars in axes.collections:
+        paths += map(bars.get_transform().transform_path, bars.get_paths())
+    points = [np.asarray(path.vertices, np.float64) for path in paths]
+    if not points:
+        return np.empty((0, 4))
+    start = np.concatenate([line[:-1] for line in points])
+    end = np.concatenate([line[1:] for line in points])
+    half = 0.5 * scale
+    low, high = np.minimum(start, end) - half, np.maximum(start, end) + half
+    return np.concatenate([low, high], axis=1)
 
 
 def _extent(label: Label, renderer: Any) -> tuple[float, float]:
     """Return the width and height of a label in pixels."""
-    drawn = label.axes.text(0, 0, label.text, fontsize=SIZE)
+    drawn = label.axes.text(0, 0, label.text, **_font(label))
     box = drawn.get_window_extent(renderer)
     drawn.remove()
     return box.width, box.height
 
 
 def _best_spot(
-    label: Label, width: float, height: float, boxes: Boxes, scale: float
+    label: Label, spots: Iterable[Spot], taken: Boxes, lines: Boxes
 ) -> Spot | None:
+    """Return the spot within the axes that covers least; None if none will do."""
     best: Spot | None = None
     least = np.inf
     frame = label.axes.get_window_extent()
-    for spot in _spots(label, width, height, scale):
+    for spot in spots:
         left, bottom, right, top = spot.box
         if left < frame.x0 or right > frame.x1 or bottom < frame.y0 or top > frame.y1:
             continue
-        covered = _covered(spot.box, boxes)
-        if covered == 0.0:
-            return spot
-        if label.is_needed and covered < least:
-            best, least = spot, covered
+        hard = _covered(spot.box, taken)
+        hard += sum(_covered(box, taken) for box in spot.leader)
+        cost = _WEIGHTS[0] * hard + _WEIGHTS[1] * _covered(spot.box, lines)
+        if cost < least and (label.is_needed or hard == 0.0):
+            best, least = spot, cost
     return best
 
 
@@ -141,7 +158,13 @@ def _spots(label: Label, width: float, height: float, scale: float) -> Iterator[
         away = np.array([right, up]) * (distance * scale + half)
         middle = point + away
         box = np.concatenate([middle - half - margin, middle + half + margin])
-        yield Spot(float(away[0]), float(away[1]), box, distance > _LEADER)
+        leader = np.empty((0, 4))
+        if distance > _LEADER:
+            dots = point + np.linspace(_DOT * 2.0 / distance, 1.0, 16)[:, None] * away
+            is_between = np.any((dots < box[:2]) | (dots > box[2:]), axis=1)
+            dots = dots[is_between]
+            leader = np.concatenate([dots - margin, dots + margin], axis=1)
+        yield Spot(float(away[0]), float(away[1]), box, leader)
 
 
 def _covered(box: npt.NDArray[np.float64], boxes: Boxes) -> float:
@@ -152,16 +175,26 @@ def _covered(box: npt.NDArray[np.float64], boxes: Boxes) -> float:
 
 
 def _write(label: Label, spot: Spot, scale: float) -> None:
+    from matplotlib.patheffects import withStroke
+
+    ground = label.axes.get_facecolor()
     line = {"arrowstyle": "-", "color": label.colour, "linewidth": 0.5, "shrinkB": 3}
-    label.axes.annotate(
+    words = label.axes.annotate(
         label.text,
         (label.x, label.y),
         xytext=(spot.across / scale, spot.above / scale),
         textcoords="offset points",
         ha="center",
         va="center",
-        fontsize=SIZE,
         color=label.colour,
-        arrowprops=line if spot.is_far else None,
+        arrowprops=line if len(spot.leader) else None,
         zorder=6,
+        **_font(label),
     )
+    words.set_path_effects([withStroke(linewidth=_HALO, foreground=ground)])
+
+
+def _font(label: Label) -> Any:
+    if label.is_needed:
+        return {"fontsize": SIZE, "fontweight": "bold"}
+    return {"fontsize": SIZE - 1.0}

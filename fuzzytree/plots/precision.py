@@ -2,91 +2,31 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fuzzytree.plots.labels import SIZE, Label, dots_of, place
+from fuzzytree.plots.marks import (
+    COLOURS,
+    MARKERS,
+    Mark,
+    floors_of,
+    marks_of,
+    nothing_text,
+)
+from fuzzytree.plots.panels import WIDTH, Panel, panels_of, scale_panels
 from fuzzytree.plots.saving import style
-from fuzzytree.timing.front import error_of
-from fuzzytree.timing.records import Kind, Point, Question, Study, Timing
+from fuzzytree.timing.records import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS: dict[Question, str] = {
-    "tree": "#c04d00",
-    "relative rules": "#0072b2",
-    "raw rules": "#00795a",
-    "rules": "#0072b2",
-}
-"""Of questions: told apart by the colour-blind, and dark enough for letters."""
-
-MARKERS: dict[Kind, str] = {"runtime": "o", "variant": "^", "peer": "D"}
-"""Of kinds; a floor is a line."""
-
-Measure = Literal["strength", "class"]
-
-AXES: dict[Measure, str] = {
-    "strength": "error of a strength\n(its certified bound, if any)",
-    "class": "share of rows\nwith another class",
-}
-"""What is drawn upwards: both on a log axis, with a strip for 0."""
-
-_WIDTH = 8.0  # inches
-_HEIGHTS: dict[Measure, float] = {"strength": 3.4, "class": 1.9}
-_LANE = 0.34
-_FRAME = 1.45  # inches around the panels: title, legend, names of axes
 _GREY = "#555555"
-_FEW = 40  # points, up to which peers are named as well
-_UNITS = (("s", 1e9), ("ms", 1e6), ("µs", 1e3), ("ns", 1.0))
-
-
-class Mark(NamedTuple):
-    """A point of the picture.
-
-    Attributes:
-        point: Of the study.
-        timing: Its time that is drawn.
-        measure: Which panel it is in.
-        error: The number drawn there.
-        is_front: Whether nobody beats it in both.
-    """
-
-    point: Point
-    timing: Timing
-    measure: Measure
-    error: float
-    is_front: bool
-
-    @property
-    def nanoseconds(self) -> float:
-        """The median time of one row."""
-        return self.timing.median_ns / self.timing.rows
-
-    @property
-    def name(self) -> str:
-        """The candidate's name without its question, which the colour tells."""
-        return self.point.name.removesuffix(f": {self.point.question}")
-
-
-class Panel(NamedTuple):
-    """The axes of one measure: a log axis, and below it a strip for an error of 0.
-
-    Attributes:
-        measure: What is drawn upwards.
-        logs: None if every error is 0.
-        strip: None if none is.
-        lanes: The question of each line of the strip, from the top.
-    """
-
-    measure: Measure
-    logs: Axes | None
-    strip: Axes | None
-    lanes: tuple[Question, ...]
+_DASHES = (0, (4, 3))
+_FEW = 100  # points, up to which peers are named as well
 
 
 def work_precision(study: Study, *, rows: int, threads: int = 1) -> Figure:
@@ -112,16 +52,16 @@ def work_precision(study: Study, *, rows: int, threads: int = 1) -> Figure:
     """
     marks = [*marks_of(study, rows, threads)]
     if not marks:
-        raise ValueError(_nothing_text(study, rows, threads))
+        raise ValueError(nothing_text(study, rows, threads))
     with style():
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(_WIDTH, 1.0))
+        figure = Figure(figsize=(WIDTH, 1.0))
         FigureCanvasAgg(figure)
-        panels = _panels(figure, marks)
-        floors = [*_floors(study, rows, threads)]
-        _scale(panels, marks, floors)
+        panels = panels_of(figure, marks)
+        floors = [*floors_of(study, rows, threads)]
+        scale_panels(panels, marks, floors)
         for panel in panels:
             _draw_marks(panel, [m for m in marks if m.measure == panel.measure])
         _draw_fronts(panels, marks)
@@ -132,177 +72,39 @@ def work_precision(study: Study, *, rows: int, threads: int = 1) -> Figure:
     return figure
 
 
-def marks_of(study: Study, rows: int, threads: int) -> Iterator[Mark]:
-    """Yield what is to be drawn, the front first, then by time."""
-    fronts = {
-        name
-        for front in study.fronts
-        if (front.rows, front.threads) == (rows, threads)
-        for name in front.names
-    }
-    found: list[Mark] = []
-    for point, timing in _timed(study, rows, threads):
-        if point.error is None or not point.error.rows:
-            continue
-        error = error_of(point)
-        measure: Measure = "strength"
-        if point.question == "tree" or error is None:
-            measure, error = "class", point.error.flips / point.error.rows
-        found.append(Mark(point, timing, measure, error, point.name in fronts))
-    yield from sorted(found, key=lambda m: (not m.is_front, m.nanoseconds, m.name))
-
-
-def _timed(study: Study, rows: int, threads: int) -> Iterator[tuple[Point, Timing]]:
-    for point in study.points:
-        for timing in point.timings:
-            if (timing.rows, timing.threads) == (rows, threads):
-                yield point, timing
-
-
-def _floors(study: Study, rows: int, threads: int) -> Iterator[tuple[str, float]]:
-    for point, timing in _timed(study, rows, threads):
-        if point.kind == "floor":
-            yield point.name.removeprefix("floor: "), timing.median_ns / timing.rows
-
-
-def _nothing_text(study: Study, rows: int, threads: int) -> str:
-    known = sorted(
-        {(one.rows, one.threads) for point in study.points for one in point.timings}
-    )
-    text = ", ".join(f"{rows} with {threads}" for rows, threads in known)
-    return (
-        f"nothing was measured with {rows} rows and {threads} threads; "
-        f"rows and threads in this study: {text or 'none'}"
-    )
-
-
-def _panels(figure: Figure, marks: Sequence[Mark]) -> list[Panel]:
-    """Return the axes, one below the other, as high as what they hold."""
-    plans: list[tuple[Measure, bool, tuple[Question, ...]]] = []
-    for measure in AXES:
-        errors = [(m.error, m.point.question) for m in marks if m.measure == measure]
-        lanes = tuple(question for question in COLOURS if (0.0, question) in errors)
-        if errors:
-            plans.append((measure, any(error > 0.0 for error, _ in errors), lanes))
-    heights: list[float] = []
-    for measure, has_logs, lanes in plans:
-        heights += [_HEIGHTS[measure]] * has_logs
-        heights += [_LANE * (len(lanes) + 0.6)] * bool(lanes)
-    figure.set_size_inches(_WIDTH, sum(heights) + _FRAME)
-    grid = figure.add_gridspec(
-        len(heights),
-        1,
-        height_ratios=heights,
-        left=0.115,
-        right=0.985,
-        top=1.0 - 0.62 / (sum(heights) + _FRAME),
-        bottom=0.83 / (sum(heights) + _FRAME),
-        hspace=0.08,
-    )
-    axes = [figure.add_subplot(grid[i]) for i in range(len(heights))]
-    found: list[Panel] = []
-    for measure, has_logs, lanes in plans:
-        logs = axes.pop(0) if has_logs else None
-        strip = axes.pop(0) if lanes else None
-        found.append(Panel(measure, logs, strip, lanes))
-    return found
-
-
-def _scale(
-    panels: Sequence[Panel], marks: Sequence[Mark], floors: Sequence[tuple[str, float]]
-) -> None:
-    """Give all axes the same times, and each log axis the decades of its errors."""
-    times = [time for _, time in floors]
-    times += [t / m.timing.rows for m in marks for t in _interval(m.timing)]
-    low, high = min(times) / 1.7, max(times) * 1.7
-    drawn = [axes for p in panels for axes in (p.logs, p.strip) if axes is not None]
-    for axes in drawn:
-        axes.set_xscale("log")
-        axes.set_xlim(low, high)
-        axes.xaxis.set_major_formatter(time_text)
-        axes.tick_params(labelsize=SIZE, labelbottom=axes is drawn[-1])
-        axes.grid(visible=True, which="major", color="#e4e4e4", linewidth=0.6)
-        axes.set_axisbelow(True)
-    drawn[-1].set_xlabel("time for one row", fontsize=SIZE + 1)
-    for panel in panels:
-        errors = [m.error for m in marks if m.measure == panel.measure if m.error > 0.0]
-        if panel.logs is not None:
-            panel.logs.set_yscale("log")
-            lowest = math.floor(math.log10(min(errors)) - 0.3)
-            highest = math.ceil(math.log10(max(errors)) + 0.3)
-            panel.logs.set_ylim(10.0**lowest, 10.0**highest)
-            panel.logs.set_ylabel(AXES[panel.measure], fontsize=SIZE + 1)
-        if panel.strip is not None:
-            _scale_strip(panel.strip, len(panel.lanes), is_alone=panel.logs is None)
-
-
-def _interval(timing: Timing) -> tuple[float, float, float]:
-    return timing.low_ns, timing.median_ns, timing.high_ns
-
-
-def _scale_strip(strip: Axes, lanes: int, *, is_alone: bool) -> None:
-    """Make a strip look like what it is: no part of the axis above."""
-    strip.set_ylim(-(lanes - 0.5) - 0.3, 0.8)
-    strip.set_yticks([(1 - lanes) / 2.0], ["exact"])
-    strip.tick_params(axis="y", length=0)
-    strip.set_facecolor("#f4f4f4")
-    strip.grid(visible=False, axis="y")
-    if is_alone:
-        strip.set_ylabel("classes", fontsize=SIZE + 1)
-
-
-def time_text(nanoseconds: float, _position: object = None) -> str:
-    """Return a time as an axis shows it.
-
-    Example:
-        >>> time_text(10.0), time_text(2500.0), time_text(1e9)
-        ('10 ns', '2.5 µs', '1 s')
-    """
-    for unit, size in _UNITS:
-        if nanoseconds >= size:
-            return f"{nanoseconds / size:g} {unit}"
-    return f"{nanoseconds:g} ns"
-
-
-def _spot(panel: Panel, mark: Mark) -> tuple[Axes, float, float]:
-    """Return where a mark lies: its axes, its time and its height there."""
-    if mark.error == 0.0 and panel.strip is not None:
-        lane = panel.lanes.index(mark.point.question)
-        return panel.strip, mark.nanoseconds, -float(lane)
-    if panel.logs is None:
-        raise AssertionError(f"{mark.name} has an error and no axis for it")
-    return panel.logs, mark.nanoseconds, mark.error
-
-
 def _draw_marks(panel: Panel, marks: Sequence[Mark]) -> None:
-    """Draw markers by kind, colours by question, bars, and the front in full colour."""
+    """Draw markers by kind, colours by question, bars, and the front filled."""
     for mark in reversed(marks):
-        axes, time, height = _spot(panel, mark)
+        axes, time, height = panel.spot(mark)
         colour = COLOURS[mark.point.question]
-        low, median, high = _interval(mark.timing)
-        rows = mark.timing.rows
+        low, high = mark.interval
         axes.errorbar(
             [time],
             [height],
-            xerr=[[(median - low) / rows], [(high - median) / rows]],
+            xerr=[[time - low], [high - time]],
             fmt=MARKERS[mark.point.kind],
             markersize=6.0 if mark.is_front else 4.5,
             color=colour,
-            markerfacecolor=colour if mark.is_front else "white",
+            markerfacecolor=colour if mark.is_front else axes.get_facecolor(),
             markeredgewidth=1.0,
+            ecolor=(colour, 1.0 if mark.is_front else 0.5),
             elinewidth=0.8,
-            alpha=1.0 if mark.is_front else 0.75,
             label=mark.point.name,
             zorder=5 if mark.is_front else 3,
         )
-        seen = mark.point.error.largest if mark.point.error else None
-        if mark.is_front and mark.measure == "strength" and seen is not None:
-            floor = axes.get_ylim()[0]
-            if mark.error > seen and axes is panel.logs:
-                ends = [max(seen, floor), mark.error]
-                axes.plot([time, time], ends, color=colour, linewidth=0.8, zorder=2)
-                if seen > floor:
-                    axes.plot([time], [seen], "_", color=colour, markersize=6)
+        if mark.is_front and mark.observed is not None:
+            _draw_observed(axes, time, height, mark.observed, colour)
+
+
+def _draw_observed(
+    axes: Axes, time: float, bound: float, observed: float, colour: str
+) -> None:
+    """Lead from a bound down to what was observed, or to the end of the axis."""
+    bottom = axes.get_ylim()[0]
+    low = max(observed, bottom)
+    axes.plot([time, time], [low, bound], color=colour, linewidth=0.8, zorder=2)
+    if observed >= bottom:
+        axes.plot([time], [low], "_", color=colour, markersize=6)
 
 
 def _draw_fronts(panels: Sequence[Panel], marks: Sequence[Mark]) -> None:
@@ -321,12 +123,12 @@ def _draw_fronts(panels: Sequence[Panel], marks: Sequence[Mark]) -> None:
             )
             if not members:
                 continue
-            times = [time for time, _ in members]
-            errors = [max(error, panel.logs.get_ylim()[0]) for _, error in members]
+            bottom, right = panel.logs.get_ylim()[0], panel.logs.get_xlim()[1]
+            times = [time for time, _ in members] + [right]
+            errors = [max(error, bottom) for _, error in members]
             panel.logs.plot(
-                [*times, panel.logs.get_xlim()[1]],
-                [*errors, errors[-1]],
-                drawstyle="steps-post",
+                [times[0], *(t for time in times[1:] for t in (time, time))][:-1],
+                [error for error in errors for _ in range(2)],
                 color=colour,
                 linewidth=1.1,
                 alpha=0.5,
@@ -340,7 +142,7 @@ def _draw_floors(panels: Sequence[Panel], floors: Sequence[tuple[str, float]]) -
             if axes is None:
                 continue
             for _, time in floors:
-                axes.axvline(time, color=_GREY, linewidth=0.9, linestyle=(0, (4, 3)))
+                axes.axvline(time, color=_GREY, linewidth=0.9, linestyle=_DASHES)
     first = panels[0].logs or panels[0].strip
     if first is None:
         return
@@ -408,12 +210,12 @@ def _draw_legend(figure: Figure, marks: Sequence[Mark]) -> None:
         for kind, marker in MARKERS.items()
         if any(m.point.kind == kind for m in marks)
     ]
-    entries.append(
-        Line2D([], [], color=_GREY, marker="o", linestyle="-", label="nobody beats it")
-    )
-    entries.append(
-        Line2D([], [], color=_GREY, linestyle=(0, (4, 3)), linewidth=0.9, label="floor")
-    )
+    entries.append(Line2D([], [], color=_GREY, marker="o", label="unbeaten"))
+    if any(m.is_front and m.observed is not None for m in marks):
+        seen = Line2D([], [], color=_GREY, marker="_", linestyle="", label="observed")
+        entries.append(seen)
+    line = Line2D([], [], color=_GREY, linestyle=_DASHES, linewidth=0.9, label="floor")
+    entries.append(line)
     figure.legend(
         handles=entries,
         loc="lower center",
@@ -436,7 +238,7 @@ def _draw_labels(
     boxes: list[np.ndarray[tuple[int, int], np.dtype[np.float64]]] = []
     labels: list[Label] = []
     for mark in marks:
-        axes, time, height = _spot(by_measure[mark.measure], mark)
+        axes, time, height = by_measure[mark.measure].spot(mark)
         boxes.append(dots_of(axes, np.array([[time, height]]), scale))
         is_peer = mark.point.kind == "peer" and len(marks) <= _FEW
         if mark.is_front or is_peer:
