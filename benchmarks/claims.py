@@ -94,7 +94,7 @@ def write(claims: Claims, folder: Path) -> None:
         ("claims-speed.svg", pictures.speed),
         ("claims-agreement.svg", pictures.agreement),
     ):
-        write_atomically(folder / name, pictures.svg(picture(claims)))
+        write_atomically(folder / name, pictures.svg(picture, claims))
 
 
 def _tell(text: str) -> None:

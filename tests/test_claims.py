@@ -413,7 +413,7 @@ def test_the_committed_picture_shows_the_committed_numbers(name: str) -> None:
     drawn_by = claims.machine.versions["matplotlib"]
     if importlib.metadata.version("matplotlib") != drawn_by:
         pytest.skip(f"drawn by matplotlib {drawn_by}, and others place letters apart")
-    picture = pictures.svg(getattr(pictures, name)(claims))
+    picture = pictures.svg(getattr(pictures, name), claims)
     assert picture == (folder / f"claims-{name}.svg").read_bytes()
 
 
@@ -468,7 +468,7 @@ def test_page_and_pictures_are_made_again_without_measuring_and_alike(
     assert (tmp_path / "claims.md").read_bytes() == (GOLDEN / "claims.md").read_bytes()
     for name in ("speed", "agreement"):
         picture = (tmp_path / f"claims-{name}.svg").read_bytes()
-        assert picture == pictures.svg(getattr(pictures, name)(_stored()))
+        assert picture == pictures.svg(getattr(pictures, name), _stored())
         assert ET.fromstring(picture).tag == "{http://www.w3.org/2000/svg}svg"
 
 

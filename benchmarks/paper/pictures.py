@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-import matplotlib
 from matplotlib.figure import Figure
 
+from fuzzytree.plots.saving import drawn, style
 from paper.inference import wilson
 from paper.judging import PRIMARY, Line, Verdict, lines, verdicts
 from paper.records import Claims
@@ -46,14 +45,10 @@ def speed(claims: Claims) -> Figure:
         axis.set_title(f"{kind} rules, {rows}", color=INK, fontsize=11, loc="left")
         chosen = [line for line in found if line.kind == kind]
         _growth(axis, [line for line in chosen if line.is_batch == bool(is_batch)])
-    for axis in axes[1]:
-        axis.set_xlabel("rules n", color=INK)
     for axis in axes[:, 0]:
         axis.set_ylabel("times the tree's time", color=INK)
-    figure.text(
-        0.01,
-        -0.02,
-        "Thick: multiway trees, bars are 95 % intervals. Thin: grown trees. "
+    figure.supxlabel(
+        "rules n\n\nThick: multiway trees, bars are 95 % intervals. Thin: grown trees. "
         "Dashed: best-first.",
         color=FAINT,
         fontsize=9,
@@ -61,14 +56,10 @@ def speed(claims: Claims) -> Figure:
     return figure
 
 
-def svg(figure: Figure) -> bytes:
-    """Return a picture as SVG: the same figure gives the same bytes."""
-    with matplotlib.rc_context({"svg.hashsalt": "fuzzytree", "svg.fonttype": "none"}):
-        buffer = io.BytesIO()
-        figure.savefig(
-            buffer, format="svg", bbox_inches="tight", metadata={"Date": None}
-        )
-    return buffer.getvalue()
+def svg(draw: Callable[[Claims], Figure], claims: Claims) -> bytes:
+    """Return a picture as SVG: the same numbers give the same bytes."""
+    with style():
+        return drawn(draw(claims), ".svg")
 
 
 def _growth(axis: Axes, chosen: Sequence[Line]) -> None:
