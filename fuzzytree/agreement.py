@@ -47,6 +47,49 @@ class Comparison(msgspec.Struct, frozen=True):
     detail: tuple[str, ...] = ()
 
 
+class Certified(msgspec.Struct, frozen=True):
+    """What a number type can change about a carrier's answers, and what it changed.
+
+    Attributes:
+        carrier: What was examined.
+        dtype: The number type.
+        sentence: What is certain about its decisions.
+        delta: The certified largest error of a strength; None where there is none.
+        origin: What delta is derived from, and for which values it holds.
+        on: Which rows are counted below: the user's, or the probes if there are none.
+        rows: How many they are.
+        largest: The largest error of a strength that was observed in them, against
+            exact arithmetic; None for a tree.
+        in_band: In how many of them the margin is at most twice the bound, or a value
+            of a tree within its rounding from a cut: there nothing is certain.
+        flips: In how many of them the class differs from the exact one.
+        largest_flip_margin: The largest exact margin of such a row; None without one.
+        cover_lost: Rows that a rule covers exactly and none in this type.
+        cover_gained: Rows that none covers exactly and one in this type.
+        unbounded: Rows in which an error has no bound.
+        verdict: Over all rows, the probes too: whether every error is within its
+            bound, and every flip within the band.
+        detail: What is not, worst first, in sentences.
+    """
+
+    carrier: str
+    dtype: str
+    sentence: str
+    delta: float | None
+    origin: str
+    on: Literal["data", "probes"]
+    rows: int
+    largest: float | None
+    in_band: int
+    flips: int
+    largest_flip_margin: float | None
+    cover_lost: int
+    cover_gained: int
+    unbounded: int
+    verdict: Verdict
+    detail: tuple[str, ...] = ()
+
+
 class Count(msgspec.Struct, frozen=True):
     """How a carrier answered the rows: nothing of this is hidden in a total."""
 
@@ -68,6 +111,7 @@ class Agreement(msgspec.Struct, frozen=True):
         skipped: What was not examined and why, in sentences.
         cells: The number of cells of the tree, or None for a rule base.
         probes: How many of the rows are probes; the others are data.
+        certificates: What each number type that was run can change, and did.
     """
 
     model: str
@@ -77,11 +121,12 @@ class Agreement(msgspec.Struct, frozen=True):
     skipped: tuple[str, ...] = ()
     cells: int | None = None
     probes: int = 0
+    certificates: tuple[Certified, ...] = ()
 
     @property
     def ok(self) -> bool:
         """Whether nothing disagrees."""
-        return all(c.verdict != "DISAGREES" for c in self.comparisons)
+        return not self._wrong()
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""
@@ -90,8 +135,16 @@ class Agreement(msgspec.Struct, frozen=True):
 
     def raise_if_not_ok(self) -> None:
         """Raise DisagreementError, naming what disagrees, unless all agrees."""
-        wrong = [c for c in self.comparisons if c.verdict == "DISAGREES"]
+        wrong = self._wrong()
         if wrong:
-            lines = [f"{c.carrier} disagrees with {c.against}" for c in wrong]
-            lines += [f"  {text}" for c in wrong for text in c.detail[:1]]
+            lines = [f"{one.carrier} disagrees with {_against(one)}" for one in wrong]
+            lines += [f"  {text}" for one in wrong for text in one.detail[:1]]
             raise DisagreementError("\n".join(lines))
+
+    def _wrong(self) -> list[Comparison | Certified]:
+        found: list[Comparison | Certified] = [*self.comparisons, *self.certificates]
+        return [one for one in found if one.verdict == "DISAGREES"]
+
+
+def _against(one: Comparison | Certified) -> str:
+    return "exact arithmetic" if isinstance(one, Certified) else one.against

@@ -15,13 +15,14 @@ import msgspec
 import numpy as np
 
 from fuzzytree import cells
-from fuzzytree.agreement import Agreement, Basis, Comparison, Count
+from fuzzytree.agreement import Agreement, Basis, Certified, Comparison, Count
 from fuzzytree.comparing import (
     Answers,
     BoolArray,
     Rows,
     compare_answers,
     compare_bits,
+    compare_exact,
     compare_excused,
     compare_within,
     labels,
@@ -29,18 +30,13 @@ from fuzzytree.comparing import (
 from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
 from fuzzytree.errors import FuzzyTreeError, LossError
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.bounds import (
-    FLOAT32_MAX,
-    UNIT,
-    axis_errors,
-    strength_bounds,
-)
+from fuzzytree.numerics.bounds import open_paths, strength_bounds
+from fuzzytree.numerics.oracle import decide
 from fuzzytree.probing import probes
 from fuzzytree.pruning import Use, proof_faults, pruned
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import Kind, RuleBase, fingerprint
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
-from fuzzytree.runtimes.axes import axis_lines, plan_axes
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -106,8 +102,10 @@ def check(
     findings: list[Finding] = []
     if isinstance(model, FuzzyTree):
         findings += _equivalence(model, carriers, rows)
+    certificates: list[Certified] = []
     for carrier in carriers:
         findings += _runtimes(carrier, chosen, rows)
+        certificates += _certificates(carrier, chosen, rows)
     for number, other in enumerate(others):
         title = names[number] if number < len(names) else f"file {number + 1}"
         findings += _shipped(title, other, model, rows)
@@ -119,6 +117,7 @@ def check(
         tuple(dict.fromkeys(f for f in findings if isinstance(f, str))),
         cells.cell_count(model) if isinstance(model, FuzzyTree) else None,
         rows.probes,
+        tuple(certificates),
     )
 
 
@@ -214,6 +213,28 @@ def _runtimes(
         yield _calls(title, run, some)
 
 
+def _certificates(
+    carrier: Answers, runtimes: Sequence[Runtime], rows: Rows
+) -> Iterator[Certified]:
+    """Hold each number type that was run against exact arithmetic.
+
+    The native runtime of a type stands for all of it, for the others equal its bits.
+    """
+    kind = "rules" if isinstance(carrier.model, RuleBase) else "tree"
+    ran = {r.dtype for r in runtimes if kind in r.runs and r.bound is None}
+    truth = decide(carrier.model, rows.values, with_strengths=False)
+    for dtype, name in _NATIVE.items():
+        if dtype not in ran:
+            continue
+        try:
+            run = find_runtime(name).load(carrier.model)
+        except LossError:  # told among what was not examined
+            continue
+        title = f"{carrier.title} in {dtype}"
+        found = Answers(title, carrier.model, run(rows.values))
+        yield compare_exact(found, truth, rows, dtype=dtype)
+
+
 def _base(
     runtime: Runtime, carrier: Answers, bases: dict[str, Answers], rows: Rows
 ) -> Answers:
@@ -239,31 +260,15 @@ def _held(runtime: Runtime, found: Answers, base: Answers, rows: Rows) -> Compar
         return compare_within(found, base, rows, allowed=allowed, origin=origin)
     if isinstance(model, FuzzyTree):
         if runtime.dtype == "float32":
-            excused = _rounds_across(model, rows)
+            excused = open_paths(model, runtime.dtype, rows.values)
             return compare_excused(
                 found, base, rows, excused=excused, origin=_FLOAT32_TREE
             )
     elif runtime.name in _NATIVE.values():
         allowed, origin = strength_bounds(model, runtime.dtype, rows.values)
+        allowed += strength_bounds(model, "float64", rows.values)[0]  # of the base
         return compare_within(found, base, rows, allowed=allowed, origin=origin)
     return compare_bits(found, base, rows)
-
-
-def _rounds_across(tree: FuzzyTree, rows: Rows) -> BoolArray:
-    """Return the rows that float32 may put on the other side of a cut, or overflow."""
-    cuts = cells.cuts_by_variable(tree)
-    near: BoolArray = np.full(rows.numbers.shape, fill_value=False)
-    near |= np.abs(rows.values).max(axis=0, initial=0.0) > FLOAT32_MAX
-    plan = plan_axes(tree.variables)
-    with np.errstate(invalid="ignore", over="ignore"):
-        lines = axis_lines(plan, rows.values)
-    for variable in tree.variables:
-        axis = lines[plan.line[variable.name]]
-        slack = axis_errors(variable, rows.inputs, rows.values)
-        for cut in cuts.get(variable.name, ()):
-            reach = slack + 2 * UNIT * abs(cut) + 2.0**-149
-            near |= np.abs(axis - cut) <= reach
-    return near
 
 
 def _stride(model: Model, rows: Rows) -> int:
@@ -422,7 +427,7 @@ def _onnx_rows(
     excused: BoolArray = np.full(rows.numbers.shape, fill_value=False)
     is_rounded = isinstance(held, FuzzyTree) and other.dtype == "float32"
     if isinstance(held, FuzzyTree) and is_rounded:
-        excused = _rounds_across(held, rows)
+        excused = open_paths(held, "float32", rows.values)
     if expected is not None:
         found, right = Answers(title, held, other.run(rows.values)), base
         if "status" not in other.outputs:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.agreement import Comparison, Verdict
-from fuzzytree.contracts import Model, Outcome
+from fuzzytree.agreement import Certified, Comparison, Verdict
+from fuzzytree.contracts import Dtype, Model, Outcome
+from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
+from fuzzytree.numerics.oracle import Decided, strength_errors
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.tree import FuzzyTree
@@ -247,3 +250,112 @@ def _answer_text(answers: Answers, row: int) -> str:
     if outcome.strengths is not None and rule:
         text += f" with {float(outcome.strengths[rule - 1, row])!r}"
     return text if status is Status.DECIDED else f"{text} ({status.name.lower()})"
+
+
+# --- against exact arithmetic
+
+
+def compare_exact(
+    found: Answers, truth: Decided, rows: Rows, *, dtype: Dtype
+) -> Certified:
+    """Hold answers against the exact ones, within what a number type may change.
+
+    A strength may be off by its bound in that row; a class may differ where the exact
+    margin is at most twice that, or where a value lies within its rounding from a cut
+    of the tree, and nowhere else.
+
+    Args:
+        found: The answers of the carrier examined.
+        truth: The exact answers to the same rows.
+        rows: The rows; those of the data are counted if there are any.
+        dtype: The number type in which they were computed.
+    """
+    allowed, largest = _errors(found, rows, dtype)
+    flips = labels(found) != truth.label
+    close = allowed >= 1.0
+    if largest is not None:
+        close |= truth.margin <= 2.0 * allowed
+    wrong = flips & ~close
+    if largest is not None:
+        wrong |= (largest.low > allowed) & (allowed < 1.0)
+    is_data = len(rows.numbers) > rows.probes
+    own = rows.numbers >= (rows.probes if is_data else 0)
+    facts = certify(found.model, dtype, rows.values[:, own] if is_data else None)
+    if facts.reasons and not is_data:
+        facts = certify(found.model, dtype, rows.values)
+    lost, gained = _cover(found, truth)
+    flipped = truth.margin_high[own & flips]
+    bounded = own & (allowed < 1.0)
+    return Certified(
+        found.title,
+        dtype,
+        facts.sentence,
+        facts.delta,
+        facts.origin,
+        "data" if is_data else "probes",
+        int(own.sum()),
+        None if largest is None else float(largest.high[bounded].max(initial=0.0)),
+        int((own & close).sum()),
+        int((own & flips).sum()),
+        float(flipped.max()) if largest is not None and flipped.size else None,
+        int((lost & own).sum()),
+        int((gained & own).sum()),
+        int((own & (allowed >= 1.0)).sum()) if largest is not None else 0,
+        "DISAGREES" if wrong.any() else "agrees",
+        tuple(_exact_texts(found, truth, rows, wrong, allowed, largest)),
+    )
+
+
+class _Ends(NamedTuple):
+    """Between these ends the largest error of a strength lies, in each row."""
+
+    low: FloatArray
+    high: FloatArray
+
+
+def _errors(
+    found: Answers, rows: Rows, dtype: Dtype
+) -> tuple[FloatArray, _Ends | None]:
+    """Return what is allowed in each row (1: anything) and what was observed."""
+    if isinstance(found.model, FuzzyTree):
+        is_open = open_paths(found.model, dtype, rows.values)
+        return is_open.astype(np.float64), None
+    allowed, _ = strength_bounds(found.model, dtype, rows.values)
+    strengths = found.outcome.strengths
+    if strengths is None:
+        return allowed, None
+    return allowed, _Ends(*strength_errors(found.model, rows.values, strengths))
+
+
+def _cover(found: Answers, truth: Decided) -> tuple[BoolArray, BoolArray]:
+    """Return which rows lost and gained cover."""
+    weighed = (found.outcome.status != Status.MISSING) & (
+        truth.status != Status.MISSING
+    )
+    is_covered, should = found.outcome.rule > 0, truth.rule > 0
+    return should & ~is_covered & weighed, is_covered & ~should & weighed
+
+
+def _exact_texts(
+    found: Answers,
+    truth: Decided,
+    rows: Rows,
+    wrong: BoolArray,
+    allowed: FloatArray,
+    ends: _Ends | None,
+) -> Iterator[str]:
+    told = np.flatnonzero(wrong)
+    if ends is not None:
+        told = told[np.argsort(-ends.low[told], kind="stable")]
+    classes = found.model.classes
+    for row in told[:_TOLD].tolist():
+        values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
+        shown = ", ".join(f"{name} {value!r}" for name, value in values)
+        number = int(truth.label[row])
+        label = classes[number] if number >= 0 else "no class"
+        text = f"{rows.name(row)}: {shown}: exactly {label} (rule {truth.rule[row]})"
+        text += f", {found.title} {_answer_text(found, row)}"
+        if ends is not None:
+            text += f"; a strength is off by {ends.low[row]:.2g}, and "
+            text += f"{allowed[row]:.2g} is allowed"
+        yield text

@@ -408,7 +408,7 @@ def _followed(
 
 
 SHARPENED = 256
-"""The most rows in which `strength_errors` takes fractions."""
+"""The most rows that `strength_errors` computes in fractions."""
 
 
 def strength_errors(
@@ -422,10 +422,10 @@ def strength_errors(
         strengths: Shape (rules, rows); NaN where a value is missing.
 
     Returns:
-        A lower and an upper end of the largest distance in each row, by intervals. The
-        `SHARPENED` rows of the largest upper ends that are more than a hundredth above
-        their lower ends are computed in fractions, so that these two are next to each
-        other. A row that is missing on one side alone is 1 off.
+        A lower and an upper end of the largest distance in each row, by intervals. Rows
+        of large upper ends are computed in fractions, so that their two ends are next
+        to each other, until the largest of all is known to a hundredth, or `SHARPENED`
+        rows are done. A row that is missing on one side alone is 1 off.
 
     Raises:
         ValueError: If the values or the strengths have another shape.
@@ -447,8 +447,9 @@ def strength_errors(
         for part in _chunks(model, values.shape[1])
     ]
     low, high = (np.concatenate(ends) for ends in zip(*parts, strict=True))
-    vague = np.flatnonzero(high > 1.01 * low)
-    for row in vague[np.argsort(-high[vague], kind="stable")][:SHARPENED].tolist():
+    for row in np.argsort(-high, kind="stable")[:SHARPENED].tolist():
+        if high[row] <= 1.01 * low.max():
+            break
         named = dict(zip(model.inputs, values[:, row].tolist(), strict=True))
         exact = exact_answer(model, named).strengths
         if exact:

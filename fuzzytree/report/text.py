@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from fuzzytree.agreement import Agreement, Comparison
+from fuzzytree.agreement import Agreement, Certified, Comparison
 from fuzzytree.contracts import Format, Runtime
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import (
@@ -298,6 +298,12 @@ def agreement_lines(found: Agreement, *, is_full: bool = False) -> Iterator[str]
             f"{count.uncovered} uncovered, {count.missing} with missing values"
         )
     yield from (f"not examined: {text}" for text in found.skipped)
+    if found.certificates:
+        yield from aligned([_CERTIFIED, *map(_certified_row, found.certificates)])
+    for one in found.certificates:
+        if one.verdict == "DISAGREES":
+            yield f"{one.carrier} against exact arithmetic:"
+            yield from (f"  {line}" for line in one.detail)
 
 
 _COMPARISON = (
@@ -335,6 +341,33 @@ def _comparison_row(one: Comparison) -> tuple[str, ...]:
         f"{one.largest_difference:.2g}",
         f"{one.allowed:.2g}",
         verdict,
+    )
+
+
+_CERTIFIED = (
+    "against exact arithmetic",
+    "largest error",
+    "inside the band",
+    "flips",
+    "verdict",
+    "certified",
+)
+
+
+def _certified_row(one: Certified) -> tuple[str, ...]:
+    flips = str(one.flips)
+    if one.largest_flip_margin is not None:
+        flips += f" (margin up to {one.largest_flip_margin:.2g})"
+    if one.cover_lost or one.cover_gained:
+        flips += f", cover lost in {one.cover_lost}, gained in {one.cover_gained}"
+    noun = "row" if one.on == "data" else "probe"
+    return (
+        one.carrier,
+        "-" if one.largest is None else f"{one.largest:.2g}",
+        f"{one.in_band} of {counted(one.rows, noun)}",
+        flips,
+        one.verdict,
+        one.sentence,
     )
 
 
