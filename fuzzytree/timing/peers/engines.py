@@ -16,10 +16,11 @@ import numpy as np
 from fuzzytree.contracts import Outcome
 from fuzzytree.errors import LossError
 from fuzzytree.rulebase import Clause, Rule, RuleBase, Shape
-from fuzzytree.runtimes.axes import axis_lines, plan_axes
+from fuzzytree.runtimes.axes import plan_axes
 from fuzzytree.runtimes.rows import checked, winners
 from fuzzytree.runtimes.sampling import line_error, samples, universe
 from fuzzytree.timing.candidates import Bound, found_of
+from fuzzytree.timing.peers.crisp import lines_of
 from fuzzytree.timing.records import Found, Loaded
 
 if TYPE_CHECKING:
@@ -269,15 +270,13 @@ def _loaded(rules: RuleBase, asked: Sequence[str], fire: Fire) -> Loaded:
     block = max(1, _BLOCK_NUMBERS // len(rules.rules))
 
     def strengths_of(values: FloatArray) -> FloatArray:
-        with np.errstate(all="ignore"):
-            lines = axis_lines(axes, values)
+        lines = lines_of(axes, values)
         return fire({name: lines[axes.line[name]] for name in asked})
 
     def answer(values: FloatArray) -> Found:
         array = checked(values, rules.inputs)
-        with np.errstate(all="ignore"):
-            lines = axis_lines(axes, array)
-        missing = ~np.logical_and.reduce(np.isfinite(lines), axis=0)
+        is_known = np.isfinite(lines_of(axes, array))
+        missing = ~np.logical_and.reduce(is_known, axis=0)
         strengths = np.zeros((len(rules.rules), array.shape[1]))
         if not missing.all():
             known = np.ascontiguousarray(array[:, ~missing])

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.runtimes.axes import Axes, plan_axes
-from fuzzytree.timing.peers.crisp import Questions, guarded, questions, tables
+from fuzzytree.runtimes.axes import Axes, axis_row, plan_axes
+from fuzzytree.timing.peers.crisp import Questions, guarded, lines_of, questions, tables
 from fuzzytree.timing.records import Loaded
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
-    from fuzzytree.timing.peers.crisp import Table
+    from fuzzytree.timing.peers.crisp import Reals
     from fuzzytree.tree import FuzzyTree
 
-    Ask = Callable[[Table], IntArray]
+    Ask = Callable[[Reals], IntArray]
 
 _COMPILE_S = 60.0
 
@@ -42,7 +42,7 @@ def load_scikit_learn_core(tree: FuzzyTree, threads: int) -> Loaded:
     axes, asked = _carried(tree)
     apply: Ask = classifier(asked, axes, len(tree.classes)).tree_.apply
 
-    def ask(table: Table) -> IntArray:
+    def ask(table: Reals) -> IntArray:
         return asked.label.take(apply(table))
 
     return _loaded(tree, axes, np.float32, ask)
@@ -70,7 +70,7 @@ def load_skl2onnx(tree: FuzzyTree, threads: int) -> Loaded:
     content: bytes = made.SerializeToString()
     session = open_bare(content, threads)
 
-    def ask(table: Table) -> IntArray:
+    def ask(table: Reals) -> IntArray:
         (found,) = session(["probabilities"], {"inputs": table})
         labels: IntArray = np.asarray(found).argmax(axis=1)
         return labels
@@ -126,7 +126,7 @@ def load_treelite(tree: FuzzyTree, threads: int) -> Loaded:
     builder.end_tree()
     model = builder.commit()
 
-    def ask(table: Table) -> IntArray:
+    def ask(table: Reals) -> IntArray:
         found = gtil.predict(model, table, nthread=threads)
         labels: IntArray = found.reshape(-1).astype(np.int64)
         return labels
@@ -153,14 +153,15 @@ def load_m2cgen_python(tree: FuzzyTree, threads: int) -> Loaded:
         return found
 
     def call(values: FloatArray) -> Callable[[], object]:
-        table = tables(axes, np.float64, values)
-        if axes.steps:
-            return lambda: each(table().tolist())
-        rows = table().tolist()
-        return partial(each, rows)
+        if not axes.steps:
+            return partial(each, values.T.tolist())
+        if values.shape[1] == 1:
+            row = values[:, 0].tolist()
+            return lambda: each([axis_row(axes, row)])
+        return lambda: each(lines_of(axes, values).T.tolist())
 
     def ask(values: FloatArray) -> IntArray:
-        return np.array(each(tables(axes, np.float64, values)().tolist()))
+        return np.array(each(lines_of(axes, values).T.tolist()))
 
     answer = guarded(tree, axes, np.float64, ask)
     return Loaded(answer, call, len(text.encode()))
@@ -198,7 +199,7 @@ def load_m2cgen_c(tree: FuzzyTree, threads: int) -> Loaded:
     answer.restype = None
     scores = np.zeros(classes)
 
-    def ask(table: Table) -> IntArray:
+    def ask(table: Reals) -> IntArray:
         labels = np.empty(len(table), np.int64)
         answer(
             table.ctypes.data,
