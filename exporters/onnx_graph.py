@@ -25,6 +25,17 @@ Body = Callable[["Sheet", Sequence[str], str], str]
 
 Attribute = int | Sequence[int] | onnx.TensorProto
 
+_NEUTRAL: Mapping[str, float] = {"Add": 0.0, "Sub": 0.0, "Mul": 1.0, "Div": 1.0}
+"""What changes nothing as the right operand."""
+
+
+def _is_mistaken(value: Constant) -> bool:
+    """Return whether a constant is a double that only float32 takes for 0 or 1."""
+    if value.dtype != np.float64 or value.size != 1:
+        return False
+    number = float(value.item())
+    return number not in (0.0, 1.0) and float(np.float32(number)) in (0.0, 1.0)
+
 
 class Sheet:
     """Nodes, constants and functions, collected; every result is known by its name.
@@ -49,6 +60,7 @@ class Sheet:
         self._known: dict[tuple[str, tuple[int, ...], bytes], str] = {}
         self._taken: dict[str, int] = {}
         self._results: dict[tuple[str, ...], str] = {}
+        self._mistaken: dict[str, Constant] = {}
 
     def node(
         self,
@@ -72,6 +84,10 @@ class Sheet:
         key = (op, *inputs)
         if key in self._results and not (named or attributes):
             return self._results[key]
+        if op in _NEUTRAL and not self._mistaken.keys().isdisjoint(inputs):
+            turned = self._turned(op, inputs)
+            if turned:
+                return self.node("Neg", turned, named=named)
         result = named or self._fresh(op.lower())
         if not (named or attributes or domain):
             self._results[key] = result
@@ -94,7 +110,30 @@ class Sheet:
             else:
                 self.tensors.append(tensor)
             self._known[key] = name
+            if _is_mistaken(value):
+                self._mistaken[name] = value
         return self._known[key]
+
+    def _turned(self, op: str, inputs: Sequence[str]) -> str:
+        """Return minus a result, without the constant that would be taken as neutral.
+
+        onnxruntime drops `x + c`, `x - c`, `x * c` and `x / c` where c is a single
+        number whose float32 is 0 or 1, though it may be a double that is neither. The
+        results here are exactly the negatives, for rounding knows no sign. "" where
+        onnxruntime makes no such mistake.
+        """
+        left, right = inputs
+        if op in ("Add", "Mul") and left in self._mistaken:
+            left, right = right, left
+        value = self._mistaken.get(right)
+        if value is None or np.float32(value.item()) != _NEUTRAL[op]:
+            return ""
+        if op == "Sub":
+            return self.node("Sub", right, left)
+        minus = self.constant(np.negative(value), "minus")
+        if op == "Add":
+            return self.node("Sub", minus, left)
+        return self.node(op, left, minus)
 
     def texts(self, values: Sequence[str], hint: str) -> str:
         """Return the name of a new constant list of texts."""
@@ -124,7 +163,9 @@ class Sheet:
             inputs: For each parameter of the function, the name of its argument.
             named: The name of the result; made unless given.
         """
-        if not self.is_readable:
+        # A constant that needs care is known here, and not behind a parameter.
+        is_plain = self._mistaken.keys().isdisjoint(inputs.values())
+        if not (self.is_readable and is_plain):
             return body(self, list(inputs.values()), named)
         if name not in self.functions:
             inner = Sheet(self.opset, in_function=True)
