@@ -125,7 +125,7 @@ def row_seconds(rules: RuleBase, terms: Terms) -> float:
     for (variable, _), one in terms.items():
         sizes[variable] = sizes.get(variable, 0) + len(one.values)
     looks = [sizes[c.variable] for r in rules.rules for c in r.when for _ in c.terms]
-    return sum(looks) * _LOOK_S + len(looks) * _NAME_S
+    return sum(looks) * _LOOK_S + (1 + len(looks)) * _NAME_S
 
 
 def load_fuzzylite(rules: RuleBase, threads: int) -> Loaded:
