@@ -121,7 +121,6 @@ def command(
     """
     from fuzzytree import verbs
     from fuzzytree.report.bench import study_lines
-    from fuzzytree.timing.study import faults
 
     _check_places(output, plots)
     with (
@@ -142,14 +141,21 @@ def command(
             seed=seed,
             progress=tell,
         )
-    answer(
-        found.to_json() if as_json else "\n".join(study_lines(found, is_full=is_full))
-    )
-    if output:
-        write_atomically(output, found.to_json().encode() + b"\n")
-    drawn = _draw(found, plots)
-    for place in (*([output] if output else []), *drawn):
+    lines = study_lines(found, is_full=is_full)
+    try:
+        if output:
+            write_atomically(output, found.to_json().encode() + b"\n")
+    finally:  # whatever happens to the file, the work is not lost
+        answer(found.to_json() if as_json else "\n".join(lines))
+    for place in (*([output] if output else []), *_draw(found, plots)):
         say(f"wrote    {place}", quiet=quiet)
+    return _ending(found, quiet=quiet)
+
+
+def _ending(found: Study, *, quiet: bool) -> int:
+    """Say how it ended, and return the exit code."""
+    from fuzzytree.timing.study import faults
+
     if found.is_interrupted:
         say("interrupted; what was measured by then is told")
         return INTERRUPTED

@@ -9,11 +9,17 @@ import msgspec
 import numpy as np
 
 from fuzzytree.contracts import Model
-from fuzzytree.numerics.oracle import Decided, decide, error_against_exact
+from fuzzytree.numerics.oracle import (
+    Decided,
+    Observed,
+    decide,
+    error_against_exact,
+    strength_errors,
+)
 from fuzzytree.probing import probes
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.timing.clock import Clock
-from fuzzytree.timing.records import Candidate, Error, Loaded, Question
+from fuzzytree.timing.records import Candidate, Error, Found, Loaded, Question
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -126,7 +132,22 @@ def _error(loaded: Loaded, sample: _Sample, bound: float | None, origin: str) ->
         origin=origin,
         exact=sample.exact,
     )
-    return Error(**facts._asdict())
+    return Error(**facts._asdict() | {"largest": _largest(facts, found, sample)})
+
+
+def _largest(facts: Observed, found: Found, sample: _Sample) -> float | None:
+    """Return the largest error, not above the bound where only the oracle is in doubt.
+
+    What was observed is an upper end. Where it is above the bound and the lower end is
+    not, the bound is the better upper end.
+    """
+    largest, bound = facts.largest, facts.bound
+    if largest is None or bound is None or largest <= bound:
+        return largest
+    if not isinstance(sample.model, RuleBase) or found.strengths is None:
+        return largest
+    least, _ = strength_errors(sample.model, sample.values, found.strengths)
+    return largest if least.max() > bound else bound
 
 
 def _part(sample: _Sample, most: int) -> _Sample:

@@ -15,6 +15,7 @@ from fuzzytree.timing.candidates import DEFAULT, questions
 from fuzzytree.timing.clock import Call, Clock, Tell, Timed, system_clock, time_calls
 from fuzzytree.timing.front import advice, fronts
 from fuzzytree.timing.gather import chosen, gather
+from fuzzytree.timing.interrupts import noticed
 from fuzzytree.timing.judging import Judge
 from fuzzytree.timing.machine import after, machine, noise
 from fuzzytree.timing.records import (
@@ -186,22 +187,24 @@ def run_study(
         clock: Where the time comes from; the system unless given.
         maker: Where a child process gets the foreign ones from; see `trial`.
     """
-    run = _Run(
-        model,
-        values,
-        plan or Plan(),
-        tell or (lambda _text, _share: None),
-        clock or system_clock(),
-    )
-    run.omissions += omissions
-    before = machine(_PACKAGES)
-    try:
-        run.try_foreign(candidates, maker)
-        run.judge(candidates)
-        run.time()
-    except KeyboardInterrupt:
-        run.is_complete, run.is_interrupted = False, True
-        run.warnings.append("interrupted: this is what was measured by then")
+    with noticed() as check:
+
+        def step(text: str, share: float) -> None:
+            check()
+            if tell:
+                tell(text, share)
+
+        run = _Run(model, values, plan or Plan(), step, clock or system_clock())
+        run.omissions += omissions
+        before = machine(_PACKAGES)
+        try:
+            run.try_foreign(candidates, maker)
+            run.judge(candidates)
+            run.time()
+            check()
+        except KeyboardInterrupt:
+            run.is_complete, run.is_interrupted = False, True
+            run.warnings.append("interrupted: this is what was measured by then")
     return run.study(data, before)
 
 

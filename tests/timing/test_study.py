@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
+import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -202,6 +205,23 @@ def test_a_study_that_is_interrupted_before_it_times_has_no_points() -> None:
     assert study.points == ()
     assert study.advice == ()
     assert json.loads(study.to_json())["points"] == []
+
+
+@pytest.mark.parametrize("at", [1, 2, 4, 9])
+def test_an_interruption_that_a_library_swallows_is_noticed(at: int) -> None:
+    calls = [0]
+
+    def swallow() -> None:
+        calls[0] += 1
+        if calls[0] == at:
+            with contextlib.suppress(KeyboardInterrupt):
+                os.kill(os.getpid(), signal.SIGINT)
+                for _ in range(1000):  # the signal is handled between two steps
+                    pass
+
+    study = studied(candidate("deaf", before=swallow), candidate("other"))
+    assert study.is_interrupted
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_the_budget_is_kept_and_slow_ones_are_left_out() -> None:

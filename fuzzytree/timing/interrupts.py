@@ -1,0 +1,39 @@
+"""Ctrl-C is noticed even where a library swallows it."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Generator
+from types import FrameType
+
+
+@contextlib.contextmanager
+def noticed() -> Generator[Callable[[], None]]:
+    """Give a function that raises KeyboardInterrupt if there was a Ctrl-C before.
+
+    A Ctrl-C raises where it arrives, as always; but where that is in a library with an
+    `except:` of its own, nothing comes of it. Whoever calls the function between its
+    steps hears of it all the same. Outside the main thread, and where the program has
+    a handler of its own, nothing is changed.
+    """
+    seen: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        seen.append(number)
+        signal.default_int_handler(number, frame)
+
+    def check() -> None:
+        if seen:
+            raise KeyboardInterrupt
+
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGINT) != signal.default_int_handler:
+        yield check
+        return
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
