@@ -204,6 +204,7 @@ def lowest(c: FloatArray, last: float, *, first: float = 0.0) -> float:
     c = np.broadcast_to(c, (len(c), 1))
     slack = float(_slack(c)[0])
     found = sure = np.inf
+    low = np.full(1, -np.inf)
     for _ in range(_ROUNDS):
         ends = values_at(c, np.stack([a, b]))
         low, _high = _enclosure(c, ends, a, b)

@@ -14,13 +14,10 @@ from fuzzytree.cells import free_axes, grid, grid_size
 from fuzzytree.contracts import Dtype
 from fuzzytree.errors import LossError
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.approximation import (
-    by_degree,
-    by_points,
-    lower_curve,
-    points_of,
-)
+from fuzzytree.numerics.approximation import by_degree, by_points
 from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.numerics.fitting import lower_curve
+from fuzzytree.numerics.placing import points_of
 from fuzzytree.reference import degree, evaluate
 from fuzzytree.rulebase import (
     LR,
