@@ -349,6 +349,7 @@ def test_the_onnx_evaluator_gives_equal_bits(case: int) -> None:
     found = answer(rules, "onnx evaluator: rules", values)
     want = native(rules, values)
     assert found.strengths is not None
+    assert want.strengths is not None
     assert np.array_equal(found.strengths, want.strengths, equal_nan=True)
     assert np.array_equal(found.labels, want.labels)
 
