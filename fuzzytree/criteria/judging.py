@@ -16,8 +16,9 @@ from fuzzytree.comparing import Answers, labels
 from fuzzytree.contracts import Dtype, Model, Outcome
 from fuzzytree.criteria.carriers import Ready, row_text
 from fuzzytree.criteria.specials import missing_rows
-from fuzzytree.numerics.bounds import UNIT, strength_bounds, value_error
+from fuzzytree.numerics.bounds import UNIT, strength_bounds
 from fuzzytree.numerics.oracle import Decided, decide, strength_errors
+from fuzzytree.numerics.rounding import value_error
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.axes import axis_lines, plan_axes
 from fuzzytree.tree import FuzzyTree

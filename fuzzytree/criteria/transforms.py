@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from typing import TypeVar, assert_never
 
 import msgspec
 
@@ -21,6 +22,8 @@ from fuzzytree.rulebase import (
     Variable,
 )
 from fuzzytree.tree import FuzzyTree
+
+AnyModel = TypeVar("AnyModel", bound=Model)
 
 Change = Callable[[str, float], float]
 """What becomes of a number in the unit of a variable, by the variable's name."""
@@ -47,7 +50,7 @@ class Units(msgspec.Struct, frozen=True):
     part: Callable[[Variable, Part], Part]
 
 
-def scaled(model: Model, exponents: Mapping[str, int]) -> Model:
+def scaled(model: AnyModel, exponents: Mapping[str, int]) -> AnyModel:
     """Return a model whose variables are measured in units 2**-k as large.
 
     Every stored number is multiplied by a power of two, which rounds nothing. So rows
@@ -99,7 +102,7 @@ def exactly_scaled(value: float, exponent: int, name: str) -> float:
     return math.ldexp(value, exponent)
 
 
-def moved(model: Model, offsets: Mapping[str, float]) -> Model:
+def moved(model: AnyModel, offsets: Mapping[str, float]) -> AnyModel:
     """Return a model whose inputs have moved away from zero.
 
     Every place is added to its input's offset and rounded once; spreads stay. It is a
@@ -125,7 +128,7 @@ def moved(model: Model, offsets: Mapping[str, float]) -> Model:
     return in_units(model, Units(place, length, part))
 
 
-def in_units(model: Model, units: Units) -> Model:
+def in_units(model: AnyModel, units: Units) -> AnyModel:
     """Return a model with every number in the unit of a variable changed."""
     variables = tuple(_variable(variable, units) for variable in model.variables)
     if not isinstance(model, FuzzyTree):
@@ -178,6 +181,7 @@ def _shape(name: str, shape: Shape, units: Units) -> Shape:
             return LR(units.place(name, mean), side(below), side(above))
         case Points(values=values, degrees=degrees):
             return Points(tuple(units.place(name, v) for v in values), degrees)
+    assert_never(shape)
 
 
 def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:

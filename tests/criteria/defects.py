@@ -145,7 +145,7 @@ def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
                 axes = _axes(model, array[:, row].tolist())
                 for number, rule in enumerate(model.rules):
                     strengths[number, row] = min(one(c, axes) for c in rule.when)
-            missing = ~np.isfinite(array).all(axis=0)
+            missing = np.logical_not(np.isfinite(array).all(axis=0))
             found = winners(np.nan_to_num(strengths), missing)
             strengths[:, missing] = math.nan
             return Outcome(found[0], found[1], strengths)
@@ -244,7 +244,8 @@ def two_pass(values: FloatArray) -> float:
 
 def one_pass(values: FloatArray) -> float:
     """Return a standard deviation from sums of values and squares."""
-    return float(np.sqrt(max(np.mean(values**2) - np.mean(values) ** 2, 0.0)))
+    rest = float(np.mean(values**2)) - float(np.mean(values)) ** 2
+    return math.sqrt(max(rest, 0.0))
 
 
 def tiny_learner(

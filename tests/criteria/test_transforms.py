@@ -26,7 +26,7 @@ def test_scaling_there_and_back_is_the_same_model(seed: int) -> None:
     there = {name: 7 * k - 20 for k, name in enumerate(tree.inputs)}
     back = {name: -k for name, k in there.items()}
     assert scaled(scaled(tree, there), back) == tree
-    rules = rules_from_tree(tree, "raw") if tree.sets else rules_from_tree(tree)
+    rules = rules_from_tree(tree, "raw" if tree.sets else "relative")
     assert scaled(scaled(rules, there), back) == rules
 
 
