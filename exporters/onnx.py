@@ -364,4 +364,5 @@ FORMAT = Format(
         "a tree's terms and fitted sets are left out: its path needs the cuts alone",
     ),
     extra="onnx",
+    dtype="float64",
 )

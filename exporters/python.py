@@ -396,5 +396,9 @@ def _examples(model: Model) -> Iterator[str]:
 
 
 FORMAT = Format(
-    name="python", suffixes=(".py",), carries=("tree", "rules"), write=write
+    name="python",
+    suffixes=(".py",),
+    carries=("tree", "rules"),
+    write=write,
+    dtype="float64",
 )

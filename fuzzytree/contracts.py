@@ -62,6 +62,8 @@ class Format(msgspec.Struct, frozen=True):
         read: Bytes and a name for messages to a model; None if it cannot be read.
         cannot: What it cannot hold, a sentence each.
         extra: The optional packages it needs, if any.
+        dtype: The number type in which a file of it computes, unless the writer's
+            option of that name says another; None if it only holds the model.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Format(msgspec.Struct, frozen=True):
     read: Callable[[bytes, str], Model] | None = None
     cannot: tuple[str, ...] = ()
     extra: str | None = None
+    dtype: Dtype | None = None
 
 
 class Outcome(msgspec.Struct, frozen=True):

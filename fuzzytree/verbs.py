@@ -6,14 +6,14 @@ import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import msgspec
 import numpy as np
 
 from fuzzytree.agreement import Agreement
 from fuzzytree.answers import Answers, answers_of, joined
-from fuzzytree.contracts import Format, Model, Run, Written
+from fuzzytree.contracts import Dtype, Format, Model, Run, Written
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, TableError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded, write_atomically
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
     from fuzzytree.criteria.results import Stability
     from fuzzytree.learning import Learnt, Settings
+    from fuzzytree.numerics.bounds import Certificate
     from fuzzytree.timing.records import Study
 
 Carried = Model | OnnxModel | bytes | str | os.PathLike[str]
@@ -490,6 +491,45 @@ def check(
         runtimes=runtimes,
         limit=limit,
     )
+
+
+def certify(
+    model: Model | str | os.PathLike[str],
+    dtype: Dtype = "float64",
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+) -> Certificate:
+    """Return how far a number type can take a model from its exact answers, at most.
+
+    Args:
+        model: A tree or a rule base, or the path of one.
+        dtype: `float64`, `mixed` or `float32`.
+        data: A table with the rows for which it shall hold; all values in the declared
+            ranges of the inputs unless given.
+        columns: The names of an array's columns.
+
+    Raises:
+        ReadError: If a file cannot be read.
+        TableError: If a column is absent or holds text.
+        ValueError: If there is no such number type.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> certify(random_tree(1, combinations=0)).sentence
+        'no path can differ: no value is rounded before it meets a cut'
+    """
+    from fuzzytree.numerics import bounds
+
+    if dtype not in get_args(Dtype):
+        known = ", ".join(get_args(Dtype))
+        raise ValueError(f"there is no number type {dtype!r}; there are {known}")
+    first = load(model) if isinstance(model, str | os.PathLike) else model
+    values = None
+    if data is not None:
+        found = batches(data, first.inputs, trained=first.columns, columns=columns)
+        values = np.hstack([batch.values for batch in found])
+    return bounds.certify(first, dtype, values)
 
 
 def bench(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import shlex
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import click
+import msgspec
 
 from fuzzytree.cli.carriers import (
     as_option,
@@ -25,12 +26,13 @@ from fuzzytree.cli.talk import (
     say_rows,
     wrong_options,
 )
-from fuzzytree.contracts import Carrier, Model, Written
+from fuzzytree.contracts import Carrier, Dtype, Format, Model, Written
 from fuzzytree.errors import LossError
 from fuzzytree.files import write_atomically
 from fuzzytree.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
+    from fuzzytree.numerics.bounds import Certificate
     from fuzzytree.verbs import Option
 
 
@@ -113,9 +115,10 @@ def command(
         answer_bytes(written.content)
     else:
         write_atomically(output, written.content)
+    proof = _certificate(found, form, dtype)
     can_check = form.read is not None or form.name == "onnx"
     after = shlex.join(["fuzzytree", "check", model, output]) if can_check else ""
-    _tell(written, form.name, output, after, as_json=as_json, quiet=quiet)
+    _tell(written, proof, form.name, output, after, as_json=as_json, quiet=quiet)
 
 
 def _written(
@@ -130,8 +133,25 @@ def _written(
         raise LossError(text) from error
 
 
+def _certificate(model: Model, form: Format, dtype: str | None) -> Certificate | None:
+    """Return what the file's number type can change; None if it does not compute."""
+    from fuzzytree import verbs
+
+    if form.dtype is None:
+        return None
+    asked = [name for name in get_args(Dtype) if name == dtype]
+    return verbs.certify(model, asked[0] if asked else form.dtype)
+
+
 def _tell(
-    written: Written, to: str, output: str, after: str, *, as_json: bool, quiet: bool
+    written: Written,
+    proof: Certificate | None,
+    to: str,
+    output: str,
+    after: str,
+    *,
+    as_json: bool,
+    quiet: bool,
 ) -> None:
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
@@ -140,6 +160,7 @@ def _tell(
         say(f"lost     {loss.where}: {loss.what}{bound}", quiet=quiet)
     say_rows(
         ("wrote", output, f"{to}, {size} bytes, sha256 {digest}"),
+        *([("bound", proof.dtype, proof.sentence)] if proof else []),
         *([("next", after, "")] if after else []),
         quiet=quiet or output == "-",
     )
@@ -151,5 +172,7 @@ def _tell(
                 "bytes": size,
                 "sha256": digest,
                 "losses": written.losses,
+                "certificate": proof
+                and {"sentence": proof.sentence, **msgspec.structs.asdict(proof)},
             }
         )

@@ -338,7 +338,7 @@ def degree_errors(
     blur = bound.steps.blur
     if off is None:
         return np.full(x.shape, bound.fixed)
-    felt = np.minimum(off, UNIT * bound.active * MORE + blur) if is_input else off
+    felt = np.minimum(off, UNIT * bound.active * MORE + 2.0**-149) if is_input else off
     found = bound.fixed + felt * bound.per_unit
     if bound.steps.places:
         near = off * MORE + blur

@@ -28,6 +28,8 @@ def test_size_and_hash_of_the_file_are_told(call: Call) -> None:
     assert (code, out) == (0, "")
     assert err == (
         f"wrote    new.onnx onnx, {len(content)} bytes, sha256 {digest}\n"
+        "bound    float64  no path can differ: "
+        "no value is rounded before it meets a cut\n"
         "next     fuzzytree check grip.yaml new.onnx\n"
     )
 
@@ -42,7 +44,37 @@ def test_json_tells_the_same_facts(call: Call) -> None:
         "bytes": len(content),
         "sha256": hashlib.sha256(content).hexdigest(),
         "losses": [],
+        "certificate": {
+            "sentence": "no path can differ: no value is rounded before it meets a cut",
+            "dtype": "float64",
+            "carrier": "tree",
+            "delta": None,
+            "origin": "largest derived error of a value in float64, "
+            "for values in the declared ranges",
+            "terms": [],
+            "values": [],
+            "reasons": [],
+            "rows": None,
+            "unbounded": 0,
+        },
     }
+
+
+def test_the_certificate_is_that_of_the_number_type_that_was_written(
+    call: Call,
+) -> None:
+    words = ("export", "grip.yaml", "-o", "new.onnx", "--as", "rules")
+    _, _, double = call(*words)
+    _, _, single = call(*words, "--dtype", "float32")
+    text = "no decision can differ where the margin exceeds 2 x"
+    assert f"bound    float64  {text} 5.6e-16\n" in double
+    assert f"bound    float32  {text} 7.2e-07\n" in single
+
+
+def test_a_format_that_only_holds_the_model_has_no_certificate(call: Call) -> None:
+    _, out, err = call("export", "grip.yaml", "-o", "new.yaml", "--json")
+    assert json.loads(out)["certificate"] is None
+    assert "bound" not in err
 
 
 @pytest.mark.parametrize(
