@@ -132,7 +132,8 @@ def _error(loaded: Loaded, sample: _Sample, bound: float | None, origin: str) ->
         origin=origin,
         exact=sample.exact,
     )
-    return Error(**facts._asdict() | {"largest": _largest(facts, found, sample)})
+    error = Error(**facts._asdict())
+    return msgspec.structs.replace(error, largest=_largest(facts, found, sample))
 
 
 def _largest(facts: Observed, found: Found, sample: _Sample) -> float | None:
