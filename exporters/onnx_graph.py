@@ -34,7 +34,9 @@ def _is_mistaken(value: Constant) -> bool:
     if value.dtype != np.float64 or value.size != 1:
         return False
     number = float(value.item())
-    return number not in (0.0, 1.0) and float(np.float32(number)) in (0.0, 1.0)
+    if number in (0.0, 1.0) or abs(number) > 2.0:
+        return False
+    return float(np.float32(number)) in (0.0, 1.0)
 
 
 class Sheet:
