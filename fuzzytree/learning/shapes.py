@@ -9,6 +9,7 @@ basis that keeps its digits.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -21,6 +22,7 @@ SAMPLES = 33
 """How many points of a ratio a flank is fitted to."""
 
 _TOLERANCE = 1e-9
+_DIGITS = 32
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,8 @@ def _side(u: FloatArray, curve: FloatArray) -> FloatArray:
     for k in range(curve.shape[1] - 2, -1, -1):
         total = total * v + curve[:, k : k + 1]
     w = np.clip((REACH - u) / (REACH - 1.0), 0.0, 1.0)
-    return np.clip(1.0 - t * total, 0.0, 1.0) * w**4
+    w *= w
+    return np.clip(1.0 - t * total, 0.0, 1.0) * (w * w)
 
 
 def fitted_sets(
@@ -127,10 +130,33 @@ def fitted_sets(
 def _interpolated(degrees: FloatArray) -> FloatArray:
     """Return the coefficients of Q through the degrees at k/n, k = 1..n."""
     n = degrees.shape[1]
-    t = np.arange(1, n + 1) / n
-    powers = np.vander(2.0 * t - 1.0, n, increasing=True)
-    wanted = (1.0 - degrees) / t
-    return np.linalg.solve(powers, wanted.T).T
+    wanted = (1.0 - degrees) / (np.arange(1, n + 1) / n)
+    curve = np.zeros(degrees.shape)
+    # In a fixed order, so that every machine has the same last digits.
+    for k, column in enumerate(_inverse(n)):
+        curve += wanted[:, k : k + 1] * column
+    return curve
+
+
+def _inverse(n: int) -> FloatArray:
+    """Return the coefficients of the polynomials in v that are 1 at one `v_k` only.
+
+    Row k belongs to `v_k = 2 k/n - 1`; its numbers are rational and rounded once.
+    """
+    places = [Fraction(2 * k, n) - 1 for k in range(1, n + 1)]
+    rows: list[list[float]] = []
+    for own in places:
+        product = [Fraction(1)]
+        for other in places:
+            if other != own:
+                shifted = [Fraction(0), *product]
+                lowered = [*(c * other for c in product), Fraction(0)]
+                product = [
+                    (a - b) / (own - other)
+                    for a, b in zip(shifted, lowered, strict=True)
+                ]
+        rows.append([float(c) for c in product])
+    return np.array(rows)
 
 
 def _flaws(curve: FloatArray) -> tuple[int, int]:
@@ -148,7 +174,9 @@ def fitted_flanks(ratios: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     The flank is a cubic that is 0 at q = 0 and 1 at q = 1 and never falls with q: in
     Bernstein form 0, b1, b2, 1 with `0 <= b1 <= b2 <= 1`. The least squares solution
-    lies inside that triangle, on one of its sides or in a corner; all are tried.
+    lies inside that triangle, on one of its sides or in a corner; all are tried. b1 and
+    b2 are rounded to 32 binary digits: then c0 + c1 + c2 is 1 without any rounding, and
+    machines that add in another order agree.
 
     Args:
         ratios: At q = 0, 1/32, ..., 1, shape (flanks, 33), not falling with q.
@@ -182,8 +210,12 @@ def fitted_flanks(ratios: FloatArray) -> tuple[FloatArray, FloatArray]:
     )
     best = costs.argmin(axis=0)
     rows = np.arange(len(ratios))
-    b1 = np.stack([pair[0] for pair in pairs])[best, rows]
-    b2 = np.stack([pair[1] for pair in pairs])[best, rows]
+    b1 = _short(np.stack([pair[0] for pair in pairs])[best, rows])
+    b2 = _short(np.stack([pair[1] for pair in pairs])[best, rows])
     curve = np.stack([3 * b1, 3 * b2 - 6 * b1, 3 * b1 - 3 * b2 + 1], axis=1)
     fit = b1[:, None] * first + b2[:, None] * second + q**3
     return curve, np.abs(fit - ratios).max(axis=1, initial=0.0)
+
+
+def _short(numbers: FloatArray) -> FloatArray:
+    return np.ldexp(np.rint(np.ldexp(numbers, _DIGITS)), -_DIGITS)

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fuzzytree.learning.arrays import FloatArray, IntArray
-from fuzzytree.learning.shapes import REACH, SAMPLES, fitted_flanks, fitted_sets
+from fuzzytree.learning.shapes import (
+    REACH,
+    SAMPLES,
+    _interpolated,
+    fitted_flanks,
+    fitted_sets,
+)
 from fuzzytree.reference import degree
 from fuzzytree.rulebase import LR, Side
 
@@ -84,11 +92,32 @@ def largest_gap(curve: FloatArray, ratios: FloatArray) -> float:
     return float(np.abs(fit - ratios).max())
 
 
-def test_a_ratio_that_is_such_a_cubic_is_fitted_exactly() -> None:
+@pytest.mark.parametrize(
+    ("first", "second", "allowed"), [(0.25, 0.75, 1e-15), (0.2, 0.7, 2.0**-32)]
+)
+def test_a_ratio_that_is_such_a_cubic_is_fitted_to_32_binary_digits(
+    first: float, second: float, allowed: float
+) -> None:
     q = np.linspace(0.0, 1.0, SAMPLES)
-    ratios = 3 * 0.2 * q * (1 - q) ** 2 + 3 * 0.7 * q**2 * (1 - q) + q**3
+    ratios = 3 * first * q * (1 - q) ** 2 + 3 * second * q**2 * (1 - q) + q**3
     _, error = fitted_flanks(ratios[None])
-    assert error[0] < 1e-14
+    assert error[0] <= allowed
+
+
+def test_a_flank_is_1_at_its_cut_without_any_rounding() -> None:
+    ratios = np.sort(np.random.default_rng(0).random((200, SAMPLES)), axis=1)
+    curves, _ = fitted_flanks(ratios)
+    for c0, c1, c2 in curves.tolist():
+        assert c0 + (c1 + c2) == Fraction(c0) + Fraction(c1) + Fraction(c2) == 1
+
+
+@pytest.mark.parametrize("n", range(1, 9))
+def test_a_curve_goes_through_its_points(n: int) -> None:
+    degrees = np.sort(np.random.default_rng(n).random((20, n)), axis=1)[:, ::-1]
+    t = np.arange(1, n + 1) / n
+    powers = np.vander(2.0 * t - 1.0, n, increasing=True)
+    found = 1.0 - t * (_interpolated(degrees) @ powers.T)
+    np.testing.assert_allclose(found, degrees, atol=1e-12)
 
 
 def test_no_other_monotone_cubic_fits_better() -> None:
