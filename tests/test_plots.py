@@ -1,0 +1,319 @@
+"""Pictures carry the numbers of what they show, and the same bytes each time."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import random
+import re
+import struct
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from fuzzytree import plots
+from fuzzytree.errors import MissingExtraError, WriteError
+from fuzzytree.plots.panels import time_text
+from fuzzytree.plots.saving import drawn
+from fuzzytree.timing.records import Kind, Point, Question, Study
+from tests.timing.studies import error, point, study, timing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+    from matplotlib.transforms import Bbox
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+
+
+def small() -> Study:
+    return study(
+        point("floor: the columns read once", 5e3, None, kind="floor"),
+        point("native", 1e5, error(1e-16, 1e-14), question="raw rules"),
+        point("native float32", 4e4, error(2e-6, 3e-5), question="raw rules"),
+        point("simpful", 9e7, error(2e-3), question="raw rules", kind="peer"),
+        point("points 1e-03", 8e4, error(9e-4, 1e-3), question="raw rules"),
+        point("native", 5e4, error(None), question="tree"),
+        point("scikit-learn", 7e4, error(None, flips=4), question="tree", kind="peer"),
+        point("onnxruntime", 3e4, error(None), question="tree"),
+    )
+
+
+def large(count: int) -> Study:
+    chance = random.Random(1)
+    asked: tuple[Question, ...] = ("tree", "relative rules", "raw rules")
+    kinds: tuple[Kind, ...] = ("runtime", "variant", "peer")
+    points = [
+        point(
+            f"candidate {number}",
+            10.0 ** chance.uniform(4, 8),
+            error(10.0 ** chance.uniform(-15, -1), flips=chance.choice((0, 0, 1, 9))),
+            question=asked[number % 3],
+            kind=kinds[number // 3 % 3],
+        )
+        for number in range(count)
+    ]
+    floor = point("floor: an empty session call", 5e3, None, kind="floor")
+    return study(floor, *points)
+
+
+def markers(figure: Figure) -> dict[str, tuple[float, float, Axes]]:
+    """Return the place of every marker of a candidate, by its name."""
+    found: dict[str, tuple[float, float, Axes]] = {}
+    for axes in figure.axes:
+        for bars in axes.containers:
+            (x,), (y,) = bars.lines[0].get_data()  # type: ignore[attr-defined] # of errorbar
+            found[str(bars.get_label())] = (float(x), float(y), axes)
+    return found
+
+
+def labels(figure: Figure) -> Iterator[Annotation]:
+    from matplotlib.text import Annotation
+
+    for axes in figure.axes:
+        for words in axes.texts:
+            if isinstance(words, Annotation) and words.get_gid() != "floor":
+                yield words
+
+
+def test_a_marker_lies_at_its_time_for_a_row_and_its_bound() -> None:
+    found = markers(plots.work_precision(small(), rows=1000))
+    assert found["native: raw rules"][:2] == (100.0, 1e-14)
+    assert found["native float32: raw rules"][:2] == (40.0, 3e-5)
+
+
+def test_what_is_not_certified_lies_at_what_was_observed() -> None:
+    found = markers(plots.work_precision(small(), rows=1000))
+    assert found["simpful: raw rules"][:2] == (90_000.0, 2e-3)
+
+
+def test_a_tree_lies_at_its_share_of_other_classes_in_a_panel_of_its_own() -> None:
+    found = markers(plots.work_precision(small(), rows=1000))
+    time, share, axes = found["scikit-learn: tree"]
+    assert (time, share) == (70.0, 0.02)
+    assert axes is not found["native: raw rules"][2]
+    assert axes.get_ylabel() == "share of rows\nwith another class"
+
+
+def test_no_error_lies_in_a_strip_that_says_exact() -> None:
+    found = markers(plots.work_precision(small(), rows=1000))
+    strip = found["native: tree"][2]
+    assert strip is found["onnxruntime: tree"][2]
+    assert strip is not found["scikit-learn: tree"][2]
+    assert strip.get_yscale() == "linear"
+    assert [tick.get_text() for tick in strip.get_yticklabels()] == ["exact"]
+
+
+def test_each_question_has_its_lane_of_the_strip() -> None:
+    exact = [
+        point("native", 5e4, error(0.0), question=question)
+        for question in ("raw rules", "relative rules")
+    ]
+    found = markers(plots.work_precision(study(*exact), rows=1000))
+    heights = [height for _, height, _ in found.values()]
+    assert sorted(heights) == [-1.0, 0.0]
+
+
+def test_a_bar_is_the_interval_of_the_median() -> None:
+    one = point("native", 1e5, error(1e-3))
+    figure = plots.work_precision(study(one), rows=1000)
+    (bars,) = figure.axes[0].containers
+    ends = bars.lines[2][0].get_segments()[0][:, 0]  # type: ignore[attr-defined]
+    taken = one.timings[0]
+    assert ends.tolist() == pytest.approx([taken.low_ns / 1e3, taken.high_ns / 1e3])
+
+
+def test_the_front_is_labelled_and_filled() -> None:
+    figure = plots.work_precision(small(), rows=1000)
+    bold = {w.get_text() for w in labels(figure) if w.get_fontweight() == "bold"}
+    assert bold == {"native", "native float32", "onnxruntime"}
+    faces = {
+        bars.get_label(): bars.lines[0].get_markerfacecolor()  # type: ignore[attr-defined]
+        for axes in figure.axes
+        for bars in axes.containers
+    }
+    assert faces["native: raw rules"] == "#00795a"
+    assert faces["simpful: raw rules"] == (1.0, 1.0, 1.0, 1.0)
+
+
+def test_a_member_of_the_front_shows_what_was_observed_below_its_bound() -> None:
+    figure = plots.work_precision(small(), rows=1000)
+    axes = markers(figure)["native float32: raw rules"][2]
+    lines = [np.asarray(line.get_xydata()).tolist() for line in axes.lines]
+    assert [[40.0, 2e-6], [40.0, 3e-5]] in lines
+
+
+def test_peers_are_named_where_points_are_few() -> None:
+    names = {
+        words.get_text() for words in labels(plots.work_precision(small(), rows=1000))
+    }
+    assert {"simpful", "scikit-learn"} <= names
+
+
+def test_among_many_points_the_front_alone_is_labelled() -> None:
+    made = large(150)
+    figure = plots.work_precision(made, rows=1000)
+    fronts = [name for front in made.fronts for name in front.names]
+    written = sorted(words.get_text() for words in labels(figure))
+    assert written == sorted(name.partition(":")[0] for name in fronts)
+    assert len(markers(figure)) == 150
+
+
+@pytest.mark.parametrize("count", [8, 40, 150])
+def test_labels_lie_apart_and_within_their_axes(count: int) -> None:
+    figure = plots.work_precision(large(count), rows=1000)
+    figure.draw_without_rendering()
+    boxes: list[Bbox] = []
+    for words in labels(figure):
+        box = words.get_bbox_patch() or words
+        extent = super(type(words), words).get_window_extent()
+        frame = words.axes.get_window_extent() if words.axes else extent
+        assert frame.x0 <= extent.x0 <= extent.x1 <= frame.x1, words.get_text()
+        assert frame.y0 <= extent.y0 <= extent.y1 <= frame.y1, words.get_text()
+        assert box is not None
+        boxes.append(extent)
+    assert boxes
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+
+
+def test_floors_are_lines_with_their_names() -> None:
+    figure = plots.work_precision(small(), rows=1000)
+    (name,) = [t for a in figure.axes for t in a.texts if t.get_gid() == "floor"]
+    assert name.get_text() == "the columns read once"
+    for axes in figure.axes:
+        assert [5.0, 5.0] in [
+            np.asarray(line.get_xdata()).tolist() for line in axes.lines
+        ]
+
+
+def test_the_words_above_name_model_rows_machine_and_data() -> None:
+    figure = plots.work_precision(small(), rows=1000)
+    assert [words.get_text() for words in figure.texts] == [
+        "grip: error against run time, 1,000 rows a call, 1 thread",
+        "a processor, 2 cores, Linux 6; grasps.csv, 200 rows",
+    ]
+
+
+def test_a_study_that_ended_early_says_so() -> None:
+    from msgspec.structs import replace
+
+    early = replace(small(), is_complete=False)
+    title = plots.work_precision(early, rows=1000).texts[0].get_text()
+    assert title.endswith("1 thread (ended early)")
+
+
+def test_other_rows_and_threads_make_another_picture() -> None:
+    more = (timing(500.0, rows=1, threads=2),)
+    made = study(point("native", 1e5, error(1e-3), more=more))
+    figure = plots.work_precision(made, rows=1, threads=2)
+    assert markers(figure)["native: rules"][:2] == (500.0, 1e-3)
+    assert "1 row a call, 2 threads" in figure.texts[0].get_text()
+
+
+def test_rows_that_were_not_measured_are_refused_with_those_that_were() -> None:
+    with pytest.raises(ValueError, match="nothing was measured") as caught:
+        plots.work_precision(small(), rows=7)
+    assert str(caught.value) == (
+        "nothing was measured with 7 rows and 1 threads; "
+        "rows and threads in this study: 1000 with 1"
+    )
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), 3.0])
+def test_an_error_that_is_none_lies_at_one(wrong: float) -> None:
+    made: list[Point] = [
+        point("broken", 1e5, error(wrong)),
+        point("a", 1e5, error(1e-3)),
+    ]
+    assert (
+        markers(plots.work_precision(study(*made), rows=1000))["broken: rules"][1]
+        == 1.0
+    )
+
+
+def test_a_study_whose_errors_are_all_zero_has_strips_alone() -> None:
+    figure = plots.work_precision(study(point("a", 1e5, error(0.0))), rows=1000)
+    assert len(figure.axes) == 1
+
+
+@pytest.mark.parametrize("suffix", plots.SUFFIXES)
+def test_the_same_study_gives_the_same_bytes(suffix: str) -> None:
+    first = drawn(plots.work_precision(large(40), rows=1000), suffix)
+    second = drawn(plots.work_precision(large(40), rows=1000), suffix)
+    assert first == second
+
+
+def test_a_users_settings_change_nothing() -> None:
+    import matplotlib as mpl
+
+    plain = drawn(plots.work_precision(small(), rows=1000), ".svg")
+    with mpl.rc_context({"font.size": 20, "axes.grid": True, "svg.fonttype": "none"}):
+        assert drawn(plots.work_precision(small(), rows=1000), ".svg") == plain
+        assert mpl.rcParams["font.size"] == 20
+
+
+def test_an_svg_is_well_formed_and_has_no_date(tmp_path: Path) -> None:
+    path = tmp_path / "study.svg"
+    plots.save(plots.work_precision(small(), rows=1000), path)
+    text = path.read_text()
+    assert ET.fromstring(text).tag == "{http://www.w3.org/2000/svg}svg"
+    assert "<text" not in text  # letters are paths
+    assert not re.search(r"dc:date|20\d\d-\d\d-\d\d", text)
+
+
+def test_a_png_is_sixteen_hundred_dots_wide(tmp_path: Path) -> None:
+    path = tmp_path / "study.PNG"
+    figure = plots.work_precision(small(), rows=1000)
+    plots.save(figure, path)
+    content = path.read_bytes()
+    width, height = struct.unpack(">II", content[16:24])
+    assert (width, height) == (1600, int(figure.get_figheight() * 200))
+    assert b"Software" not in content
+
+
+def test_another_suffix_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "study.pdf"
+    with pytest.raises(ValueError, match="ends in") as caught:
+        plots.save(plots.work_precision(small(), rows=1000), path)
+    assert str(caught.value) == f"{path}: a picture's name ends in .svg or .png"
+    assert not path.exists()
+
+
+def test_a_place_that_is_none_is_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "nowhere" / "study.svg"
+    with pytest.raises(WriteError, match="no such file or directory"):
+        plots.save(plots.work_precision(small(), rows=1000), path)
+
+
+def test_drawing_without_matplotlib_names_the_extra(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(MissingExtraError) as caught:
+        plots.work_precision(small(), rows=1000)
+    assert str(caught.value) == (
+        "drawing pictures needs the extra 'plots': "
+        "pip install 'fuzzytree-toolkit[plots]'"
+    )
+
+
+def test_drawing_leaves_no_figure_in_the_librarys_state() -> None:
+    import matplotlib.pyplot as plt
+
+    before = plt.get_fignums()
+    plots.work_precision(small(), rows=1000)
+    assert plt.get_fignums() == before
+
+
+@pytest.mark.parametrize(
+    ("nanoseconds", "text"),
+    [(0.5, "0.5 ns"), (1.0, "1 ns"), (1e4, "10 µs"), (2.5e6, "2.5 ms"), (6e10, "60 s")],
+)
+def test_times_have_their_units(nanoseconds: float, text: str) -> None:
+    assert time_text(nanoseconds) == text
