@@ -59,7 +59,7 @@ def _chained(
     sheet: Sheet, values: str, lines: Segments, numbers: Numbers, longest: int
 ) -> str:
     """Go from point to point; behind a shape's last one nothing changes."""
-    degree = _column(sheet, lines.to[lines.first], "degrees")
+    degree = _column(sheet, lines.far[lines.first], "degrees")
     point_count = 2 * lines.room - 1
     for number in range(longest):
         has_line = number < point_count
@@ -67,13 +67,13 @@ def _chained(
         behind = lines.first + np.where(has_line, number + 1, 0)
         point = np.where(has_line, lines.values[here], lines.values[-1])
         is_above = sheet.node("Greater", values, _column(sheet, point, "points"))
-        line = to = _column(sheet, lines.to[behind], "degrees")
-        if (lines.start[behind] != lines.to[behind]).any():
+        line = far = _column(sheet, lines.far[behind], "degrees")
+        if (lines.near[behind] != lines.far[behind]).any():
             parts = {
-                "right": _column(sheet, lines.right[behind], "rights"),
+                "anchor": _column(sheet, lines.anchor[behind], "anchors"),
                 "width": _column(sheet, lines.width[behind], "widths"),
-                "start": _column(sheet, lines.start[behind], "starts"),
-                "to": to,
+                "near": _column(sheet, lines.near[behind], "degrees"),
+                "far": far,
             }
             line = _line(sheet, values, parts, numbers)
         degree = sheet.node("Where", is_above, line, degree)
@@ -96,10 +96,10 @@ def _searched(sheet: Sheet, values: str, lines: Segments, numbers: Numbers) -> s
     parts = {
         name: sheet.node("Gather", sheet.constant(table, name), place, axis=0)
         for name, table in (
-            ("right", lines.right),
+            ("anchor", lines.anchor),
             ("width", lines.width),
-            ("start", lines.start),
-            ("to", lines.to),
+            ("near", lines.near),
+            ("far", lines.far),
         )
     }
     return _line(sheet, values, parts, numbers)
@@ -113,14 +113,14 @@ def _line(sheet: Sheet, values: str, parts: dict[str, str], numbers: Numbers) ->
     """Add the degree on a line, as in `fuzzytree.numerics.segments`."""
 
     def body(inner: Sheet, inputs: Sequence[str], named: str) -> str:
-        x, right, width, start, to = inputs
-        position = inner.node("Div", inner.node("Sub", x, right), width)
+        x, anchor, width, near, far = inputs
+        position = inner.node("Div", inner.node("Sub", x, anchor), width)
         if numbers.is_mixed:
             kind = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
             position = inner.node("Cast", position, to=kind)
-        fall = inner.node("Mul", position, inner.node("Sub", start, to))
-        degree = inner.node("Add", fall, to)
-        degree = inner.node("Max", degree, inner.node("Min", start, to))
-        return inner.node("Min", degree, inner.node("Max", start, to), named=named)
+        change = inner.node("Mul", position, inner.node("Sub", far, near))
+        degree = inner.node("Add", change, near)
+        degree = inner.node("Max", degree, inner.node("Min", near, far))
+        return inner.node("Min", degree, inner.node("Max", near, far), named=named)
 
     return sheet.block("Line", body, {"x": values, **parts})

@@ -150,10 +150,12 @@ def points(x, values, degrees):
             high = middle
     if low in (0, len(values)):
         return degrees[low and -1]
-    left, right = values[low - 1], values[low]
-    here, there = degrees[low - 1], degrees[low]
-    line = there + (x - right) / (left - right) * (here - there)
-    return min(max(line, min(here, there)), max(here, there))
+    anchor, other = values[low], values[low - 1]
+    near, far = degrees[low], degrees[low - 1]
+    if far == 0.0:
+        anchor, other, near, far = other, anchor, far, near
+    line = near + (x - anchor) / (other - anchor) * (far - near)
+    return min(max(line, min(near, far)), max(near, far))
 
 
 def horner(coefficients, x):

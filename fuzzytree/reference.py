@@ -207,17 +207,21 @@ def side_degree(side: Side, distance: float) -> float:
 def points_degree(points: Points, value: float) -> float:
     """Return the degree on the line between the points on either side of a value.
 
-    The quotient lies in [0, 1] and falls as the value grows, in rounded numbers too;
-    so does the product in size, and the sum is held between the two degrees.
+    The quotient lies in [0, 1] and is monotone, in rounded numbers too; so are the
+    product and the sum, which is held between the two degrees. Measured from its right
+    end, a line is exact there, and from a left end of degree 0 it is exact at both and
+    near 0 to the last digit.
     """
     values, degrees = points.values, points.degrees
     after = bisect_left(values, value)  # so many points lie below the value
     if after in (0, len(values)):
         return degrees[after and -1]
-    left, right = values[after - 1], values[after]
-    here, there = degrees[after - 1], degrees[after]
-    line = there + (value - right) / (left - right) * (here - there)
-    return min(max(line, min(here, there)), max(here, there))
+    anchor, other = values[after], values[after - 1]
+    near, far = degrees[after], degrees[after - 1]
+    if far == 0.0:
+        anchor, other, near, far = other, anchor, far, near
+    line = near + (value - anchor) / (other - anchor) * (far - near)
+    return min(max(line, min(near, far)), max(near, far))
 
 
 def horner(coefficients: tuple[float, ...], x: float) -> float:

@@ -102,9 +102,10 @@ class Points(Value, frozen=True, tag="points"):
     """Points joined by lines: triangles, trapezoids, ramps, steps and free curves.
 
     Between two neighbours `(a, p)` and `(b, r)`, for `a < x <= b`, the degree is
-    `r + (x - b) / (a - b) * (p - r)`, each operation rounded once, held between p and
-    r: so it is exact at the points and where p = r, and monotone between them. Before
-    the first point its degree holds, behind the last one the last one's.
+    `r + (x - b) / (a - b) * (p - r)`, or `(x - a) / (b - a) * r` if p is 0, each
+    operation rounded once, held between p and r: so it is exact at the points and where
+    p = r, and monotone between them. Before the first point its degree holds, behind
+    the last one the last one's.
 
     A value that occurs twice is a step: at the value itself the first degree holds,
     above it the second.

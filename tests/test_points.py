@@ -123,6 +123,16 @@ def test_a_single_point_is_the_same_everywhere() -> None:
     assert {degree(Points((3.0,), (0.5,)), x) for x in (-1e300, 3.0, 9.0)} == {0.5}
 
 
+@pytest.mark.parametrize("dtype", ["float64", "mixed"])
+def test_a_degree_next_to_zero_keeps_its_digits(dtype: Dtype) -> None:
+    rising, falling = Points((0.0, 1.0), (0.0, 1.0)), Points((-1.0, 0.0), (1.0, 0.0))
+    rows = np.array([[1e-30, -1e-30, 0.0]])
+    found = fire(rules_of(rising, falling), dtype)(rows).strengths
+    assert found is not None
+    tiny = 1e-30 if dtype == "float64" else float(np.float32(1e-30))
+    assert found.tolist() == [[tiny, 0.0, 0.0], [0.0, tiny, 0.0]]
+
+
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(points())
 def test_a_degree_is_exact_at_the_points_and_never_leaves_their_range(

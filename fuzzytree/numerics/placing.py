@@ -106,6 +106,7 @@ def _side_half(shape: LR, sign: int, tolerance: float) -> _Half:
     lost = float(slack) * _ROUNDING
     points, bound = _joined(tail, (outer, inner), tolerance - lost)
     others, other = _joined(body, (inner, shape.mean), tolerance - lost)
+    lost += abs(others[0][1] - points[-1][1])  # the same degree, rounded twice
     return _Half([*points, *others[1:-1]], max(bound, other) + lost)
 
 
@@ -125,7 +126,13 @@ def _steepness(stretch: Stretch) -> Fraction:
 def _joined(
     stretch: Stretch, ends: tuple[float, float], tolerance: float
 ) -> tuple[list[tuple[float, float]], float]:
-    """Return points along a stretch, its ends included, and the error of the lines."""
+    """Return points along a stretch, its ends included, and the error of the lines.
+
+    Args:
+        stretch: The stretch.
+        ends: The doubles that stand for its first and last value.
+        tolerance: The largest error that is allowed.
+    """
     curve = np.array(stretch.coefficients).reshape(-1, 1)
     knots = _knots(stretch)
     share = 1.0 - 2.0**-6  # the bound may be above the error by a hundredth

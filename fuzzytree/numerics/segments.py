@@ -1,8 +1,8 @@
 """The lines between points, in a number type: one table for everybody who joins them.
 
-Runtimes and exporters that promise equal bits take their constants from here. On the
-line that ends at (`right`, `to`), with `position = (x - right) / width`, the degree is
-`to + position * (start - to)`, held between `start` and `to`.
+Runtimes and exporters that promise equal bits take their constants from here. On each
+line, with `position = (x - anchor) / width`, the degree is
+`near + position * (far - near)`, held between `near` and `far`.
 """
 
 from __future__ import annotations
@@ -37,20 +37,21 @@ class Segments:
         room: Of each shape, half as many lines as there is room for.
         values: The points; x lies `k` lines behind the first if k points are below x.
             Infinite where there is no further point.
-        right: Where a line ends.
-        width: Its beginning minus its end: below 0. A level line ends at 0 and is as
-            wide as the type allows, so that nothing overflows on it.
-        start: The degree at its beginning.
-        to: The degree at its end.
+        anchor: The end of a line from which x is measured: the right one, or the left
+            one if the degree is 0 there.
+        width: The other end minus the anchor. A level line has an anchor of 0 and is
+            as wide as the type allows, so that nothing overflows on it.
+        near: The degree at the anchor.
+        far: The degree at the other end.
     """
 
     first: IntArray
     room: IntArray
     values: Reals
-    right: Reals
+    anchor: Reals
     width: Reals
-    start: Reals
-    to: Reals
+    near: Reals
+    far: Reals
 
 
 def segments(shapes: Sequence[Points], axis: Real, degree: Real) -> Segments:
@@ -66,16 +67,16 @@ def segments(shapes: Sequence[Points], axis: Real, degree: Real) -> Segments:
 
     Example:
         >>> double = np.dtype(np.float64)
-        >>> segments([Points((1.0, 3.0), (0.0, 1.0))], double, double).to.tolist()
+        >>> segments([Points((1.0, 3.0), (0.0, 1.0))], double, double).far.tolist()
         [0.0, 1.0, 1.0, 0.0]
     """
     sizes = np.array([1 << len(shape.values).bit_length() for shape in shapes], int)
     first = np.cumsum(sizes) - sizes
     whole = int(sizes.sum())
     values = np.full(whole, np.inf, axis)
-    right, width = np.zeros(whole, axis), np.full(whole, -np.finfo(axis).max, axis)
-    start, to = np.zeros(whole, degree), np.zeros(whole, degree)
-    tables = values, right, width, start, to
+    anchor, width = np.zeros(whole, axis), np.full(whole, np.finfo(axis).max, axis)
+    near, far = np.zeros(whole, degree), np.zeros(whole, degree)
+    tables = values, anchor, width, near, far
     for place, shape in zip(first.tolist(), shapes, strict=True):
         found = _lines(shape, axis, degree)
         for table, part in zip(tables, found, strict=True):
@@ -84,18 +85,21 @@ def segments(shapes: Sequence[Points], axis: Real, degree: Real) -> Segments:
 
 
 def _lines(points: Points, axis: Real, degree: Real) -> tuple[Reals, ...]:
-    """Return values, right, width, start and to of one shape."""
+    """Return values, anchor, width, near and far of one shape."""
     largest = np.finfo(axis).max
     values = np.clip(points.values, -largest, largest).astype(axis)
     below_one = np.nextafter(degree.type(1), degree.type(0))
     exact = np.array(points.degrees)
     degrees = exact.astype(degree)
     degrees = np.where(exact < 1.0, np.minimum(degrees, below_one), degrees)
-    start, to = np.append(degrees[0], degrees), np.append(degrees, degrees[-1])
-    between = values[:-1].astype(np.float64) - values[1:]
-    width = np.clip(np.concatenate([[0], between, [0]]), -largest, largest)
-    width = width.astype(axis)
-    is_level = (start == to) | (width == 0)
-    right = np.where(is_level, axis.type(0), np.append(values, axis.type(0)))
-    width = np.where(is_level, -largest, width).astype(axis)
-    return values, right, width, start, to
+    start, end = np.append(values[0], values), np.append(values, values[-1])
+    here, there = np.append(degrees[0], degrees), np.append(degrees, degrees[-1])
+    is_rising = here == 0
+    anchor, other = np.where(is_rising, [start, end], [end, start])
+    near, far = np.where(is_rising, [here, there], [there, here])
+    with np.errstate(over="ignore"):  # of points that only float32 finds too far apart
+        width = np.clip(other - anchor, -largest, largest)
+    is_level = (here == there) | (start == end)
+    anchor = np.where(is_level, axis.type(0), anchor)
+    width = np.where(is_level, largest, width)
+    return values, anchor, width, near, far

@@ -26,15 +26,15 @@ def join(lines: Segments, place: IntArray, x: Reals) -> Reals:
         place: The place of each value's line.
         x: Finite values, in the lines' type.
     """
-    position = _taken(lines.right, place)
+    position = _taken(lines.anchor, place)
     np.subtract(x, position, out=position)
     position /= _taken(lines.width, place)
-    start, to = _taken(lines.start, place), _taken(lines.to, place)
-    found = position.astype(to.dtype, copy=False)
-    found *= start - to
-    found += to
-    np.maximum(found, np.minimum(start, to), out=found)
-    np.minimum(found, np.maximum(start, to, out=to), out=found)
+    near, far = _taken(lines.near, place), _taken(lines.far, place)
+    found = position.astype(near.dtype, copy=False)
+    found *= far - near
+    found += near
+    np.maximum(found, np.minimum(near, far), out=found)
+    np.minimum(found, np.maximum(near, far, out=far), out=found)
     return found
 
 
