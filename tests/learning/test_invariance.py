@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, Literal
@@ -38,10 +39,10 @@ def blobs(rows: int, *, step: float = 0.0, seed: int = 0) -> Table:
 TABLES: dict[str, Callable[[], Table]] = {
     "iris": lambda: public("iris"),
     "wine": lambda: public("wine"),
-    "sampled": lambda: blobs(3_000),
-    "sampled whole numbers": lambda: blobs(3_000, step=1.0),
+    "sampled": lambda: blobs(1_500),
+    "sampled whole numbers": lambda: blobs(1_500, step=1.0),
 }
-ROWS_PER_CLASS = 300
+ROWS_PER_CLASS = 100
 """Fewer than the rows of a class in the tables that are sampled."""
 
 
@@ -135,11 +136,11 @@ def test_a_column_times_a_power_of_two_gives_the_tree_in_that_unit(
     values, labels = TABLES[name]()
     settings = Settings(mode=mode, rows_per_class=ROWS_PER_CLASS)
     base = learn((values, labels), settings)
-    exponents = np.random.default_rng(1).integers(-200, 201, values.shape[1])
+    chance = random.Random(1)
+    exponents = [chance.randint(-200, 200) for _ in base.tree.columns]
     found = learn((np.ldexp(values, exponents), labels), settings)
     units = {
-        column: Unit(int(k))
-        for column, k in zip(base.tree.columns, exponents, strict=True)
+        column: Unit(k) for column, k in zip(base.tree.columns, exponents, strict=True)
     }
     assert found.tree == in_units(base.tree, units)
     assert found.report == base.report
@@ -201,11 +202,11 @@ def test_a_negative_zero_is_zero() -> None:
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("power", [3, 13, 27, 40])
+@pytest.mark.parametrize("power", [3, 23, 40])
 def test_a_column_moved_by_an_offset_gives_the_moved_tree(
     power: int, mode: Mode
 ) -> None:
-    assert_an_offset_moves_the_tree(blobs(400, step=2.0**-10), power, mode)
+    assert_an_offset_moves_the_tree(blobs(300, step=2.0**-10), power, mode)
 
 
 @pytest.mark.heavy

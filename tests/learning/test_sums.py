@@ -121,8 +121,9 @@ def test_a_mean_and_a_spread_are_those_of_more_digits() -> None:
     with localcontext() as context:
         context.prec = 80
         exact = [Decimal(v) for v in values.tolist()]
-        mean = sum(exact) / len(exact)
-        variance = sum((v - mean) ** 2 for v in exact) / (len(exact) - 1)
+        mean = sum(exact, Decimal(0)) / len(exact)
+        squares = sum(((v - mean) ** 2 for v in exact), Decimal(0))
+        variance = squares / (len(exact) - 1)
         assert totals.means()[0] == float(mean)
         assert totals.spreads()[0] == float(variance.sqrt())
         assert totals.means(float(exact[0]), -3)[0] == float((mean - exact[0]) * 8)
