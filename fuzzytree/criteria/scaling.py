@@ -59,8 +59,10 @@ def scaling(
         low, high = exponent_range(one.model, one.runtime.dtype)
         key = (one.carrier, one.runtime.dtype)
         usable[key] = Usable(one.carrier, one.runtime.dtype, low, high)
-        inner = [k for k in _STEPS if low < k < high]
-        plans = [dict.fromkeys(model.inputs, k) for k in (low, *inner, high)]
+        ks = [k for k in _STEPS if low < k < high]
+        # An engine of others divides and multiplies in between as it likes.
+        ks += [] if one.runtime.bound is not None else [low, high]
+        plans = [dict.fromkeys(model.inputs, k) for k in ks]
         plans.append(_apart(model.inputs, max(low, -60), min(high, 60), seed=0))
         for plan in plans:
             count, fault = _tried(one, plan, values, skipped)

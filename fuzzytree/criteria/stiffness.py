@@ -42,12 +42,14 @@ class Scale(NamedTuple):
         slope: The steepest slope of a degree, per unit.
         low: The smallest value in its range.
         high: The largest.
+        curves: What evaluating curves in float32 costs, wherever the value is found.
     """
 
     spread: float
     slope: float
     low: float
     high: float
+    curves: float
 
     @property
     def location(self) -> float:
@@ -82,7 +84,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
             gap = max(gap, _gap(before, after))
         predicted = scale.slope * scale.location * UNIT
         offset = _offset(scale)
-        is_safe = predicted <= SAFE and not (is_data and flips)
+        is_safe = max(predicted, scale.curves) <= SAFE and not (is_data and flips)
         ratio = scale.spread / scale.location if scale.location else math.inf
         found.append(
             Stiff(
@@ -95,7 +97,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
                 flips,
                 near.shape[1],
                 None if is_safe else offset,
-                _advice(predicted, offset, is_safe=is_safe),
+                _advice(scale, predicted, offset, is_safe=is_safe),
             )
         )
     return tuple(sorted(found, key=lambda one: (-one.predicted, -one.observed)))
@@ -110,12 +112,15 @@ def input_scales(model: Model, values: FloatArray) -> dict[str, Scale]:
     widths: dict[str, list[float]] = {name: [] for name in model.inputs}
     slopes: dict[str, list[float]] = {name: [] for name in model.inputs}
     places: dict[str, list[float]] = {name: [] for name in model.inputs}
+    curves = dict.fromkeys(model.inputs, 0.0)
     for _, form in forms(model):
         for variable in form.variables:
             shapes = [term.shape for term in variable.terms]
             steep = max((_slope(shape) for shape in shapes), default=0.0)
             width = min(map(_width, shapes), default=math.inf)
+            fixed = max((_mixed_cost(shape) for shape in shapes), default=0.0)
             for name, weight in _inputs_of(variable):
+                curves[name] = max(curves[name], fixed)
                 widths[name].append(width / abs(weight))
                 slopes[name].append(steep * abs(weight))
             if not variable.parts:
@@ -128,6 +133,7 @@ def input_scales(model: Model, values: FloatArray) -> dict[str, Scale]:
             min(widths[name], default=math.inf),
             max(slopes[name], default=0.0),
             *_range(model, name, places[name], lines[name]),
+            curves[name],
         )
         for name in model.inputs
     }
@@ -162,6 +168,11 @@ def _range(
 def _slope(shape: Shape) -> float:
     """Return a bound of the slope of a degree; steps are told by flips alone."""
     return degree_bound(shape, "float32").per_unit
+
+
+def _mixed_cost(shape: Shape) -> float:
+    """Return the largest error of a degree whose place on the curve is double."""
+    return degree_bound(shape, "mixed").fixed
 
 
 def _width(shape: Shape) -> float:
@@ -207,10 +218,13 @@ def _offset(scale: Scale) -> float | None:
     return round(0.5 * (scale.low + scale.high) / unit) * unit
 
 
-def _advice(predicted: float, offset: float | None, *, is_safe: bool) -> str:
+def _advice(
+    scale: Scale, predicted: float, offset: float | None, *, is_safe: bool
+) -> str:
     if is_safe:
         return "float32 is safe"
     subtract = "" if offset is None else f"subtract {offset!r} first"
     if predicted * _DOUBLE > SAFE:
         return subtract or "use double, and even that is coarse"
-    return f"use mixed, or {subtract}" if subtract else "use mixed"
+    use = "use double" if scale.curves > SAFE else "use mixed"
+    return f"{use}, or {subtract}" if subtract and use == "use mixed" else use

@@ -179,6 +179,13 @@ def test_a_distance_at_which_doubles_are_too_coarse_is_told() -> None:
     assert found.advice == f"subtract {found.offset!r} first"
 
 
+def test_a_curve_that_costs_too_much_in_float32_asks_for_double() -> None:
+    wild = Band(high=0.0, right=Flank(0.0, 1.0, (1.0, 900.0, -900.0)))
+    values = np.linspace(-1.0, 2.0, 50)[np.newaxis]
+    (found,) = stiffness(one_rule(Term("wild", wild)), values, is_data=True)
+    assert found.advice == "use double"
+
+
 # --- the learner of this package
 
 
