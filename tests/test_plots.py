@@ -98,7 +98,7 @@ def test_a_tree_lies_at_its_share_of_other_classes_in_a_panel_of_its_own() -> No
     time, share, axes = found["scikit-learn: tree"]
     assert (time, share) == (70.0, 0.02)
     assert axes is not found["native: raw rules"][2]
-    assert axes.get_ylabel() == "share of rows\nwith another class"
+    assert axes.get_ylabel() == "rows with\nanother class"
 
 
 def test_no_error_lies_in_a_strip_that_says_exact() -> None:
@@ -167,16 +167,16 @@ def test_among_many_points_the_front_alone_is_labelled() -> None:
 
 @pytest.mark.parametrize("count", [8, 40, 150])
 def test_labels_lie_apart_and_within_their_axes(count: int) -> None:
+    from matplotlib.text import Text
+
     figure = plots.work_precision(large(count), rows=1000)
     figure.draw_without_rendering()
     boxes: list[Bbox] = []
     for words in labels(figure):
-        box = words.get_bbox_patch() or words
-        extent = super(type(words), words).get_window_extent()
+        extent = Text.get_window_extent(words)  # without the line to its point
         frame = words.axes.get_window_extent() if words.axes else extent
         assert frame.x0 <= extent.x0 <= extent.x1 <= frame.x1, words.get_text()
         assert frame.y0 <= extent.y0 <= extent.y1 <= frame.y1, words.get_text()
-        assert box is not None
         boxes.append(extent)
     assert boxes
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
@@ -309,6 +309,22 @@ def test_drawing_leaves_no_figure_in_the_librarys_state() -> None:
     before = plt.get_fignums()
     plots.work_precision(small(), rows=1000)
     assert plt.get_fignums() == before
+
+
+def test_close_times_still_have_a_number_on_their_axis() -> None:
+    made = study(point("a", 3.1e5, error(1e-3)), point("b", 3.2e5, error(1e-4)))
+    axes = plots.work_precision(made, rows=1000).axes[0]
+    low, high = axes.get_xlim()
+    assert [time for time in (10.0, 100.0, 1e3) if low < time < high]
+
+
+def test_shares_are_percent() -> None:
+    figure = plots.work_precision(small(), rows=1000)
+    axes = markers(figure)["scikit-learn: tree"][2]
+    figure.draw_without_rendering()
+    shown = [tick.get_text() for tick in axes.get_yticklabels(which="both")]
+    assert {text for text in shown if text} >= {"1 %", "10 %"}
+    assert not any("times" in text for text in shown)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 AXES: dict[Measure, str] = {
     "strength": "error of a strength\n(its certified bound, if any)",
-    "class": "share of rows\nwith another class",
+    "class": "rows with\nanother class",
 }
 """What the axes are called."""
 
@@ -27,6 +27,7 @@ _LOWEST = 1e-18  # observed errors below it are not followed
 _HEIGHTS: dict[Measure, float] = {"strength": 3.4, "class": 1.9}
 _LANE = 0.34  # of a question in a strip
 _ROOM = 1.1  # of a strip alone, for names
+_LEAST_RATIO = 20.0  # of times, so that one power of ten is among them
 _TOP, _BOTTOM = 0.62, 0.83  # for words above, and the legend below
 _UNITS = (("s", 1e9), ("ms", 1e6), ("µs", 1e3), ("ns", 1.0))
 
@@ -99,11 +100,14 @@ def scale_panels(
     times = [time for _, time in floors]
     times += [time for m in marks for time in m.interval]
     low, high = min(times) / 1.7, max(times) * 1.7
+    widening = max(1.0, math.sqrt(_LEAST_RATIO * low / high))
+    low, high = low / widening, high * widening
     drawn = [axes for p in panels for axes in (p.logs, p.strip) if axes is not None]
     for axes in drawn:
         axes.set_xscale("log")
         axes.set_xlim(low, high)
         axes.xaxis.set_major_formatter(time_text)
+        axes.xaxis.set_minor_formatter("")
         axes.tick_params(labelsize=SIZE, labelbottom=axes is drawn[-1])
         axes.grid(visible=True, which="major", color="#e4e4e4", linewidth=0.6)
         axes.set_axisbelow(True)
@@ -114,6 +118,9 @@ def scale_panels(
             panel.logs.set_yscale("log")
             panel.logs.set_ylim(*_decades(mine))
             panel.logs.set_ylabel(AXES[panel.measure], fontsize=SIZE + 1)
+            panel.logs.yaxis.set_minor_formatter("")
+            if panel.measure == "class":
+                panel.logs.yaxis.set_major_formatter(share_text)
         if panel.strip is not None:
             _scale_strip(panel.strip, len(panel.lanes), is_alone=panel.logs is None)
 
@@ -124,6 +131,7 @@ def _decades(marks: Sequence[Mark]) -> tuple[float, float]:
     errors += [seen for m in marks if m.is_front if (seen := m.observed)]
     lowest = math.floor(math.log10(max(min(errors), _LOWEST)) - 0.3)
     highest = math.ceil(math.log10(max(errors)) + 0.2)
+    highest = min(highest, 0) if max(errors) < 1.0 else highest
     return 10.0**lowest, 10.0**highest
 
 
@@ -149,3 +157,13 @@ def time_text(nanoseconds: float, _position: object = None) -> str:
         if nanoseconds >= size:
             return f"{nanoseconds / size:g} {unit}"
     return f"{nanoseconds:g} ns"
+
+
+def share_text(share: float, _position: object = None) -> str:
+    """Return a share of rows as an axis shows it.
+
+    Example:
+        >>> share_text(0.1), share_text(0.001)
+        ('10 %', '0.1 %')
+    """
+    return f"{share * 100.0:.6g} %"
