@@ -339,16 +339,21 @@ def test_conclusions_follow_the_numbers() -> None:
     )
     assert _conclusions(right) == [
         'Counted, "n times" is right.',
-        "Timed, it is right as well.",
+        "Timed, the ratio grows like n everywhere, and is n, within a factor of 2, "
+        "everywhere.",
         "For a single row, overhead does not decide.",
         '"Less reliable" is confirmed.',
     ]
     assert _conclusions(wrong)[1:] == [
-        "Timed, no runtime keeps to it.",
+        "Timed, the ratio grows like n nowhere, and is n, within a factor of 2, "
+        "nowhere.",
         "For a single row, overhead decides at first.",
         '"Less reliable" is not what is seen, rather the opposite.',
     ]
-    assert _conclusions(mixed)[1] == "Timed, it is right in reference row by row alone."
+    assert _conclusions(mixed)[1] == (
+        "Timed, the ratio grows like n in reference row by row, and is n, within a "
+        "factor of 2, in reference row by row."
+    )
     assert _conclusions(mixed)[-1] == 'Which is "less reliable" depends on the table.'
     neither = Claims(MACHINE, (), (_comparison(tree=3, raw=2),))
     assert _conclusions(neither) == [

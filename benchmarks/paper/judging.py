@@ -13,6 +13,7 @@ LARGE = 100  # rules: from here on the law of growth is fitted
 LEVEL = 0.05  # of the family of tests
 ABOUT = 2.0  # "about n times" is within this factor of n
 NEARLY = 2.0  # "nearly the tree's price" is at most so many times it
+SAME = 0.01  # exponents that differ by less are the same
 PRIMARY: Family = "multiway"
 """The family whose leaves are equally likely; tables show it."""
 
@@ -101,9 +102,9 @@ def lines(claims: Claims) -> Iterator[Line]:
 
 def growth(law: Power) -> str:
     """Return how a ratio grows, as its exponent's interval allows to say it."""
-    if law.low > 1.0:
+    if law.low > 1.0 + SAME:
         return "faster than n"
-    return "slower than n" if law.high < 1.0 else "like n"
+    return "slower than n" if law.high < 1.0 - SAME else "like n"
 
 
 def counted(size: Size) -> tuple[float, float]:

@@ -36,6 +36,7 @@ from paper.text import (
     told_half,
 )
 
+FLAT = 0.05  # an exponent of less in size is no growth worth a word
 ENOUGH = 6  # samples of which the smallest and largest enclose the median with 95 %
 FAMILIES: tuple[Family, ...] = ("multiway", "grown")
 FIRING = ("reference", "native", "onnxruntime float64", "scikit-fuzzy")
@@ -389,7 +390,10 @@ def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
             else f"surely faster than firing from {start:,} rules on"
         )
         law = line.law
-        grows = f", which grows like n^{law.exponent:.2f}" if law else ""
+        grows = ""
+        if law:
+            is_flat = abs(law.exponent) < FLAT
+            grows = ", whatever n" if is_flat else f", growing as n^{law.exponent:.2f}"
         told.append(
             f"{line.kind.capitalize()} rules of {line.family} trees, "
             f"{'in batches' if line.is_batch else 'row by row'}: {gain}; "
@@ -412,9 +416,9 @@ def _trade(claims: Claims) -> str:
             "Where raw rules are right more often, this is the price of their answers."
         )
     return (
-        "On no table above are raw rules surely right more often than the tree, so "
-        "there is no reliability to buy; what the search buys is the strengths' own "
-        "answer, where raw rules are wanted for another reason."
+        "On no table above are raw rules surely right more often than the tree, so the "
+        "trade is not there to be made. The search is for those who want the answer of "
+        "all raw rules for another reason."
     )
 
 

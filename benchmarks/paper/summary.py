@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from fuzzytree.rulebase import Kind
-from paper.judging import ABOUT, PRIMARY, Line, Verdict, counted, verdicts
+from paper.judging import ABOUT, PRIMARY, Line, Verdict, counted, growth, verdicts
 from paper.records import Claims, Size
 from paper.text import bullet, listed, place, short_name, spanned, three, told_half
 
@@ -43,31 +43,37 @@ def _timed_in_short(found: Sequence[Line]) -> str:
     groups: dict[str, list[Line]] = {}
     for line in fired:
         groups.setdefault(place(line), []).append(line)
+    like = [
+        where
+        for where, members in groups.items()
+        if all(line.law and growth(line.law) == "like n" for line in members)
+    ]
     right = [
         where
         for where, members in groups.items()
         if all(line.is_about_n for line in members)
     ]
-    if len(right) == len(groups):
-        head = "Timed, it is right as well."
-    elif right:
-        head = f"Timed, it is right in {listed(right)} alone."
-    else:
-        head = "Timed, no runtime keeps to it."
     told = []
     for is_batch, rows in ((False, "One row at a time"), (True, "In batches")):
         ranges = [
-            f"{spanned(share for line in members for share in line.shares)} n in "
+            f"{spanned(share for line in members for share in line.shares)} in "
             f"{short_name(members[0])}"
             for members in groups.values()
             if members[0].is_batch == is_batch
         ]
         if ranges:
-            told.append(f"{rows} it takes {listed(ranges)}.")
+            told.append(f"{rows}: {listed(ranges)}.")
     return (
-        f"**{head}** Firing raw rules should take n times the tree's time, within a "
-        f"factor of {ABOUT:g} at every n. {' '.join(told)}"
+        f"**Timed, the ratio grows like n {_places(like, groups)}, and is n, within a "
+        f"factor of {ABOUT:g}, {_places(right, groups)}.** Of n times the tree's time, "
+        f"firing raw rules takes this much. {' '.join(told)}"
     )
+
+
+def _places(chosen: Sequence[str], of: Collection[str]) -> str:
+    if len(chosen) == len(of):
+        return "everywhere"
+    return f"in {listed(chosen)}" if chosen else "nowhere"
 
 
 def _overhead_in_short(found: Sequence[Line]) -> str:
