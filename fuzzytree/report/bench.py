@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
+from typing import get_args
 
 from fuzzytree.report.text import aligned, counted
 from fuzzytree.timing.candidates import DEFAULT, title
@@ -183,11 +184,19 @@ def _digits(value: float) -> str:
 
 def _grouped(omissions: Iterable[Omission]) -> Iterator[str]:
     """Yield each reason once, with all that were left out for it."""
-    names: dict[str, list[str]] = {}
+    found: dict[str, dict[str, list[str]]] = {}
     for one in omissions:
-        names.setdefault(one.why, []).append(one.name)
-    for why, who in names.items():
-        yield from textwrap.wrap(f"{', '.join(who)}: {why}", _WIDTH)
+        short, _, question = one.name.rpartition(": ")
+        who = found.setdefault(one.why, {})
+        if question in get_args(Question):
+            who.setdefault(short, []).append(question)
+        else:
+            who.setdefault(one.name, [])
+    for why, who in found.items():
+        names = [
+            f"{k} ({', '.join(asked)})" if asked else k for k, asked in who.items()
+        ]
+        yield from textwrap.wrap(f"{', '.join(names)}: {why}", _WIDTH)
 
 
 def _section(name: str, lines: Iterable[str]) -> Iterator[str]:

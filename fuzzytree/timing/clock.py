@@ -24,6 +24,9 @@ from fuzzytree.timing.records import Timing
 CONFIDENCE = 0.95
 """Of all intervals."""
 
+SURE = 6
+"""Samples from which an interval reaches that: 1 - 2 / 2**6 is 96.9 %."""
+
 Call = Callable[[], object]
 Tell = Callable[[str, float], None]
 """Told what is done and which share of it, in [0, 1]."""
@@ -140,8 +143,8 @@ def time_calls(
         threads: Threads that each may use, for the record.
         rounds: The most samples of each call. From six on the interval of the median
             reaches 95 %.
-        seconds: The time for all of it. Fast calls get all their rounds, and slow ones
-            share the rest evenly; when it is over, no further sample begins.
+        seconds: The time for all of it, shared as `shared_rounds` says; when it is
+            over, no further sample begins.
         seed: Of the order within the rounds.
         tell: Told how far it is.
         clock: Where the time comes from; the system unless given.
@@ -278,20 +281,25 @@ def shared_rounds(
 ) -> dict[str, int]:
     """Return how many rounds each call gets, so that all together fit the time.
 
-    Whoever needs less than an even share gets all its rounds; the others share what is
-    left evenly. One round is everybody's due.
+    Everybody gets the six rounds that an interval needs, if all these fit; what is
+    left is shared evenly, and what fast calls do not need of it goes to slower ones.
+    If they do not fit, all is shared so. One round is everybody's due.
 
     Example:
-        >>> shared_rounds({"fast": 1.0, "slow": 100.0, "slower": 500.0}, 15, 1015.0)
-        {'fast': 15, 'slow': 5, 'slower': 1}
+        >>> shared_rounds({"fast": 1.0, "slow": 30.0, "slower": 50.0}, 15, 600.0)
+        {'fast': 15, 'slow': 7, 'slower': 7}
     """
+    least = min(rounds, SURE)
+    if least * sum(costs.values()) > left:
+        least = 1
+    left -= least * sum(costs.values())
     shares: dict[str, int] = {}
     todo = sorted(costs, key=costs.__getitem__)
     for position, name in enumerate(todo):
         even = left / (len(todo) - position)
-        wanted = rounds if math.isinf(even) else int(max(even, 0.0) // costs[name])
-        shares[name] = max(1, min(rounds, wanted))
-        left -= shares[name] * costs[name]
+        more = rounds if math.isinf(even) else int(max(even, 0.0) // costs[name])
+        shares[name] = min(rounds, least + more)
+        left -= (shares[name] - least) * costs[name]
     return {name: shares[name] for name in costs}
 
 

@@ -149,7 +149,7 @@ def _sentences(
         return
     before: Entry | None = None
     for level in (level for level in _LEVELS if level >= smallest):
-        best = next(one for one in known if one.error <= level)
+        best = _choice(known, question, level)
         if before is None or _is_surely_faster(best, before):
             yield _sentence(known, question, rows, level)
             before = best
@@ -164,30 +164,49 @@ def _is_surely_faster(one: Entry, other: Entry) -> bool:
     return ratio.low > 1.0 and ratio.confidence >= CONFIDENCE
 
 
+def _choice(known: Sequence[Entry], question: Question, level: float) -> Entry:
+    """Return the fastest within a level, or the default if nothing is surely faster."""
+    within = [one for one in known if one.error <= level]
+    default = _default(within, question)
+    if default is not None and not _is_surely_faster(within[0], default):
+        return default
+    return within[0]
+
+
+def _default(known: Sequence[Entry], question: Question) -> Entry | None:
+    name = title(DEFAULT, question)
+    return next((one for one in known if one.name == name), None)
+
+
 def _sentence(
     known: Sequence[Entry], question: Question, rows: int, level: float
 ) -> str:
-    """Say what is the fastest within a level, and against what."""
-    best, *others = [one for one in known if one.error <= level]
+    """Say what to use within a level, and against what.
+
+    That is the default; or, for the default, the fastest of the others.
+    """
+    best = _choice(known, question, level)
+    others = [one for one in known if one.error <= level and one.name != best.name]
     head = f"{_where(question, rows)}: for {_level(best, level)}, use {_what(best)}"
-    default = title(DEFAULT, question)
-    other = next((one for one in known if one.name == default), None)
-    if other is None or best.name == default:
+    other = _default(known, question)
+    if other is None or best.name == other.name:
         other = others[0] if others else None
     if other is None:
         return f"{head}, the only one"
     ratio = times_faster(other.timing, best.timing)
     if ratio is None:
         return f"{head}; {other.short} shares no round with it"
-    ends = f"{_times(ratio.low)} to {_times(ratio.high)}"
     if ratio.confidence < CONFIDENCE:
-        ends = f"{ends} in too few rounds to be sure"
+        sure = f"{_times(ratio.low)} to {_times(ratio.high)}, in too few rounds"
     elif ratio.low <= 1.0:
-        ends = f"quotient {ratio.low:.2f} to {ratio.high:.2f}, 95 % CI"
-        return f"{head}; {other.short} is as fast, as far as can be told ({ends})"
+        return (
+            f"{head}: nothing is surely faster ({other.short} takes "
+            f"{_times(ratio.median)} times as long, 95 % CI "
+            f"{_times(ratio.low)} to {_times(ratio.high)})"
+        )
     else:
-        ends = f"95 % CI {ends}"
-    return f"{head}: {_times(ratio.median)} times faster than {other.short} ({ends})"
+        sure = f"95 % CI {_times(ratio.low)} to {_times(ratio.high)}"
+    return f"{head}: {_times(ratio.median)} times faster than {other.short} ({sure})"
 
 
 def _what(best: Entry) -> str:
@@ -217,4 +236,10 @@ def _level(best: Entry, level: float) -> str:
 
 
 def _times(ratio: float) -> str:
-    return f"{ratio:.1f}" if ratio < 100 else f"{ratio:.0f}"
+    return (
+        f"{ratio:.2f}"
+        if ratio < 2
+        else f"{ratio:.1f}"
+        if ratio < 100
+        else f"{ratio:.0f}"
+    )

@@ -11,8 +11,16 @@ import msgspec
 from fuzzytree.contracts import Model
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.timing import trial
-from fuzzytree.timing.candidates import DEFAULT, questions
-from fuzzytree.timing.clock import Call, Clock, Tell, Timed, system_clock, time_calls
+from fuzzytree.timing.candidates import DEFAULT, questions, title
+from fuzzytree.timing.clock import (
+    SURE,
+    Call,
+    Clock,
+    Tell,
+    Timed,
+    system_clock,
+    time_calls,
+)
 from fuzzytree.timing.front import advice, fronts
 from fuzzytree.timing.gather import chosen, gather
 from fuzzytree.timing.interrupts import noticed
@@ -40,7 +48,7 @@ BUDGET_S = 300.0
 _MADE = 100_000  # rows that are made where there is no table; more are these again
 _TRIED = 16  # rows that a child process answers
 _MOST_BYTES = 6 * 2**30  # for all layouts of the rows of a study
-_SURE = 6  # samples from which an interval reaches 95 %
+_SHARE = 0.1  # of the time: what a single candidate may take at most
 _PACKAGES = ("onnx", "onnxruntime", "scikit-fuzzy", "scipy")
 
 
@@ -315,8 +323,7 @@ class _Run:
             return
         for name, draft in self.drafts.items():
             one = draft.candidate
-            is_measure = one.name.startswith(f"{DEFAULT}: ") or one.kind == "floor"
-            if not (is_first or one.is_parallel or is_measure):
+            if not (is_first or one.is_parallel or _is_measure(one)):
                 continue
             if one.most_rows is not None and rows > one.most_rows:
                 if is_first:
@@ -337,16 +344,14 @@ class _Run:
         return size > _MOST_BYTES
 
     def _fitting(self, names: Sequence[str], rows: int, seconds: float) -> list[str]:
-        """Leave out who cannot have six samples in an even share of the time."""
+        """Leave out who cannot have six samples in the time that is there."""
         costs = {name: self.drafts[name].row_ns * rows for name in names}
-        kept = fitting(costs, seconds * 1e9, self.plan.rounds)
+        ranks = {name: _rank(self.drafts[name].candidate) for name in names}
+        kept = fitting(costs, ranks, seconds * 1e9, min(SURE, self.plan.rounds))
         for name in names:
             if name not in kept:
-                self.omit(
-                    name,
-                    f"{rows:,} rows: {min(_SURE, self.plan.rounds)} calls take more "
-                    "than its share of the time; a larger budget helps",
-                )
+                why = f"{rows:,} rows: too slow for the budget; a larger one helps"
+                self.omit(name, why)
         return [name for name in names if name in kept]
 
     def _calls(
@@ -408,27 +413,44 @@ class _Run:
         )
 
 
-def fitting(costs: Mapping[str, float], left: float, rounds: int) -> set[str]:
-    """Return whose warm-up and first six samples fit an even share of the time.
+def fitting(
+    costs: Mapping[str, float], ranks: Mapping[str, int], left: float, samples: int
+) -> set[str]:
+    """Return whose warm-up and first samples fit the time.
+
+    What all others are compared with comes first, then ours, then the others, the
+    faster ones before the slower ones. Nobody may take more than a tenth of the time.
 
     Args:
         costs: What one call of each is likely to cost.
+        ranks: Who comes first: the lowest.
         left: The time for all of them, in the same unit.
-        rounds: How often each is called beside the warm-up, if there is time.
+        samples: How many samples each needs, beside the warm-up.
 
     Example:
-        >>> sorted(fitting({"fast": 1.0, "slow": 8.0, "slower": 20.0}, 150.0, 9))
-        ['fast', 'slow']
+        >>> costs = {"native": 2.0, "fast": 1.0, "slow": 30.0}
+        >>> sorted(fitting(costs, {"native": 0, "fast": 1, "slow": 1}, 200.0, 6))
+        ['fast', 'native']
     """
     kept: set[str] = set()
-    least = 1 + min(rounds, _SURE)
-    todo = sorted(costs, key=costs.__getitem__)
-    for position, name in enumerate(todo):
-        even = left / (len(todo) - position)
-        if least * costs[name] <= even:
+    most = left * _SHARE
+    for name in sorted(costs, key=lambda one: (ranks[one], costs[one])):
+        needed = (1 + samples) * costs[name]
+        if needed <= most and needed <= left:
             kept.add(name)
-            left -= min((rounds + 1) * costs[name], even)
+            left -= needed
     return kept
+
+
+def _rank(one: Candidate) -> int:
+    """Return 0 for what others are compared with, then ours, peers, variants."""
+    if _is_measure(one):
+        return 0
+    return {"floor": 0, "runtime": 1, "peer": 2, "variant": 3}[one.kind]
+
+
+def _is_measure(one: Candidate) -> bool:
+    return one.kind == "floor" or one.name == title(DEFAULT, one.question)
 
 
 def _part(tell: Tell, first: float, last: float) -> Tell:
@@ -469,7 +491,7 @@ def faults(points: Sequence[Point]) -> Iterator[str]:
 
 
 def _unsure(points: Sequence[Point]) -> Iterator[str]:
-    few = sum(len(t.samples_ns) < _SURE for point in points for t in point.timings)
+    few = sum(len(t.samples_ns) < SURE for point in points for t in point.timings)
     if few:
         verb = "time has" if few == 1 else "times have"
-        yield f"{few} {verb} fewer than {_SURE} samples, and an interval below 95 %"
+        yield f"{few} {verb} fewer than {SURE} samples, and an interval below 95 %"

@@ -147,7 +147,10 @@ def test_everybody_has_the_rounds_of_its_share(share: int) -> None:
 
 def test_fast_calls_keep_their_rounds_when_time_is_short() -> None:
     costs = {"slow": 30.0, "fast": 1.0, "middle": 10.0}
-    assert shared_rounds(costs, 10, 310.0) == {"slow": 6, "fast": 10, "middle": 10}
+    # Six each are 246; of the other 64 fast takes 4, middle 3 times 10, slow 30.
+    assert shared_rounds(costs, 10, 310.0) == {"slow": 7, "fast": 10, "middle": 9}
+    assert shared_rounds(costs, 10, 246.0) == {"slow": 6, "fast": 6, "middle": 6}
+    assert shared_rounds(costs, 10, 245.0) == {"slow": 4, "fast": 10, "middle": 10}
     assert shared_rounds(costs, 10, 0.0) == {"slow": 1, "fast": 1, "middle": 1}
     assert shared_rounds(costs, 10, math.inf) == dict.fromkeys(costs, 10)
 

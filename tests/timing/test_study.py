@@ -235,20 +235,24 @@ def test_the_budget_is_kept_and_slow_ones_are_left_out() -> None:
     )
     assert study.seconds <= 4.0 + 0.5  # judging has its own limits
     assert omitted(study) == {
-        "slow: rules": "1,000 rows: 6 calls take more than its share of the time; "
-        "a larger budget helps"
+        "slow: rules": "1,000 rows: too slow for the budget; a larger one helps"
     }
     slow, fast = study.points
     assert [timing.rows for timing in slow.timings] == [1]
     assert [len(timing.samples_ns) for timing in fast.timings] == [15, 15]
 
 
-def test_what_fits_takes_what_the_others_leave() -> None:
-    costs = {"a": 1.0, "b": 1.0, "c": 10.0}
-    assert fitting(costs, 90.0, 9) == {"a", "b", "c"}
-    assert fitting(costs, 89.0, 9) == {"a", "b"}
-    assert fitting(costs, 1.0, 9) == set()
-    assert fitting({}, 1.0, 9) == set()
+def test_what_others_are_compared_with_comes_first() -> None:
+    costs = {"native": 3.0, "ours": 1.0, "peer": 1.0, "other": 1.0}
+    ranks = {"native": 0, "ours": 1, "peer": 2, "other": 2}
+    assert fitting(costs, ranks, 210.0, 6) == {"native", "ours", "peer", "other"}
+    assert fitting(costs, ranks, 209.0, 6) == {"ours", "peer", "other"}  # a tenth each
+    many = {f"peer {k}": 2.0 for k in range(20)}
+    ranks = dict.fromkeys(many, 2) | {"native": 0}
+    kept = fitting(many | {"native": 2.0}, ranks, 140.0, 6)
+    assert "native" in kept
+    assert len(kept) == 10
+    assert fitting({}, {}, 1.0, 9) == set()
 
 
 def test_two_threads_are_for_those_who_can_use_them() -> None:
