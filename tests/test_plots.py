@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from fuzzytree import plots
+from fuzzytree.criteria.results import OffsetCost
 from fuzzytree.errors import MissingExtraError, WriteError
 from fuzzytree.plots.panels import time_text
 from fuzzytree.plots.saving import drawn
@@ -145,8 +146,8 @@ def test_the_front_is_labelled_and_filled() -> None:
 def test_a_member_of_the_front_shows_what_was_observed_below_its_bound() -> None:
     figure = plots.work_precision(small(), rows=1000)
     axes = markers(figure)["native float32: raw rules"][2]
-    lines = [np.asarray(line.get_xydata()).tolist() for line in axes.lines]
-    assert [[40.0, 2e-6], [40.0, 3e-5]] in lines
+    drawn_lines = [np.asarray(line.get_xydata()).tolist() for line in axes.lines]
+    assert [[40.0, 2e-6], [40.0, 3e-5]] in drawn_lines
 
 
 def test_peers_are_named_where_points_are_few() -> None:
@@ -325,6 +326,72 @@ def test_shares_are_percent() -> None:
     shown = [tick.get_text() for tick in axes.get_yticklabels(which="both")]
     assert {text for text in shown if text} >= {"1 %", "10 %"}
     assert not any("times" in text for text in shown)
+
+
+def costs() -> list[OffsetCost]:
+    """Return what a distance costs: float32 ever more, and then not held at all."""
+    found = [
+        OffsetCost("relative rules", 10.0**-k, 1e-7 * 10.0**k, 1e-7, 0.0, k, 150)
+        for k in (1, 3, 5)
+    ]
+    lost = OffsetCost("relative rules", 1e-7, None, 2e-7, 1e-16, 0, 150)
+    return [lost, *found, OffsetCost("raw rules", 1e-1, 1e-6, 3e-7, 2e-16, 0, 150)]
+
+
+def lines(figure: Figure) -> dict[tuple[str, int], list[list[float]]]:
+    """Return the points of each line, by its name and the number of its axes."""
+    return {
+        (str(line.get_label()), number): np.asarray(line.get_xydata()).tolist()
+        for number, axes in enumerate(figure.axes)
+        for line in axes.lines
+    }
+
+
+def test_errors_are_drawn_against_the_distance_from_zero() -> None:
+    found = lines(plots.error_against_offset("grip", costs()))
+    assert found["mixed: relative rules", 0] == [
+        [1e-1, 1e-7],
+        [1e-3, 1e-7],
+        [1e-5, 1e-7],
+        [1e-7, 2e-7],
+    ]
+    assert found["mixed: raw rules", 0] == [[1e-1, 3e-7]]
+
+
+def test_a_line_ends_where_a_number_type_cannot_hold_the_model() -> None:
+    found = lines(plots.error_against_offset("grip", costs()))
+    assert [ratio for ratio, _ in found["float32: relative rules", 0]] == [
+        1e-1,
+        1e-3,
+        1e-5,
+    ]
+
+
+def test_no_error_at_some_distance_lies_in_the_strip() -> None:
+    found = lines(plots.error_against_offset("grip", costs()))
+    assert found["float64: relative rules", 0] == [[1e-7, 1e-16]]
+    assert [error for _, error in found["float64: relative rules", 1]] == [0.0] * 3
+
+
+def test_without_an_exact_point_there_is_no_strip() -> None:
+    figure = plots.error_against_offset("grip", costs()[-1:])
+    assert len(figure.axes) == 1
+
+
+def test_number_types_are_named_at_the_ends_of_their_lines() -> None:
+    figure = plots.error_against_offset("grip", costs())
+    assert {words.get_text() for words in labels(figure)} == {
+        "float32",
+        "mixed",
+        "float64",
+    }
+    assert figure.texts[0].get_text() == "grip: error against the distance from zero"
+
+
+def test_no_distance_at_all_is_a_sentence() -> None:
+    with pytest.raises(ValueError, match="no error was measured") as caught:
+        plots.error_against_offset("grip", [])
+    assert str(caught.value) == "grip: no error was measured at any distance from zero"
 
 
 @pytest.mark.parametrize(

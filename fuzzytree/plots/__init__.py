@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from fuzzytree.plots.offsets import error_against_offset
 from fuzzytree.plots.precision import work_precision
 from fuzzytree.plots.saving import SUFFIXES, save
 
-__all__ = ["SUFFIXES", "save", "work_precision"]
+__all__ = ["SUFFIXES", "error_against_offset", "save", "work_precision"]

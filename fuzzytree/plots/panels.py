@@ -122,7 +122,7 @@ def scale_panels(
             if panel.measure == "class":
                 panel.logs.yaxis.set_major_formatter(share_text)
         if panel.strip is not None:
-            _scale_strip(panel.strip, len(panel.lanes), is_alone=panel.logs is None)
+            scale_strip(panel.strip, len(panel.lanes), is_alone=panel.logs is None)
 
 
 def _decades(marks: Sequence[Mark]) -> tuple[float, float]:
@@ -135,7 +135,7 @@ def _decades(marks: Sequence[Mark]) -> tuple[float, float]:
     return 10.0**lowest, 10.0**highest
 
 
-def _scale_strip(strip: Axes, lanes: int, *, is_alone: bool) -> None:
+def scale_strip(strip: Axes, lanes: int, *, is_alone: bool) -> None:
     """Make a strip look like what it is: no part of the axis above."""
     strip.set_ylim(-(lanes - 0.5) - 0.3, 0.8)
     strip.set_yticks([(1 - lanes) / 2.0], ["exact"])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     Ask = Callable[[Reals], IntArray]
 
-_COMPILE_S = 60.0
+_COMPILE_S = 40.0
 
 _ENSEMBLE_OPSET = 17
 
@@ -185,7 +185,7 @@ def load_m2cgen_c(tree: FuzzyTree, threads: int) -> Loaded:
     """Prepare the C function that m2cgen writes, compiled by gcc, with a loop of ours.
 
     Raises:
-        LossError: If gcc does not compile it, or not within a minute.
+        LossError: If gcc does not compile it, or not within 40 seconds.
     """
     import m2cgen
 
