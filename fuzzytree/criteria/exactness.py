@@ -63,8 +63,8 @@ def _fact(name: str, found: Sequence[Observed]) -> str:
     worst = max(found, key=lambda one: one.worst)
     flips = max(one.flips for one in found)
     text = f"{name}: strengths off by at most {worst.worst:.2g}"
-    text += f" where {worst.allowed:.2g} is allowed; other classes in {flips} rows"
+    text += f" where {worst.allowed:.2g} is allowed, classes in {flips}"
     unbounded = max(one.unbounded for one in found)
     if unbounded:
-        text += f"; no bound in {unbounded} rows, within rounding of a step"
+        text += f"; {unbounded} rows, too near to a step, have no bound"
     return text

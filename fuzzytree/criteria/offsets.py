@@ -11,7 +11,7 @@ from fuzzytree.contracts import Dtype, Model, Runtime
 from fuzzytree.criteria.carriers import forms, made_ready, probe_values
 from fuzzytree.criteria.judging import Observed, observed
 from fuzzytree.criteria.results import Criterion, OffsetCost, judged
-from fuzzytree.criteria.stiffness import input_scales
+from fuzzytree.criteria.stiffness import Scale, input_scales
 from fuzzytree.criteria.transforms import moved
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.numerics.oracle import decide
@@ -56,10 +56,7 @@ def offsets(
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
     for carrier, form in forms(model):
         for ratio in RATIOS:
-            steps = {
-                name: scale.spread / ratio if np.isfinite(scale.spread) else 0.0
-                for name, scale in scales.items()
-            }
+            steps = {name: _step(scale, ratio) for name, scale in scales.items()}
             try:
                 far = moved(form, steps)
             except InvalidModelError as error:
@@ -79,6 +76,13 @@ def offsets(
         "N2", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped
     )
     return criterion, tuple(costs)
+
+
+def _step(scale: Scale, ratio: float) -> float:
+    """Return what takes the middle of an input to its spread over a ratio."""
+    if not np.isfinite(scale.spread):
+        return 0.0
+    return scale.spread / ratio - 0.5 * (scale.low + scale.high)
 
 
 def _observed(

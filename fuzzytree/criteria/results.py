@@ -90,8 +90,7 @@ class Stiff(msgspec.Struct, frozen=True):
         flips: Rows whose exact class changes with it.
         rows: How many rows were tried.
         offset: A value to subtract before rounding that would help, if one would.
-        advice: `float32 is safe`, `use mixed`, `use double`, or
-            `subtract ... first`.
+        advice: `float32 is safe`, `use mixed`, `use double`, and what to subtract.
     """
 
     input: str
@@ -139,27 +138,27 @@ class Stability(msgspec.Struct, frozen=True):
         model: The model's name.
         fingerprint: The SHA-256 of its content.
         probes: How many rows were made for it.
-        rows: How many rows of data were asked beside them.
+        rows: How many rows of data were given beside them.
+        tried: How many of those were tried, evenly drawn; the others are too many.
         runtimes: What was run.
         criteria: In the order of their codes.
         stiff: Every input, the costliest in float32 first.
         curves: Terms with something to know about, worst first.
         usable: By what the inputs can be multiplied.
         offsets: What a distance from zero costs.
-        skipped: What was left out as a whole, and why.
     """
 
     model: str
     fingerprint: str
     probes: int
     rows: int
+    tried: int
     runtimes: tuple[str, ...]
     criteria: tuple[Criterion, ...]
     stiff: tuple[Stiff, ...] = ()
     curves: tuple[CurveFault, ...] = ()
     usable: tuple[Usable, ...] = ()
     offsets: tuple[OffsetCost, ...] = ()
-    skipped: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:

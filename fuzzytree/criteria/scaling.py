@@ -69,7 +69,7 @@ def scaling(
             cases += count
             faults += [fault] if fault else []
     facts = [
-        f"{name}: nothing is lost from 2**{low} to 2**{high}"
+        f"{name}: inputs times 2**{low} to 2**{high} change nothing"
         for name, low, high in _together(tuple(usable.values()))
     ]
     criterion = judged(

@@ -223,8 +223,16 @@ def _advice(
 ) -> str:
     if is_safe:
         return "float32 is safe"
-    subtract = "" if offset is None else f"subtract {offset!r} first"
-    if predicted * _DOUBLE > SAFE:
-        return subtract or "use double, and even that is coarse"
     use = "use double" if scale.curves > SAFE else "use mixed"
-    return f"{use}, or {subtract}" if subtract and use == "use mixed" else use
+    if predicted * _DOUBLE > SAFE:
+        if offset is None:
+            return "use double, and even that is coarse"
+        return f"{use}, and subtract {_short(offset)} where the values are made"
+    if offset is None or use == "use double":
+        return use
+    return f"use mixed, or subtract {_short(offset)} first"
+
+
+def _short(value: float) -> str:
+    text = f"{value:g}"
+    return text if float(text) == value else repr(value)

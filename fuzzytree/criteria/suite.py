@@ -121,6 +121,7 @@ def examine(
         fingerprint(model),
         probes.shape[1],
         rows.shape[1],
+        values.shape[1] - probes.shape[1],
         tuple(runtime.name for runtime in runtimes if is_installed(runtime)),
         tuple(found),
         stiffness(model, rows if has_data else probes, is_data=has_data),

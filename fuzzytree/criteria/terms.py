@@ -220,10 +220,10 @@ def held(
     found, warning = answered(one, question.values)
     faults = [f"{one.title}: it warns: {warning}"] if warning else []
     if found.strengths is None:
-        skipped.append(f"{one.title}: it tells no degrees")
+        skipped.append(f"{one.runtime.name} tells no degrees")
         return Held(0, 0.0, faults)
     if one.runtime.bound is not None:  # it promises nothing at a single value
-        skipped.append(f"{one.title}: points joined by lines have edges of their own")
+        skipped.append(f"{one.runtime.name} promises a bound, and no edge")
         return Held(0, 0.0, faults)
     cases, worst = 0, 0.0
     for number, (line, shape, rows) in enumerate(question.places):
@@ -244,7 +244,7 @@ def held(
                 )
             elif difference is not None:
                 gap, allowed = difference(number, value, degree)
-                worst = max(worst, gap)
+                worst = max(worst, gap) if allowed < 1.0 else worst
                 if not gap <= allowed:
                     faults.append(
                         f"{name} at {value!r}: degree {degree!r} is {gap:.3g} from "

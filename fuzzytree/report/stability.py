@@ -18,7 +18,7 @@ _SKIPPED_TOLD = 3
 
 _CRITERION = ("code", "criterion", "cases", "worst", "verdict")
 _STIFF = ("input", "spread/size", "float32 costs", "observed", "flips", "advice")
-_OFFSET = ("form", "spread/size", "float32", "mixed", "double", "flips in float32")
+_OFFSET = ("form", "spread/distance", "float32", "mixed", "double", "flips in float32")
 _CURVE = ("curve", "form", "size", "leaves [0, 1]", "rises", "advice")
 
 
@@ -30,6 +30,7 @@ def stability_lines(found: Stability, *, is_full: bool = False) -> Iterator[str]
         is_full: Whether to tell everything that was left out, and every curve.
     """
     rows = f", {counted(found.rows, 'row')} of data" if found.rows else ""
+    rows += f", {found.tried} of them tried" if found.tried < found.rows else ""
     yield f"{found.model}: {counted(found.probes, 'probe')}{rows}"
     yield f"run by   {', '.join(found.runtimes) or 'nothing'}"
     yield ""
