@@ -17,6 +17,7 @@ from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_lines import MOST_CHAINED
 from fuzzytree.exporters.yaml import write
+from fuzzytree.lowering import rules_from_tree
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.numerics.segments import segments
 from fuzzytree.probing import landmarks
@@ -39,6 +40,7 @@ from fuzzytree.runtimes.envelope import (
     plan_envelope,
 )
 from fuzzytree.runtimes.native_rules import fire
+from fuzzytree.testing import probes, random_tree, with_points
 
 TRAPEZOID = Points((1.0, 2.0, 4.0, 8.0), (0.0, 1.0, 1.0, 0.0))
 STEP = Points((0.0, 2.5, 2.5, 3.0), (0.25, 0.75, 0.5, 0.5))
@@ -343,3 +345,28 @@ def test_a_row_with_a_missing_value_is_missing_in_a_graph_of_points() -> None:
 
 def test_the_landmarks_of_points_are_the_points_and_places_between() -> None:
     assert landmarks(TRAPEZOID) == (1.0, 2.0, 4.0, 8.0, 1.4, 2.8, 5.6)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(20))
+def test_random_rules_of_points_have_the_same_bits_everywhere(seed: int) -> None:
+    rules = with_points(rules_from_tree(random_tree(seed), "raw"), seed)
+    rows = probes(rules, limit=1500)
+    values = np.array([[row[name] for row in rows] for name in rules.inputs])
+    reference = find_runtime("reference").load(rules)(values)
+    for runtime in all_runtimes():
+        if "rules" not in runtime.runs or not is_installed(runtime):
+            continue
+        found = runtime.load(rules)(values)
+        if runtime.bound is not None:
+            assert found.strengths is not None
+            assert reference.strengths is not None
+            error = np.nanmax(np.abs(found.strengths - reference.strengths))
+            assert error <= runtime.bound(rules)[0]
+            continue
+        expected = fire(rules, runtime.dtype)(values)
+        if runtime.dtype == "float64":
+            np.testing.assert_array_equal(found.rule, reference.rule)
+        np.testing.assert_array_equal(found.rule, expected.rule)
+        if found.strengths is not None:
+            np.testing.assert_array_equal(found.strengths, expected.strengths)

@@ -393,3 +393,33 @@ def test_a_fit_error_that_was_known_grows_by_the_bound() -> None:
     assert isinstance(lowered, Band)
     assert lowered.left is not None
     assert lowered.left.error == 0.25 + found.bound
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(12))
+def test_no_random_curve_is_further_off_than_certified(seed: int) -> None:
+    chance = random.Random(seed)
+
+    def curve() -> tuple[float, ...]:
+        return tuple(chance.uniform(-3.0, 3.0) for _ in range(chance.randint(1, 8)))
+
+    def side() -> Side:
+        return Side(10.0 ** chance.uniform(-6, 6), curve(), chance.uniform(1.1, 9.0))
+
+    for _ in range(6):
+        mean = chance.uniform(-10.0, 10.0)
+        low, high = mean, mean + chance.uniform(0.1, 2.0)
+        left, right = Flank(low, low - 0.7, curve()), Flank(high, high + 1.0, curve())
+        shapes: list[Band | LR] = [
+            LR(mean, side(), side()),
+            Band(low, high, left, right),
+        ]
+        for shape in shapes:
+            for tolerance in (0.1, 1e-2, 1e-4):
+                found, bound = points_of(shape, tolerance)
+                error = largest_error(found, shape, places(found, seed))
+                assert error <= Fraction(bound) <= Fraction(tolerance)
+            lowered = by_degree(model_of(shape), chance.randint(1, 4))
+            (term,) = lowered.model.variables[0].terms
+            at = [Fraction(mean) + Fraction(n, 37) for n in range(-200, 201)]
+            assert largest_error(term.shape, shape, at) <= Fraction(lowered.bound)
