@@ -76,6 +76,8 @@ class Because(msgspec.Struct, frozen=True):
 class Graph(msgspec.Struct, frozen=True):
     """The ONNX graph of one carrier in one number type, with label and rule number.
 
+    What is in it for what is told for `float64`; the other types differ by a cast.
+
     Attributes:
         carrier: `tree`, `relative rules`, `raw rules` or `rules`.
         dtype: The number type.
@@ -88,9 +90,9 @@ class Graph(msgspec.Struct, frozen=True):
     carrier: str
     dtype: Dtype
     contents: Contents
-    because: tuple[Because, ...]
-    on_request: tuple[Because, ...]
-    left_out: tuple[str, ...]
+    because: tuple[Because, ...] = ()
+    on_request: tuple[Because, ...] = ()
+    left_out: tuple[str, ...] = ()
 
 
 class Needs(msgspec.Struct, frozen=True):
@@ -197,6 +199,8 @@ def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
 def _graph(title: str, model: Model, dtype: Dtype) -> Graph:
     usual: tuple[Output, ...] = ("label", "rule")
     whole = _written(model, dtype, usual)
+    if dtype != "float64":
+        return Graph(title, dtype, whole)
     more: tuple[Output, ...] = ("status",)
     if isinstance(model, RuleBase):
         more = ("status", "strengths")

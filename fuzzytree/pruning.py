@@ -274,14 +274,11 @@ def _idle_variables(variables: Iterable[Variable]) -> Iterator[tuple[Removed, st
             continue
         name = repr(variable.name)
         if not variable.parts:
-            change = f"rows in which only {name} or its like is missing are answered"
+            change = "a row is answered though it is missing"
             yield Removed(f"input {name}", "nothing asks it", change), variable.name
             continue
-        change = (
-            ""
-            if cannot_overflow(variable.parts)
-            else (f"rows in which only {name} or its like overflows are answered")
-        )
+        change = "a row is answered though it overflows"
+        change = "" if cannot_overflow(variable.parts) else change
         yield Removed(f"combination {name}", "nothing asks it", change), variable.name
 
 

@@ -86,7 +86,7 @@ def _graph_lines(graphs: Sequence[Graph]) -> Iterator[str]:
         rows.append((graph.carrier, graph.dtype, *map(str, sizes)))
     yield from aligned(rows)
     for graph in graphs:
-        if graph.dtype == "float64":
+        if graph.because or graph.left_out:
             yield f"{graph.carrier}: {_operators(graph.contents.operators)}"
             yield from _because_lines(graph)
 
