@@ -60,7 +60,9 @@ class Value(NamedTuple):
 
     Attributes:
         x: As a chain of doubles gives it.
-        slack: How far each may be from the exact one; None if none is.
+        slack: How far each may be from the exact one, at least `LEAST` (so that even
+            the steepest slope that doubles can hold makes more than 1 of it); None if
+            none is off.
     """
 
     x: FloatArray
@@ -219,9 +221,10 @@ def _points(points: Points, value: Value) -> Enclosure:
     share = np.where(is_level, 0.0, (x - b) / np.where(a < b, a - b, -1.0))
     degree = r + share * (p - r)
     error = share * np.abs(p - r) * (5 * U * _MORE) + (2 * U) * degree + LEAST
-    error[is_level] = 0.0
     low, high = np.minimum(p, r), np.maximum(p, r)
-    if slack is not None:
+    if slack is None:
+        error[is_level] = 0.0
+    else:
         # On the level of the first or last point, or of a line, it stays exact.
         start = np.where(after > 0, a, -np.inf)
         end = np.where(after < len(values), b, np.inf)

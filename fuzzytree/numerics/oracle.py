@@ -9,7 +9,7 @@ to fractions what the intervals leave open:
 - No rule fires if all upper ends are 0, and some rule does if a lower end is above 0.
 - Under the minimum, rules of a tree often tie because they share their weakest clause.
   Where all the strongest have the same term as their weakest, for sure, they are equal
-  in exact arithmetic too, whatever its degree is.
+  in exact arithmetic too, whatever its degree above 0 is.
 - A tree takes the same path exactly as in doubles wherever no value that a node asks is
   as close to one of its cuts as its slack.
 """
@@ -183,7 +183,8 @@ def _decide_rules(rules: RuleBase, values: FloatArray) -> Decided:
         is_bare = high.max(axis=0) == 0.0
         is_open = ~is_bare & (is_tie | (best == 0.0)) & ~enclosed.missing
         is_open &= (contends & (low < high)).any(axis=0)
-        is_open &= ~_share_weakest(rules, enclosed, contends, is_open)
+        is_shared = _share_weakest(rules, enclosed, contends, is_open & (best > 0.0))
+        is_open &= ~is_shared
         rule = np.where(is_bare, 0, contends.argmax(axis=0) + 1)
         margin, margin_high = _margins(rules, low, high, rule)
         strengths = low + (high - low) * 0.5
