@@ -2,22 +2,18 @@
 
 Multiway trees of cubic memberships, each node with sets of its own, as in the study
 that set the figures to beat (there without a guard for missing values). All numbers of
-a line come from one process; the columns are interleaved and minima are shown.
+a line come from one process; the columns are interleaved and medians are shown.
 
     python benchmarks/onnx_speed.py
 """
 
 from __future__ import annotations
 
-import os
-import platform
 import random
-import time
 from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-import onnxruntime
 from onnx import TensorProto, helper
 
 from fuzzytree.contracts import Dtype
@@ -26,6 +22,8 @@ from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.exporters.onnx_session import open_session
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import Band, Flank, Term, Variable
+from fuzzytree.timing.clock import measure
+from fuzzytree.timing.machine import machine
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 COLUMNS = tuple(f"x{number}" for number in range(1, 12))
@@ -34,7 +32,8 @@ TARGETS = {7: (12.1, 38.5), 100: (22.0, 708.0), 1000: (118.0, 10_700.0)}
 
 CHUNKS = (64, 128, 256, 512, 1024, 4096, 16384)
 LARGEST = 2_000_000  # rows times leaves: 30 kB a row at 1000 leaves
-SECONDS = 0.25
+SECONDS = 0.5
+"""For each number of rows of a line."""
 
 
 def multiway_tree(leaves: int, seed: int = 0) -> FuzzyTree:
@@ -84,20 +83,6 @@ def _band(low: float | None, high: float | None) -> Band:
     left = None if low is None else Flank(low, low - 0.5, curve)
     right = None if high is None else Flank(high, high + 0.5, curve)
     return Band(low, high, left, right)
-
-
-def fastest(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
-    """Return the shortest time of each call in seconds, taken in turns."""
-    best = dict.fromkeys(calls, float("inf"))
-    for call in calls.values():
-        call()
-    end = time.perf_counter() + SECONDS * len(calls)
-    while time.perf_counter() < end:
-        for name, call in calls.items():
-            start = time.perf_counter()
-            call()
-            best[name] = min(best[name], time.perf_counter() - start)
-    return best
 
 
 def _call(content: bytes, output: str, rows: int, kind: type) -> Callable[[], object]:
@@ -177,11 +162,10 @@ def _number(sheet: Sheet, value: float) -> str:
 
 def main() -> None:
     """Print one table for rules and trees of each size."""
-    load = ", ".join(f"{value:.2f}" for value in os.getloadavg())
-    print(
-        f"onnxruntime {onnxruntime.__version__}, numpy {np.__version__}, "
-        f"Python {platform.python_version()}, load {load}"
-    )
+    found = machine(["onnxruntime"])
+    load = ", ".join(f"{value:.2f}" for value in found.load_before)
+    versions = ", ".join(f"{name} {v}" for name, v in found.versions.items())
+    print(f"{found.python}, {versions}; {found.processor}, load {load}")
     print(f"{'':26}{'one row':>9}  {'x floor':>8}  batch, ns a row, by rows a call")
     print(f"{'':26}{'us':>9}  {'':>8}  " + "".join(f"{rows:>8}" for rows in CHUNKS))
     for leaves, (one, batch) in TARGETS.items():
@@ -201,11 +185,14 @@ def _line(title: str, content: bytes, dtype: Dtype, leaves: int) -> None:
     kind = np.float32 if dtype == "float32" else np.float64
     sizes = [n for n in CHUNKS if n * leaves <= LARGEST]
     # One row is measured apart: large calls would throw it out of the cache.
-    best = fastest({"floor": floor(1), "1": _call(content, "rule", 1, kind)})
-    one = best["1"]
-    best |= fastest({str(n): _call(content, "rule", n, kind) for n in sizes})
-    batch = "".join(f"{best[str(rows)] / rows * 1e9:>8.0f}" for rows in sizes)
-    print(f"{title:26}{one * 1e6:>9.1f}  {one / best['floor']:>8.1f}  {batch}")
+    single = measure(
+        {"floor": floor(1), "one": _call(content, "rule", 1, kind)}, rows=1
+    )
+    one, least = single["one"].median_ns, single["floor"].median_ns
+    calls = {str(n): _call(content, "rule", n, kind) for n in sizes}
+    many = measure(calls, rows=1, seconds=SECONDS * len(sizes))
+    batch = "".join(f"{many[str(rows)].median_ns / rows:>8.0f}" for rows in sizes)
+    print(f"{title:26}{one / 1e3:>9.1f}  {one / least:>8.1f}  {batch}")
 
 
 if __name__ == "__main__":

@@ -4,17 +4,14 @@
 
 A decision tree of scikit-learn is grown on synthetic data and carried over to a
 FuzzyTree with the same cuts, so that both answer the same question. All candidates are
-timed in turn, again and again, and the fastest time of each counts. Two kinds of data:
+timed in turn, again and again, and the median of each counts. Two kinds of data:
 few classes, and a class for each leaf, as a fuzzy tree has one pattern for each leaf.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
 import os
-import platform
-import time
 from collections.abc import Callable, Mapping
 from functools import partial
 
@@ -30,6 +27,8 @@ from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load, load_best_first
+from fuzzytree.timing.clock import measure
+from fuzzytree.timing.machine import load_averages, machine
 from fuzzytree.tree import FuzzyTree
 
 Singles = npt.NDArray[np.float32]
@@ -58,24 +57,17 @@ def main() -> None:
 
 
 def _machine() -> str:
-    names = ("numpy", "scikit-learn", "onnx", "onnxruntime", "skl2onnx")
-    versions = [f"{name} {_version(name)}" for name in names]
+    found = machine(["scikit-learn", "onnx", "onnxruntime", "skl2onnx"])
+    versions = [f"{name} {version}" for name, version in found.versions.items()]
     return (
-        f"Python {platform.python_version()}, {', '.join(versions)}\n"
-        f"{os.cpu_count()} cores, {platform.machine()}, one thread; "
+        f"{found.python}, {', '.join(versions)}\n"
+        f"{found.processor}, {found.cores} cores, one thread; "
         f"load average at the start: {_load()}"
     )
 
 
-def _version(name: str) -> str:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return "absent"
-
-
 def _load() -> str:
-    return " ".join(f"{value:.2f}" for value in os.getloadavg())
+    return " ".join(f"{value:.2f}" for value in load_averages())
 
 
 def _descent(leaves: int, *, is_many: bool, rounds: int, quick: bool) -> None:
@@ -139,33 +131,22 @@ def _rules(count: int, *, raw: bool, rounds: int) -> None:
     _table({"native float64": lambda: run(few), "reference": lambda: slow(few)}, 5, 1)
     many = np.random.default_rng(2).normal(size=(len(rules.inputs), 100_000))
     part = many[:, : values.shape[1]].copy()
-    ours = _fastest({"native": lambda: run(part), "best": lambda: best(many)}, rounds)
-    ratio = (ours["native"] / part.shape[1]) / (ours["best"] / many.shape[1])
+    calls = {"native": lambda: run(part), "best": lambda: best(many)}
+    ours = measure(calls, rows=part.shape[1], rounds=rounds)
+    ratio = ours["native"].median_ns / ours["best"].median_ns
+    ratio *= many.shape[1] / part.shape[1]
     print(f"best-first on 100,000 rows is {ratio:.1f} times as fast a row as firing")
 
 
 def _table(candidates: Candidates, rows: int, rounds: int) -> None:
-    times = _fastest(candidates, rounds, calls=50 if rows == 1 else 1)
+    times = measure(candidates, rows=rows, rounds=rounds)
     first = next(iter(times.values()))
     print(f"\n{'rows ' + format(rows, ','):34} {'ratio':>9} {'ns a row':>12}")
-    for name, seconds in times.items():
-        print(f"{name:34} {seconds / first:9.4f} {seconds / rows * 1e9:12.1f}")
-
-
-def _fastest(candidates: Candidates, rounds: int, calls: int = 1) -> dict[str, float]:
-    """Return the fastest of interleaved rounds, in seconds of the thread's own time.
-
-    That time does not run while a neighbour has the core; what a neighbour does to the
-    caches remains.
-    """
-    best = dict.fromkeys(candidates, float("inf"))
-    for _ in range(rounds + 1):
-        for name, run in candidates.items():
-            start = time.thread_time()
-            for _ in range(calls):
-                run()
-            best[name] = min(best[name], (time.thread_time() - start) / calls)
-    return best
+    for name, timing in times.items():
+        print(
+            f"{name:34} {timing.median_ns / first.median_ns:9.4f} "
+            f"{timing.median_ns / rows:12.1f}"
+        )
 
 
 def _needed(tree: FuzzyTree) -> list[int]:
