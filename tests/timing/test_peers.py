@@ -260,6 +260,51 @@ def test_a_tree_of_one_leaf_leaves_peers_nothing_to_do() -> None:
     }
 
 
+def chain(count: int) -> FuzzyTree:
+    """Return a tree that asks one question after another of the same input."""
+    terms: list[Term] = []
+    nodes: list[Node] = []
+    for k in range(count):
+        cut = float(k)
+        terms.append(Term(f"l{k}", Band(None, cut, None, Flank(cut, cut + 1.0))))
+        terms.append(Term(f"h{k}", Band(cut, None, Flank(cut, cut - 1.0), None)))
+        onward = Branch((f"h{k}",), node=k + 2)
+        if k == count - 1:
+            onward = Branch((f"h{k}",), leaf=count + 1)
+        branches = (Branch((f"l{k}",), leaf=k + 1), onward)
+        nodes.append(Node("x", (cut,), (0, 1), branches))
+    leaves = tuple(Leaf("ab"[k % 2]) for k in range(count + 1))
+    x = Variable("x", tuple(terms))
+    return FuzzyTree("chain", ("a", "b"), (x,), tuple(nodes), leaves)
+
+
+@pytest.mark.parametrize("peer", [peer.name for peer in TREE_PEERS])
+def test_a_deep_tree_is_followed_or_refused_in_a_sentence(peer: str) -> None:
+    tree = chain(1100)
+    one = candidate(tree, f"{peer}: tree")
+    if peer.startswith("m2cgen"):
+        with pytest.raises(LossError) as caught:
+            one.load(1)
+        assert str(caught.value) == (
+            "cannot run chain as m2cgen: a path asks 1100 questions: "
+            "it is written by recursion"
+        )
+        return
+    values = np.linspace(-0.5, 1100.5, 300)[None]
+    assert np.array_equal(
+        one.load(1).answer(values).labels, native(tree, values).labels
+    )
+
+
+def test_python_takes_fewer_ifs_within_each_other_than_m2cgen_writes() -> None:
+    with pytest.raises(LossError) as caught:
+        candidate(chain(150), "m2cgen python: tree").load(1)
+    assert str(caught.value) == (
+        "cannot run chain as m2cgen: a path asks 150 questions: "
+        "Python does not take so many ifs within each other"
+    )
+
+
 def rules_cases() -> list[RuleBase]:
     cases = [
         rules_from_tree(random_tree(seed, leaves=6, semantics=semantics), kind)
