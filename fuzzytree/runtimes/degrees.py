@@ -39,6 +39,7 @@ BLOCK = 1 << 15
 
 _SMALL_BLOCK = 1 << 13  # numbers: scratch that the allocator keeps at hand
 _MANY = 16  # points from which a line is found faster by halving
+_TINY = 1 << 9  # numbers up to which it is faster anyway
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +176,7 @@ def _kind(atom: Atom) -> tuple[int, int]:
         case Slope():
             return 3, len(atom.side.curve)
         case Polyline():
-            return 4, len(atom.points.values).bit_length()
+            return (4 if len(atom.points.values) < _MANY else 5), 0
 
 
 def _column(values: Sequence[float], kind: Real) -> Reals:
@@ -301,12 +302,13 @@ def _polylines(
     shapes = [atom.points for atom in atoms]
     lines = segments(shapes, numbers.axis, numbers.degree)
     shape = np.arange(len(atoms)).reshape(-1, 1)
-    find = counted if len(shapes[0].values) < _MANY else halved
+    is_few = len(shapes[0].values) < _MANY
     size = max(_SMALL_BLOCK // len(atoms), 1)
 
     def run(x: Reals, out: Reals, _: Reals) -> None:
         for start in range(0, x.shape[1], size):
             part = x[:, start : start + size]
+            find = counted if is_few and part.size > _TINY else halved
             out[:, start : start + size] = join(lines, find(lines, shape, part), part)
 
     return run

@@ -43,16 +43,16 @@ def counted(lines: Segments, shape: IntArray, x: Reals) -> IntArray:
 
     Args:
         lines: The lines of all shapes.
-        shape: The number of each line of values' shape, of shape (lines, 1); the
-            shapes have equally much room.
-        x: Of shape (lines, rows).
+        shape: Numbers of shapes of less than 128 points, in a form that broadcasts to
+            that of the values.
+        x: The values.
     """
     first = lines.first.take(shape)
-    points = 2 * int(lines.room.take(shape[0, 0])) - 1
+    last = 2 * lines.room.take(shape) - 1  # a line without a further point
     below = np.zeros(x.shape, np.int8)
     is_above = np.empty(x.shape, np.bool_)
-    for number in range(points):
-        limit = lines.values.take(first + number)
+    for number in range(int(last.max(initial=0))):
+        limit = lines.values.take(first + np.minimum(number, last))
         if np.isinf(limit).all():
             break
         np.greater(x, limit, out=is_above)
