@@ -62,8 +62,7 @@ TREE_PEERS = (
         "skl2onnx",
         ("sklearn", "skl2onnx", "onnx", "onnxruntime"),
         trees.load_skl2onnx,
-        "from the scikit-learn tree, in onnxruntime, all in float32, without zipmap; "
-        "the class of the highest probability, since labels of two classes are wrong",
+        "from the scikit-learn tree, in onnxruntime, all in float32, without zipmap",
         is_parallel=True,
     ),
     TreePeer(

@@ -51,8 +51,7 @@ def load_scikit_learn_core(tree: FuzzyTree, threads: int) -> Loaded:
 def load_skl2onnx(tree: FuzzyTree, threads: int) -> Loaded:
     """Prepare what skl2onnx makes of the scikit-learn tree, in onnxruntime.
 
-    It writes the classifier without zipmap. Its labels are known to be wrong for two
-    classes in onnxruntime, so the class of the highest probability is taken.
+    It writes the classifier without zipmap, and its output `label` is asked for.
     """
     from skl2onnx import convert_sklearn
     from skl2onnx.common.data_types import FloatTensorType
@@ -71,9 +70,8 @@ def load_skl2onnx(tree: FuzzyTree, threads: int) -> Loaded:
     session = open_bare(content, threads)
 
     def ask(table: Reals) -> IntArray:
-        (found,) = session(["probabilities"], {"inputs": table})
-        labels: IntArray = np.asarray(found).argmax(axis=1)
-        return labels
+        (found,) = session(["label"], {"inputs": table})
+        return np.asarray(found, np.int64)
 
     return _loaded(tree, axes, np.float32, ask, len(content))
 
