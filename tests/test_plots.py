@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import itertools
 import random
@@ -46,6 +47,11 @@ def small() -> Study:
     )
 
 
+@functools.cache
+def picture() -> Figure:
+    return plots.work_precision(small(), rows=1000)
+
+
 def large(count: int) -> Study:
     chance = random.Random(1)
     asked: tuple[Question, ...] = ("tree", "relative rules", "raw rules")
@@ -84,18 +90,18 @@ def labels(figure: Figure) -> Iterator[Annotation]:
 
 
 def test_a_marker_lies_at_its_time_for_a_row_and_its_bound() -> None:
-    found = markers(plots.work_precision(small(), rows=1000))
+    found = markers(picture())
     assert found["native: raw rules"][:2] == (100.0, 1e-14)
     assert found["native float32: raw rules"][:2] == (40.0, 3e-5)
 
 
 def test_what_is_not_certified_lies_at_what_was_observed() -> None:
-    found = markers(plots.work_precision(small(), rows=1000))
+    found = markers(picture())
     assert found["simpful: raw rules"][:2] == (90_000.0, 2e-3)
 
 
 def test_a_tree_lies_at_its_share_of_other_classes_in_a_panel_of_its_own() -> None:
-    found = markers(plots.work_precision(small(), rows=1000))
+    found = markers(picture())
     time, share, axes = found["scikit-learn: tree"]
     assert (time, share) == (70.0, 0.02)
     assert axes is not found["native: raw rules"][2]
@@ -103,7 +109,7 @@ def test_a_tree_lies_at_its_share_of_other_classes_in_a_panel_of_its_own() -> No
 
 
 def test_no_error_lies_in_a_strip_that_says_exact() -> None:
-    found = markers(plots.work_precision(small(), rows=1000))
+    found = markers(picture())
     strip = found["native: tree"][2]
     assert strip is found["onnxruntime: tree"][2]
     assert strip is not found["scikit-learn: tree"][2]
@@ -131,7 +137,7 @@ def test_a_bar_is_the_interval_of_the_median() -> None:
 
 
 def test_the_front_is_labelled_and_filled() -> None:
-    figure = plots.work_precision(small(), rows=1000)
+    figure = picture()
     bold = {w.get_text() for w in labels(figure) if w.get_fontweight() == "bold"}
     assert bold == {"native", "native float32", "onnxruntime"}
     faces = {
@@ -144,16 +150,14 @@ def test_the_front_is_labelled_and_filled() -> None:
 
 
 def test_a_member_of_the_front_shows_what_was_observed_below_its_bound() -> None:
-    figure = plots.work_precision(small(), rows=1000)
+    figure = picture()
     axes = markers(figure)["native float32: raw rules"][2]
     drawn_lines = [np.asarray(line.get_xydata()).tolist() for line in axes.lines]
     assert [[40.0, 2e-6], [40.0, 3e-5]] in drawn_lines
 
 
 def test_peers_are_named_where_points_are_few() -> None:
-    names = {
-        words.get_text() for words in labels(plots.work_precision(small(), rows=1000))
-    }
+    names = {words.get_text() for words in labels(picture())}
     assert {"simpful", "scikit-learn"} <= names
 
 
@@ -184,7 +188,7 @@ def test_labels_lie_apart_and_within_their_axes(count: int) -> None:
 
 
 def test_floors_are_lines_with_their_names() -> None:
-    figure = plots.work_precision(small(), rows=1000)
+    figure = picture()
     (name,) = [t for a in figure.axes for t in a.texts if t.get_gid() == "floor"]
     assert name.get_text() == "the columns read once"
     for axes in figure.axes:
@@ -194,7 +198,7 @@ def test_floors_are_lines_with_their_names() -> None:
 
 
 def test_the_words_above_name_model_rows_machine_and_data() -> None:
-    figure = plots.work_precision(small(), rows=1000)
+    figure = picture()
     assert [words.get_text() for words in figure.texts] == [
         "grip: error against run time, 1,000 rows a call, 1 thread",
         "a processor, 2 cores, Linux 6; grasps.csv, 200 rows",
@@ -245,23 +249,23 @@ def test_a_study_whose_errors_are_all_zero_has_strips_alone() -> None:
 
 @pytest.mark.parametrize("suffix", plots.SUFFIXES)
 def test_the_same_study_gives_the_same_bytes(suffix: str) -> None:
-    first = drawn(plots.work_precision(large(40), rows=1000), suffix)
-    second = drawn(plots.work_precision(large(40), rows=1000), suffix)
-    assert first == second
+    again = plots.work_precision(small(), rows=1000)
+    assert drawn(picture(), suffix) == drawn(again, suffix)
 
 
 def test_a_users_settings_change_nothing() -> None:
     import matplotlib as mpl
 
-    plain = drawn(plots.work_precision(small(), rows=1000), ".svg")
+    plain = drawn(picture(), ".svg")
     with mpl.rc_context({"font.size": 20, "axes.grid": True, "svg.fonttype": "none"}):
-        assert drawn(plots.work_precision(small(), rows=1000), ".svg") == plain
+        again = plots.work_precision(small(), rows=1000)
+        assert drawn(again, ".svg") == plain
         assert mpl.rcParams["font.size"] == 20
 
 
 def test_an_svg_is_well_formed_and_has_no_date(tmp_path: Path) -> None:
     path = tmp_path / "study.svg"
-    plots.save(plots.work_precision(small(), rows=1000), path)
+    plots.save(picture(), path)
     text = path.read_text()
     assert ET.fromstring(text).tag == "{http://www.w3.org/2000/svg}svg"
     assert "<text" not in text  # letters are paths
@@ -270,7 +274,7 @@ def test_an_svg_is_well_formed_and_has_no_date(tmp_path: Path) -> None:
 
 def test_a_png_is_sixteen_hundred_dots_wide(tmp_path: Path) -> None:
     path = tmp_path / "study.PNG"
-    figure = plots.work_precision(small(), rows=1000)
+    figure = picture()
     plots.save(figure, path)
     content = path.read_bytes()
     width, height = struct.unpack(">II", content[16:24])
@@ -281,7 +285,7 @@ def test_a_png_is_sixteen_hundred_dots_wide(tmp_path: Path) -> None:
 def test_another_suffix_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "study.pdf"
     with pytest.raises(ValueError, match="ends in") as caught:
-        plots.save(plots.work_precision(small(), rows=1000), path)
+        plots.save(picture(), path)
     assert str(caught.value) == f"{path}: a picture's name ends in .svg or .png"
     assert not path.exists()
 
@@ -289,7 +293,7 @@ def test_another_suffix_is_refused(tmp_path: Path) -> None:
 def test_a_place_that_is_none_is_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "nowhere" / "study.svg"
     with pytest.raises(WriteError, match="no such file or directory"):
-        plots.save(plots.work_precision(small(), rows=1000), path)
+        plots.save(picture(), path)
 
 
 def test_drawing_without_matplotlib_names_the_extra(
@@ -320,7 +324,7 @@ def test_close_times_still_have_a_number_on_their_axis() -> None:
 
 
 def test_shares_are_percent() -> None:
-    figure = plots.work_precision(small(), rows=1000)
+    figure = picture()
     axes = markers(figure)["scikit-learn: tree"][2]
     figure.draw_without_rendering()
     shown = [tick.get_text() for tick in axes.get_yticklabels(which="both")]
