@@ -58,7 +58,7 @@ class Certified(msgspec.Struct, frozen=True):
         origin: What delta is derived from, and for which values it holds.
         on: Which rows are counted below: the user's, or the probes if there are none.
         rows: How many they are.
-        largest: The largest error of a strength that was observed in them, against
+        largest: The largest error of a strength in them that is certain, against
             exact arithmetic; None for a tree.
         in_band: In how many of them the margin is at most twice the bound, or a value
             of a tree within its rounding from a cut: there nothing is certain.

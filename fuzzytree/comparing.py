@@ -294,7 +294,7 @@ def compare_exact(
         facts.origin,
         "data" if is_data else "probes",
         int(own.sum()),
-        None if largest is None else float(largest.high[bounded].max(initial=0.0)),
+        None if largest is None else float(largest.low[bounded].max(initial=0.0)),
         int((own & close).sum()),
         int((own & flips).sum()),
         float(flipped.max()) if largest is not None and flipped.size else None,

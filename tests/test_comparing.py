@@ -1,18 +1,22 @@
 import math
 
 import numpy as np
+import pytest
 
+from fuzzytree.agreement import Certified
 from fuzzytree.comparing import (
     Answers,
     Rows,
     compare_answers,
     compare_bits,
+    compare_exact,
     compare_excused,
     compare_within,
     labels,
     margins,
 )
-from fuzzytree.contracts import Outcome
+from fuzzytree.contracts import Dtype, Outcome
+from fuzzytree.numerics.oracle import decide
 from fuzzytree.rulebase import (
     Band,
     Clause,
@@ -23,6 +27,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.testing import random_tree
 
 LOW = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
 CLAUSE = Clause("x", ("low",))
@@ -133,3 +138,88 @@ def test_a_margin_lies_between_classes_and_not_between_rules() -> None:
 def test_data_rows_are_numbered_from_one_behind_the_probes() -> None:
     assert [ROWS.name(0), ROWS.name(1), ROWS.name(2)] == ["probe 1", "row 1", "row 2"]
     assert ROWS.part(slice(None, None, 2)).name(1) == "row 2"
+
+
+# --- against exact arithmetic
+
+
+NARROW = RuleBase(
+    "r",
+    ("a", "b"),
+    (Variable("x", (LOW, Term("high", Band(low=2.0)))),),
+    (Rule((CLAUSE,), "a"), Rule((Clause("x", ("high",)),), "b")),
+)
+
+
+def held(values: list[float], strengths: list[list[float]], dtype: Dtype) -> Certified:
+    """Hold strengths against the exact ones of `a: low, b: above 2`; one probe."""
+    fired = np.array(strengths)
+    rows = Rows(("x",), np.array([values]), np.arange(len(values)), 1)
+    rule = np.where(fired.max(axis=0) > 0, fired.argmax(axis=0) + 1, 0)
+    status = np.where(rule > 0, 0, 2)
+    found = Answers("mine", NARROW, Outcome(rule, status, fired))
+    return compare_exact(found, decide(NARROW, rows.values), rows, dtype=dtype)
+
+
+def test_exact_strengths_agree_and_the_data_are_counted() -> None:
+    found = held([9.0, 1.0, 2.0], [[0.0, 1.0, 0.5], [1.0, 0.0, 0.0]], "float64")
+    assert (found.verdict, found.on, found.rows) == ("agrees", "data", 2)
+    assert (found.largest, found.flips, found.in_band) == (0.0, 0, 0)
+    assert found.sentence == (
+        "no decision can differ where the margin exceeds 2 x 5.6e-16"
+    )
+
+
+def test_without_data_the_probes_are_counted() -> None:
+    found = held([1.0], [[1.0], [0.0]], "mixed")
+    assert (found.on, found.rows) == ("probes", 1)
+
+
+def test_a_strength_beyond_its_bound_disagrees_and_is_told() -> None:
+    found = held([1.0, 2.0], [[1.0, 0.51], [0.0, 0.0]], "mixed")
+    assert (found.verdict, found.flips) == ("DISAGREES", 0)
+    assert found.detail == (
+        "row 1: x 2.0: exactly a (rule 1), mine a (rule 1) with 0.51; a strength is "
+        "off by 0.01, and 3e-07 is allowed",
+    )
+
+
+def test_a_flip_where_the_margin_is_wide_disagrees() -> None:
+    found = held([1.0, 2.0], [[1.0, 0.0], [0.0, 0.5]], "float64")
+    assert (found.verdict, found.flips) == ("DISAGREES", 1)
+    assert found.largest_flip_margin == pytest.approx(0.5)
+
+
+def test_a_flip_beside_a_step_that_float32_cannot_tell_is_allowed() -> None:
+    above = math.nextafter(2.0, 3.0)
+    values, strengths = [1.0, above], [[1.0, 0.5], [0.0, 0.0]]
+    assert held(values, strengths, "float64").verdict == "DISAGREES"
+    found = held(values, strengths, "float32")
+    assert (found.verdict, found.flips, found.in_band) == ("agrees", 1, 1)
+    assert found.unbounded == 1
+
+
+def test_cover_that_is_lost_and_gained_is_counted() -> None:
+    near = math.nextafter(3.0, 0.0)
+    low = RuleBase("r", ("a",), (Variable("x", (LOW,)),), (Rule((CLAUSE,), "a"),))
+    rows = Rows(("x",), np.array([[near, 3.0]]), np.arange(2), 0)
+    fired = np.array([[0.0, 1e-17]])
+    found = Answers("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))
+    told = compare_exact(found, decide(low, rows.values), rows, dtype="float64")
+    assert (told.cover_lost, told.cover_gained, told.verdict) == (1, 1, "agrees")
+
+
+def test_a_path_that_leaves_the_tree_far_from_its_cuts_disagrees() -> None:
+    tree = random_tree(1, leaves=2, inputs=1, combinations=0)
+    (cut,) = tree.nodes[0].cuts[:1]
+    values = np.array([[cut, math.nextafter(cut, math.inf), cut + abs(cut)]])
+    rows = Rows(tree.inputs, values, np.arange(3), 0)
+    truth = decide(tree, values)
+    wrong = Outcome(3 - truth.rule, truth.status)
+    found = Answers("mine", tree, wrong)
+    assert labels(found).tolist() != truth.label.tolist()
+    assert compare_exact(found, truth, rows, dtype="float64").verdict == "DISAGREES"
+    near = Rows(tree.inputs, values[:, :2], np.arange(2), 0)
+    part = found.part(slice(0, 2))
+    told = compare_exact(part, decide(tree, near.values), near, dtype="float32")
+    assert (told.verdict, told.flips, told.in_band) == ("agrees", 2, 2)

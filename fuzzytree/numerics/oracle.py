@@ -408,7 +408,7 @@ def _followed(
 # --- strengths that somebody computed
 
 
-SHARPENED = 256
+SHARPENED = 64
 """The most rows that `strength_errors` computes in fractions."""
 
 
@@ -482,8 +482,9 @@ class Observed(NamedTuple):
 
     Attributes:
         rows: Rows on which it was observed.
-        largest: The largest difference of a strength from the exact one, rounded up;
-            None where no strengths are told.
+        largest: The largest difference of a strength from the exact one that is
+            certain: the largest lower end of `strength_errors`. None where no strengths
+            are told.
         bound: The certified bound of it; None where there is none.
         origin: Where the bound comes from, or why there is none.
         flips: Rows whose class differs from the exact one.
@@ -541,7 +542,7 @@ def error_against_exact(
     is_rules = isinstance(model, RuleBase)
     largest = None
     if isinstance(model, RuleBase) and strengths is not None:
-        errors = strength_errors(model, values, strengths)[1]
+        errors = strength_errors(model, values, strengths)[0]
         largest = float(errors.max(initial=0.0))
     band = None
     if bound is not None and is_rules:

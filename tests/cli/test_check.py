@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.agreement import Agreement, Comparison
+from fuzzytree.agreement import Agreement, Certified, Comparison
+from fuzzytree.errors import DisagreementError
 from fuzzytree.report.text import agreement_lines
 from tests.cli.conftest import Call, grip
 
@@ -104,3 +105,35 @@ def test_a_disagreement_is_told_with_its_worst_row() -> None:
         "x.onnx against tree:",
         "  probe 1: force 2.0: tree answers soft, x.onnx firm",
     ]
+
+
+def test_certificates_stand_behind_all_the_rest() -> None:
+    sentence = "no decision can differ where the margin exceeds 2 x 1.3e-06"
+    mixed = Certified(
+        "rules in mixed", "mixed", sentence, 1.25e-6, "derived", "data", 178, 9.6e-8,
+        2, 1, 3.1e-7, 1, 0, 0, "agrees",
+    )  # fmt: skip
+    tree = Certified(
+        "tree in mixed", "mixed", "no path can differ", None, "derived", "probes", 9,
+        None, 0, 1, None, 0, 0, 0, "DISAGREES", ("probe 1: force 2.0: exactly soft",),
+    )  # fmt: skip
+    found = Agreement("grip", "0" * 64, (), probes=9, certificates=(mixed, tree))
+    assert not found.ok
+    head, one, other, *told = list(agreement_lines(found))[2:]
+    flips = "1 (margin up to 3.1e-07), cover lost in 1, gained in 0"
+    start = "against exact arithmetic  largest error  inside the band  "
+    assert head == f"{start}{'flips':{len(flips)}}  verdict    certified"
+    start = "rules in mixed            9.6e-08        2 of 178 rows    "
+    assert one == f"{start}{flips}  agrees     {sentence}"
+    start = "tree in mixed             -              0 of 9 probes    "
+    assert other == f"{start}{'1':{len(flips)}}  DISAGREES  no path can differ"
+    assert told == [
+        "tree in mixed against exact arithmetic:",
+        "  probe 1: force 2.0: exactly soft",
+    ]
+    with pytest.raises(DisagreementError) as caught:
+        found.raise_if_not_ok()
+    assert str(caught.value) == (
+        "tree in mixed disagrees with exact arithmetic\n"
+        "  probe 1: force 2.0: exactly soft"
+    )
