@@ -340,12 +340,21 @@ def _clauses(
         pairs = {}
     single = [clause for clause in clauses if clause not in pairs]
     joined = dict.fromkeys((c.variable, term) for c in single for term in c.terms)
-    double = [key for key in joined if len(parts[key]) == 2]
+    ends = {
+        key: (row[parts[key][0]], row[parts[key][1]])
+        for key in joined
+        if len(parts[key]) == 2
+    }
+    double = list(dict.fromkeys(ends.values()))  # terms of one curve are one
     if double:
-        left, right = (table.take([row[parts[k][i]] for k in double]) for i in (0, 1))
+        left, right = (table.take([pair[i] for pair in double]) for i in (0, 1))
         first = table.append(sheet.node("Min", left, right), len(double))
-        of_term |= {key: first + number for number, key in enumerate(double)}
-    lists = {c: [of_term[c.variable, term] for term in c.terms] for c in single}
+        place = {pair: first + number for number, pair in enumerate(double)}
+        of_term |= {key: place[pair] for key, pair in ends.items()}
+    lists = {
+        c: list(dict.fromkeys(of_term[c.variable, term] for term in c.terms))
+        for c in single
+    }
     of_clause = _largest(sheet, table, lists)
     negated = [clause for clause in clauses if clause.negated]
     if negated:
