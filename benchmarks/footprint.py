@@ -1,8 +1,8 @@
 """What each verb loads, and what leaving out saves on real tables.
 
-    python benchmarks/footprint.py [--write]
+    python benchmarks/footprint.py [--write] [loads] [saved] [timed] [memory]
 
-Prints the tables of docs/needs.md; `--write` puts them there. Every verb runs in a
+Prints the tables of docs/needs.md; `--write` puts them there, all or those named. Every verb runs in a
 process of its own, several times in turn, and the median counts; memory is the most
 that a process ever had, as Linux counts it. Trees are learnt from the wine table and
 from the digits of scikit-learn.
@@ -67,13 +67,21 @@ def main() -> None:
     """Print the tables, or write them into the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--write", action="store_true", help="into docs/needs.md")
+    parser.add_argument("tables", nargs="*", help=f"some of {', '.join(TABLES)}")
     arguments = parser.parse_args()
-    made = {name: "\n".join(make()) + "\n" for name, make in TABLES.items()}
+    wrong = [name for name in arguments.tables if name not in TABLES]
+    if wrong:
+        parser.error(f"no table {wrong[0]!r}; there is {', '.join(TABLES)}")
+    chosen = arguments.tables or list(TABLES)
+    made = {name: "\n".join(TABLES[name]()) + "\n" for name in chosen}
     if not arguments.write:
         print("\n".join(made.values()))
         return
     text = PAGE.read_text("utf-8")
-    PAGE.write_text(TABLE.sub(lambda m: m[1] + made[m[2]] + m[3], text), "utf-8")
+    PAGE.write_text(
+        TABLE.sub(lambda m: m[1] + made[m[2]] + m[3] if m[2] in made else m[0], text),
+        "utf-8",
+    )
 
 
 def markdown(rows: Sequence[Sequence[str]]) -> Iterator[str]:
