@@ -2,10 +2,10 @@
 
     python benchmarks/footprint.py [--write] [loads] [saved] [timed] [memory]
 
-Prints the tables of docs/needs.md; `--write` puts them there, all or those named. Every verb runs in a
-process of its own, several times in turn, and the median counts; memory is the most
-that a process ever had, as Linux counts it. Trees are learnt from the wine table and
-from the digits of scikit-learn.
+Prints the tables of docs/needs.md; `--write` puts them there, all or those named. Every
+verb runs in a process of its own, several times in turn, and the median counts; memory
+is the most that a process ever had, as Linux counts it. Trees are learnt from the wine
+table and from the digits of scikit-learn.
 """
 
 from __future__ import annotations
