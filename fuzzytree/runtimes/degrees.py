@@ -37,7 +37,8 @@ BLOCK = 1 << 15
 """Numbers in a block: with its scratch it fits into a second-level cache."""
 
 
-_SMALL_BLOCK = 1 << 13  # numbers: scratch that the allocator keeps at hand
+_LARGE_BLOCK = 1 << 17  # numbers: of points, which go through in small blocks
+_SMALL_BLOCK = 1 << 14  # numbers: scratch that the allocator keeps at hand
 _MANY = 16  # points from which a line is found faster by halving
 _TINY = 1 << 9  # numbers up to which it is faster anyway
 
@@ -144,9 +145,9 @@ def plan_blocks(
     """
     ordered = sorted(atoms, key=_kind)
     blocks: list[Block] = []
-    size = max(BLOCK // rows, 1)
     for (kind, _), group in itertools.groupby(ordered, key=_kind):
         members = list(group)
+        size = max((BLOCK if kind < 4 else _LARGE_BLOCK) // rows, 1)
         for start in range(0, len(members), size):
             part = members[start : start + size]
             lines = np.array([atom.line for atom in part], np.int64)
@@ -303,13 +304,13 @@ def _polylines(
     lines = segments(shapes, numbers.axis, numbers.degree)
     shape = np.arange(len(atoms)).reshape(-1, 1)
     is_few = len(shapes[0].values) < _MANY
-    size = max(_SMALL_BLOCK // len(atoms), 1)
 
     def run(x: Reals, out: Reals, _: Reals) -> None:
-        for start in range(0, x.shape[1], size):
-            part = x[:, start : start + size]
+        size = max(_SMALL_BLOCK // max(x.shape[1], 1), 1)
+        for start in range(0, len(x), size):
+            part, which = x[start : start + size], shape[start : start + size]
             find = counted if is_few and part.size > _TINY else halved
-            out[:, start : start + size] = join(lines, find(lines, shape, part), part)
+            out[start : start + size] = join(lines, find(lines, which, part), part)
 
     return run
 
