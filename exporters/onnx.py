@@ -107,7 +107,8 @@ def write(
     _require("onnx", "writing onnx needs")
     if verify:
         _require("onnxruntime", "verifying a written onnx file needs")
-    from fuzzytree.exporters.onnx_numbers import NUMBERS, losses
+    from fuzzytree.exporters.onnx_numbers import NUMBERS
+    from fuzzytree.numerics.narrowing import losses
 
     lost = losses(model, dtype)
     if lost and not allow_loss:

@@ -10,7 +10,8 @@ from onnx import numpy_helper
 
 from fuzzytree.contracts import Model
 from fuzzytree.exporters.onnx_graph import Sheet
-from fuzzytree.exporters.onnx_numbers import Numbers, Real, RealArray, rounded
+from fuzzytree.exporters.onnx_numbers import Numbers
+from fuzzytree.numerics.narrowing import Real, RealArray, rounded
 from fuzzytree.rulebase import Part, RuleBase, Variable
 
 

@@ -11,8 +11,8 @@ import onnxruntime
 
 from fuzzytree.contracts import Model
 from fuzzytree.errors import DisagreementError, LossError
-from fuzzytree.exporters.onnx_numbers import Real
 from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_session
+from fuzzytree.numerics.narrowing import Real
 from fuzzytree.reference import descend, evaluate
 from fuzzytree.rulebase import LR, Band, Points, RuleBase, Term
 

@@ -24,7 +24,8 @@ from onnx import helper
 from fuzzytree.exporters.onnx_axes import Axes, axes, column, is_known, scalar
 from fuzzytree.exporters.onnx_graph import Sheet, Table
 from fuzzytree.exporters.onnx_lines import Polyline, is_chained, polylines
-from fuzzytree.exporters.onnx_numbers import Numbers, RealArray, rounded
+from fuzzytree.exporters.onnx_numbers import Numbers
+from fuzzytree.numerics.narrowing import RealArray, rounded
 from fuzzytree.rulebase import LR, Clause, Flank, Points, RuleBase, Shape, Side
 
 Key = tuple[str, str]  # variable and term

@@ -16,7 +16,8 @@ from onnx import numpy_helper
 
 from fuzzytree.exporters.onnx_axes import Axes, axes, flat_guard, is_known
 from fuzzytree.exporters.onnx_graph import TREES, Constant, Sheet
-from fuzzytree.exporters.onnx_numbers import Numbers, rounded
+from fuzzytree.exporters.onnx_numbers import Numbers
+from fuzzytree.numerics.narrowing import rounded
 from fuzzytree.tree import FuzzyTree, Node
 
 _MOST_QUESTIONS = 1_000_000

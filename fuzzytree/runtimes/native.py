@@ -6,7 +6,7 @@ from functools import partial
 
 from fuzzytree.contracts import Dtype, Model, Run, Runtime
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.onnx_numbers import losses
+from fuzzytree.numerics.narrowing import losses
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.best_first import search
 from fuzzytree.runtimes.native_rules import fire

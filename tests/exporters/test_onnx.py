@@ -21,8 +21,8 @@ from fuzzytree.errors import DisagreementError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format, onnx_outputs
 from fuzzytree.exporters.onnx import FORMAT, IRS, OPSETS, Output, write
 from fuzzytree.exporters.onnx_graph import Sheet
-from fuzzytree.exporters.onnx_numbers import rounded
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.numerics.narrowing import rounded
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import (
     LR,
