@@ -108,13 +108,34 @@ def test_a_tree_lies_at_its_share_of_other_classes_in_a_panel_of_its_own() -> No
     assert axes.get_ylabel() == "rows with\nanother class"
 
 
-def test_no_error_lies_in_a_strip_that_says_exact() -> None:
+def test_no_error_lies_in_a_strip_that_says_so() -> None:
     found = markers(picture())
     strip = found["native: tree"][2]
     assert strip is found["onnxruntime: tree"][2]
     assert strip is not found["scikit-learn: tree"][2]
     assert strip.get_yscale() == "linear"
-    assert [tick.get_text() for tick in strip.get_yticklabels()] == ["exact"]
+    assert [tick.get_text() for tick in strip.get_yticklabels()] == ["none"]
+
+
+def test_rules_without_an_error_are_called_exact() -> None:
+    figure = plots.work_precision(study(point("a", 1e5, error(0.0))), rows=1000)
+    assert [tick.get_text() for tick in figure.axes[0].get_yticklabels()] == ["exact"]
+
+
+def test_a_legend_explains_what_there_is() -> None:
+    words = [text.get_text() for text in picture().legends[0].get_texts()]
+    assert words == [
+        "tree",
+        "raw rules",
+        "runtime",
+        "peer",
+        "unbeaten",
+        "observed",
+        "floor",
+    ]
+    bare = plots.work_precision(study(point("a", 1e5, error(0.1))), rows=1000)
+    words = [text.get_text() for text in bare.legends[0].get_texts()]
+    assert words == ["rules", "runtime", "unbeaten"]
 
 
 def test_each_question_has_its_lane_of_the_strip() -> None:

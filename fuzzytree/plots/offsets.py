@@ -141,7 +141,7 @@ def _axes(figure: Figure, curves: Sequence[Curve]) -> tuple[Axes, Axes]:
     strip.set_xlabel("spread over distance from zero", fontsize=SIZE + 1)
     _scale(logs, [error for error in errors if error > 0.0] or [1.0])
     if strip is not logs:
-        scale_strip(strip, 1, is_alone=False)
+        scale_strip(strip, 1, "exact")
     return logs, strip
 
 

@@ -20,6 +20,9 @@ AXES: dict[Measure, str] = {
 }
 """What the axes are called."""
 
+NOTHING: dict[Measure, str] = {"strength": "exact", "class": "none"}
+"""What an error of 0 is called."""
+
 WIDTH = 8.0
 """Of the picture, in inches."""
 
@@ -122,7 +125,9 @@ def scale_panels(
             if panel.measure == "class":
                 panel.logs.yaxis.set_major_formatter(share_text)
         if panel.strip is not None:
-            scale_strip(panel.strip, len(panel.lanes), is_alone=panel.logs is None)
+            scale_strip(panel.strip, len(panel.lanes), NOTHING[panel.measure])
+            if panel.logs is None:
+                panel.strip.set_ylabel(AXES[panel.measure], fontsize=SIZE + 1)
 
 
 def _decades(marks: Sequence[Mark]) -> tuple[float, float]:
@@ -135,15 +140,13 @@ def _decades(marks: Sequence[Mark]) -> tuple[float, float]:
     return 10.0**lowest, 10.0**highest
 
 
-def scale_strip(strip: Axes, lanes: int, *, is_alone: bool) -> None:
+def scale_strip(strip: Axes, lanes: int, word: str) -> None:
     """Make a strip look like what it is: no part of the axis above."""
     strip.set_ylim(-(lanes - 0.5) - 0.3, 0.8)
-    strip.set_yticks([(1 - lanes) / 2.0], ["exact"])
+    strip.set_yticks([(1 - lanes) / 2.0], [word])
     strip.tick_params(axis="y", length=0)
     strip.set_facecolor("#f4f4f4")
     strip.grid(visible=False, axis="y")
-    if is_alone:
-        strip.set_ylabel("classes", fontsize=SIZE + 1)
 
 
 def time_text(nanoseconds: float, _position: object = None) -> str:

@@ -67,7 +67,7 @@ def work_precision(study: Study, *, rows: int, threads: int = 1) -> Figure:
         _draw_fronts(panels, marks)
         _draw_floors(panels, floors)
         _draw_words(figure, study, rows, threads)
-        _draw_legend(figure, marks)
+        _draw_legend(figure, marks, has_floors=bool(floors))
         _draw_labels(figure, panels, marks)
     return figure
 
@@ -187,7 +187,7 @@ def _draw_words(figure: Figure, study: Study, rows: int, threads: int) -> None:
     )
 
 
-def _draw_legend(figure: Figure, marks: Sequence[Mark]) -> None:
+def _draw_legend(figure: Figure, marks: Sequence[Mark], *, has_floors: bool) -> None:
     """Say what colours and markers mean, in one line at the bottom."""
     from matplotlib.lines import Line2D
 
@@ -214,8 +214,9 @@ def _draw_legend(figure: Figure, marks: Sequence[Mark]) -> None:
     if any(m.is_front and m.observed is not None for m in marks):
         seen = Line2D([], [], color=_GREY, marker="_", linestyle="", label="observed")
         entries.append(seen)
-    line = Line2D([], [], color=_GREY, linestyle=_DASHES, linewidth=0.9, label="floor")
-    entries.append(line)
+    if has_floors:
+        line = Line2D([], [], color=_GREY, linestyle=_DASHES, label="floor")
+        entries.append(line)
     figure.legend(
         handles=entries,
         loc="lower center",

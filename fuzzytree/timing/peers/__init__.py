@@ -25,7 +25,8 @@ _MINUTE = 60.0
 
 _PYTHON = "one row after another"
 _SINGLE = "compares values rounded to float32 with cuts in double"
-_LINES = "the strongest rule is taken by us: it has no word for ties"
+_BARE = "missing values are not looked for within the call"
+_LINES = f"the strongest rule is taken by us: it has no word for ties; {_BARE}"
 
 
 class TreePeer(msgspec.Struct, frozen=True):
@@ -38,7 +39,6 @@ class TreePeer(msgspec.Struct, frozen=True):
         note: What a reader must know to compare it fairly.
         program: A program that it needs, if any.
         is_parallel: Whether a second thread can make it faster.
-        most_rows: Above so many rows it would take minutes; None: no limit.
     """
 
     name: str
@@ -47,7 +47,6 @@ class TreePeer(msgspec.Struct, frozen=True):
     note: str
     program: str | None = None
     is_parallel: bool = False
-    most_rows: int | None = None
 
 
 TREE_PEERS = (
@@ -56,33 +55,34 @@ TREE_PEERS = (
         "scikit-learn core",
         ("sklearn",),
         trees.load_scikit_learn_core,
-        f"what predict calls behind its checks; {_SINGLE}",
+        f"what predict calls behind its checks; {_SINGLE}; {_BARE}",
     ),
     TreePeer(
         "skl2onnx",
         ("sklearn", "skl2onnx", "onnx", "onnxruntime"),
         trees.load_skl2onnx,
-        "from the scikit-learn tree, in onnxruntime, all in float32, without zipmap",
+        "from the scikit-learn tree, in onnxruntime, all in float32, without zipmap; "
+        f"{_BARE}",
         is_parallel=True,
     ),
     TreePeer(
         "treelite",
         ("treelite",),
         trees.load_treelite,
-        "its interpreter GTIL, in double",
+        f"its interpreter GTIL, in double; {_BARE}",
         is_parallel=True,
     ),
     TreePeer(
         "m2cgen python",
         ("sklearn", "m2cgen"),
         trees.load_m2cgen_python,
-        f"its generated Python, in double; {_PYTHON}",
+        f"its generated Python, in double; {_PYTHON}; {_BARE}",
     ),
     TreePeer(
         "m2cgen c",
         ("sklearn", "m2cgen"),
         trees.load_m2cgen_c,
-        "its generated C, in double, by gcc -O3, in a loop of ours",
+        f"its generated C, in double, by gcc -O3, in a loop of ours; {_BARE}",
         program="gcc",
     ),
 )
@@ -144,7 +144,6 @@ def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
             "tree",
             "peer",
             partial(peer.load, tree),
-            most_rows=peer.most_rows,
             note=note,
             is_foreign=True,
             is_parallel=peer.is_parallel,
