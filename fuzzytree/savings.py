@@ -347,7 +347,7 @@ def _plain_rows(model: Model, count: int) -> FloatArray:
     made = [[row[name] for name in model.inputs] for row in probes(model, limit=500)]
     plain = [row for row in made if all(map(_is_plain, row))]
     width = len(model.inputs)
-    values = np.array(plain or [[0.0] * width], np.float64).reshape(-1, width)
+    values = np.array(plain or [[0.0] * width], np.float64)
     return np.ascontiguousarray(np.resize(values, (count, width)).T)
 
 

@@ -242,6 +242,15 @@ def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
     assert names == {(stage, *what) for stage in made for what in whats}
 
 
+def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
+    tree = random_tree(1, leaves=1)
+    told = report(tree, pruned(tree), seconds=5.0)
+    assert told.proof.ok
+    assert told.needs.inputs == ()
+    assert {cost.what for cost in told.costs} == {"open", "one row", "10,000 rows"}
+    assert [size.row_bytes for size in told.sizes] == [8 * len(tree.columns), 0, 0]
+
+
 def test_what_the_time_does_not_reach_is_an_omission() -> None:
     found, omissions = savings.costs(
         {"as it is": base((force("soft"),))}, PATH, seconds=1e-9
