@@ -59,7 +59,7 @@ class _Exact:
         self.degrees = [
             {
                 value: exact_degree(shape, Fraction(value))
-                for value in question.values[line, :rows].tolist()
+                for value in question.values[line, rows].tolist()
             }
             for line, shape, rows in question.places
         ]

@@ -63,8 +63,8 @@ def _fact(name: str, found: Sequence[Observed]) -> str:
     worst = max(found, key=lambda one: one.worst)
     flips = max(one.flips for one in found)
     text = f"{name}: strengths off by at most {worst.worst:.2g}"
-    text += f" where {worst.allowed:.2g} is allowed, classes in {flips}"
+    text += f" where {worst.allowed:.2g} is allowed, flips: {flips}"
     unbounded = max(one.unbounded for one in found)
     if unbounded:
-        text += f"; {unbounded} rows, too near to a step, have no bound"
+        text += f", rows without a bound, too near to a step: {unbounded}"
     return text

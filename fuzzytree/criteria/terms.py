@@ -6,9 +6,10 @@ makes every runtime tell the degree of each term: it is the strength of its rule
 
 from __future__ import annotations
 
+import itertools
 import math
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Literal, NamedTuple, assert_never
 
 import msgspec
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
 
 Demand = Literal["one", "below one", "zero"]
 
+MOST_TERMS = 240
+"""Terms that are asked one by one; of more, evenly drawn ones."""
+
 _END_SLACK: dict[Dtype, float] = {
     "float64": 2.0**-50,
     "mixed": 2.0**-22,
@@ -50,13 +54,15 @@ class Asked(msgspec.Struct, frozen=True):
     Attributes:
         rules: One rule for each term.
         values: Shape (variables, rows).
-        places: For each rule: its variable's line, its shape, and how many of the
-            first rows hold values of its variable that matter.
+        places: For each rule: its variable's line, its shape, and the rows that hold
+            its own edges.
+        left_out: How many terms are not asked, for there are too many.
     """
 
     rules: RuleBase
     values: FloatArray
-    places: tuple[tuple[int, Shape, int], ...]
+    places: tuple[tuple[int, Shape, slice], ...]
+    left_out: int
 
 
 class Held(NamedTuple):
@@ -89,34 +95,40 @@ def asked(
     Returns:
         What to ask; None if no variable has a term.
     """
+    total = sum(len(v.terms) for v in rules.variables)
+    step = -(-total // MOST_TERMS) or 1
+    numbers = itertools.count()
     variables = [
-        Variable(v.name, tuple(Term(t.name, shape(t.shape)) for t in v.terms))
+        Variable(v.name, kept)
         for v in rules.variables
-        if v.terms
+        if (
+            kept := tuple(
+                Term(t.name, shape(t.shape))
+                for t in v.terms
+                if next(numbers) % step == 0
+            )
+        )
     ]
     if not variables:
         return None
     found = [
         Rule((Clause(v.name, (t.name,)),), "true") for v in variables for t in v.terms
     ]
-    edges = [_edges([t.shape for t in v.terms], near) for v in variables]
-    longest = max(map(len, edges))
-    values = np.array([(line * longest)[:longest] for line in edges], np.float64)
-    places = tuple(
-        (line, term.shape, len(edges[line]))
-        for line, v in enumerate(variables)
-        for term in v.terms
-    )
-    return Asked(
-        RuleBase(rules.name, ("true",), tuple(variables), tuple(found)), values, places
-    )
+    lines: list[list[float]] = [[] for _ in variables]
+    places: list[tuple[int, Shape, slice]] = []
+    for number, v in enumerate(variables):
+        for term in v.terms:
+            start = len(lines[number])
+            lines[number] += _edges(term.shape, near)
+            places.append((number, term.shape, slice(start, len(lines[number]))))
+    longest = max(map(len, lines))
+    values = np.array([(line * longest)[:longest] for line in lines], np.float64)
+    whole = RuleBase(rules.name, ("true",), tuple(variables), tuple(found))
+    return Asked(whole, values, tuple(places), total - len(found))
 
 
-def _edges(
-    shapes: Sequence[Shape], near: Callable[[float], Iterable[float]]
-) -> list[float]:
-    marks = dict.fromkeys(mark for shape in shapes for mark in landmarks(shape))
-    found = [value for mark in marks for value in near(mark)]
+def _edges(shape: Shape, near: Callable[[float], Iterable[float]]) -> list[float]:
+    found = [value for mark in landmarks(shape) for value in near(mark)]
     return list(dict.fromkeys(found)) or [0.0]
 
 
@@ -219,6 +231,8 @@ def held(
     """
     found, warning = answered(one, question.values)
     faults = [f"{one.title}: it warns: {warning}"] if warning else []
+    if question.left_out:
+        skipped.append(f"{question.left_out} of the terms: there are too many")
     if found.strengths is None:
         skipped.append(f"{one.runtime.name} tells no degrees")
         return Held(0, 0.0, faults)
@@ -230,8 +244,8 @@ def held(
         clause = question.rules.rules[number].when[0]
         name = f"{one.title}: {clause.variable} is {clause.terms[0]}"
         pairs = zip(
-            question.values[line, :rows].tolist(),
-            found.strengths[number, :rows].tolist(),
+            question.values[line, rows].tolist(),
+            found.strengths[number, rows].tolist(),
             strict=True,
         )
         for value, degree in pairs:
