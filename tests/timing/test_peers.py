@@ -6,6 +6,8 @@ import importlib.util
 import math
 import pickle
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -543,3 +545,15 @@ def test_generated_c_without_a_compiler_is_left_out(
     assert [(one.name, one.why) for one in omitted] == [
         ("m2cgen c", "the program 'gcc' is not installed")
     ]
+
+
+def test_the_list_of_peers_is_made_without_loading_any() -> None:
+    code = (
+        "import sys; from fuzzytree.testing import random_tree; "
+        "from fuzzytree.timing.peers import peers; peers(random_tree(1)); "
+        "import fuzzytree.plots; "
+        "names = 'sklearn skl2onnx treelite m2cgen fuzzylite simpful onnx onnxruntime "
+        "matplotlib'; print([name for name in names.split() if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
