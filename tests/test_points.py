@@ -135,7 +135,7 @@ def test_a_degree_next_to_zero_keeps_its_digits(dtype: Dtype) -> None:
     assert found.tolist() == [[tiny, 0.0, 0.0], [0.0, tiny, 0.0]]
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(points())
 def test_a_degree_is_exact_at_the_points_and_never_leaves_their_range(
     shape: Points,
@@ -148,7 +148,7 @@ def test_a_degree_is_exact_at_the_points_and_never_leaves_their_range(
     assert max(found) <= max(shape.degrees)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(NUMBERS, NUMBERS, DEGREES, DEGREES, st.lists(st.floats(0, 1), min_size=2))
 def test_a_line_is_monotone_and_level_if_its_ends_are(
     start: float, end: float, here: float, there: float, shares: list[float]
@@ -162,7 +162,7 @@ def test_a_line_is_monotone_and_level_if_its_ends_are(
     assert found == sorted(found, reverse=here > there)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(points())
 def test_a_degree_is_that_of_the_formula_to_a_few_units(shape: Points) -> None:
     for value in places_of(shape):

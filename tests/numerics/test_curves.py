@@ -43,7 +43,7 @@ def bound_of(p: list[float], r: list[float]) -> float:
     return distance(zero, one, first, second, 1.0)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=80, deadline=None, derandomize=True)
 @given(CURVES, CURVES)
 def test_no_difference_is_above_the_bound(p: list[float], r: list[float]) -> None:
     bound = Fraction(bound_of(p, r))
@@ -51,7 +51,7 @@ def test_no_difference_is_above_the_bound(p: list[float], r: list[float]) -> Non
         assert abs(clipped(value(p, z)) - clipped(value(r, z))) <= bound
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(CURVES, CURVES)
 def test_the_bound_is_little_above_what_occurs(p: list[float], r: list[float]) -> None:
     z = np.linspace(0.0, 1.0, 20_001)
@@ -85,7 +85,7 @@ def test_a_bound_that_ignored_the_bend_would_be_too_small() -> None:
     assert bound_of(p, r) >= 0.25
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 @given(CURVES, st.floats(0.125, 1.0))
 def test_the_lowest_value_is_never_missed(p: list[float], last: float) -> None:
     found = lowest(np.array(p).reshape(-1, 1), last)
