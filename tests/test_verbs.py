@@ -193,3 +193,17 @@ def test_a_runtime_that_does_not_run_trees_says_so() -> None:
     assert str(caught.value) == (
         f"cannot run {TREE.name} in best-first: it runs rules, not a tree"
     )
+
+
+def test_a_certificate_for_the_rows_of_a_table_counts_them() -> None:
+    tree = random_tree(1, inputs=2, combinations=0)
+    table = pd.DataFrame({name: [0.0, 1.0, 2.0] for name in tree.inputs})
+    found = ft.certify(ft.rules_from_tree(tree), "mixed", data=table)
+    assert (found.rows, found.dtype, found.unbounded) == (3, "mixed", 0)
+    assert found.delta is not None
+
+
+def test_a_number_type_that_does_not_exist_is_refused() -> None:
+    text = r"^there is no number type 'float16'; there are float64, mixed, float32$"
+    with pytest.raises(ValueError, match=text):
+        ft.certify(random_tree(1), "float16")  # type: ignore[arg-type] # the mistake
