@@ -31,8 +31,9 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             powerful features the cheaper one is chosen.
         choices: What inner validation may choose beside the patterns, of `alpha`,
             `l_max`, `shrinkage` and `entry`.
-        rows_per_class: How many rows of a class are kept for clusters, combinations,
-            window counts and inner validation.
+        rows_per_class: How many rows of a class are kept at most for clusters,
+            combinations, window counts and inner validation; none is left out where
+            no more are distinct and there are no more.
         seed: Moves the folds of inner validation.
         keep_reversals: Whether a wide set that overtakes again far outside gets the
             far interval (a second cut); otherwise it is counted and left out.

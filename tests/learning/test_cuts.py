@@ -111,3 +111,54 @@ def test_neighbouring_doubles_can_be_cut_apart() -> None:
     low = 1.0
     high = math.nextafter(low, 2.0)
     assert settled_cuts(np.array([low]), np.array([low, high])).tolist() == [low]
+
+
+DYADIC = st.integers(-(2**20), 2**20).map(lambda steps: steps / 2.0**10)
+
+
+@given(
+    st.lists(DYADIC, min_size=2, max_size=12, unique=True),
+    DYADIC,
+    st.integers(-300, 300),
+    st.sampled_from([0.0, 2.0**12, -(2.0**33), 2.0**40]),
+)
+def test_a_cut_settles_alike_in_every_unit(
+    values: list[float], cut: float, exponent: int, offset: float
+) -> None:
+    rows = np.array(values)
+    base = settled_cuts(np.array([cut]), rows)[0]
+    moved = np.ldexp(rows + offset, exponent)
+    found = settled_cuts(
+        np.array([cut]), moved, rows, origin=offset * 2.0**exponent, exponent=exponent
+    )
+    # At 2^40 floats are 2^-12 apart: what is finer is rounded to the lower row.
+    allowed = math.ldexp(math.ulp(offset), exponent)
+    assert abs(found[0] - np.ldexp(base + offset, exponent)) <= allowed
+    assert ((moved <= found[0]) == (rows <= base)).all()
+
+
+def test_a_cut_between_rows_that_share_a_place_keeps_one_side_for_both() -> None:
+    rows = np.array([1.0, 1.0 + 2.0**-52, 2.0])  # at -2^60 all of them are one place
+    places = rows + 2.0**60
+    (cut,) = settled_cuts(places[:1] - 2.0**10, rows, places, origin=-(2.0**60))
+    assert not (rows <= cut).any()
+
+
+@pytest.mark.parametrize(
+    ("cut", "low", "high", "expected"),
+    [
+        (0.1, -1.0, 1.0, 0.0),
+        (1.8, 1.0, 3.0, 2.0),
+        (0.3, 0.0, 0.4, 0.25),
+        (1e308, -1.7e308, 1.7e308, 0.0),
+        (1.5e308, 1.0e308, 1.7e308, 2.0**1023 + 2.0**1022),
+        (5e-324, 0.0, 1e-323, 5e-324),
+        (1e-310, 0.0, 1.0, 0.25),
+        (0.0, 0.0, 5e-324, 0.0),
+    ],
+)
+def test_a_cut_is_a_round_number(
+    cut: float, low: float, high: float, expected: float
+) -> None:
+    found = settled_cuts(np.array([cut]), np.array([low, high]))
+    assert found.tolist() == [expected]

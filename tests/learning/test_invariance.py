@@ -241,6 +241,22 @@ def assert_an_offset_moves_the_tree(table: Table, power: int, mode: Mode) -> Non
     assert labels_of(found, moved[:200]) == labels_of(base, values[:200])
 
 
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("offset", [-0.625, 12345.6875, 1e9 + 1.5])
+def test_any_offset_without_rounding_keeps_every_answer(
+    offset: float, mode: Mode
+) -> None:
+    values, labels = blobs(300, step=2.0**-10)
+    moved = values + offset
+    assert (moved - offset == values).all()
+    settings = Settings(mode=mode)
+    base, found = (learn((v, labels), settings).tree for v in (values, moved))
+    # A cut is rounded in the table's unit, to another place between the same rows.
+    assert [n.owners for n in found.nodes] == [n.owners for n in base.nodes]
+    assert found.leaves == base.leaves
+    assert labels_of(found, moved) == labels_of(base, values)
+
+
 def test_a_column_at_1e12_with_a_spread_of_1_is_as_good_as_one_at_0() -> None:
     values, labels = blobs(600)
     far = values + 1e12
