@@ -146,7 +146,7 @@ def test_rows_without_a_bound_are_counted() -> None:
 
 
 def test_a_strength_that_can_be_half_wrong_makes_no_decision_certain() -> None:
-    narrow = Term("low", Band(high=1e9, right=Flank(1e9, 1e9 + 400.0)))
+    narrow = Term("low", Band(high=1e9, right=Flank(1e9, 1e9 + 250.0)))
     found = certify(grip(narrow), "float32")
     assert found.delta is not None
     assert found.sentence.startswith("no decision is certain: a strength can be off by")
