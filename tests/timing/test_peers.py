@@ -41,7 +41,7 @@ from fuzzytree.testing import probes, random_tree, with_points
 from fuzzytree.timing.candidates import found_of, questions
 from fuzzytree.timing.peers import TREE_PEERS, engines, peers
 from fuzzytree.timing.peers.crisp import questions as asked_questions
-from fuzzytree.timing.records import Candidate, Found
+from fuzzytree.timing.records import Candidate, Found, Loaded
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 if TYPE_CHECKING:
@@ -280,27 +280,32 @@ def chain(count: int) -> FuzzyTree:
     return FuzzyTree("chain", ("a", "b"), (x,), tuple(nodes), leaves)
 
 
+def loaded_deep(peer: str, tree: FuzzyTree) -> Loaded:
+    """Load a tree in a peer, without preparing its rules for others."""
+    candidate(random_tree(1), f"{peer}: tree")  # or skip
+    (load,) = [one.load for one in TREE_PEERS if one.name == peer]
+    return load(tree, 1)
+
+
 @pytest.mark.parametrize("peer", [peer.name for peer in TREE_PEERS])
 def test_a_deep_tree_is_followed_or_refused_in_a_sentence(peer: str) -> None:
     tree = chain(1100)
-    one = candidate(tree, f"{peer}: tree")
     if peer.startswith("m2cgen"):
         with pytest.raises(LossError) as caught:
-            one.load(1)
+            loaded_deep(peer, tree)
         assert str(caught.value) == (
             "cannot run chain as m2cgen: a path asks 1100 questions: "
             "it is written by recursion"
         )
         return
     values = np.linspace(-0.5, 1100.5, 300)[None]
-    assert np.array_equal(
-        one.load(1).answer(values).labels, native(tree, values).labels
-    )
+    found = loaded_deep(peer, tree).answer(values)
+    assert np.array_equal(found.labels, native(tree, values).labels)
 
 
 def test_python_takes_fewer_ifs_within_each_other_than_m2cgen_writes() -> None:
     with pytest.raises(LossError) as caught:
-        candidate(chain(150), "m2cgen python: tree").load(1)
+        loaded_deep("m2cgen python", chain(150))
     assert str(caught.value) == (
         "cannot run chain as m2cgen: a path asks 150 questions: "
         "Python does not take so many ifs within each other"
@@ -449,6 +454,18 @@ def test_simpful_refuses_what_takes_seconds_for_a_row() -> None:
     rules = rules_from_tree(random_tree(0, leaves=60, classes=5), "raw")
     with pytest.raises(LossError, match=r"it would take about \d+ s for one row"):
         candidate(rules, "simpful: rules").load(1)
+
+
+def test_engines_are_left_out_of_models_with_thousands_of_terms(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(engines, "MOST_TERMS", 5)
+    found, omitted = peers(negated(Semantics()))
+    assert [one.name for one in found] == ["onnx evaluator: rules"]
+    assert [(one.name, one.why) for one in omitted] == [
+        (f"{name}: rules", "6 terms, and 5 are the most to make points of")
+        for name in ENGINES
+    ]
 
 
 def test_simpful_has_no_bound_where_a_slope_overflows() -> None:

@@ -18,7 +18,7 @@ from fuzzytree.contracts import Model
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.timing.candidates import Bound, Bounds, questions, title
 from fuzzytree.timing.peers import engines, evaluator, trees
-from fuzzytree.timing.records import Candidate, Loaded, Omission
+from fuzzytree.timing.records import Candidate, Loaded, Omission, Question
 from fuzzytree.tree import FuzzyTree
 
 _MINUTE = 60.0
@@ -118,7 +118,7 @@ def peers(
     omitted: dict[str, Omission] = {}
     for question, form in questions(model).items():
         if isinstance(form, RuleBase):
-            made, left = _of_rules(form, bounds)
+            made, left = _of_rules(form, question, bounds)
         else:
             made, left = _of_tree(form)
         for one in made:
@@ -153,11 +153,12 @@ def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
 
 
 def _of_rules(
-    rules: RuleBase, bounds: Bounds | None
+    rules: RuleBase, question: Question, bounds: Bounds | None
 ) -> tuple[list[Candidate], list[Omission]]:
     found: list[Candidate] = []
     omitted: list[Omission] = []
     certified = bounds(rules, "float64") if bounds else None
+    count = len(engines.names_of(rules))
     for name, module, load, points in (
         ("pyfuzzylite", "fuzzylite", engines.load_fuzzylite, engines.FINE),
         ("simpful", "simpful", engines.load_simpful, engines.COARSE),
@@ -165,6 +166,11 @@ def _of_rules(
         why = _absent((module,))
         if why:
             omitted.append(Omission(name, why))
+            continue
+        if count > engines.MOST_TERMS:
+            most = f"{engines.MOST_TERMS:,}"
+            why = f"{count:,} terms, and {most} are the most to make points of"
+            omitted.append(Omission(title(name, question), why))
             continue
         is_rowwise = name == "simpful"
         note = f"each curved piece as {points} lines; {_LINES}"

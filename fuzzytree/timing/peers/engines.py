@@ -32,6 +32,9 @@ FINE = 128
 COARSE = 16
 """How many lines stand for each curved piece of a shape."""
 
+MOST_TERMS = 3000
+"""What takes a second or two to become points; more of them take minutes to load."""
+
 _LOOK_S = 1.2e-7  # what simpful takes to look at a point, on a processor of 2020 or so
 _NAME_S = 1e-5  # and for a term beside
 _LONGEST_ROW_S = 1.0
