@@ -131,8 +131,8 @@ def _degrees(
     wanted = {NOTHING: None} if all(kept) else {NOTHING: None, ALWAYS: None}
     found: dict[Part, None] = dict.fromkeys(
         part
-        for when in live
-        for clause in when
+        for clause in clauses
+        if clause not in constant
         for term in clause.terms
         for part in parts[clause.variable, term]
     )
