@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.contracts import Model, Runtime
-from fuzzytree.criteria.carriers import ready
+from fuzzytree.contracts import Dtype, Model, Outcome, Runtime
+from fuzzytree.criteria.carriers import ready, unequal
 from fuzzytree.criteria.judging import Observed, observed
 from fuzzytree.criteria.results import Criterion, judged
 from fuzzytree.numerics.oracle import Decided, decide
@@ -25,6 +25,9 @@ def exactness(
 ) -> Criterion:
     """Hold every runtime against the exact answers, within its bound (N8).
 
+    Runtimes of one number type that claim no bound of their own promise the same
+    operations: they are held against each other as well, bit for bit.
+
     Args:
         model: A tree or a rule base.
         runtimes: What to run.
@@ -35,6 +38,7 @@ def exactness(
     skipped: list[str] = []
     exact: dict[tuple[str, int], Decided] = {}
     seen: dict[str, list[Observed]] = {}
+    first: dict[tuple[str, Dtype, bool], tuple[str, Outcome]] = {}
     cases = 0
     for one in ready(model, runtimes, skipped):
         rows = one.some(values)
@@ -44,6 +48,12 @@ def exactness(
         found = observed(one, rows, exact[key])
         cases += found.rows
         faults += found.faults
+        if one.runtime.bound is None:
+            same = (one.carrier, one.runtime.dtype, one.runtime.is_slow)
+            title, other = first.setdefault(same, (one.title, found.outcome))
+            wrong = int(unequal(found.outcome, other).sum())
+            if wrong:
+                faults.append(f"{one.title}: other bits than {title} in {wrong} rows")
         own = f" in {one.runtime.name}" if one.runtime.bound is not None else ""
         seen.setdefault(f"{one.runtime.dtype}{own}", []).append(found)
     errors = [one.worst for found in seen.values() for one in found]

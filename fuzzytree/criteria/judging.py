@@ -40,6 +40,7 @@ class Observed(NamedTuple):
         flips: Rows whose class differs from the exact one.
         unbounded: Rows in which the bound is 1 and proves nothing.
         faults: What is beyond the bound, in sentences.
+        outcome: What the runtime answered.
     """
 
     rows: int
@@ -49,6 +50,7 @@ class Observed(NamedTuple):
     flips: int
     unbounded: int
     faults: tuple[str, ...]
+    outcome: Outcome
 
 
 def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Observed:
@@ -89,6 +91,7 @@ def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Ob
         int(flips.sum()),
         int((known & (allowed >= 1.0)).sum()),
         tuple(faults),
+        found,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from fuzzytree.contracts import Dtype, Format, Model, Outcome, Run, Runtime, Written
 from fuzzytree.exporters import find_format
+from fuzzytree.reference import axis_values, degree, horner
 from fuzzytree.rulebase import (
     LR,
     Band,
@@ -141,11 +142,12 @@ def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
         def answer(values: FloatArray) -> Outcome:
             array = checked(values, model.inputs)
             strengths = np.zeros((len(model.rules), array.shape[1]))
+            missing = np.zeros(array.shape[1], np.bool_)
             for row in range(array.shape[1]):
                 axes = _axes(model, array[:, row].tolist())
+                missing[row] = not all(map(math.isfinite, axes.values()))
                 for number, rule in enumerate(model.rules):
                     strengths[number, row] = min(one(c, axes) for c in rule.when)
-            missing = np.logical_not(np.isfinite(array).all(axis=0))
             found = winners(np.nan_to_num(strengths), missing)
             strengths[:, missing] = math.nan
             return Outcome(found[0], found[1], strengths)
@@ -156,14 +158,10 @@ def by_terms(degree: Callable[[Band | LR, float], float]) -> Runtime:
 
 
 def _axes(model: RuleBase, row: list[float]) -> dict[str, float]:
-    from fuzzytree.reference import axis_values
-
     return axis_values(model.variables, dict(zip(model.inputs, row, strict=True)))
 
 
 def _plain(shape: Band | LR, value: float) -> float:
-    from fuzzytree.reference import degree
-
     return degree(shape, value)
 
 
@@ -194,6 +192,18 @@ def _raw_flank(shape: Band | LR, value: float) -> float:
     return float(min(max(whole(value), 0.0), 1.0 - 2.0**-53))
 
 
+def _reciprocal(shape: Band | LR, value: float) -> float:
+    """Return a degree whose place on a flank is a product instead of a quotient."""
+    if not isinstance(shape, Band) or shape.high is None or shape.right is None:
+        return _plain(shape, value)
+    flank = shape.right
+    if value <= shape.high:
+        return _plain(shape, value)
+    place = (value - flank.end) * (1.0 / (flank.start - flank.end))
+    place = min(max(place, 0.0), 1.0)
+    return min(max(horner(flank.curve, place) * place, 0.0), 1.0 - 2.0**-53)
+
+
 def _no_spread(shape: Band | LR, value: float) -> float:
     """Return 0 wherever a spread is as good as none, at the mean too."""
     if isinstance(shape, LR) and shape.left.spread <= 1e-12 * max(abs(shape.mean), 1.0):
@@ -205,6 +215,7 @@ SWAPPED_EDGE = by_terms(_swapped_edge)
 SOFT_ZERO = by_terms(_soft_zero)
 RAW_POWERS = by_terms(_raw_flank)
 NO_SPREAD = by_terms(_no_spread)
+RECIPROCAL = by_terms(_reciprocal)
 PLAIN = by_terms(_plain)
 """The same way of running, and nothing wrong with it."""
 
