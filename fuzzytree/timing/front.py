@@ -196,17 +196,14 @@ def _sentence(
     ratio = times_faster(other.timing, best.timing)
     if ratio is None:
         return f"{head}; {other.short} shares no round with it"
+    sure = f"95 % CI {_times(ratio.low)} to {_times(ratio.high)}"
     if ratio.confidence < CONFIDENCE:
-        sure = f"{_times(ratio.low)} to {_times(ratio.high)}, in too few rounds"
-    elif ratio.low <= 1.0:
-        return (
-            f"{head}: nothing is surely faster ({other.short} takes "
-            f"{_times(ratio.median)} times as long, 95 % CI "
-            f"{_times(ratio.low)} to {_times(ratio.high)})"
-        )
-    else:
-        sure = f"95 % CI {_times(ratio.low)} to {_times(ratio.high)}"
-    return f"{head}: {_times(ratio.median)} times faster than {other.short} ({sure})"
+        sure = "in too few rounds to be sure"
+    elif ratio.low > 1.0:
+        times = f"{_times(ratio.median)} times faster than {other.short}"
+        return f"{head}: {times} ({sure})"
+    took = f"{other.short} takes {_times(ratio.median)} times as long"
+    return f"{head}: nothing is surely faster ({took}, {sure})"
 
 
 def _what(best: Entry) -> str:

@@ -30,7 +30,6 @@ MOST_ROWS = 2_000
 MOST_PROBES = 500
 """Rows aimed at edges; nearly each of them costs the oracle rational arithmetic."""
 
-_FEW = 8  # rows that tell how long a row takes
 _PATIENCE_NS = 3e8  # for the answers of one candidate to one set of rows
 _MOST_STRENGTHS = 2_000_000
 
@@ -76,14 +75,15 @@ class Judge:
         Raises:
             Exception: Whatever the candidate raises.
         """
-        few = self.values[:, :_FEW]
-        loaded.answer(few)  # the first call of many a library does more than others
+        one = np.ascontiguousarray(self.values[:, :1])
+        loaded.answer(one)  # the first call of many a library does more than others
+        call = loaded.call(one)
         start = self.clock.wall()
-        loaded.call(few)()
-        row_ns = max(self.clock.wall() - start, 1) / few.shape[1]
+        call()
+        row_ns = float(max(self.clock.wall() - start, 1))
         if candidate.kind == "floor":
             return Judged(None, None, self._row_ns(loaded, row_ns))
-        most = max(int(_PATIENCE_NS // row_ns), _FEW)
+        most = max(int(_PATIENCE_NS // row_ns), 1)
         rows, edges = self._samples(candidate.question)
         certified = loaded.bound or candidate.bound
         bound, origin = certified or (None, "nothing is certified")
@@ -162,4 +162,4 @@ def _part(sample: _Sample, most: int) -> _Sample:
 
 def _most_rows(model: Model) -> int:
     rules = len(model.rules) if isinstance(model, RuleBase) else 1
-    return max(min(MOST_ROWS, _MOST_STRENGTHS // rules), _FEW)
+    return max(min(MOST_ROWS, _MOST_STRENGTHS // rules), 1)

@@ -268,8 +268,13 @@ class _Run:
         judge = Judge(questions(self.model), self.values, self.clock)
         todo = [c for c in candidates if c.name not in self.faulty]
         tell = _part(self.tell, 0.1, 0.3)
-        for position, one in enumerate(todo):
+        # If the time is short, what others are compared with is still there.
+        for position, one in enumerate(sorted(todo, key=_rank)):
             tell(f"judging {one.name}", position / len(todo))
+            if self.spent_s() > self.plan.budget_s / 2 and _rank(one):
+                why = "half of the budget was over before it was judged"
+                self.omit(one.name, f"{why}; a larger one helps")
+                continue
             start = self.clock.wall()
             try:
                 loaded = one.load(min(self.plan.threads))
@@ -350,7 +355,7 @@ class _Run:
         kept = fitting(costs, ranks, seconds * 1e9, min(SURE, self.plan.rounds))
         for name in names:
             if name not in kept:
-                why = f"{rows:,} rows: too slow for the budget; a larger one helps"
+                why = f"{_rows(rows)}: too slow for the budget; a larger one helps"
                 self.omit(name, why)
         return [name for name in names if name in kept]
 

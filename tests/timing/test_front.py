@@ -117,6 +117,19 @@ def test_the_default_is_kept_unless_something_is_surely_faster() -> None:
         )
 
 
+def test_few_rounds_are_never_sure() -> None:
+    few = msgspec.structs.replace(
+        timing(100.0), samples_ns=(100.0,) * 3, rounds=(0, 1, 2)
+    )
+    fast = msgspec.structs.replace(
+        point("fast", 100.0, error(2e-16, 1e-15)), timings=(few,)
+    )
+    assert advice([NATIVE, fast]) == (
+        "rules, 1,000 rows: for an error of at most 1e-15, use native: nothing is "
+        "surely faster (fast takes 0.10 times as long, in too few rounds to be sure)",
+    )
+
+
 def test_what_tells_no_strengths_is_said() -> None:
     best_first = point("best-first", 100.0, error(None, 1e-15))
     (sentence,) = advice([NATIVE, best_first])

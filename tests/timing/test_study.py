@@ -242,6 +242,24 @@ def test_the_budget_is_kept_and_slow_ones_are_left_out() -> None:
     assert [len(timing.samples_ns) for timing in fast.timings] == [15, 15]
 
 
+def test_half_of_the_budget_is_for_timing() -> None:
+    time = FakeTime()
+    plan = Plan(rows=(1,), threads=(1,), rounds=6, budget_s=2.0)
+    study = studied(
+        candidate("b", time=time, ms=1200.0),
+        candidate("c", time=time),
+        candidate("native", time=time),
+        plan=plan,
+        time=time,
+    )
+    assert omitted(study) == {
+        "b: rules": "1 row: too slow for the budget; a larger one helps",
+        "c: rules": "half of the budget was over before it was judged; "
+        "a larger one helps",
+    }
+    assert [point.name for point in study.points] == ["native: rules"]
+
+
 def test_what_others_are_compared_with_comes_first() -> None:
     costs = {"native": 3.0, "ours": 1.0, "peer": 1.0, "other": 1.0}
     ranks = {"native": 0, "ours": 1, "peer": 2, "other": 2}
