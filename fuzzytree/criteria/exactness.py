@@ -76,5 +76,5 @@ def _fact(name: str, found: Sequence[Observed]) -> str:
     text += f" where {worst.allowed:.2g} is allowed, flips: {flips}"
     unbounded = max(one.unbounded for one in found)
     if unbounded:
-        text += f", rows without a bound, too near to a step: {unbounded}"
+        text += f"; no bound in {unbounded}, beyond the type or near a step"
     return text

@@ -81,9 +81,10 @@ class Stiff(msgspec.Struct, frozen=True):
 
     Attributes:
         input: Its name.
-        spread: The shortest distance over which a degree changes fully, in its unit.
+        spread: The shortest distance over which a degree changes fully, in its unit;
+            None where degrees only step.
         location: The largest absolute value in its range.
-        ratio: spread / location: small is stiff.
+        ratio: spread / location: small is stiff. None where one of them is missing.
         predicted: The largest error of a degree that rounding this input alone to
             float32 can cause, from the slopes of the terms; at most 1.
         observed: The largest change of a strength that it did cause, on the rows.
@@ -94,9 +95,9 @@ class Stiff(msgspec.Struct, frozen=True):
     """
 
     input: str
-    spread: float
+    spread: float | None
     location: float
-    ratio: float
+    ratio: float | None
     predicted: float
     observed: float
     flips: int

@@ -85,13 +85,14 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
         predicted = scale.slope * scale.location * UNIT
         offset = _offset(scale)
         is_safe = max(predicted, scale.curves) <= SAFE and not (is_data and flips)
-        ratio = scale.spread / scale.location if scale.location else math.inf
+        spread = scale.spread if math.isfinite(scale.spread) else None
+        is_known = spread is not None and scale.location > 0.0
         found.append(
             Stiff(
                 name,
-                scale.spread,
+                spread,
                 scale.location,
-                ratio,
+                scale.spread / scale.location if is_known else None,
                 min(predicted, 1.0),
                 gap,
                 flips,

@@ -85,7 +85,7 @@ def _stiff_row(one: Stiff) -> tuple[str, ...]:
     flips = f"{one.flips} of {one.rows}"
     return (
         one.input,
-        f"{one.ratio:.1e}",
+        "-" if one.ratio is None else f"{one.ratio:.1e}",
         f"{one.predicted:.1e}",
         f"{one.observed:.1e}",
         flips,

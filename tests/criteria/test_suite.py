@@ -173,6 +173,15 @@ def test_what_rounding_costs_is_never_above_what_was_predicted() -> None:
             assert one.observed <= one.predicted or one.flips
 
 
+def test_an_input_whose_terms_only_step_has_no_spread() -> None:
+    rules = one_rule(Term("step", Band(high=1.0)))
+    (found,) = stiffness(rules, np.array([[0.5, 1.0, 1.5]]), is_data=True)
+    assert (found.spread, found.ratio) == (None, None)
+    assert found.advice == "float32 is safe"
+    study = examine(rules, runtimes=FAST, formats=(), only=["N3"])
+    jsonschema.validate(json.loads(study.to_json()), json.loads(generate()))
+
+
 def test_a_distance_at_which_doubles_are_too_coarse_is_told() -> None:
     values = 1e14 + np.arange(4.0)[np.newaxis]
     (found,) = stiffness(far_away(1e14), values, is_data=True)
