@@ -82,7 +82,7 @@ def _step(scale: Scale, ratio: float) -> float:
     """Return what takes the middle of an input to its spread over a ratio."""
     if not np.isfinite(scale.spread):
         return 0.0
-    return scale.spread / ratio - 0.5 * (scale.low + scale.high)
+    return scale.spread / ratio - (0.5 * scale.low + 0.5 * scale.high)
 
 
 def _observed(

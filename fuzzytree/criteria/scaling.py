@@ -57,13 +57,18 @@ def scaling(
     cases = 0
     for one in ready(model, runtimes, skipped):
         low, high = exponent_range(one.model, one.runtime.dtype)
+        if low > high:
+            skipped.append(f"{one.title}: its numbers span more than the type does")
+            continue
         key = (one.carrier, one.runtime.dtype)
         usable[key] = Usable(one.carrier, one.runtime.dtype, low, high)
         ks = [k for k in _STEPS if low < k < high]
         # An engine of others divides and multiplies in between as it likes.
         ks += [] if one.runtime.bound is not None else [low, high]
         plans = [dict.fromkeys(model.inputs, k) for k in ks]
-        plans.append(_apart(model.inputs, max(low, -60), min(high, 60), seed=0))
+        middle = min(max(0, low), high)
+        least, most = max(low, middle - 60), min(high, middle + 60)
+        plans.append(_apart(model.inputs, least, most, seed=0))
         for plan in plans:
             count, fault = _tried(one, plan, values, skipped)
             cases += count

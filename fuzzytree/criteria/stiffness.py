@@ -76,7 +76,8 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
     for line, name in enumerate(model.inputs):
         scale = scales[name]
         changed = near.copy()
-        changed[line] = near[line].astype(np.float32)
+        with np.errstate(over="ignore"):  # beyond float32 is missing
+            changed[line] = near[line].astype(np.float32)
         gap, flips = 0.0, 0
         for form, before in zip(rule_bases, exact, strict=True):
             after = decide(form, changed)
@@ -195,7 +196,7 @@ def _near(model: Model, values: FloatArray, scales: dict[str, Scale]) -> FloatAr
     for line, name in enumerate(model.inputs):
         scale = scales[name]
         reach = (scale.high - scale.low) or scale.location or 1.0
-        with np.errstate(invalid="ignore"):
+        with np.errstate(all="ignore"):
             inside &= values[line] >= scale.low - reach
             inside &= values[line] <= scale.high + reach
     return values[:, inside]
@@ -213,10 +214,10 @@ def _gap(before: Decided, after: Decided) -> float:
 def _offset(scale: Scale) -> float | None:
     """Return a short value within the range whose subtraction keeps more digits."""
     span = scale.high - scale.low
-    if span <= 0.0 or scale.location < _OFFSET_HELPS * span:
+    if not 0.0 < span < math.inf or scale.location < _OFFSET_HELPS * span:
         return None
     unit = 2.0 ** math.floor(math.log2(span))
-    return round(0.5 * (scale.low + scale.high) / unit) * unit
+    return round((0.5 * scale.low + 0.5 * scale.high) / unit) * unit
 
 
 def _advice(

@@ -22,7 +22,17 @@ from fuzzytree.criteria.suite import examine
 from fuzzytree.exporters import all_formats
 from fuzzytree.learning.sums import totals_of
 from fuzzytree.learning.windows import window_counts as counted
-from fuzzytree.rulebase import Band, Flank, Points, RuleBase, Semantics, Term
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Flank,
+    Points,
+    RuleBase,
+    Semantics,
+    Shape,
+    Side,
+    Term,
+)
 from fuzzytree.runtimes import all_runtimes, find_runtime
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree
@@ -105,6 +115,24 @@ def test_a_model_without_inputs_can_be_examined() -> None:
 
     rules = RuleBase("always", ("yes",), (), (Rule((), "yes"),))
     assert failures(examine(rules, runtimes=FAST, formats=all_formats())) == []
+
+
+EXTREME: dict[str, Shape] = {
+    "a subnormal width": Band(high=5e-324, right=Flank(5e-324, 1e-323)),
+    "a huge width": Band(high=1e308, right=Flank(1e308, 1.7e308)),
+    "a huge mean": LR(1e308, Side(1e300, (1.0,)), Side(1.0, (1.0,))),
+    "a wide reach": LR(0.0, Side(1.0, (1.0,), 1e300), Side(1.0, (1.0,), 1.0 + 2e-16)),
+    "points all over": Points((1e-320, 2e-320, 2e-320, 1e300), (0.0, 1.0, 0.5, 0.25)),
+    "everything": Band(),
+}
+
+
+@pytest.mark.parametrize("name", EXTREME)
+def test_numbers_at_the_ends_of_double_can_be_examined(name: str) -> None:
+    model = one_rule(Term("t", EXTREME[name]))
+    found = examine(model, runtimes=FAST, formats=all_formats())
+    assert failures(found) == []
+    jsonschema.validate(json.loads(found.to_json()), json.loads(generate()))
 
 
 def test_only_what_was_asked_for_is_applied() -> None:
