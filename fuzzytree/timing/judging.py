@@ -20,6 +20,7 @@ from fuzzytree.probing import probes
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.timing.clock import Clock
 from fuzzytree.timing.records import Candidate, Error, Found, Loaded, Question
+from fuzzytree.timing.rows import repeated
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -31,6 +32,7 @@ MOST_PROBES = 500
 """Rows aimed at edges; nearly each of them costs the oracle rational arithmetic."""
 
 _PATIENCE_NS = 3e8  # for the answers of one candidate to one set of rows
+_BATCH = 1 << 15  # rows in which a call's own cost no longer counts
 _MOST_STRENGTHS = 2_000_000
 
 
@@ -96,9 +98,8 @@ class Judge:
 
     def _row_ns(self, loaded: Loaded, row_ns: float) -> float:
         """Return what a row takes in a batch as large as there is patience for."""
-        most = max(int(_PATIENCE_NS // row_ns), 1)
-        values = np.ascontiguousarray(self.values[:, :most])
-        call, count = loaded.call(values), int(values.shape[1])
+        count = max(min(int(_PATIENCE_NS // row_ns), _BATCH), 1)
+        call = loaded.call(repeated(self.values, count))
         start = self.clock.wall()
         call()
         return min(row_ns, max(self.clock.wall() - start, 1) / count)

@@ -424,7 +424,8 @@ def fitting(
     """Return whose warm-up and first samples fit the time.
 
     What all others are compared with comes first, then ours, then the others, the
-    faster ones before the slower ones. Nobody may take more than a tenth of the time.
+    faster ones before the slower ones. None of these may take more than a tenth of
+    the time.
 
     Args:
         costs: What one call of each is likely to cost.
@@ -438,10 +439,11 @@ def fitting(
         ['fast', 'native']
     """
     kept: set[str] = set()
-    most = left * _SHARE
+    whole = left
     for name in sorted(costs, key=lambda one: (ranks[one], costs[one])):
         needed = (1 + samples) * costs[name]
-        if needed <= most and needed <= left:
+        most = whole * _SHARE if ranks[name] else left
+        if needed <= min(most, left):
             kept.add(name)
             left -= needed
     return kept

@@ -264,7 +264,12 @@ def test_what_others_are_compared_with_comes_first() -> None:
     costs = {"native": 3.0, "ours": 1.0, "peer": 1.0, "other": 1.0}
     ranks = {"native": 0, "ours": 1, "peer": 2, "other": 2}
     assert fitting(costs, ranks, 210.0, 6) == {"native", "ours", "peer", "other"}
-    assert fitting(costs, ranks, 209.0, 6) == {"ours", "peer", "other"}  # a tenth each
+    assert fitting(costs, ranks, 41.0, 6) == {"native"}
+    assert fitting(costs, dict.fromkeys(costs, 1), 209.0, 6) == {
+        "ours",
+        "peer",
+        "other",
+    }
     many = {f"peer {k}": 2.0 for k in range(20)}
     ranks = dict.fromkeys(many, 2) | {"native": 0}
     kept = fitting(many | {"native": 2.0}, ranks, 140.0, 6)
