@@ -308,11 +308,10 @@ def _all_flanks(
 def _values_beyond(
     start: float, places: FloatArray, unit: _Unit, sign: int
 ) -> FloatArray:
-    """Return places as values, at least one float away from a start."""
+    """Return places as values, at least one float beyond a start."""
+    next_to = math.nextafter(start, sign * math.inf)
     values = [unit.value(place) for place in places.tolist()]
-    return np.array(
-        [v if v != start else math.nextafter(start, sign * math.inf) for v in values]
-    )
+    return np.array([v if sign * (v - start) > 0 else next_to for v in values])
 
 
 def _sampled_ratios(

@@ -182,10 +182,11 @@ def smoothed_cuts(
     if not step > 0:
         middle = float(np.median(values))
         return Cuts(np.array([middle]), np.array([0, 1]))
-    place = np.clip((values - low) / step, 0, _GRID - 1).astype(np.int64)
+    with np.errstate(over="ignore"):  # so far away lies in the last place anyway
+        place = np.clip((values - low) / step, 0, _GRID - 1).astype(np.int64)
     signed = np.where(is_right, weights, -weights)
     counted: FloatArray = np.bincount(place, signed, _GRID).astype(np.float64)
-    balance = _smoothed(counted, _bandwidth(sides) / step)
+    balance = _smoothed(counted, min(_bandwidth(sides), _GRID * step) / step)
     gain = np.concatenate([[0.0], np.cumsum(balance)])
     edges: FloatArray = low + step * np.arange(_GRID + 1, dtype=np.float64)
     rising = _best_place(-gain)

@@ -66,7 +66,8 @@ class FittedSets:
 
     def degrees(self, chosen: IntArray, points: FloatArray) -> FloatArray:
         """Return the degree of some sets at each point, shape (chosen, points)."""
-        u = (points - self.means[chosen, None]) / self.spreads[chosen, None]
+        with np.errstate(over="ignore"):  # so far away is beyond the reach anyway
+            u = (points - self.means[chosen, None]) / self.spreads[chosen, None]
         below = _side(-u, self.left[chosen])
         return np.minimum(below, _side(u, self.right[chosen]))
 

@@ -99,6 +99,12 @@ class Totals:
             ]
         )
 
+    @property
+    def exponent(self) -> int:
+        """An exponent e so that no mean and no spread is above 2^e."""
+        bits = max((square.bit_length() for square in self.squares), default=0)
+        return self.unit + bits // 2 + 1
+
     def variance(self, group: int) -> int:
         """Return `n Q - S^2` of a group, in units of `2**(2 unit)`; never negative."""
         total = self.sums[group]

@@ -72,7 +72,9 @@ def _steps(
     A step is off by a few units of the last place of M / SD (mean and difference are
     rounded) and of its own; where a whole number is that near, integers decide.
     """
-    exponent = math.frexp(float(np.abs(values).max(initial=0.0)))[1]
+    exponent = max(
+        math.frexp(float(np.abs(values).max(initial=0.0)))[1], totals.exponent
+    )
     mean = totals.means(exponent=exponent)[groups]
     spread = totals.spreads(exponent)[groups]
     is_equal = np.array([totals.variance(g) == 0 for g in range(len(totals.counts))])

@@ -9,6 +9,7 @@ import itertools
 from fractions import Fraction
 from typing import Literal
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -130,6 +131,57 @@ def test_a_class_without_rows_is_named_and_never_answers(mode: Mode) -> None:
 def test_one_class_is_refused_though_its_rows_differ(mode: Mode) -> None:
     with pytest.raises(LearningError, match="cannot learn from one class"):
         learn(np.array([[1.0], [2.0]]), [0, 0], mode)
+
+
+def strange_column(rng: np.random.Generator, rows: int) -> FloatArray:
+    """Return a column that is constant, discrete, far away, wide or at the ends."""
+    columns = (
+        rng.normal(size=rows),
+        rng.integers(0, 3, rows).astype(np.float64),
+        np.exp(60 * rng.normal(size=rows)),
+        1e12 + rng.normal(size=rows),
+        np.full(rows, 0.1),
+        rng.choice([0.0, 5e-324, 1e-310, 1.0, -1e300, 1e300], rows),
+    )
+    return columns[int(rng.integers(len(columns)))]
+
+
+def assert_a_strange_table_is_learnt(seed: int) -> None:
+    """Learn a random table in two orders, without a warning, or refuse it twice."""
+    rng = np.random.default_rng(seed)
+    rows, width = int(rng.integers(2, 40)), int(rng.integers(1, 5))
+    values = np.column_stack([strange_column(rng, rows) for _ in range(width)])
+    labels, order = rng.integers(0, 4, rows), rng.permutation(rows)
+    settings = Settings(
+        mode=MODES[seed % 2], rows_per_class=[1, 3, 10, 5000][int(rng.integers(4))]
+    )
+    columns, classes = [f"x{k}" for k in range(width)], [f"c{k}" for k in range(4)]
+    found: list[bytes] = []
+    for own in (np.arange(rows), order):
+        try:
+            learnt = learn_arrays(
+                values[own],
+                labels[own],
+                columns=columns,
+                classes=classes,
+                settings=settings,
+            )
+            found.append(msgspec.json.encode(learnt))
+            assert len(labels_of(learnt.tree, values)) == rows
+        except LearningError as error:
+            found.append(str(error).encode())
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_strange_tables_are_learnt_or_refused(seed: int) -> None:
+    assert_a_strange_table_is_learnt(seed)
+
+
+@pytest.mark.heavy
+def test_many_strange_tables_are_learnt_or_refused() -> None:
+    for seed in range(100, 500):
+        assert_a_strange_table_is_learnt(seed)
 
 
 def patterns_of(values: FloatArray, labels: IntArray) -> Patterns:
