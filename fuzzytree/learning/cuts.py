@@ -340,8 +340,9 @@ def _tidy(cut: Fraction, low: float, high: float) -> float:
     # All denominators are powers of two: the largest one makes all of them whole.
     scale = max(near.denominator, ends[0].denominator, ends[1].denominator)
     place, first, last = (int(number * scale) for number in (near, *ends))
-    highest = math.frexp(max(abs(low), abs(high)))[1]
-    for exponent in range(highest, max(highest - 54, -1075), -1):
+    # Twice the ends: of a larger power of two, too, 0 is the nearest multiple.
+    highest = math.frexp(max(abs(low), abs(high)))[1] + 1
+    for exponent in range(highest, max(highest - 55, -1075), -1):
         step = scale << exponent if exponent >= 0 else scale >> -exponent
         shown = _nearest_multiple(place, max(step, 1))
         if first <= shown <= last:
