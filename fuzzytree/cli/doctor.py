@@ -26,6 +26,13 @@ EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "networkx": "networkx",
         },
         "parquet": {"pyarrow": "pyarrow"},
+        "plots": {"matplotlib": "matplotlib"},
+        "peers": {
+            "m2cgen": "m2cgen",
+            "simpful": "simpful",
+            "skl2onnx": "skl2onnx",
+            "treelite": "treelite",
+        },
     }
 )
 """The packages of each extra and their modules; a test compares it with the project."""

@@ -13,15 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.comparing import Answers, labels
-from fuzzytree.contracts import Dtype, Model, Outcome
+from fuzzytree.contracts import Dtype, Outcome
 from fuzzytree.criteria.carriers import Ready, row_text
 from fuzzytree.criteria.specials import missing_rows
-from fuzzytree.numerics.bounds import UNIT, strength_bounds
+from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import Decided, decide, strength_errors
-from fuzzytree.numerics.rounding import value_error
 from fuzzytree.rulebase import RuleBase
-from fuzzytree.runtimes.axes import axis_lines, plan_axes
-from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -73,7 +70,7 @@ def observed(one: Ready, values: FloatArray, exact: Decided | None = None) -> Ob
     if isinstance(one.model, RuleBase):
         excused = truth.margin <= 2.0 * allowed
     else:
-        excused = near_cut(one.model, values, dtype)
+        excused = open_paths(one.model, dtype, values)
     wrong = flips & ~excused
     low = np.zeros(values.shape[1])
     if found.strengths is not None and isinstance(one.model, RuleBase):
@@ -105,27 +102,6 @@ def allowed_errors(one: Ready, values: FloatArray) -> FloatArray:
     if own is not None:
         allowed = np.minimum(allowed + own(one.model)[0], 1.0)
     return allowed
-
-
-def near_cut(tree: Model, values: FloatArray, dtype: Dtype) -> BoolArray:
-    """Return the rows in which rounding can put a value on another side of a cut."""
-    near = np.zeros(values.shape[1], np.bool_)
-    if not isinstance(tree, FuzzyTree):
-        return near
-    plan = plan_axes(tree.variables)
-    variables = {variable.name: variable for variable in tree.variables}
-    named = dict(zip(tree.inputs, zip(values, values, strict=True), strict=True))
-    unit = UNIT if dtype == "float32" else 0.0  # a cut is rounded in float32
-    with np.errstate(all="ignore"):
-        lines = axis_lines(plan, values)
-        for node in tree.nodes:
-            slack = value_error(variables[node.variable], dtype, named)
-            if slack is None:
-                continue  # nothing is rounded before the comparison
-            for cut in node.cuts:
-                reach = 2.0 * slack + 2.0 * unit * abs(cut)
-                near |= np.abs(lines[plan.line[node.variable]] - cut) <= reach
-    return near
 
 
 def _fault(

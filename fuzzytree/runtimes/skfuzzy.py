@@ -145,7 +145,13 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
         points = _universe(list(shapes.values()))
         antecedents[name] = control.Antecedent(points, name)
         for term, shape in shapes.items():
-            antecedents[name][term] = samples(shape, points)
+            degrees = samples(shape, points)
+            if _is_too_steep(points, degrees):
+                raise LossError(
+                    f"cannot run {rules.name} as scikit-fuzzy: term {term!r} of "
+                    f"{name!r} is too narrow for the slope of a line in double"
+                )
+            antecedents[name][term] = degrees
     answer = control.Consequent(np.arange(len(rules.classes) + 1.0), "class")
     for number, label in enumerate(rules.classes):
         answer[label] = (answer.universe == number).astype(np.float64)
@@ -156,6 +162,16 @@ def _build(rules: RuleBase) -> tuple[dict[str, Any], list[Any]]:
         then = answer[rule.then]
         fired.append(control.Rule(condition, then, str(number), conjunction, np.fmax))
     return antecedents, fired
+
+
+def _is_too_steep(points: FloatArray, degrees: FloatArray) -> bool:
+    """Return whether a line's slope overflows where there are values to be asked."""
+    import numpy as np
+
+    with np.errstate(over="ignore"):
+        slopes = np.diff(degrees) / np.diff(points)
+    is_step = np.nextafter(points[:-1], np.inf) == points[1:]
+    return bool((np.isinf(slopes) & ~is_step).any())
 
 
 def _condition(antecedent: Any, clause: Clause) -> Any:

@@ -108,3 +108,24 @@ def test_a_second_run_forgets_the_first() -> None:
     again = run(values)
     assert first.strengths is not None
     np.testing.assert_array_equal(first.strengths, again.strengths)
+
+
+def _falling(width: float) -> RuleBase:
+    low = Term("low", Band(high=0.0, right=Flank(0.0, width)))
+    rule = Rule((Clause("x", ("low",)),), "a")
+    return RuleBase("r", ("a",), (Variable("x", (low,)),), (rule,))
+
+
+def test_a_width_whose_slope_overflows_is_refused() -> None:
+    with pytest.raises(LossError) as caught:
+        load(_falling(1e-310))
+    assert str(caught.value) == (
+        "cannot run r as scikit-fuzzy: term 'low' of 'x' is too narrow for the slope "
+        "of a line in double"
+    )
+
+
+def test_a_width_whose_slope_just_fits_has_finite_strengths() -> None:
+    found = load(_falling(1e-307))(np.array([[0.0, 0.5e-307, 1e-307]]))
+    assert found.strengths is not None
+    assert np.isfinite(found.strengths).all()
