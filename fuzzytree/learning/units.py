@@ -45,12 +45,6 @@ class Units:
         moved[:, ~self.is_sound] = 0.0
         return moved
 
-    def back(self, feature: int, points: FloatArray) -> FloatArray:
-        """Return points of one column in the table's unit, rounded to floats."""
-        exponent = int(self.exponents[feature])
-        back: FloatArray = self.origins[feature] + np.ldexp(points, exponent)
-        return back
-
 
 def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> Units:
     """Return the units of a table.
@@ -64,8 +58,10 @@ def units_of(rows: FloatArray, lows: FloatArray, highs: FloatArray) -> Units:
     Example:
         >>> rows = np.array([[10.0], [11.0], [14.0]])
         >>> units = units_of(rows, np.array([10.0]), np.array([14.0]))
-        >>> units.moved(rows).tolist(), units.back(0, np.array([0.5])).tolist()
-        ([[-0.125], [0.0], [0.375]], [15.0])
+        >>> units.origins.tolist(), units.exponents.tolist()
+        ([11.0], [3])
+        >>> units.moved(rows).tolist()
+        [[-0.125], [0.0], [0.375]]
     """
     middle = (len(rows) - 1) // 2
     origins = np.partition(rows, middle, axis=0)[middle]
