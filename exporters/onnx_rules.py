@@ -26,7 +26,16 @@ from fuzzytree.exporters.onnx_graph import Sheet, Table
 from fuzzytree.exporters.onnx_lines import Polyline, is_chained, polylines
 from fuzzytree.exporters.onnx_numbers import Numbers
 from fuzzytree.numerics.narrowing import RealArray, rounded
-from fuzzytree.rulebase import LR, Clause, Flank, Points, RuleBase, Shape, Side
+from fuzzytree.rulebase import (
+    LR,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    shapes_of,
+)
 
 Key = tuple[str, str]  # variable and term
 Curve = tuple[float, ...]
@@ -119,7 +128,7 @@ def _degrees(
     Returns:
         The rows whose AND is the strength of no rule, of the first rule, and so on.
     """
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = shapes_of(rules.variables)
     clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
     used = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
     parts = {key: _parts(key[0], shapes[key]) for key in used}

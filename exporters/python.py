@@ -28,6 +28,7 @@ from fuzzytree.rulebase import (
     Variable,
     fingerprint,
     sentence,
+    shapes_of,
 )
 from fuzzytree.tree import FuzzyTree, Node, intervals
 
@@ -290,7 +291,7 @@ def _node(tree: FuzzyTree, node: Node, line: dict[str, int]) -> str:
 
 
 def _rule_tables(rules: RuleBase, line: dict[str, int]) -> Iterator[str]:
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = shapes_of(rules.variables)
     clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
     keys = list(dict.fromkeys((c.variable, term) for c in clauses for term in c.terms))
     term = {key: number for number, key in enumerate(keys)}

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.reference import Status, axis_values, clause_degree, evaluate
-from fuzzytree.rulebase import RuleBase, Semantics, Shape, clause_text
+from fuzzytree.rulebase import RuleBase, Semantics, Shape, clause_text, shapes_of
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray, Outcome
@@ -196,7 +196,7 @@ def reasons(rules: RuleBase, values: FloatArray, answers: Answers) -> list[str]:
         >>> reasons(rules, np.array([[2.0]]), found)
         ['IF force is low (0.5) THEN soft']
     """
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = shapes_of(rules.variables)
     found = zip(
         values.T.tolist(), answers.rule.tolist(), answers.status.tolist(), strict=True
     )

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 from msgspec.structs import replace
 
 from fuzzytree.reference import clause_degree
-from fuzzytree.rulebase import Clause, RuleBase, Variable
+from fuzzytree.rulebase import Clause, RuleBase, Variable, shapes_of
 from fuzzytree.tree import FuzzyTree, Node
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def node_faults(tree: FuzzyTree) -> Iterator[str]:
     1 and every other branch less. With `fuzzytree.lowering`'s argument this proves
     that the relative rules equal the tree on every input.
     """
-    shapes = {(v.name, t.name): t.shape for v in tree.variables for t in v.terms}
+    shapes = shapes_of(tree.variables)
     for number, node in enumerate(tree.nodes, 1):
         clauses = [Clause(node.variable, branch.terms) for branch in node.branches]
         for point in node_points(node):

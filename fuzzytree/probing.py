@@ -16,7 +16,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import axis_values
-from fuzzytree.rulebase import LR, Band, Clause, Points, Rule, RuleBase, Shape, Variable
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Shape,
+    Variable,
+    shapes_of,
+)
 from fuzzytree.tree import FuzzyTree
 
 SPECIAL = (
@@ -123,9 +133,7 @@ class _Maker:
 
     def __init__(self, rules: RuleBase, chance: random.Random) -> None:
         self.chance = chance
-        self.shapes = {
-            (v.name, t.name): t.shape for v in rules.variables for t in v.terms
-        }
+        self.shapes = shapes_of(rules.variables)
         self.variables = {v.name: v for v in rules.variables}
         self.ranges = _ranges(rules)
 

@@ -42,6 +42,7 @@ from fuzzytree.rulebase import (
     Value,
     Variable,
     clause_text,
+    shapes_of,
 )
 from fuzzytree.tree import Branch, FuzzyTree, Sets
 
@@ -388,11 +389,6 @@ def _pruned_sets(
 
 
 # --- where clauses hold
-
-
-def shapes_of(variables: Iterable[Variable]) -> dict[tuple[str, str], Shape]:
-    """Return the shape of each term, by variable and name."""
-    return {(v.name, t.name): t.shape for v in variables for t in v.terms}
 
 
 def always_holds(clause: Clause, shapes: Mapping[tuple[str, str], Shape]) -> bool:

@@ -24,6 +24,7 @@ from fuzzytree.rulebase import (
     Shape,
     Side,
     Variable,
+    shapes_of,
 )
 from fuzzytree.tree import FuzzyTree
 
@@ -84,7 +85,7 @@ def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
     if not all(map(math.isfinite, axes.values())):
         missing = (math.nan,) * len(rules.rules)
         return Answer(0, rules.semantics.missing, Status.MISSING, missing)
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = shapes_of(rules.variables)
     # The rules of a tree share their clauses: each is evaluated once.
     clauses = {id(clause): clause for rule in rules.rules for clause in rule.when}
     degrees = {

@@ -274,6 +274,11 @@ def clause_text(clause: Clause) -> str:
     return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
 
 
+def shapes_of(variables: Iterable[Variable]) -> dict[tuple[str, str], Shape]:
+    """Return the shape of each term, by variable and name."""
+    return {(v.name, t.name): t.shape for v in variables for t in v.terms}
+
+
 def fingerprint(value: msgspec.Struct) -> str:
     """Return the SHA-256 of a model's content, as 64 hexadecimal digits.
 

@@ -24,6 +24,7 @@ from fuzzytree.rulebase import (
     Variable,
     clause_mistakes,
     naming_mistakes,
+    shapes_of,
     term_names,
     variable_mistakes,
 )
@@ -313,7 +314,7 @@ def intervals(node: Node) -> tuple[tuple[float | None, float | None], ...]:
 
 def _plateau_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
     """Compare each branch's plateaus with its intervals: this makes rules = tree."""
-    shapes = {(v.name, t.name): t.shape for v in tree.variables for t in v.terms}
+    shapes = shapes_of(tree.variables)
     for number, node in enumerate(tree.nodes, 1):
         owned: list[list[tuple[float | None, float | None]]]
         owned = [[] for _ in node.branches]

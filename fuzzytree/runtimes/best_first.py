@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Outcome, Run
-from fuzzytree.rulebase import LR, Band, Clause, Points, RuleBase, Shape
+from fuzzytree.rulebase import LR, Band, Clause, Points, RuleBase, Shape, shapes_of
 from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
 from fuzzytree.runtimes.descent import Split, plan_descent
 from fuzzytree.runtimes.envelope import (
@@ -220,7 +220,7 @@ def _splits(
     rules: RuleBase, forks: Sequence[Fork], line: dict[str, int]
 ) -> list[Split] | None:
     """Return the forks as splits if the plateaus of each divide its axis, or None."""
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = shapes_of(rules.variables)
     inner = [number for number, fork in enumerate(forks) if fork.clauses]
     place = {number: position for position, number in enumerate(inner)}
     splits: list[Split] = []

@@ -43,6 +43,7 @@ from fuzzytree.rulebase import (
     RuleBase,
     Shape,
     Side,
+    shapes_of,
 )
 from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS
 from fuzzytree.runtimes.polylines import halved, join
@@ -164,7 +165,7 @@ def plan_envelope(
         clauses: Distinct clauses. A clause without terms is always true.
         at_line: The line of each variable's values.
     """
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = shapes_of(rules.variables)
     always = Band(None, None)
     of_clause = [
         list(dict.fromkeys(shapes[c.variable, term] for term in c.terms)) or [always]

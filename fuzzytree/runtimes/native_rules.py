@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.contracts import Dtype, Outcome, Run
-from fuzzytree.rulebase import Clause, RuleBase
+from fuzzytree.rulebase import Clause, RuleBase, shapes_of
 from fuzzytree.runtimes.axes import Axes, axis_lines, missing_rows, plan_axes
 from fuzzytree.runtimes.degrees import (
     NUMBERS,
@@ -179,7 +179,7 @@ def plan_degrees(
         numbers: The types.
         rows: How many rows go through together.
     """
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    shapes = shapes_of(rules.variables)
     keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
     atoms = {key: atoms_of(at_line[key[0]], shapes[key]) for key in keys}
     wanted = dict.fromkeys(atom for key in keys for atom in atoms[key])
