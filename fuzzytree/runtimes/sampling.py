@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.probing import landmarks
-from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.rulebase import LR, Band, Flank, Points, RuleBase, Shape, Side, shapes_of
 from fuzzytree.runtimes.degrees import shape_degrees
 
 FloatArray = npt.NDArray[np.float64]
@@ -25,6 +25,14 @@ HIGHEST = 1.0 - 2.0**-50
 """The highest sample off a plateau: joined by lines, such samples stay below 1."""
 
 _ROUNDING = 2.0**-40  # relative to a curve's coefficients; covers far more than it must
+
+
+def asked_shapes(rules: RuleBase) -> dict[tuple[str, str], Shape]:
+    """Return the shapes that clauses name, in the order of the rules."""
+    shapes = shapes_of(rules.variables)
+    clauses = (clause for rule in rules.rules for clause in rule.when)
+    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    return {key: shapes[key] for key in keys}
 
 
 def universe(shapes: Sequence[Shape], points: int) -> FloatArray:
@@ -75,6 +83,26 @@ def line_error(shape: Shape, values: FloatArray) -> float:
         case Points():
             errors = [_ROUNDING]
     return max(errors, default=0.0)
+
+
+def lines_bound(
+    rules: RuleBase, errors: Mapping[tuple[str, str], float]
+) -> tuple[float, str]:
+    """Return how far strengths can be from those of the terms themselves, and why.
+
+    The minimum passes on the largest error of a clause; a product adds them up.
+
+    Args:
+        rules: The rule base.
+        errors: The `line_error` of each term that a clause names.
+    """
+    is_product = rules.semantics.conjunction == "product"
+    worst = 0.0
+    for rule in rules.rules:
+        clauses = [max(errors[c.variable, term] for term in c.terms) for c in rule.when]
+        worst = max(worst, sum(clauses) if is_product else max(clauses, default=0.0))
+    how = "summed" if is_product else "largest"
+    return min(worst, 1.0), f"{how} error of lines between the points of the terms"
 
 
 def _marks(shape: Shape) -> tuple[float, ...]:

@@ -112,14 +112,12 @@ def _carried(model: Model) -> RuleBase:
 
 
 def _asked(rules: RuleBase) -> dict[str, dict[str, Shape]]:
-    """Return the shapes that clauses name, by variable and term."""
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    """Return the shapes that clauses name: those of each variable, by term."""
+    from fuzzytree.runtimes.sampling import asked_shapes
+
     found: dict[str, dict[str, Shape]] = {}
-    for rule in rules.rules:
-        for clause in rule.when:
-            for term in clause.terms:
-                known = found.setdefault(clause.variable, {})
-                known[term] = shapes[clause.variable, term]
+    for (variable, term), shape in asked_shapes(rules).items():
+        found.setdefault(variable, {})[term] = shape
     return found
 
 
@@ -188,11 +186,8 @@ def _either(terms: list[Any]) -> Any:
 
 
 def bound(model: Model) -> tuple[float, str]:
-    """Return how far strengths may be from the reference's, and why.
-
-    The minimum passes on the largest error of a degree; a product adds them up.
-    """
-    from fuzzytree.runtimes.sampling import line_error
+    """Return how far strengths may be from the reference's, and why."""
+    from fuzzytree.runtimes.sampling import line_error, lines_bound
 
     rules = _carried(model)
     errors: dict[tuple[str, str], float] = {}
@@ -200,13 +195,7 @@ def bound(model: Model) -> tuple[float, str]:
         points = _universe(list(shapes.values()))
         for term, shape in shapes.items():
             errors[name, term] = line_error(shape, points)
-    worst = 0.0
-    for rule in rules.rules:
-        clauses = [max(errors[c.variable, term] for term in c.terms) for c in rule.when]
-        is_product = rules.semantics.conjunction == "product"
-        worst = max(worst, sum(clauses) if is_product else max(clauses))
-    how = "summed" if rules.semantics.conjunction == "product" else "largest"
-    return min(worst, 1.0), f"{how} error of lines between the points of the terms"
+    return lines_bound(rules, errors)
 
 
 RUNTIMES = (

@@ -37,6 +37,7 @@ from fuzzytree.runtimes.axes import axis_lines, plan_axes
 from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.runtimes.native import load as load_native
 from fuzzytree.runtimes.reference import RUNTIMES as REFERENCE
+from fuzzytree.runtimes.sampling import lines_bound
 from fuzzytree.testing import probes, random_tree, with_points
 from fuzzytree.timing.candidates import found_of, questions
 from fuzzytree.timing.peers import TREE_PEERS, engines, peers
@@ -359,7 +360,8 @@ def test_an_engine_keeps_the_certified_bound_of_its_lines(
     assert found.strengths is not None
     assert want.strengths is not None
     points = engines.FINE if engine == "pyfuzzylite" else engines.COARSE
-    bound, _ = engines.lines_bound(rules, engines.asked_terms(rules, points))
+    terms = engines.asked_terms(rules, points)
+    bound, _ = lines_bound(rules, {key: one.error for key, one in terms.items()})
     missing = np.isnan(want.strengths[0])
     assert np.array_equal(np.isnan(found.strengths[0]), missing)
     differences = np.abs(found.strengths - want.strengths)[:, ~missing]

@@ -16,6 +16,7 @@ import msgspec
 
 from fuzzytree.contracts import Model
 from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes.sampling import lines_bound
 from fuzzytree.timing.candidates import Bound, Bounds, questions, title
 from fuzzytree.timing.peers import engines, evaluator, trees
 from fuzzytree.timing.records import Candidate, Loaded, Omission, Question
@@ -221,7 +222,8 @@ def _lines(
     """Return the certified bound of an engine that joins points by lines."""
     if is_rowwise and engines.is_steep(terms):
         return None
-    more, origin = engines.lines_bound(rules, terms)
+    errors = {key: one.error for key, one in terms.items()}
+    more, origin = lines_bound(rules, errors)
     return min(certified[0] + more, 1.0), f"{certified[1]}, and {origin}"
 
 

@@ -18,8 +18,8 @@ from fuzzytree.errors import LossError
 from fuzzytree.rulebase import Clause, Rule, RuleBase, Shape
 from fuzzytree.runtimes.axes import plan_axes
 from fuzzytree.runtimes.rows import checked, winners
-from fuzzytree.runtimes.sampling import line_error, samples, universe
-from fuzzytree.timing.candidates import Bound, found_of
+from fuzzytree.runtimes.sampling import asked_shapes, line_error, samples, universe
+from fuzzytree.timing.candidates import found_of
 from fuzzytree.timing.peers.crisp import lines_of
 from fuzzytree.timing.records import Found, Loaded
 
@@ -76,34 +76,15 @@ Terms = Mapping[tuple[str, str], Knots]
 
 def names_of(rules: RuleBase) -> dict[tuple[str, str], tuple[str, str]]:
     """Return plain words for variables and terms that clauses ask: v1 and t1 ..."""
-    words: dict[tuple[str, str], tuple[str, str]] = {}
     variables = {v.name: f"v{n}" for n, v in enumerate(rules.variables, 1)}
-    for rule in rules.rules:
-        for clause in rule.when:
-            for term in clause.terms:
-                key = (clause.variable, term)
-                words.setdefault(key, (variables[key[0]], f"t{len(words) + 1}"))
-    return words
+    asked = enumerate(asked_shapes(rules), 1)
+    return {key: (variables[key[0]], f"t{number}") for number, key in asked}
 
 
 def asked_terms(rules: RuleBase, points: int) -> dict[tuple[str, str], Knots]:
     """Return the points of every term that a clause names."""
-    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
-    return {key: knots(shapes[key], points) for key in names_of(rules)}
-
-
-def lines_bound(rules: RuleBase, terms: Terms) -> Bound:
-    """Return how far strengths can be from those of the terms themselves, and why.
-
-    The minimum passes on the largest error of a clause; a product adds them up.
-    """
-    is_product = rules.semantics.conjunction == "product"
-    worst = 0.0
-    for rule in rules.rules:
-        clauses = [max(terms[c.variable, t].error for t in c.terms) for c in rule.when]
-        worst = max(worst, sum(clauses) if is_product else max(clauses, default=0.0))
-    how = "summed" if is_product else "largest"
-    return min(worst, 1.0), f"{how} error of lines between the points of the terms"
+    shapes = asked_shapes(rules).items()
+    return {key: knots(shape, points) for key, shape in shapes}
 
 
 def is_steep(terms: Terms) -> bool:
