@@ -21,11 +21,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import fuzzytree as ft
-from fuzzytree.needs import carriers
-from fuzzytree.pruning import Use, pruned
+from fuzzytree.lowering import forms
+from fuzzytree.pruning import pruned
 from fuzzytree.savings import ALL_COLUMNS, PRUNED, Cost, File, costs, sizes, stages
 from fuzzytree.timing.clock import times_faster
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.tree import FuzzyTree, Use
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "needs.md"
@@ -233,7 +233,7 @@ def memory() -> Iterator[str]:
         for tree in (wine(), digits()):
             made = stages(tree, pruned(tree).model)
             for stage in (ALL_COLUMNS, PRUNED):
-                for name, model in carriers(made[stage], ("tree", "relative")).items():
+                for name, model in forms(made[stage], ("tree", "relative")).items():
                     path = Path(folder) / "model.onnx"
                     ft.save(model, path)
                     peak = answering_peak(path, len(model.inputs), folder)

@@ -29,15 +29,15 @@ from fuzzytree.comparing import (
 )
 from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
 from fuzzytree.errors import FuzzyTreeError, LossError
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.lowering import forms, rules_from_tree
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide
 from fuzzytree.probing import probes
-from fuzzytree.pruning import Use, proof_faults, pruned
+from fuzzytree.pruning import proof_faults, pruned
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import Kind, RuleBase, fingerprint
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.tree import FuzzyTree, Use
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -139,15 +139,7 @@ def _native(title: str, model: Model, rows: Rows) -> Answers:
 
 def _carriers(model: Model, rows: Rows) -> tuple[Answers, ...]:
     """Return what can be made of a model, each with the native runtime's answers."""
-    if isinstance(model, RuleBase):
-        return (_native("rules", model, rows),)
-    made = [
-        _native("tree", model, rows),
-        _native("relative rules", rules_from_tree(model), rows),
-    ]
-    if model.sets:
-        made.append(_native("raw rules", rules_from_tree(model, "raw"), rows))
-    return tuple(made)
+    return tuple(_native(title, form, rows) for title, form in forms(model).items())
 
 
 def _equivalence(

@@ -10,6 +10,9 @@ strength 1, wins alone.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
     Clause,
@@ -21,7 +24,39 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.tree import Branch, FuzzyTree
+from fuzzytree.tree import Branch, FuzzyTree, Use
+
+TITLES: Mapping[Use, str] = MappingProxyType(
+    {"tree": "tree", "relative": "relative rules", "raw": "raw rules"}
+)
+"""What people call each form of a tree."""
+
+
+def forms(
+    model: FuzzyTree | RuleBase, uses: Collection[Use] | None = None
+) -> dict[str, FuzzyTree | RuleBase]:
+    """Return what can be made of a model, by the name that people call it.
+
+    Args:
+        model: A tree or a rule base.
+        uses: Only what serves these; all that the model can serve if None.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> list(forms(random_tree(1)))
+        ['tree', 'relative rules', 'raw rules']
+    """
+    if isinstance(model, RuleBase):
+        return {"rules": model}
+    wanted = TITLES if uses is None else uses
+    made: dict[str, FuzzyTree | RuleBase] = {}
+    if "tree" in wanted:
+        made[TITLES["tree"]] = model
+    kinds: tuple[Kind, ...] = ("relative", "raw") if model.sets else ("relative",)
+    for kind in kinds:
+        if kind in wanted:
+            made[TITLES[kind]] = rules_from_tree(model, kind)
+    return made
 
 
 def rules_from_tree(

@@ -8,7 +8,7 @@ what is missing from that graph was there because of it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -23,12 +23,11 @@ from fuzzytree.contracts import Carrier, Dtype, Model, Outcome
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_contents import Contents, contents
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.lowering import forms
 from fuzzytree.probing import probes
 from fuzzytree.pruning import (
     Pruned,
     Removed,
-    Use,
     proof_faults,
     pruned,
     unguarded,
@@ -37,7 +36,6 @@ from fuzzytree.rulebase import (
     LR,
     Band,
     Clause,
-    Kind,
     Points,
     RuleBase,
     Shape,
@@ -45,17 +43,13 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.axes import axis_lines, plan_axes
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.tree import FuzzyTree, Use
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
     from fuzzytree.exporters.onnx import Output
 
 DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
-TITLES: Mapping[Use, str] = MappingProxyType(
-    {"tree": "tree", "relative": "relative rules", "raw": "raw rules"}
-)
-"""What people call each use of a tree."""
 
 
 class Because(msgspec.Struct, frozen=True):
@@ -161,31 +155,13 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
     )
 
 
-def carriers(model: Model, uses: Iterable[Use] | None = None) -> dict[str, Model]:
-    """Return what can be made of a model, by the name that people call it.
-
-    Args:
-        model: A tree or a rule base.
-        uses: Only what serves these; all that the model can serve if None.
-    """
-    if isinstance(model, RuleBase):
-        return {"rules": model}
-    wanted = set(TITLES if uses is None else uses)
-    made: dict[str, Model] = {TITLES["tree"]: model} if "tree" in wanted else {}
-    kinds: tuple[Kind, ...] = ("relative", "raw") if model.sets else ("relative",)
-    for kind in kinds:
-        if kind in wanted:
-            made[TITLES[kind]] = rules_from_tree(model, kind)
-    return made
-
-
 # --- graphs
 
 
 def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
     found: list[Graph] = []
     omissions: list[str] = []
-    for title, carrier in carriers(model).items():
+    for title, carrier in forms(model).items():
         for dtype in DTYPES:
             if title == "tree" and dtype == "mixed":
                 continue  # a path has comparisons alone: it is float64
@@ -342,7 +318,7 @@ def prove(
     Raises:
         ValueError: If a runtime is unknown, or `data` has another shape.
     """
-    whole, left = carriers(model, uses), carriers(found.model, uses)
+    whole, left = forms(model, uses), forms(found.model, uses)
     faults = [*proof_faults(model, found.model, uses=uses, rules=found.rules)]
     comparisons = [_proof(model, faults)]
     rows = _rows(model, data, limit)

@@ -23,7 +23,6 @@ import itertools
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from fractions import Fraction
-from typing import Literal
 
 import msgspec
 from msgspec.structs import replace
@@ -44,10 +43,7 @@ from fuzzytree.rulebase import (
     clause_text,
     shapes_of,
 )
-from fuzzytree.tree import Branch, FuzzyTree, Sets
-
-Use = Literal["tree", "relative", "raw"]
-"""What a tree serves: its own path, its relative rules, the paper's raw rules."""
+from fuzzytree.tree import Branch, FuzzyTree, Sets, Use
 
 USES: tuple[Use, ...] = ("tree", "relative", "raw")
 

@@ -24,9 +24,10 @@ from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_contents import contents
-from fuzzytree.needs import DTYPES, Needs, carriers, needs, prove
+from fuzzytree.lowering import forms
+from fuzzytree.needs import DTYPES, Needs, needs, prove
 from fuzzytree.probing import probes
-from fuzzytree.pruning import Pruned, Removed, Use
+from fuzzytree.pruning import Pruned, Removed
 from fuzzytree.rulebase import Variable
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
@@ -34,6 +35,7 @@ from fuzzytree.schemas.generation import of_result
 from fuzzytree.tables import batches
 from fuzzytree.timing.clock import measure
 from fuzzytree.timing.records import Timing
+from fuzzytree.tree import Use
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -227,7 +229,7 @@ def _term_count(model: Model) -> int:
 
 def _files(model: Model, uses: Collection[Use], omissions: list[str]) -> Iterator[File]:
     yaml, python = find_format("yaml"), find_format("python")
-    for title, carrier in carriers(model, uses).items():
+    for title, carrier in forms(model, uses).items():
         for form in (yaml, python):
             try:
                 written = form.write(carrier)
@@ -283,7 +285,7 @@ def costs(
     groups: dict[int, dict[_Key, Call]] = {1: {}, BATCH: {}}
     for stage, model in made.items():
         rows = _plain_rows(model, BATCH)
-        for title, carrier in carriers(model, uses).items():
+        for title, carrier in forms(model, uses).items():
             for rows_of, key, call in _calls(stage, title, carrier, rows, omissions):
                 groups[rows_of][key] = call
         if table is not None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from typing import Literal
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
@@ -28,6 +29,9 @@ from fuzzytree.rulebase import (
     term_names,
     variable_mistakes,
 )
+
+Use = Literal["tree", "relative", "raw"]
+"""What a tree serves: its own path, its relative rules, the paper's raw rules."""
 
 
 class Leaf(Value, frozen=True):

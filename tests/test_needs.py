@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from fuzzytree import savings
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.needs import COMBINATIONS, Graph, carriers, needs, prove
+from fuzzytree.lowering import forms, rules_from_tree
+from fuzzytree.needs import COMBINATIONS, Graph, needs, prove
 from fuzzytree.pruning import USES, Pruned, pruned
 from fuzzytree.report.needs import report_lines
 from fuzzytree.rulebase import Clause, Part, Rule, RuleBase, Semantics, Variable
@@ -112,10 +112,10 @@ def test_an_input_of_combinations_alone_is_guarded_by_them() -> None:
 
 def test_the_carriers_of_a_tree_are_those_it_can_serve() -> None:
     tree = random_tree(1)
-    assert list(carriers(tree)) == ["tree", "relative rules", "raw rules"]
-    assert list(carriers(pruned(tree).model)) == ["tree", "relative rules"]
-    assert list(carriers(tree, ("raw",))) == ["raw rules"]
-    assert list(carriers(rules_from_tree(tree), ("raw",))) == ["rules"]
+    assert list(forms(tree)) == ["tree", "relative rules", "raw rules"]
+    assert list(forms(pruned(tree).model)) == ["tree", "relative rules"]
+    assert list(forms(tree, ("raw",))) == ["raw rules"]
+    assert list(forms(rules_from_tree(tree), ("raw",))) == ["rules"]
 
 
 # --- the proof

@@ -20,7 +20,7 @@ from fuzzytree.cli.talk import (
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, Model
-    from fuzzytree.pruning import Use
+    from fuzzytree.tree import Use
 
 
 @click.command("needs", short_help="Tell what a model needs, and leave out the rest.")

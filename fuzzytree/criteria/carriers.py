@@ -12,9 +12,8 @@ import numpy.typing as npt
 
 from fuzzytree.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.errors import LossError
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.lowering import forms
 from fuzzytree.probing import probes
-from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import is_installed
 from fuzzytree.tree import FuzzyTree
 
@@ -55,19 +54,6 @@ class Ready(msgspec.Struct, frozen=True):
         return values[:, :: -(-rows // _SLOW_ROWS)]
 
 
-def forms(model: Model) -> tuple[tuple[str, Model], ...]:
-    """Return the forms of a model: a tree with its rules, or the rules as they are."""
-    if isinstance(model, RuleBase):
-        return (("rules", model),)
-    made: list[tuple[str, Model]] = [
-        ("tree", model),
-        ("relative rules", rules_from_tree(model)),
-    ]
-    if model.sets:
-        made.append(("raw rules", rules_from_tree(model, "raw")))
-    return tuple(made)
-
-
 def ready(
     model: Model, runtimes: Sequence[Runtime], skipped: list[str]
 ) -> Iterator[Ready]:
@@ -78,7 +64,7 @@ def ready(
         runtimes: The runtimes.
         skipped: Gets a sentence for each that is not installed or cannot.
     """
-    for carrier, form in forms(model):
+    for carrier, form in forms(model).items():
         for runtime in runtimes:
             found = made_ready(carrier, form, runtime, skipped)
             if found is not None:

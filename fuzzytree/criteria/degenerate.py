@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Model, Outcome, Runtime
-from fuzzytree.criteria.carriers import Ready, forms, made_ready, ready, unequal
+from fuzzytree.criteria.carriers import Ready, made_ready, ready, unequal
 from fuzzytree.criteria.results import Criterion, judged
 from fuzzytree.criteria.terms import asked, collapsed, held
 from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.lowering import forms
 from fuzzytree.rulebase import LR, Band, Points, RuleBase, Shape
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def degenerate(
     faults: list[str] = []
     skipped: list[str] = []
     cases = 0
-    for carrier, form in forms(model):
+    for carrier, form in forms(model).items():
         question = asked(form, shape=collapsed) if isinstance(form, RuleBase) else None
         if question is None:
             continue
@@ -89,7 +90,7 @@ def repeated(alone: Outcome, count: int) -> Outcome:
 
 def _thin_terms(model: Model) -> Iterator[str]:
     """Yield the model's own terms that are as good as made from a single value."""
-    for carrier, form in forms(model):
+    for carrier, form in forms(model).items():
         for variable in form.variables if isinstance(form, RuleBase) else ():
             for term in variable.terms:
                 ulps = width_in_ulps(term.shape)

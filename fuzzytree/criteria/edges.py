@@ -7,10 +7,11 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from fuzzytree.contracts import Model, Runtime
-from fuzzytree.criteria.carriers import forms, made_ready
+from fuzzytree.criteria.carriers import made_ready
 from fuzzytree.criteria.judging import allowed_errors
 from fuzzytree.criteria.results import Criterion, judged
 from fuzzytree.criteria.terms import Asked, asked, held
+from fuzzytree.lowering import forms
 from fuzzytree.numerics.oracle import exact_degree
 from fuzzytree.rulebase import RuleBase
 
@@ -34,7 +35,7 @@ def edges(model: Model, runtimes: Sequence[Runtime]) -> Criterion:
     faults: list[str] = []
     skipped: list[str] = []
     cases, worst = 0, 0.0
-    for carrier, form in forms(model):
+    for carrier, form in forms(model).items():
         question = asked(form) if isinstance(form, RuleBase) else None
         if question is None:
             continue

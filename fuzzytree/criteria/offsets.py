@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Dtype, Model, Runtime
-from fuzzytree.criteria.carriers import forms, made_ready, probe_values
+from fuzzytree.criteria.carriers import made_ready, probe_values
 from fuzzytree.criteria.judging import Observed, observed
 from fuzzytree.criteria.results import Criterion, OffsetCost, judged
 from fuzzytree.criteria.stiffness import Scale, input_scales
 from fuzzytree.criteria.transforms import moved
 from fuzzytree.errors import InvalidModelError
+from fuzzytree.lowering import forms
 from fuzzytree.numerics.oracle import decide
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def offsets(
     cases, worst = 0, 0.0
     scales = input_scales(model, data)
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
-    for carrier, form in forms(model):
+    for carrier, form in forms(model).items():
         for ratio in RATIOS:
             steps = {name: _step(scale, ratio) for name, scale in scales.items()}
             try:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, cast, get_args
 
 from fuzzytree.comparing import strength_gap
 from fuzzytree.contracts import Dtype, Format, Model, Outcome, Run, Written
-from fuzzytree.criteria.carriers import first_line, forms, unequal
+from fuzzytree.criteria.carriers import first_line, unequal
 from fuzzytree.criteria.results import Criterion, judged
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
+from fuzzytree.lowering import forms
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
@@ -45,7 +46,7 @@ def roundtrips(
     skipped: list[str] = []
     cases = 0
     worst = 0.0
-    for carrier, form in forms(model):
+    for carrier, form in forms(model).items():
         kind = "rules" if isinstance(form, RuleBase) else "tree"
         for one in formats:
             if kind not in one.carries:

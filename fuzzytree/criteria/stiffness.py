@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.contracts import Model
-from fuzzytree.criteria.carriers import forms
 from fuzzytree.criteria.results import Stiff
+from fuzzytree.lowering import forms
 from fuzzytree.numerics.bounds import UNIT, degree_bound
 from fuzzytree.numerics.oracle import Decided, decide
 from fuzzytree.probing import landmarks
@@ -66,7 +66,7 @@ def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff
         is_data: Whether the rows are data, of which no class should change; probes lie
             on edges, where some must.
     """
-    rule_bases = [form for _, form in forms(model) if isinstance(form, RuleBase)]
+    rule_bases = [form for form in forms(model).values() if isinstance(form, RuleBase)]
     step = max(-(-values.shape[1] // _ROWS), 1)
     rows = values[:, ::step]
     scales = input_scales(model, rows)
@@ -115,7 +115,7 @@ def input_scales(model: Model, values: FloatArray) -> dict[str, Scale]:
     slopes: dict[str, list[float]] = {name: [] for name in model.inputs}
     places: dict[str, list[float]] = {name: [] for name in model.inputs}
     curves = dict.fromkeys(model.inputs, 0.0)
-    for _, form in forms(model):
+    for form in forms(model).values():
         for variable in form.variables:
             shapes = [term.shape for term in variable.terms]
             steep = max((_slope(shape) for shape in shapes), default=0.0)
