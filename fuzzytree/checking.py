@@ -26,13 +26,13 @@ from fuzzytree.comparing import (
     compare_excused,
     compare_within,
     labels,
+    probed,
 )
 from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
 from fuzzytree.errors import FuzzyTreeError, LossError
 from fuzzytree.lowering import forms, rules_from_tree
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide
-from fuzzytree.probing import probes
 from fuzzytree.pruning import proof_faults, pruned
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import Kind, RuleBase, fingerprint
@@ -96,7 +96,7 @@ def check(
     Raises:
         ValueError: If `data` is not of shape (inputs, rows), or a runtime is unknown.
     """
-    rows = _rows(model, data, limit)
+    rows = probed(model, data, limit)
     chosen = all_runtimes() if runtimes is None else tuple(map(find_runtime, runtimes))
     carriers = _carriers(model, rows)
     findings: list[Finding] = []
@@ -119,18 +119,6 @@ def check(
         rows.probes,
         tuple(certificates),
     )
-
-
-def _rows(model: Model, data: FloatArray | None, limit: int) -> Rows:
-    made = probes(model, limit=limit)
-    width = len(model.inputs)
-    values = np.array([[row[n] for row in made] for n in model.inputs], np.float64)
-    values = values.reshape(width, len(made))
-    if data is not None:
-        if data.ndim != 2 or data.shape[0] != width:
-            raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
-        values = np.concatenate([values, data], axis=1)
-    return Rows(model.inputs, values, np.arange(values.shape[1]), len(made))
 
 
 def _native(title: str, model: Model, rows: Rows) -> Answers:

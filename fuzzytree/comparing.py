@@ -13,6 +13,7 @@ from fuzzytree.agreement import Certified, Comparison, Verdict
 from fuzzytree.contracts import Dtype, Model, Outcome
 from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
 from fuzzytree.numerics.oracle import Decided, strength_errors
+from fuzzytree.probing import probe_values
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.tree import FuzzyTree
@@ -50,6 +51,26 @@ class Rows(msgspec.Struct, frozen=True):
         if number < self.probes:
             return f"probe {number + 1}"
         return f"row {number - self.probes + 1}"
+
+
+def probed(model: Model, data: FloatArray | None, limit: int) -> Rows:
+    """Return probes of a model with the user's rows behind them.
+
+    Args:
+        model: A tree or a rule base.
+        data: Rows of one's own, shape (inputs, rows), in the order of `model.inputs`.
+        limit: The most probes.
+
+    Raises:
+        ValueError: If `data` has another shape.
+    """
+    values = probe_values(model, limit)
+    width, count = values.shape
+    if data is not None:
+        if data.ndim != 2 or data.shape[0] != width:
+            raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
+        values = np.ascontiguousarray(np.concatenate([values, data], axis=1))
+    return Rows(model.inputs, values, np.arange(values.shape[1]), count)
 
 
 class Answers(msgspec.Struct, frozen=True):

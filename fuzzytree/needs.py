@@ -18,13 +18,12 @@ from msgspec.structs import replace
 
 from fuzzytree.agreement import Agreement, Comparison
 from fuzzytree.cells import free_axes
-from fuzzytree.comparing import Answers, BoolArray, Rows, compare_bits
+from fuzzytree.comparing import Answers, BoolArray, Rows, compare_bits, probed
 from fuzzytree.contracts import Carrier, Dtype, Model, Outcome
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_contents import Contents, contents
 from fuzzytree.lowering import forms
-from fuzzytree.probing import probes
 from fuzzytree.pruning import (
     Pruned,
     Removed,
@@ -321,7 +320,7 @@ def prove(
     whole, left = forms(model, uses), forms(found.model, uses)
     faults = [*proof_faults(model, found.model, uses=uses, rules=found.rules)]
     comparisons = [_proof(model, faults)]
-    rows = _rows(model, data, limit)
+    rows = probed(model, data, limit)
     is_seen = _is_seen(model, found.model, rows)
     for title, carrier in whole.items():
         other = left.get(title)
@@ -346,19 +345,6 @@ def _proof(model: Model, faults: Sequence[str]) -> Comparison:
         origin="equal operations on equal numbers",
         detail=tuple(faults[:5]),
     )
-
-
-def _rows(model: Model, data: FloatArray | None, limit: int) -> Rows:
-    made = probes(model, limit=limit)
-    width = len(model.inputs)
-    values = np.array([[row[n] for n in model.inputs] for row in made], np.float64)
-    values = values.reshape(len(made), width).T
-    if data is not None:
-        if data.ndim != 2 or data.shape[0] != width:
-            raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
-        values = np.concatenate([values, data], axis=1)
-    whole = np.ascontiguousarray(values)
-    return Rows(model.inputs, whole, np.arange(whole.shape[1]), len(made))
 
 
 def _is_seen(model: Model, left: Model, rows: Rows) -> BoolArray:

@@ -13,6 +13,7 @@ import math
 import random
 import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import axis_values
@@ -28,6 +29,9 @@ from fuzzytree.rulebase import (
     shapes_of,
 )
 from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
 
 SPECIAL = (
     math.nan,
@@ -78,6 +82,17 @@ def probes(
     if len(targets) > limit - len(tail):
         targets = chance.sample(targets, max(limit - len(tail), 0))
     return [maker.meet(*target) for target in targets] + tail
+
+
+def probe_values(
+    model: FuzzyTree | RuleBase, limit: int, *, seed: int = 0
+) -> FloatArray:
+    """Return the rows of `probes` as an array of shape (inputs, rows)."""
+    import numpy as np
+
+    made = probes(model, limit=limit, seed=seed)
+    table = np.array([[row[n] for row in made] for n in model.inputs], np.float64)
+    return table.reshape(len(model.inputs), len(made))
 
 
 def landmarks(shape: Shape) -> tuple[float, ...]:

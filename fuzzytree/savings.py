@@ -8,7 +8,6 @@ does that declares them all; *as it is* is the model; *pruned* is what is left o
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -26,7 +25,7 @@ from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_contents import contents
 from fuzzytree.lowering import forms
 from fuzzytree.needs import DTYPES, Needs, needs, prove
-from fuzzytree.probing import probes
+from fuzzytree.probing import probe_values
 from fuzzytree.pruning import Pruned, Removed
 from fuzzytree.rulebase import Variable
 from fuzzytree.runtimes import find_runtime
@@ -346,15 +345,13 @@ def _reading(table: str, model: Model) -> Call:
 
 def _plain_rows(model: Model, count: int) -> FloatArray:
     """Return probes without extremes, again and again; shape (inputs, count)."""
-    made = [[row[name] for name in model.inputs] for row in probes(model, limit=500)]
-    plain = [row for row in made if all(map(_is_plain, row))]
-    width = len(model.inputs)
-    values = np.array(plain or [[0.0] * width], np.float64)
-    return np.ascontiguousarray(np.resize(values, (count, width)).T)
-
-
-def _is_plain(value: float) -> bool:
-    return value == 0.0 or 1.0 / _LARGEST_VALUE < math.fabs(value) < _LARGEST_VALUE
+    values = probe_values(model, 500)
+    size = np.abs(values)
+    is_plain = (size > 1.0 / _LARGEST_VALUE) & (size < _LARGEST_VALUE) | (size == 0.0)
+    kept = values[:, is_plain.all(axis=0)]
+    if not kept.shape[1]:
+        kept = np.zeros((len(values), 1))
+    return kept.take(np.arange(count) % kept.shape[1], axis=1)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ import numpy.typing as npt
 from fuzzytree.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.errors import LossError
 from fuzzytree.lowering import forms
-from fuzzytree.probing import probes
 from fuzzytree.runtimes import is_installed
 from fuzzytree.tree import FuzzyTree
 
@@ -96,13 +95,6 @@ def answered(one: Ready, values: FloatArray) -> tuple[Outcome, str | None]:
         warnings.simplefilter("always")
         found = one.loud(values)
     return found, str(caught[0].message) if caught else None
-
-
-def probe_values(model: Model, limit: int, *, seed: int = 0) -> FloatArray:
-    """Return rows aimed at a model's edges, of shape (inputs, rows)."""
-    made = probes(model, limit=limit, seed=seed)
-    table = np.array([[row[n] for row in made] for n in model.inputs], np.float64)
-    return table.reshape(len(model.inputs), len(made))
 
 
 def unequal(one: Outcome, two: Outcome) -> BoolArray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Dtype, Model, Runtime
-from fuzzytree.criteria.carriers import made_ready, probe_values
+from fuzzytree.criteria.carriers import made_ready
 from fuzzytree.criteria.judging import Observed, observed
 from fuzzytree.criteria.results import Criterion, OffsetCost, judged
 from fuzzytree.criteria.stiffness import Scale, input_scales
@@ -16,6 +16,7 @@ from fuzzytree.criteria.transforms import moved
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.lowering import forms
 from fuzzytree.numerics.oracle import decide
+from fuzzytree.probing import probe_values
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

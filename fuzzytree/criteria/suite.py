@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Format, Model, Runtime
-from fuzzytree.criteria.carriers import probe_values
 from fuzzytree.criteria.curves import curves
 from fuzzytree.criteria.degenerate import degenerate
 from fuzzytree.criteria.edges import edges
@@ -28,6 +27,7 @@ from fuzzytree.criteria.roundtrips import roundtrips
 from fuzzytree.criteria.scaling import decades, scaling
 from fuzzytree.criteria.specials import specials
 from fuzzytree.criteria.stiffness import stiffness
+from fuzzytree.probing import probe_values
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.runtimes import is_installed
 
