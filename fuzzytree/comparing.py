@@ -41,7 +41,7 @@ class Rows(msgspec.Struct, frozen=True):
     numbers: IntArray
     probes: int
 
-    def part(self, rows: slice) -> Rows:
+    def part(self, rows: slice | IntArray) -> Rows:
         """Return some of the rows, which keep their numbers."""
         return Rows(self.inputs, self.values[:, rows], self.numbers[rows], self.probes)
 
@@ -86,19 +86,9 @@ class Answers(msgspec.Struct, frozen=True):
     model: Model
     outcome: Outcome
 
-    def part(self, rows: slice) -> Answers:
+    def part(self, rows: slice | IntArray) -> Answers:
         """Return some of the answers."""
-        all_of = self.outcome
-        strengths = all_of.strengths
-        return Answers(
-            self.title,
-            self.model,
-            Outcome(
-                all_of.rule[rows],
-                all_of.status[rows],
-                None if strengths is None else strengths[:, rows],
-            ),
-        )
+        return Answers(self.title, self.model, self.outcome.part(rows))
 
 
 def compare_bits(found: Answers, expected: Answers, rows: Rows) -> Comparison:

@@ -90,6 +90,11 @@ class Outcome(msgspec.Struct, frozen=True):
     status: IntArray
     strengths: FloatArray | None = None
 
+    def part(self, rows: slice | IntArray) -> Outcome:
+        """Return the answers to some of the rows."""
+        strengths = None if self.strengths is None else self.strengths[:, rows]
+        return Outcome(self.rule[rows], self.status[rows], strengths)
+
 
 Run = Callable[["FloatArray"], Outcome]
 """Answers to values of shape (inputs, rows), in the order of the model's inputs."""

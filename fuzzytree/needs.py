@@ -45,7 +45,7 @@ from fuzzytree.runtimes.axes import axis_lines, plan_axes
 from fuzzytree.tree import FuzzyTree, Use
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.contracts import FloatArray
     from fuzzytree.exporters.onnx import Output
 
 DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
@@ -383,20 +383,11 @@ def _compared(
     for chosen, is_by_design in parts:
         numbers = np.flatnonzero(chosen)
         if not is_by_design or numbers.size:
-            some = Rows(rows.inputs, rows.values[:, numbers], numbers, rows.probes)
-            one, two = (_part(answers, numbers) for answers in pair)
-            compared = compare_bits(one, two, some)
+            one, two = (answers.part(numbers) for answers in pair)
+            compared = compare_bits(one, two, rows.part(numbers))
             if is_by_design and compared.differing:
                 compared = replace(compared, verdict="differs by design", detail=())
             yield compared
-
-
-def _part(answers: Answers, rows: IntArray) -> Answers:
-    whole = answers.outcome
-    strengths = None if whole.strengths is None else whole.strengths[:, rows]
-    return replace(
-        answers, outcome=Outcome(whole.rule[rows], whole.status[rows], strengths)
-    )
 
 
 def _in_old_numbers(outcome: Outcome, model: Model, numbers: Sequence[int]) -> Outcome:

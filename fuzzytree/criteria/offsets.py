@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Dtype, Model, Runtime
-from fuzzytree.criteria.carriers import made_ready
+from fuzzytree.criteria.carriers import first_line, made_ready
 from fuzzytree.criteria.judging import Observed, observed
 from fuzzytree.criteria.results import Criterion, OffsetCost, judged
 from fuzzytree.criteria.stiffness import Scale, input_scales
@@ -62,8 +62,7 @@ def offsets(
             try:
                 far = moved(form, steps)
             except InvalidModelError as error:
-                first = str(error).partition("\n")[0]
-                skipped.append(f"{carrier} at {ratio:.0e}: {first}")
+                skipped.append(f"{carrier} at {ratio:.0e}: {first_line(error)}")
                 continue
             away = rows + np.array([[steps[name]] for name in model.inputs])
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)

@@ -14,6 +14,7 @@ from fuzzytree.criteria.results import Criterion, judged
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
+    from fuzzytree.criteria.carriers import BoolArray
 
 BATCHES = (1, 7, 33, 1000)
 """Rows answered at a time."""
@@ -51,31 +52,31 @@ def order(model: Model, runtimes: Sequence[Runtime], values: FloatArray) -> Crit
 
 def _tries(
     one: Ready, rows: FloatArray, whole: Outcome
-) -> Iterator[tuple[str, np.ndarray[tuple[int], np.dtype[np.bool_]]]]:
+) -> Iterator[tuple[str, BoolArray]]:
     """Yield what was done to the rows, and which were then answered differently."""
     count = rows.shape[1]
     mixed = np.random.default_rng(0).permutation(count)
-    yield "in another order", unequal(one.run(rows[:, mixed]), _part(whole, mixed))
+    yield "in another order", unequal(one.run(rows[:, mixed]), whole.part(mixed))
     twice = np.repeat(np.arange(count), 2)
     yield (
         "when each stands twice",
-        unequal(one.run(rows[:, twice]), _part(whole, twice)),
+        unequal(one.run(rows[:, twice]), whole.part(twice)),
     )
     large = max(BATCHES)
     if count < large and not one.runtime.is_slow:
         many = np.resize(np.arange(count), large)
-        yield f"among {large}", unequal(one.run(rows[:, many]), _part(whole, many))
+        yield f"among {large}", unequal(one.run(rows[:, many]), whole.part(many))
     for size in BATCHES:
         starts = np.arange(0, count, size)
         for start in starts[:: -(-len(starts) // _CALLS)] if size < count else ():
             some = np.arange(start, min(start + size, count))
             found = one.run(np.ascontiguousarray(rows[:, some]))
-            yield f"in a batch of {len(some)}", unequal(found, _part(whole, some))
+            yield f"in a batch of {len(some)}", unequal(found, whole.part(some))
 
 
 def _renumbered(
     one: Ready, rows: FloatArray, whole: Outcome
-) -> Iterator[tuple[str, np.ndarray[tuple[int], np.dtype[np.bool_]]]]:
+) -> Iterator[tuple[str, BoolArray]]:
     """Yield the same for a model whose inputs stand in the opposite order."""
     inputs = [v for v in one.model.variables if not v.parts]
     if len(inputs) < 2:
@@ -86,12 +87,3 @@ def _renumbered(
     if after is not None:
         found = after.run(np.ascontiguousarray(rows[::-1]))
         yield "when the inputs stand in another order", unequal(found, whole)
-
-
-def _part(whole: Outcome, rows: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Outcome:
-    strengths = whole.strengths
-    return Outcome(
-        whole.rule[rows],
-        whole.status[rows],
-        None if strengths is None else strengths[:, rows],
-    )

@@ -11,7 +11,7 @@ import numpy as np
 from fuzzytree.contracts import Dtype, Model, Runtime
 from fuzzytree.criteria.carriers import Ready, made_ready, ready, unequal
 from fuzzytree.criteria.results import Criterion, Usable, judged
-from fuzzytree.criteria.transforms import exponent_range, scaled
+from fuzzytree.criteria.transforms import NORMAL, exponent_range, scaled
 from fuzzytree.errors import InvalidModelError, LossError
 
 if TYPE_CHECKING:
@@ -26,11 +26,6 @@ _ADVICE = (
     "in between; use one whose steps are differences, quotients and comparisons"
 )
 _NO_INPUT = "the model has no input"
-_LIMITS: Mapping[Dtype, tuple[int, int]] = {
-    "float64": (-1021, 1022),
-    "mixed": (-1021, 1022),
-    "float32": (-125, 126),
-}
 
 
 def scaling(
@@ -158,7 +153,7 @@ def _tried(
 
 def _is_normal(values: FloatArray, ks: Sequence[int], dtype: Dtype) -> BoolArray:
     """Return the rows whose numbers are normal or 0, before and after; NaN may be."""
-    low, high = _LIMITS[dtype]
+    low, high = NORMAL[dtype]
     exponents = np.frexp(values)[1]
     free = (values == 0.0) | ~np.isfinite(values)
     fits = np.ones(values.shape[1], np.bool_)

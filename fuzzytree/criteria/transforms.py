@@ -28,7 +28,7 @@ AnyModel = TypeVar("AnyModel", bound=Model)
 Change = Callable[[str, float], float]
 """What becomes of a number in the unit of a variable, by the variable's name."""
 
-_NORMAL: Mapping[Dtype, tuple[int, int]] = {
+NORMAL: Mapping[Dtype, tuple[int, int]] = {
     "float64": (-1021, 1022),
     "mixed": (-1021, 1022),
     "float32": (-125, 126),
@@ -93,7 +93,7 @@ def exactly_scaled(value: float, exponent: int, name: str) -> float:
     """
     if value == 0.0 or exponent == 0:
         return value
-    low, high = _NORMAL["float64"]
+    low, high = NORMAL["float64"]
     if not low <= math.frexp(value)[1] + exponent <= high + 2:
         raise LossError(
             f"cannot scale {name!r} by 2**{exponent}: {value!r} would leave the "
@@ -220,7 +220,7 @@ def exponent_range(model: Model, dtype: Dtype) -> tuple[int, int]:
     """
     inputs = set(model.inputs)
     low, high = -2000, 2000
-    least, most = _NORMAL[dtype]
+    least, most = NORMAL[dtype]
     for name, power, value in numbers_in_units(model):
         if name not in inputs or value == 0.0 or not math.isfinite(value):
             continue
