@@ -2,15 +2,11 @@
 
 *all columns* looks at every column of the table that it was learnt from, as a model
 does that declares them all; *as it is* is the model; *pruned* is what is left of it.
-
-`python -m fuzzytree.savings` rewrites the JSON Schema of a report.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -30,7 +26,6 @@ from fuzzytree.pruning import Pruned, Removed
 from fuzzytree.rulebase import Variable
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.schemas.generation import of_result
 from fuzzytree.tables import batches
 from fuzzytree.timing.clock import measure
 from fuzzytree.timing.records import Timing
@@ -41,8 +36,6 @@ if TYPE_CHECKING:
     from fuzzytree.timing.clock import Call, Tell
 
 ALL_COLUMNS, AS_IT_IS, PRUNED = "all columns", "as it is", "pruned"
-
-SCHEMA = "needs.schema.json"
 
 BATCH = 10_000
 """Rows of the larger of the two timed calls."""
@@ -127,9 +120,14 @@ class Report(msgspec.Struct, frozen=True):
     proof: Agreement
     omissions: tuple[str, ...] = ()
 
+    @property
+    def ok(self) -> bool:
+        """Whether the pruned model was proved to be the model."""
+        return self.proof.ok
+
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""
-        facts = {"ok": self.proof.ok, **msgspec.to_builtins(self)}
+        facts = {"ok": self.ok, **msgspec.to_builtins(self)}
         return msgspec.json.format(msgspec.json.encode(facts), indent=2).decode()
 
 
@@ -170,11 +168,6 @@ def report(
         prove(model, found, uses=uses, data=data),
         (*omissions, *untimed),
     )
-
-
-def schema() -> bytes:
-    """Return the JSON Schema of what `Report.to_json` writes."""
-    return of_result(Report, ok={"type": "boolean"})
 
 
 def stages(model: Model, left: Model) -> dict[str, Model]:
@@ -352,7 +345,3 @@ def _plain_rows(model: Model, count: int) -> FloatArray:
     if not kept.shape[1]:
         kept = np.zeros((len(values), 1))
     return kept.take(np.arange(count) % kept.shape[1], axis=1)
-
-
-if __name__ == "__main__":
-    (Path(str(files("fuzzytree.schemas"))) / SCHEMA).write_bytes(schema())

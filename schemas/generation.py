@@ -1,6 +1,6 @@
 """The JSON Schemas of our YAML files, from the records that the reader uses.
 
-Those of what `--json` prints are made by `of_result` from the records of each result.
+Those of what `--json` prints are made by `of_result`: see `fuzzytree.report.schemas`.
 
 `python -m fuzzytree.schemas.generation` rewrites the files beside this module.
 """

@@ -13,6 +13,7 @@ import yaml
 from fuzzytree.contracts import Model
 from fuzzytree.exporters.yaml import write
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.report import schemas as results
 from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.schemas.generation import FILES, generate, write_all
 from fuzzytree.testing import random_tree
@@ -50,6 +51,18 @@ def models() -> list[Model]:
 @pytest.mark.parametrize("name", FILES)
 def test_a_schema_is_the_one_that_the_code_generates(name: str) -> None:
     assert (ROOT / "schemas" / name).read_bytes() == generate(name)
+
+
+@pytest.mark.parametrize("name", results.FILES)
+def test_the_schema_of_a_result_is_the_one_that_the_code_generates(name: str) -> None:
+    found = (ROOT / "schemas" / name).read_bytes()
+    assert found == results.generate(name)
+    jsonschema.Draft202012Validator.check_schema(json.loads(found))
+
+
+def test_every_schema_is_of_a_file_or_of_a_result() -> None:
+    found = {path.name for path in (ROOT / "schemas").glob("*.json")}
+    assert found == {*FILES, *results.FILES}
 
 
 def test_schemas_are_written_to_a_folder(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def command(
             tell=tell,
         )
     answer(told.to_json() if as_json else "\n".join(report_lines(told)))
-    if not told.proof.ok:
+    if not told.ok:
         wrong = sum(c.verdict == "DISAGREES" for c in told.proof.comparisons)
         say(f"the pruned model differs in {wrong} ways; nothing is written")
         return 1

@@ -1,0 +1,48 @@
+"""The JSON Schemas of what `--json` prints, from the records of each result.
+
+`python -m fuzzytree.report.schemas` rewrites their files among `fuzzytree.schemas`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+import msgspec
+
+from fuzzytree.criteria.results import Stability
+from fuzzytree.savings import Report
+from fuzzytree.schemas.generation import Json, of_result
+from fuzzytree.timing.records import Study
+
+FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
+    {
+        "bench.schema.json": Study,
+        "needs.schema.json": Report,
+        "stability.schema.json": Stability,
+    }
+)
+"""Each file's name and the record that it describes."""
+
+_OK: Mapping[str, Json] = {"ok": {"type": "boolean"}}
+"""What `to_json` writes before the fields of a record that has a verdict."""
+
+
+def generate(name: str) -> bytes:
+    """Return the JSON Schema (draft 2020-12) of a name in `FILES`.
+
+    Example:
+        >>> b'"title": "Error against run time' in generate("bench.schema.json")
+        True
+    """
+    kind = FILES[name]
+    return of_result(kind, **(_OK if hasattr(kind, "ok") else {}))
+
+
+if __name__ == "__main__":
+    folder = Path(str(files("fuzzytree.schemas")))
+    for name in FILES:
+        (folder / name).write_bytes(generate(name))
