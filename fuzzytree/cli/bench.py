@@ -18,7 +18,7 @@ from fuzzytree.cli.talk import (
     progress_bar,
     quiet_option,
     say,
-    standard_input,
+    table_source,
     wrong_options,
 )
 from fuzzytree.errors import MissingExtraError
@@ -130,7 +130,7 @@ def command(
     ):
         found = verbs.bench(
             model,
-            data=standard_input() if data == "-" else data,
+            data=table_source(data),
             delimiter=delimiter,
             rows=rows,
             threads=threads,

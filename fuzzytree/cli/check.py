@@ -8,10 +8,12 @@ import click
 
 from fuzzytree.cli.talk import (
     answer,
+    data_option,
     json_option,
     quiet_option,
+    runtimes_option,
     say,
-    standard_input,
+    table_source,
     wrong_options,
 )
 
@@ -19,14 +21,8 @@ from fuzzytree.cli.talk import (
 @click.command("check", short_help="Compare a model with all that is made of it.")
 @click.argument("model", metavar="MODEL")
 @click.argument("files", metavar="[FILES]...", nargs=-1)
-@click.option("--data", metavar="TABLE", help="Rows of your own, beside the probes.")
-@click.option(
-    "--runtime",
-    "runtimes",
-    metavar="NAME",
-    multiple=True,
-    help="Run these only; all that are installed if none.",
-)
+@data_option
+@runtimes_option
 @click.option(
     "--limit",
     type=click.IntRange(min=1),
@@ -59,7 +55,7 @@ def command(
         found = verbs.check(
             model,
             *files,
-            data=standard_input() if data == "-" else data,
+            data=table_source(data),
             runtimes=runtimes or None,
             limit=limit,
         )

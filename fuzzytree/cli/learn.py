@@ -26,7 +26,7 @@ from fuzzytree.cli.talk import (
     progress_bar,
     quiet_option,
     say_rows,
-    standard_input,
+    table_source,
     wrong_options,
 )
 from fuzzytree.contracts import Carrier
@@ -157,7 +157,7 @@ def command(
         check_place(output)
     settings, units_of = _settings(chosen), dict(_pairs("--unit", units))
     found = read_table(
-        standard_input() if table == "-" else table,
+        table_source(table),
         target=target,
         ignore=ignore,
         delimiter=delimiter,

@@ -9,12 +9,13 @@ import click
 
 from fuzzytree.cli.talk import (
     answer,
+    data_option,
     json_option,
     progress_bar,
     quiet_option,
     say,
     say_rows,
-    standard_input,
+    table_source,
     wrong_options,
 )
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 @click.command("needs", short_help="Tell what a model needs, and leave out the rest.")
 @click.argument("model", metavar="MODEL")
-@click.option("--data", metavar="TABLE", help="Rows of your own, beside the probes.")
+@data_option
 @click.option(
     "-o", "--output", metavar="FILE", help="Write the pruned model, if it is proved."
 )
@@ -107,8 +108,7 @@ def _rows(data: str, model: Model) -> FloatArray:
 
     from fuzzytree.tables import batches
 
-    source = standard_input() if data == "-" else data
-    found = batches(source, model.inputs, trained=model.columns)
+    found = batches(table_source(data), model.inputs, trained=model.columns)
     return np.hstack([batch.values for batch in found])
 
 

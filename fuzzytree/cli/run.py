@@ -17,7 +17,7 @@ from fuzzytree.cli.talk import (
     delimiter_option,
     quiet_option,
     say_rows,
-    standard_input,
+    table_source,
     wrong_options,
 )
 from fuzzytree.errors import TableError
@@ -86,7 +86,7 @@ def command(
         found = rules_from_tree(found)
     with wrong_options():
         answer = verbs.answering(found, runtime, with_strengths=strengths is not None)
-    source = standard_input() if table == "-" else table
+    source = table_source(table)
     name = "standard input" if table == "-" else table
     tally = _Tally(_tells_ties(found))
     with _opened(output) as stream:

@@ -8,31 +8,27 @@ import click
 
 from fuzzytree.cli.talk import (
     answer,
+    data_option,
     json_option,
     progress_bar,
     quiet_option,
+    runtimes_option,
     say,
-    standard_input,
+    table_source,
     wrong_options,
 )
 
 
 @click.command("stability", short_help="Is a model numerically stable?")
 @click.argument("model", metavar="MODEL")
-@click.option("--data", metavar="TABLE", help="Rows of your own, beside the probes.")
+@data_option
 @click.option(
     "--only",
     metavar="CODE",
     multiple=True,
     help="Apply these criteria only, such as N3; all if none.",
 )
-@click.option(
-    "--runtime",
-    "runtimes",
-    metavar="NAME",
-    multiple=True,
-    help="Run these only; all that are installed if none.",
-)
+@runtimes_option
 @click.option(
     "--rows", "is_full", is_flag=True, help="Tell all that was left out, too."
 )
@@ -59,7 +55,7 @@ def command(
     with wrong_options(), progress_bar(quiet=quiet) as tell:
         found = verbs.stability(
             model,
-            data=standard_input() if data == "-" else data,
+            data=table_source(data),
             only=only,
             runtimes=runtimes or None,
             progress=tell,

@@ -6,7 +6,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable, Generator
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
 import click
 import msgspec
@@ -15,6 +15,8 @@ from fuzzytree.errors import FuzzyTreeError
 
 if TYPE_CHECKING:
     from rich.progress import Progress
+
+Name = TypeVar("Name", str, str | None)
 
 _PATIENCE_S = 0.5  # before a bar appears
 
@@ -26,6 +28,17 @@ delimiter_option = click.option(
     "--delimiter",
     metavar="CHARACTER",
     help="Between the cells of a CSV file, if its first line does not tell.",
+)
+
+data_option = click.option(
+    "--data", metavar="TABLE", help="Rows of your own, beside the probes."
+)
+runtimes_option = click.option(
+    "--runtime",
+    "runtimes",
+    metavar="NAME",
+    multiple=True,
+    help="Run these only; all that are installed if none.",
 )
 
 
@@ -60,9 +73,9 @@ def answer_bytes(content: bytes) -> None:
     sys.stdout.buffer.flush()
 
 
-def standard_input() -> BinaryIO:
-    """Return the stream behind `-`."""
-    return sys.stdin.buffer
+def table_source(name: Name) -> Name | BinaryIO:
+    """Return where to read a table: behind `-` is standard input."""
+    return sys.stdin.buffer if name == "-" else name
 
 
 @contextlib.contextmanager
