@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import get_args
 
-from fuzzytree.report.text import aligned, counted
+from fuzzytree.report.text import aligned, counted, digits, duration
 from fuzzytree.timing.candidates import DEFAULT, title
 from fuzzytree.timing.clock import CONFIDENCE, times_faster
 from fuzzytree.timing.floors import READING
@@ -27,7 +27,6 @@ Timed = dict[str, tuple[Point, Timing]]
 """What was measured at one number of rows and threads, by name."""
 
 _WIDTH = 96  # of a line of names
-_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
 _LEGEND = (
     "* nobody is both faster and more exact; +- the 95 % interval of the median;",
     f"speed: times as fast as {DEFAULT}; floor x: as long as reading the columns;",
@@ -146,8 +145,8 @@ def _time_cells(
     return (
         duration(middle / timing.rows),
         f"{reach:.0%}{sure}",
-        _digits(ratio.median) if ratio else "",
-        _digits(middle / floor[1].median_ns) if floor else "",
+        digits(ratio.median) if ratio else "",
+        digits(middle / floor[1].median_ns) if floor else "",
     )
 
 
@@ -162,24 +161,6 @@ def _errors(point: Point) -> tuple[str, ...]:
         f"{error.flips} of {error.rows}",
         f"{edges.flips} of {edges.rows}" if edges else "",
     )
-
-
-def duration(ns: float) -> str:
-    """Return a time with three digits and the unit that fits.
-
-    Example:
-        >>> duration(45.31), duration(2069.0), duration(0.0712)
-        ('45.3 ns', '2.07 µs', '0.0712 ns')
-    """
-    for size, unit in _UNITS:
-        if ns >= size:
-            return f"{_digits(ns / size)} {unit}"
-    return f"{_digits(ns)} ns"
-
-
-def _digits(value: float) -> str:
-    """Return a positive number with three digits; no exponent from 100 on."""
-    return f"{value:.0f}" if value >= 100 else f"{value:#.3g}"
 
 
 def _grouped(omissions: Iterable[Omission]) -> Iterator[str]:

@@ -7,12 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from fuzzytree.agreement import Agreement
 from fuzzytree.needs import Because, Graph, Needs
 from fuzzytree.pruning import Removed
-from fuzzytree.report.text import agreement_lines, aligned, counted
+from fuzzytree.report.text import agreement_lines, aligned, counted, duration
 from fuzzytree.savings import Cost, File, Report, Size
 from fuzzytree.timing.clock import times_faster
 
 _MOST = 12  # things told one by one; --json tells all
-_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
 
 
 def report_lines(found: Report) -> Iterator[str]:
@@ -144,7 +143,7 @@ def _cost_rows(costs: Sequence[Cost]) -> Iterator[tuple[str, ...]]:
         groups.setdefault(_cost_title(cost), {})[cost.stage] = cost
     for title, group in groups.items():
         cells = [
-            _time(group[name].timing.median_ns) if name in group else "-"
+            duration(group[name].timing.median_ns) if name in group else "-"
             for name in names
         ]
         yield (title, *cells, _ratio_text(group.get(names[0]), group.get(names[-1])))
@@ -163,10 +162,3 @@ def _ratio_text(before: Cost | None, after: Cost | None) -> str:
     if ratio is None:
         return "-"
     return f"{ratio.median:.2f} ({ratio.low:.2f} to {ratio.high:.2f})"
-
-
-def _time(nanoseconds: float) -> str:
-    for size, unit in _UNITS:
-        if nanoseconds >= size:
-            return f"{nanoseconds / size:.3g} {unit}"
-    return f"{nanoseconds:.3g} ns"

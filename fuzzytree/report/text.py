@@ -23,6 +23,7 @@ from fuzzytree.runtimes.onnxruntime import Facts, OnnxModel
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 _MOST_PAIRS = 6  # points that a line of text shows one by one
+_UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
 
 
 def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
@@ -48,6 +49,24 @@ def counted(count: int, what: str, many: str | None = None) -> str:
 def number(value: float) -> str:
     """Return a number with six digits, for people; files have all of them."""
     return f"{value:.6g}"
+
+
+def duration(ns: float) -> str:
+    """Return a time with three digits and the unit that fits.
+
+    Example:
+        >>> duration(45.31), duration(999.7), duration(2069.0), duration(0.0712)
+        ('45.3 ns', '1000 ns', '2.07 µs', '0.0712 ns')
+    """
+    for size, unit in _UNITS:
+        if ns >= size:
+            return f"{digits(ns / size)} {unit}"
+    return f"{digits(ns)} ns"
+
+
+def digits(value: float) -> str:
+    """Return a positive number with three digits; no exponent from 100 on."""
+    return f"{value:.0f}" if value >= 100 else f"{value:#.3g}"
 
 
 # --- models

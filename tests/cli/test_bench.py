@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from fuzzytree import verbs
-from fuzzytree.report.bench import duration, study_lines
+from fuzzytree.report.bench import study_lines
+from fuzzytree.report.text import duration
 from fuzzytree.timing.records import Study
 from tests.cli.conftest import Call
 from tests.timing.studies import error, point, study, timing
