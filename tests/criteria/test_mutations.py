@@ -10,7 +10,6 @@ import pytest
 
 from fuzzytree.contracts import Model, Runtime
 from fuzzytree.criteria import learning
-from fuzzytree.criteria.carriers import probe_values
 from fuzzytree.criteria.curves import curves
 from fuzzytree.criteria.degenerate import degenerate
 from fuzzytree.criteria.edges import edges
@@ -21,6 +20,7 @@ from fuzzytree.criteria.roundtrips import roundtrips
 from fuzzytree.criteria.scaling import decades, scaling
 from fuzzytree.criteria.specials import specials
 from fuzzytree.exporters import find_format
+from fuzzytree.probing import probe_values
 from fuzzytree.rulebase import LR, Band, Flank, Side, Term
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.testing import random_tree

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.criteria.carriers import probe_values, unequal
+from fuzzytree.criteria.carriers import unequal
+from fuzzytree.probing import probe_values
 from fuzzytree.rulebase import (
     LR,
     Band,
