@@ -10,7 +10,7 @@ strength 1, wins alone.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from fuzzytree.errors import InvalidModelError
@@ -33,7 +33,7 @@ TITLES: Mapping[Use, str] = MappingProxyType(
 
 
 def forms(
-    model: FuzzyTree | RuleBase, uses: Collection[Use] | None = None
+    model: FuzzyTree | RuleBase, uses: Iterable[Use] | None = None
 ) -> dict[str, FuzzyTree | RuleBase]:
     """Return what can be made of a model, by the name that people call it.
 
@@ -48,7 +48,7 @@ def forms(
     """
     if isinstance(model, RuleBase):
         return {"rules": model}
-    wanted = TITLES if uses is None else uses
+    wanted = set(TITLES if uses is None else uses)
     made: dict[str, FuzzyTree | RuleBase] = {}
     if "tree" in wanted:
         made[TITLES["tree"]] = model

@@ -344,4 +344,4 @@ def _plain_rows(model: Model, count: int) -> FloatArray:
     kept = values[:, is_plain.all(axis=0)]
     if not kept.shape[1]:
         kept = np.zeros((len(values), 1))
-    return kept.take(np.arange(count) % kept.shape[1], axis=1)
+    return np.ascontiguousarray(kept[:, np.arange(count) % kept.shape[1]])

@@ -15,7 +15,6 @@ from fuzzytree.pruning import (
     USES,
     Pruned,
     Removed,
-    Use,
     always_holds,
     cannot_overflow,
     never_firing,
@@ -39,7 +38,7 @@ from fuzzytree.rulebase import (
     Variable,
 )
 from fuzzytree.testing import random_tree
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.tree import FuzzyTree, Use
 
 SOFT = Term("soft", Band(high=1.0, right=Flank(1.0, 2.0)))
 FIRM = Term("firm", Band(low=1.0, high=4.0, left=Flank(1.0, 0.0)))
