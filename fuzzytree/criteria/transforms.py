@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TypeVar, assert_never
@@ -187,7 +188,8 @@ def _shape(name: str, shape: Shape, units: Units) -> Shape:
 def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
     """Yield each number that has a unit: its variable, its power of it, its value.
 
-    The power is 1 for places and lengths, and -1 for weights, which divide by it.
+    The power is 1 for places and lengths, and -1 for weights, which divide by it. The
+    lengths between two places are among them, for runtimes divide by those.
     """
     found: list[tuple[str, int, float]] = []
 
@@ -202,13 +204,31 @@ def numbers_in_units(model: Model) -> Iterator[tuple[str, int, float]]:
 
     in_units(model, Units(keep, keep, part))
     yield from found
+    groups = [(variable.name, variable.terms) for variable in model.variables]
+    if isinstance(model, FuzzyTree):
+        groups += [(group.variable, group.terms) for group in model.sets]
+    for name, terms in groups:
+        for term in terms:
+            yield from ((name, 1, length) for length in _lengths(term.shape))
+
+
+def _lengths(shape: Shape) -> list[float]:
+    """Return the lengths of flanks and of the lines between points."""
+    match shape:
+        case Band(left=left, right=right):
+            return [flank.start - flank.end for flank in (left, right) if flank]
+        case Points(values=values):
+            return [b - a for a, b in itertools.pairwise(values)]
+        case LR():
+            return []
+    assert_never(shape)
 
 
 def exponent_range(model: Model, dtype: Dtype) -> tuple[int, int]:
     """Return by which powers of two all inputs can be scaled: lowest and highest.
 
-    Within the range every stored number with the unit of an input, multiplied, is a
-    normal number of the type, so that nothing but the exponents changes.
+    Within the range every number with the unit of an input, multiplied, is a normal
+    number of the type, so that nothing but the exponents changes.
 
     Example:
         >>> from fuzzytree.rulebase import Clause, Rule, RuleBase

@@ -15,7 +15,7 @@ from fuzzytree.criteria.transforms import (
 )
 from fuzzytree.errors import LossError
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Points, Term
+from fuzzytree.rulebase import Band, Flank, Points, Term
 from fuzzytree.testing import random_tree
 from tests.criteria.defects import one_rule, small_rules
 
@@ -74,6 +74,14 @@ def test_the_ends_of_the_usable_range_can_be_reached(dtype: str) -> None:
         for name, _, value in numbers_in_units(other):
             if name in tree.inputs:
                 assert value == 0.0 or 2.0**-1022 <= abs(value) < limit
+
+
+def test_a_narrow_flank_ends_the_usable_range() -> None:
+    narrow = Term("low", Band(high=2.25, right=Flank(2.25, 2.296875)))
+    low, _ = exponent_range(one_rule(narrow), "float32")
+    assert (2.296875 - 2.25) * 2.0**low == 3 * 2.0**-127
+    lines = Points((2.25, 2.25, 2.296875), (0.0, 1.0, 0.0))
+    assert exponent_range(one_rule(Term("low", lines)), "float32")[0] == low
 
 
 def test_a_model_without_change_of_units_is_itself() -> None:
