@@ -154,7 +154,7 @@ def _flank(flank: Flank, value: Value) -> Enclosure:
     error = q * ((4 * slope + (2 * len(curve) + 2) * size) * U * _MORE) + LEAST
     is_zero = away <= 0.0
     if slack is not None:
-        error += slack * min(slope / abs(span) * _MORE, _LARGEST)
+        error += slope * _MORE * np.minimum(slack / abs(span), 1.0)
         is_zero = away <= -slack
     high = np.clip(degree + error, 0.0, _CAP)
     high[is_zero] = 0.0
@@ -242,7 +242,8 @@ def _moved(points: Points, x: FloatArray, slack: FloatArray) -> FloatArray:
     width, height = np.diff(values), np.abs(np.diff(degrees))
     is_step = (width == 0.0) & (height > 0.0)
     steepest = np.max(height[width > 0.0] / width[width > 0.0], initial=0.0)
-    moved = np.minimum(slack * min(float(steepest) * _MORE, _LARGEST), 1.0)
+    slope = np.nextafter(min(float(steepest) * _MORE, _LARGEST), _LARGEST)
+    moved = np.minimum(slack * slope, 1.0)
     first = np.searchsorted(values[1:][is_step], x - slack, side="left")
     last = np.searchsorted(values[1:][is_step], x + slack, side="right")
     return np.where(first < last, 1.0, moved)

@@ -16,7 +16,7 @@ s reaches across a step also by the step's height:
   of Horner's rule (and its own, in float32), which makes sum (2 k + 2) |c_k| u. At the
   plateau's edge the flank ends at 1 or it does not: what is missing is a step.
 - **Side.** The same for 1 - t Q(2 t - 1); the tail w**4 is 4 times as steep as w, whose
-  place is off by (u-relative error) * reach / (reach - 1) at most, and costs 15
+  place is off by (u-relative error) * reach / (reach - 1) at most, and costs 16
   roundings.
 - **Points.** Rounded values move the points and x, which is as if x alone moved twice
   as far; a line turns this into its slope times it. Lines narrower than that are steps.
@@ -62,7 +62,7 @@ FLOAT32_MAX = 3.4028234663852886e38
 MORE = 1.0 + 2.0**-10
 """A factor that covers terms of second order."""
 
-_MOST = 1e300  # of a slope: finite, so that nothing times it is nothing
+_MOST = 1e300  # of a slope: finite, for 0 times it; the value must be exact, then
 
 
 class Type(NamedTuple):
@@ -177,18 +177,18 @@ def _together(parts: Sequence[DegreeBound]) -> DegreeBound:
 
 
 def _edge_bound(edge: float, flank: Flank | None, kind: Type) -> DegreeBound:
-    blur = kind.stored * abs(edge) + kind.least * bool(kind.stored)
+    blur = _stored(edge, kind)
     if flank is None:
         return DegreeBound(0.0, 0.0, Steps((edge,), (1.0,), blur), abs(edge))
     span = abs(flank.start - flank.end)
     slope = steepest(flank.curve)
-    moved = kind.stored * abs(flank.end) + 2 * kind.least
+    moved = _stored(flank.end, kind) + _stored(0.0, kind)  # the end, and the width
     place = 3 * kind.axis + kind.cast + moved / span
     rounds = sum(
         ((2 * k + 2) * kind.degree + kind.curve) * abs(c)
         for k, c in enumerate(flank.curve)
     )
-    per_unit = min(slope / span * MORE, _MOST)
+    per_unit = _per_unit(slope, span)
     gap = float(1 - exact_flank(flank, Fraction(edge)))
     return DegreeBound(
         slope * place + rounds + kind.curve + kind.tiny,
@@ -208,21 +208,22 @@ def _side_bound(side: Side, mean: float, kind: Type) -> DegreeBound:
         for k, c in enumerate(curve)
     )
     rounds += kind.degree + kind.tiny
-    relative = 3 * kind.axis + kind.cast + kind.least / side.spread
-    moved = (kind.stored * abs(mean) + kind.least) / side.spread
+    relative = 3 * kind.axis + kind.cast + _stored(0.0, kind) / side.spread
+    moved = _stored(mean, kind) / side.spread
     shift = (
         abs(float(np.float32(min(reach, FLOAT32_MAX))) - reach) if kind.curve else 0.0
     )
     last = min(max(1.0 - sum(curve) + sum(map(abs, curve)) * 2.0**-40, 0.0), 1.0)
     w = min(0.75 * reach / length, 1.0)  # where u-relative errors weigh most
     peak = max(w**3 * (reach - w * length), 1.0)
-    tail = 4.0 * (moved + relative * peak + shift) / length + 16 * kind.degree
-    within = slope * (moved + relative) + rounds
+    tail = last * 4.0 * (moved + relative * peak + shift) / length
+    within = slope * (moved + relative)
     if shift:
         within += 4.0 * shift / length + 16 * kind.degree
+    rounds += last * 16 * kind.degree  # a value within may be rounded into the tail
     return DegreeBound(
-        max(within, last * tail + rounds),
-        min(max(slope, last * 4.0 / length) / side.spread * MORE, _MOST),
+        max(within, tail) + rounds,
+        _per_unit(max(slope, last * 4.0 / length), side.spread),
         active=abs(mean) + reach * side.spread,
     )
 
@@ -234,14 +235,14 @@ def _pairs(curve: Sequence[float]) -> Iterator[tuple[float, float]]:
 def _points_bound(points: Points, kind: Type) -> DegreeBound:
     """Bound lines between points; what is narrower than rounding counts as a step."""
     active = max(map(abs, points.values))
-    moved = kind.stored * active + kind.least * bool(kind.stored)
+    moved = _stored(active, kind)
     slope = height = narrow = 0.0
     places: list[float] = []
     heights: list[float] = []
     joined = zip(points.values, points.degrees, strict=True)
     for (a, p), (b, r) in itertools.pairwise(joined):
         if b - a > 4 * moved:
-            slope = max(slope, abs(r - p) / (b - a))
+            slope = max(slope, _per_unit(abs(r - p), b - a))
         elif p != r:
             places.append(a)
             heights.append(abs(r - p))
@@ -249,9 +250,18 @@ def _points_bound(points: Points, kind: Type) -> DegreeBound:
         height = max(height, abs(r - p))
     rounds = height * (3 * kind.axis + kind.cast + 2 * kind.degree)
     rounds += kind.degree + 2 * kind.curve + kind.tiny
-    per_unit = min(slope * MORE, _MOST)
     steps = Steps(tuple(places), tuple(heights), 2 * moved + narrow)
-    return DegreeBound(per_unit * 2 * moved + rounds, per_unit, steps, active)
+    return DegreeBound(slope * 2 * moved + rounds, slope, steps, active)
+
+
+def _stored(value: float, kind: Type) -> float:
+    """Return how far a number of the model is moved by being stored, at most."""
+    return kind.stored * abs(value) + kind.least if kind.stored else 0.0
+
+
+def _per_unit(rise: float, width: float) -> float:
+    """Return a slope, rounded up: above 0, in doubles too, if the rise is."""
+    return min(rise / width * MORE + 2.0**-1074, _MOST) if rise else 0.0
 
 
 @functools.lru_cache(maxsize=1 << 12)
@@ -333,7 +343,8 @@ def degree_errors(
 ) -> Reals:
     """Return the largest error of a degree at each value, which is off by so much.
 
-    An input's own rounding is relative: beyond `active` it changes nothing.
+    An input's own rounding is relative: beyond `active` it changes nothing. Of a shape
+    too steep for doubles to say how steep, no value that is off has a bound.
     """
     blur = bound.steps.blur
     if off is None:
@@ -347,4 +358,5 @@ def degree_errors(
         last = np.searchsorted(places, x + near, side="right")
         sums = np.append(0.0, np.cumsum(bound.steps.heights))
         found = found + (sums[last] - sums[first])
-    return np.where(np.isfinite(off), np.minimum(found * MORE, 1.0), 1.0)
+    is_bound = np.isfinite(off) & (bound.per_unit < _MOST)
+    return np.where(is_bound, np.minimum(found * MORE, 1.0), 1.0)

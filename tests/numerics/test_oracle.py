@@ -238,6 +238,9 @@ SHAPES: list[Shape] = [
     LR(0.0, Side(1e-310, (0.5,)), Side(1e307, (0.5,), 1.0 + 2.0**-50)),
     LR(1e308, Side(1e308, (0.5, 0.1)), Side(1.0, (1e6, -1e6))),
     Points((-1e300, 0.0, 0.0, 1e-320, 1e300), (0.0, 1.0, 0.5, 0.7, 0.1)),
+    # slopes that are 0 in doubles, and values off by more than such a slope is small
+    Band(low=-1e289, left=Flank(-1e289, -2e289, (1e-120,))),
+    Points((0.0, 1e308), (0.0, 1e-20)),
 ]
 
 

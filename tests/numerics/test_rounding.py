@@ -86,6 +86,30 @@ def test_an_lr_set_pays_for_a_tail_that_ends_soon_after_one_spread() -> None:
     assert degree_bound(far, "mixed").fixed < degree_bound(near, "mixed").fixed < 1e-4
 
 
+def test_a_value_within_a_spread_can_be_rounded_into_the_tail() -> None:
+    shape = LR(0.0, Side(1.0, (-10.0, 10.0)), Side(1.0, (-10.0, 10.0)))
+    roundings = 2 * 10 + 5 * 10 + 1  # of the body; 16 of the tail, which starts at 1
+    slope = 1 * abs(-10 + 10) + 2 * 10
+    bound = degree_bound(shape, "float64").fixed
+    assert bound == pytest.approx((3 * slope + roundings + 16) * 2.0**-53, rel=2e-3)
+
+
+def test_a_value_that_is_off_has_no_bound_on_a_flank_of_next_to_no_width() -> None:
+    x, off = np.array([0.0]), np.array([5e-324])  # which makes 1/20 of the width
+    flank = degree_bound(Band(high=-1.0, right=Flank(0.0, 1e-322)), "float64")
+    points = degree_bound(Points((0.0, 1e-322), (1.0, 0.0)), "float64")
+    for bound in (flank, points):
+        assert bound.per_unit < np.inf
+        assert degree_errors(bound, x, off, is_input=False).tolist() == [1.0]
+        assert degree_errors(bound, x, None, is_input=True)[0] < 1e-15
+
+
+def test_a_slope_that_is_zero_in_doubles_still_costs_something() -> None:
+    flank = Band(low=-1e289, left=Flank(-1e289, -2e289, (1e-120,)))
+    for shape in (flank, Points((0.0, 1e300), (0.0, 1e-50))):
+        assert degree_bound(shape, "float64").per_unit > 0.0
+
+
 def test_level_points_cost_nothing_but_the_rounding_of_their_degree() -> None:
     level = Points((0.0, 1.0), (0.5, 0.5))
     assert degree_bound(level, "float64").fixed < 2 * 2.0**-53
