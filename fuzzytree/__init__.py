@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fuzzytree.tree import FuzzyTree
     from fuzzytree.verbs import (
         bench,
+        certify,
         check,
         export,
         learn,

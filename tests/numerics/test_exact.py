@@ -128,7 +128,7 @@ def test_a_path_follows_the_exact_value_and_not_the_rounded_one() -> None:
 
 def answered(
     x: float, *terms: Shape, then: str, conjunction: Conjunction = "min"
-) -> tuple[int, str | None, int, Fraction]:
+) -> tuple[int, str | None, int, Fraction | int]:
     """Ask rules with one clause each, of one variable, for the classes in `then`."""
     variable = Variable("x", tuple(Term(str(k), t) for k, t in enumerate(terms)))
     rules = RuleBase(
@@ -167,7 +167,7 @@ def test_no_rule_and_no_value_answer_as_declared() -> None:
 
 def test_a_rule_without_a_clause_always_holds() -> None:
     rules = RuleBase("one", ("a",), (), (Rule((), "a"),))
-    assert exact_answer(rules, {}).strengths == (1,)
+    assert exact_answer(rules, {}).strengths == (Fraction(1),)
 
 
 def test_is_not_is_one_minus_the_largest_of_the_terms() -> None:
@@ -230,11 +230,11 @@ def _decimal(shape: Shape, x: Decimal) -> Decimal:
     """Evaluate in decimals, by powers and not by Horner's rule."""
     if isinstance(shape, Band):
         sides = (
-            (shape.low, shape.left, lambda end: x <= end),
-            (shape.high, shape.right, lambda end: x > end),
+            (shape.left, shape.low is not None and x <= Decimal(shape.low)),
+            (shape.right, shape.high is not None and x > Decimal(shape.high)),
         )
-        for edge, flank, is_off in sides:
-            if edge is not None and flank is not None and is_off(Decimal(edge)):
+        for flank, is_off in sides:
+            if flank is not None and is_off:
                 start, end = Decimal(flank.start), Decimal(flank.end)
                 q = _held((x - end) / (start - end))
                 powers = (Decimal(c) * q**k for k, c in enumerate(flank.curve, 1))

@@ -121,6 +121,7 @@ def marks_of(shapes: list[Shape]) -> list[float]:
                 steps = (0.0, 0.5, 1.0, side.reach)
                 found += [shape.mean + sign * side.spread * step for step in steps]
             continue
+        assert isinstance(shape, Band)
         for flank in (shape.left, shape.right):
             found += [] if flank is None else [flank.start, flank.end]
         found += [end for end in (shape.low, shape.high) if end is not None]
