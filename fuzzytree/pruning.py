@@ -19,10 +19,12 @@ Why an answer keeps its bits:
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from fractions import Fraction
+from functools import partial
 
 import msgspec
 from msgspec.structs import replace
@@ -161,19 +163,23 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
         for variable, names in same.items()
         for name, other in names.items()
     ]
-    shapes = shapes_of(rules.variables)
+    is_min = rules.semantics.conjunction == "min"
+    # Rules of a tree share their clauses, and these may name thousands of terms.
+    renamed = functools.cache(partial(_renamed, same=same))
+    is_idle = functools.cache(partial(always_holds, shapes=shapes_of(rules.variables)))
     kept: list[Rule] = []
     for number in numbers:
         rule = rules.rules[number - 1]
-        when = [_renamed(clause, same[clause.variable]) for clause in rule.when]
-        needed = _needed_clauses(when, shapes, rules.semantics.conjunction == "min")
+        when = [renamed(clause) for clause in rule.when]
+        needed = _needed_clauses(when, is_idle, is_min=is_min)
         texts = [clause_text(c) for k, c in enumerate(when) if k not in needed]
         removed += [
             Removed(f"clause {text!r} of rule {number}", "it changes no strength")
             for text in texts
         ]
         kept.append(replace(rule, when=tuple(when[k] for k in needed)))
-    named = {(c.variable, t) for rule in kept for c in rule.when for t in c.terms}
+    clauses = {clause for rule in kept for clause in rule.when}
+    named = {(clause.variable, t) for clause in clauses for t in clause.terms}
     variables = _pruned_variables(
         _merged(rules.variables, same), named, removed, drops_inputs=drops_inputs
     )
@@ -182,12 +188,12 @@ def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> 
 
 
 def _needed_clauses(
-    when: list[Clause], shapes: Mapping[tuple[str, str], Shape], is_min: bool
+    when: list[Clause], is_idle: Callable[[Clause], bool], *, is_min: bool
 ) -> list[int]:
     """Return the positions of the clauses that can lower a strength."""
     needed: dict[Clause | int, int] = {}
     for position, clause in enumerate(when):
-        if not always_holds(clause, shapes):
+        if not is_idle(clause):
             needed.setdefault(clause if is_min else position, position)
     return list(needed.values())
 
@@ -217,10 +223,11 @@ def curve_bytes(shape: Shape) -> bytes:
     return msgspec.json.encode(shape)
 
 
-def _renamed(clause: Clause, same: Mapping[str, str]) -> Clause:
-    if not same.keys() & set(clause.terms):
+def _renamed(clause: Clause, same: Mapping[str, Mapping[str, str]]) -> Clause:
+    of = same[clause.variable]
+    if not of.keys() & set(clause.terms):
         return clause
-    names = dict.fromkeys(same.get(name, name) for name in clause.terms)
+    names = dict.fromkeys(of.get(name, name) for name in clause.terms)
     return replace(clause, terms=tuple(names))
 
 
@@ -415,7 +422,7 @@ def never_firing(rules: RuleBase) -> dict[int, str]:
         >>> never_firing(RuleBase("r", ("a",), (Variable("x", (low, high)),), rules))
         {1: 'x is low AND x is high never hold together'}
     """
-    shapes = shapes_of(rules.variables)
+    holding = functools.cache(partial(_holding, shapes=shapes_of(rules.variables)))
     found: dict[int, str] = {}
     for number, rule in enumerate(rules.rules, 1):
         by_variable: dict[str, list[Clause]] = {}
@@ -424,7 +431,7 @@ def never_firing(rules: RuleBase) -> dict[int, str]:
         for clauses in by_variable.values():
             left = EVERYWHERE
             for clause in clauses:
-                left = _both(left, _holding(clause, shapes))
+                left = _both(left, holding(clause))
             if not left:
                 texts = " AND ".join(map(clause_text, clauses))
                 verb = "never holds" if len(clauses) == 1 else "never hold together"
@@ -586,7 +593,7 @@ def _rule_faults(
 ) -> Iterator[str]:
     kept = list(numbers) or list(range(1, len(before.rules) + 1))
     dead = never_firing(before)
-    gone = [n for n in range(1, len(before.rules) + 1) if n not in kept]
+    gone = sorted({*range(1, len(before.rules) + 1)}.difference(kept))
     yield from (f"rule {n} may fire and is gone" for n in gone if n not in dead)
     if len(kept) != len(after.rules) or kept != sorted(set(kept)):
         yield f"{len(after.rules)} rules where {len(kept)} are right"
@@ -601,17 +608,17 @@ def _rule_forms(rules: RuleBase) -> list[object]:
     axes, shapes = _axes(rules), shapes_of(rules.variables)
     curves = {key: curve_bytes(shape) for key, shape in shapes.items()}
     is_min = rules.semantics.conjunction == "min"
+
+    @functools.cache
+    def form(clause: Clause) -> tuple[object, ...]:
+        if always_holds(clause, shapes):
+            return ()
+        met = frozenset(curves[clause.variable, t] for t in clause.terms)
+        return axes[clause.variable], clause.negated, met
+
     forms: list[object] = []
     for rule in rules.rules:
-        when = [
-            (
-                axes[clause.variable],
-                clause.negated,
-                frozenset(curves[clause.variable, t] for t in clause.terms),
-            )
-            for clause in rule.when
-            if not always_holds(clause, shapes)
-        ]
+        when = [found for clause in rule.when if (found := form(clause))]
         forms.append((rule.then, frozenset(when) if is_min else tuple(when)))
     return forms
 
