@@ -8,8 +8,10 @@ that is points is itself, its steps as wide as one double.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -134,19 +136,31 @@ def _flank_error(flank: Flank, values: FloatArray) -> float:
 
 def _side_error(side: Side, distance: FloatArray) -> float:
     u = np.clip(distance / side.spread, 0.0, side.reach)
-    # 1 - t Q(2 t - 1) as a polynomial of t, for t up to 1; then body * w**4.
-    inner = np.polynomial.Polynomial(side.curve)
-    body = 1.0 - np.polynomial.Polynomial([0.0, 1.0]) * inner(
-        np.polynomial.Polynomial([-1.0, 2.0])
-    )
-    level = min(max(float(body(1.0)), 0.0), 1.0)
+    body = _body(side.curve)
+    level = min(max(_at_one(body), 0.0), 1.0)
     gaps = np.abs(np.diff(np.clip(u, 1.0, side.reach))) / (side.reach - 1.0)
     tail = 12.0 * level * float(np.max(gaps, initial=0.0)) ** 2 / 8.0
     slack = _ROUNDING * (1.0 + sum(map(abs, side.curve)) * 4.0 ** len(side.curve))
-    return (
-        max(_curve_error(np.asarray(body.coef, np.float64), np.clip(u, 0.0, 1.0)), tail)
-        + slack
-    )
+    return max(_curve_error(np.array(body), np.clip(u, 0.0, 1.0)), tail) + slack
+
+
+def _body(curve: Sequence[float]) -> list[float]:
+    """Return 1 - t Q(2 t - 1), a side for t up to 1, by the powers of t.
+
+    Example:
+        >>> _body((0.5, 0.25))  # 1 - t (0.5 + 0.25 (2 t - 1))
+        [1.0, -0.25, -0.5]
+    """
+    inner = [curve[-1]]
+    for coefficient in reversed(curve[:-1]):
+        pairs = zip([0.0, *inner], [*inner, 0.0], strict=True)
+        inner = [2.0 * below - same for below, same in pairs]
+        inner[0] += coefficient
+    return [1.0, *(-coefficient for coefficient in inner)]
+
+
+def _at_one(curve: Sequence[float]) -> float:
+    return functools.reduce(operator.add, reversed(curve))
 
 
 def _curve_error(curve: FloatArray, position: FloatArray) -> float:
