@@ -138,6 +138,7 @@ def report(
     uses: Collection[Use] = ("tree", "relative"),
     data: FloatArray | None = None,
     table: str | None = None,
+    delimiter: str | None = None,
     seconds: float = 0.0,
     tell: Tell | None = None,
 ) -> Report:
@@ -149,6 +150,7 @@ def report(
         uses: What a tree serves, as when it was pruned.
         data: Rows of one's own for the proof, in the order of the model's inputs.
         table: The path of a table; reading it is timed.
+        delimiter: Of a CSV file, if its first line does not tell.
         seconds: For all timings together; 0 for none.
         tell: Told how far the timings are.
     """
@@ -157,7 +159,9 @@ def report(
     timed, untimed = (
         ((), ())
         if seconds <= 0
-        else costs(made, uses, table=table, seconds=seconds, tell=tell)
+        else costs(
+            made, uses, table=table, delimiter=delimiter, seconds=seconds, tell=tell
+        )
     )
     return Report(
         needs(model, uses=uses),
@@ -253,6 +257,7 @@ def costs(
     uses: Collection[Use],
     *,
     table: str | None = None,
+    delimiter: str | None = None,
     seconds: float = 20.0,
     rounds: int = 15,
     tell: Tell | None = None,
@@ -266,6 +271,7 @@ def costs(
         made: The stages.
         uses: What a tree serves.
         table: The path of a table to read; none is read if None.
+        delimiter: Of a CSV file, if its first line does not tell.
         seconds: For all of it.
         rounds: The most samples of each call.
         tell: Told how far it is.
@@ -281,7 +287,7 @@ def costs(
             for rows_of, key, call in _calls(stage, title, carrier, rows, omissions):
                 groups[rows_of][key] = call
         if table is not None:
-            reading = _reading(table, model)
+            reading = _reading(table, model, delimiter)
             try:
                 reading()
             except FuzzyTreeError as error:
@@ -328,9 +334,9 @@ def _bound(run: Callable[[FloatArray], object], values: FloatArray) -> Call:
     return lambda: run(values)
 
 
-def _reading(table: str, model: Model) -> Call:
+def _reading(table: str, model: Model, delimiter: str | None) -> Call:
     def read() -> int:
-        found = batches(table, model.inputs, trained=model.columns)
+        found = batches(table, model.inputs, trained=model.columns, delimiter=delimiter)
         return sum(batch.values.shape[1] for batch in found)
 
     return read

@@ -441,11 +441,47 @@ def _loaded(model: Model, name: str) -> Run:
     return runtime.load(model)
 
 
+def rows_of(
+    data: object,
+    model: Model,
+    *,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+) -> FloatArray | None:
+    """Return the rows of a table for a model, of shape (inputs, rows).
+
+    Args:
+        data: A table; see `fuzzytree.tables`. Without one (None) there are no rows.
+        model: Whose inputs they are for.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+
+    Raises:
+        TableError: If a column is absent or holds text, or the table has no row.
+    """
+    if data is None:
+        return None
+    found = [
+        *batches(
+            data,
+            model.inputs,
+            trained=model.columns,
+            columns=columns,
+            delimiter=delimiter,
+        )
+    ]
+    values = np.hstack([batch.values for batch in found])
+    if not values.shape[1]:
+        raise TableError(f"{found[0].piece.name} has no rows")
+    return values
+
+
 def check(
     model: Model | str | os.PathLike[str],
     *others: Carried,
     data: object = None,
     columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     limit: int = 20_000,
@@ -458,13 +494,14 @@ def check(
             paths.
         data: A table with rows of one's own, beside the probes.
         columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
         names: What to call each of the others; its path unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
         limit: The most probes.
 
     Raises:
         ReadError: If a file cannot be read.
-        TableError: If a column is absent or holds text.
+        TableError: If a column is absent or holds text, or the table has no row.
         ValueError: If a runtime is unknown.
 
     Example:
@@ -479,14 +516,10 @@ def check(
         names[k] if k < len(names) else _title(other, k)
         for k, other in enumerate(others)
     ]
-    values = None
-    if data is not None:
-        found = batches(data, first.inputs, trained=first.columns, columns=columns)
-        values = np.hstack([batch.values for batch in found])
     return checking.check(
         first,
         *map(opened, others),
-        data=values,
+        data=rows_of(data, first, columns=columns, delimiter=delimiter),
         names=titles,
         runtimes=runtimes,
         limit=limit,
@@ -511,7 +544,7 @@ def certify(
 
     Raises:
         ReadError: If a file cannot be read.
-        TableError: If a column is absent or holds text.
+        TableError: If a column is absent or holds text, or the table has no row.
         ValueError: If there is no such number type.
 
     Example:
@@ -525,11 +558,7 @@ def certify(
         known = ", ".join(get_args(Dtype))
         raise ValueError(f"there is no number type {dtype!r}; there are {known}")
     first = load(model) if isinstance(model, str | os.PathLike) else model
-    values = None
-    if data is not None:
-        found = batches(data, first.inputs, trained=first.columns, columns=columns)
-        values = np.hstack([batch.values for batch in found])
-    return bounds.certify(first, dtype, values)
+    return bounds.certify(first, dtype, rows_of(data, first, columns=columns))
 
 
 def bench(
@@ -584,21 +613,9 @@ def bench(
 
     plan = study.Plan(tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed)
     first = load(model) if isinstance(model, str | os.PathLike) else model
-    values = None
-    if data is not None:
-        found = batches(
-            data,
-            first.inputs,
-            trained=first.columns,
-            columns=columns,
-            delimiter=delimiter,
-        )
-        values = np.hstack([batch.values for batch in found])
-        if not values.shape[1]:
-            raise TableError(f"{_data_name(data)} has no rows")
     return study.bench(
         first,
-        values=values,
+        values=rows_of(data, first, columns=columns, delimiter=delimiter),
         data=_data_name(data),
         only=only,
         skip=skip,
@@ -618,6 +635,7 @@ def stability(
     *,
     data: object = None,
     columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
     only: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     progress: Progress | None = None,
@@ -628,13 +646,14 @@ def stability(
         model: A tree or a rule base, or the path of one.
         data: A table with rows of one's own, beside the probes.
         columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
         only: The codes of criteria, such as `N3`; all unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
         progress: Told what is done and which share of it.
 
     Raises:
         ReadError: If the file cannot be read.
-        TableError: If a column is absent or holds text.
+        TableError: If a column is absent or holds text, or the table has no row.
         ValueError: If a criterion or a runtime is unknown.
 
     Example:
@@ -646,15 +665,11 @@ def stability(
 
     first = load(model) if isinstance(model, str | os.PathLike) else model
     chosen = all_runtimes() if runtimes is None else tuple(map(find_runtime, runtimes))
-    values = None
-    if data is not None:
-        found = batches(data, first.inputs, trained=first.columns, columns=columns)
-        values = np.hstack([batch.values for batch in found])
     return examine(
         first,
         runtimes=chosen,
         formats=all_formats(),
-        data=values,
+        data=rows_of(data, first, columns=columns, delimiter=delimiter),
         only=only,
         tell=progress or (lambda _text, _share: None),
     )

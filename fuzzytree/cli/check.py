@@ -9,6 +9,7 @@ import click
 from fuzzytree.cli.talk import (
     answer,
     data_option,
+    delimiter_option,
     json_option,
     quiet_option,
     runtimes_option,
@@ -31,6 +32,7 @@ from fuzzytree.cli.talk import (
     help="The most probes.",
 )
 @click.option("--rows", "is_full", is_flag=True, help="Tell rows that may differ, too.")
+@delimiter_option
 @json_option
 @quiet_option
 def command(
@@ -40,6 +42,7 @@ def command(
     runtimes: Sequence[str],
     limit: int,
     is_full: bool,
+    delimiter: str | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -56,6 +59,7 @@ def command(
             model,
             *files,
             data=table_source(data),
+            delimiter=delimiter,
             runtimes=runtimes or None,
             limit=limit,
         )

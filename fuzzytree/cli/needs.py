@@ -10,6 +10,7 @@ import click
 from fuzzytree.cli.talk import (
     answer,
     data_option,
+    delimiter_option,
     json_option,
     progress_bar,
     quiet_option,
@@ -18,9 +19,9 @@ from fuzzytree.cli.talk import (
     table_source,
     wrong_options,
 )
+from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray, Model
     from fuzzytree.tree import Use
 
 
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     metavar="SECONDS",
     help="Measure for so long what opening, answering and reading cost.",
 )
+@delimiter_option
 @json_option
 @quiet_option
 def command(
@@ -59,6 +61,7 @@ def command(
     uses: Sequence[Use],
     drop: Sequence[str],
     seconds: float | None,
+    delimiter: str | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -81,7 +84,9 @@ def command(
         found = pruned(
             first, uses=wanted, inputs="inputs" in drop, rules="rules" in drop
         )
-    rows = None if data is None else _rows(data, first)
+    if output is not None:
+        check_place(output)
+    rows = verbs.rows_of(table_source(data), first, delimiter=delimiter)
     with progress_bar(quiet=quiet) as tell:
         told = savings.report(
             first,
@@ -89,6 +94,7 @@ def command(
             uses=wanted,
             data=rows,
             table=None if data == "-" else data,
+            delimiter=delimiter,
             seconds=seconds or 0.0,
             tell=tell,
         )
@@ -101,15 +107,6 @@ def command(
         verbs.save(found.model, output)
         say_rows(("wrote", output, _next(model, output, found.is_same)), quiet=quiet)
     return 0
-
-
-def _rows(data: str, model: Model) -> FloatArray:
-    import numpy as np
-
-    from fuzzytree.tables import batches
-
-    found = batches(table_source(data), model.inputs, trained=model.columns)
-    return np.hstack([batch.values for batch in found])
 
 
 def _next(model: str, output: str, is_same: bool) -> str:

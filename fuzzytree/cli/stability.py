@@ -9,6 +9,7 @@ import click
 from fuzzytree.cli.talk import (
     answer,
     data_option,
+    delimiter_option,
     json_option,
     progress_bar,
     quiet_option,
@@ -32,6 +33,7 @@ from fuzzytree.cli.talk import (
 @click.option(
     "--rows", "is_full", is_flag=True, help="Tell all that was left out, too."
 )
+@delimiter_option
 @json_option
 @quiet_option
 def command(
@@ -40,6 +42,7 @@ def command(
     only: Sequence[str],
     runtimes: Sequence[str],
     is_full: bool,
+    delimiter: str | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -56,6 +59,7 @@ def command(
         found = verbs.stability(
             model,
             data=table_source(data),
+            delimiter=delimiter,
             only=only,
             runtimes=runtimes or None,
             progress=tell,
