@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from fuzzytree.contracts import Dtype, Model
 from fuzzytree.numerics.bounds import certify
@@ -11,11 +12,13 @@ from fuzzytree.rulebase import RuleBase
 from fuzzytree.timing.candidates import Bound, Bounds, Layouts, own, questions
 from fuzzytree.timing.floors import floors
 from fuzzytree.timing.peers import peers
-from fuzzytree.timing.records import Candidate, Omission
+from fuzzytree.timing.records import Candidate, Kind, Omission, Question
 from fuzzytree.timing.variants import variants
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
+
+_GROUPS = (*get_args(Question), *get_args(Kind))
 
 
 def gather(model: Model, values: FloatArray) -> tuple[list[Candidate], list[Omission]]:
@@ -53,17 +56,13 @@ def chosen(
         skip: The same, for what is not wanted.
 
     Raises:
-        ValueError: If a word names nothing, or nothing is left; the message lists
-            what there is.
+        ValueError: If a word names nothing that could be there, or nothing is left;
+            the message lists what there is.
     """
+    known = set().union(_GROUPS, *map(_words, candidates))
     for word in (*only, *skip):
-        if not any(word in _words(one) for one in candidates):
-            known = dict.fromkeys(_short(one) for one in candidates)
-            groups = dict.fromkeys(w for one in candidates for w in _groups(one))
-            raise ValueError(
-                f"no candidate {word!r}; there is {', '.join(known)}, "
-                f"or all of {', '.join(groups)}"
-            )
+        if word not in known:
+            raise ValueError(_unknown(word, candidates))
     kept = [
         one
         for one in candidates
@@ -76,6 +75,19 @@ def chosen(
     if not left:
         return kept, []
     return kept, [Omission(_counted(left), "not asked for")]
+
+
+def _unknown(word: str, candidates: Sequence[Candidate]) -> str:
+    """Say what there is, without the variants of each number, and what was meant."""
+    names = [_short(one) for one in candidates if one.kind != "variant"]
+    groups = [group for one in candidates for group in _groups(one)]
+    known = [*dict.fromkeys((*names, *groups))]
+    close = difflib.get_close_matches(word, known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return (
+        f"no candidate {word!r}; there is {', '.join(dict.fromkeys(names))}, "
+        f"or all of {', '.join(dict.fromkeys(groups))}{hint}"
+    )
 
 
 def _counted(count: int) -> str:

@@ -84,14 +84,16 @@ class Plan(msgspec.Struct, frozen=True):
                     raise ValueError(f"{name}: 1 is the least, not {value}")
         if not 0 < self.budget_s < math.inf:
             raise ValueError(
-                f"the budget must be more than 0 seconds, not {self.budget_s:g}"
+                "the budget must be a number of seconds above 0, "
+                f"not {self.budget_s:g}"
             )
         if self.most is not None and not 0 <= self.most <= 1:
             raise ValueError(
                 f"an error of a strength lies in [0, 1], not at {self.most:g}"
             )
-        if self.rounds < 1:
-            raise ValueError(f"rounds: 1 is the least, not {self.rounds}")
+        for name, value, least in (("rounds", self.rounds, 1), ("seed", self.seed, 0)):
+            if value < least:
+                raise ValueError(f"{name}: {least} is the least, not {value}")
 
 
 def bench(

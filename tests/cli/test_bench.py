@@ -157,7 +157,12 @@ def test_what_libraries_print_is_no_part_of_the_answer(
     [
         (("--rows", "0"), "rows: 1 is the least, not 0"),
         (("--threads", "-1"), "threads: 1 is the least, not -1"),
-        (("--budget", "-5"), "the budget must be more than 0 seconds, not -5"),
+        (("--budget", "-5"), "the budget must be a number of seconds above 0, not -5"),
+        (
+            ("--budget", "inf"),
+            "the budget must be a number of seconds above 0, not inf",
+        ),
+        (("--seed", "-1"), "seed: 0 is the least, not -1"),
         (("--error", "2"), "an error of a strength lies in [0, 1], not at 2"),
         (("--plot", "a.pdf"), "--plot a.pdf: a picture ends in .svg or .png"),
     ],
@@ -174,6 +179,17 @@ def test_an_unknown_candidate_is_one_sentence(call: Call) -> None:
     assert (code, out) == (2, "")
     assert err.startswith("no candidate 'nativ'; there is floor: the columns read once")
     assert "or all of tree, floor, " in err
+    assert "points" not in err
+    assert err.splitlines()[0].endswith(" (did you mean 'native'?)")
+
+
+def test_what_a_model_does_not_have_can_be_skipped(call: Call) -> None:
+    assert call("bench", "grip.yaml", "--skip", "rules", *FAST)[0] == 0
+    code, _, err = call("bench", "grip.yaml", "--only", "rules", "--budget", "1")
+    assert code == 2
+    assert err == (
+        "no candidate is left to measure\n  fuzzytree bench --help tells more\n"
+    )
 
 
 def test_a_table_without_rows_is_one_sentence(call: Call) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import re
 import signal
@@ -421,10 +422,14 @@ def test_a_name_of_nothing_is_refused_with_what_there_is() -> None:
         ({"rows": (0,)}, "rows: 1 is the least, not 0"),
         ({"rows": ()}, "rows: name at least one number"),
         ({"threads": (1, -2)}, "threads: 1 is the least, not -2"),
-        ({"budget_s": -3.0}, "the budget must be more than 0 seconds, not -3"),
-        ({"budget_s": float("inf")}, "the budget must be more than 0 seconds, not inf"),
+        ({"budget_s": -3.0}, "the budget must be a number of seconds above 0, not -3"),
+        (
+            {"budget_s": math.inf},
+            "the budget must be a number of seconds above 0, not inf",
+        ),
         ({"most": 1.5}, r"an error of a strength lies in \[0, 1\], not at 1.5"),
         ({"rounds": 0}, "rounds: 1 is the least, not 0"),
+        ({"seed": -1}, "seed: 0 is the least, not -1"),
     ],
 )
 def test_a_plan_that_cannot_be_is_refused(
