@@ -1,7 +1,7 @@
 """Models to test with, for us and for people who write formats and runtimes.
 
 `random_tree` makes valid trees of any size from a seed; `probes` (from
-`fuzzytree.probing`) the rows that matter for a model.
+`fuzzytree.probing`) the rows that matter for a model, `probe_values` as an array.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
-from fuzzytree.probing import SPECIAL, landmarks, probes
+from fuzzytree.probing import SPECIAL, landmarks, probe_values, probes
 from fuzzytree.rulebase import (
     LR,
     Band,
@@ -36,7 +36,7 @@ from fuzzytree.tree import (
     intervals,
 )
 
-__all__ = ["SPECIAL", "probes", "random_tree", "with_points"]
+__all__ = ["SPECIAL", "probe_values", "probes", "random_tree", "with_points"]
 
 
 def random_tree(

@@ -40,7 +40,7 @@ from fuzzytree.runtimes.envelope import (
     plan_envelope,
 )
 from fuzzytree.runtimes.native_rules import fire
-from fuzzytree.testing import probes, random_tree, with_points
+from fuzzytree.testing import probe_values, random_tree, with_points
 
 TRAPEZOID = Points((1.0, 2.0, 4.0, 8.0), (0.0, 1.0, 1.0, 0.0))
 STEP = Points((0.0, 2.5, 2.5, 3.0), (0.25, 0.75, 0.5, 0.5))
@@ -351,8 +351,7 @@ def test_the_landmarks_of_points_are_the_points_and_places_between() -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_random_rules_of_points_have_the_same_bits_everywhere(seed: int) -> None:
     rules = with_points(rules_from_tree(random_tree(seed), "raw"), seed)
-    rows = probes(rules, limit=1500)
-    values = np.array([[row[name] for row in rows] for name in rules.inputs])
+    values = probe_values(rules, 1500)
     reference = find_runtime("reference").load(rules)(values)
     for runtime in all_runtimes():
         if "rules" not in runtime.runs or not is_installed(runtime):

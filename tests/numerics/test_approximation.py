@@ -36,7 +36,7 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load
-from fuzzytree.testing import probes, random_tree, with_points
+from fuzzytree.testing import probe_values, probes, random_tree, with_points
 
 SMOOTH = (0.0, 3.0, -2.0)  # q**2 (3 - 2 q): level at both ends
 SHAPES: dict[str, Band | LR] = {
@@ -229,8 +229,7 @@ def test_relative_rules_of_points_have_degree_one_where_they_had_it(
 ) -> None:
     rules = rules_from_tree(random_tree(seed))
     found = by_points(rules, 1e-2).model
-    rows = probes(rules, limit=1000)
-    values = np.array([[row[name] for row in rows] for name in rules.inputs])
+    values = probe_values(rules, 1000)
     before, after = load(rules, dtype)(values), load(found, dtype)(values)
     assert np.array_equal(before.rule, after.rule)
     assert np.array_equal(before.status, after.status)

@@ -13,7 +13,7 @@ from fuzzytree.numerics import bounds, rounding
 from fuzzytree.numerics.bounds import strength_bounds
 from fuzzytree.numerics.oracle import strength_errors
 from fuzzytree.numerics.rounding import TYPES, Type
-from fuzzytree.probing import probes
+from fuzzytree.probing import probe_values
 from fuzzytree.rulebase import (
     LR,
     Band,
@@ -151,6 +151,4 @@ def test_no_error_of_many_models_exceeds_its_bound(dtype: Dtype) -> None:
         )
         if seed % 3 == 0:
             rules = with_points(rules, seed)
-        made = probes(rules, limit=300)
-        values = np.array([[row[name] for row in made] for name in rules.inputs])
-        assert beyond(rules, dtype, values) == 0
+        assert beyond(rules, dtype, probe_values(rules, 300)) == 0

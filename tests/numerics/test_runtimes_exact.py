@@ -8,7 +8,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide, strength_errors
-from fuzzytree.probing import probes
+from fuzzytree.probing import probe_values
 from fuzzytree.rulebase import Conjunction, Kind
 from fuzzytree.runtimes import all_runtimes, is_installed
 from fuzzytree.testing import random_tree
@@ -30,8 +30,7 @@ def test_no_strength_of_a_runtime_is_farther_off_than_certified(
         run = runtime.load(rules)
     except LossError as error:
         pytest.skip(str(error))
-    rows = probes(rules, limit=150)
-    values = np.array([[row[name] for row in rows] for name in rules.inputs])
+    values = probe_values(rules, 150)
     found = run(values)
     allowed, _ = strength_bounds(rules, runtime.dtype, values)
     if runtime.bound is not None:
@@ -53,7 +52,6 @@ def test_no_path_of_a_runtime_leaves_the_exact_one_but_where_it_is_open(
     runtime: Runtime,
 ) -> None:
     tree = random_tree(22, leaves=7, inputs=3, combinations=0.5)
-    rows = probes(tree, limit=150)
-    values = np.array([[row[name] for row in rows] for name in tree.inputs])
+    values = probe_values(tree, 150)
     differs = runtime.load(tree)(values).rule != decide(tree, values).rule
     assert not (differs & ~open_paths(tree, runtime.dtype, values)).any()

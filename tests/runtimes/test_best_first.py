@@ -33,7 +33,7 @@ from fuzzytree.runtimes.envelope import (
     plan_envelope,
 )
 from fuzzytree.runtimes.native import load, load_best_first
-from fuzzytree.testing import probes, random_tree
+from fuzzytree.testing import probe_values, random_tree
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -216,9 +216,7 @@ def test_raw_rules_of_a_tree_are_won_as_by_firing(
 ) -> None:
     tree = random_tree(seed, leaves=90, inputs=5)
     rules = rules_from_tree(tree, "raw", conjunction=conjunction)
-    rows = probes(tree, limit=1500)
-    values = np.array([[row[name] for name in rules.inputs] for row in rows]).T
-    assert_fired(rules, values)
+    assert_fired(rules, probe_values(tree, 1500))
 
 
 def test_more_rows_than_go_through_together_are_answered() -> None:

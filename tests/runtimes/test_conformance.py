@@ -31,7 +31,7 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.reference import load as load_reference
-from fuzzytree.testing import probes, random_tree, with_points
+from fuzzytree.testing import probe_values, random_tree, with_points
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -142,15 +142,8 @@ MODELS = models()
 @functools.cache
 def believed(position: int) -> tuple[FloatArray, Outcome]:
     """Return probes of one of `MODELS`, and the reference's answers to them."""
-    values = values_for(MODELS[position])
+    values = probe_values(MODELS[position], 500)
     return values, load_reference(MODELS[position])(values)
-
-
-def values_for(model: Model, limit: int = 500) -> FloatArray:
-    """Return probes of a model, of shape (inputs, rows)."""
-    rows = probes(model, limit=limit)
-    table = np.array([[row[name] for name in model.inputs] for row in rows], np.float64)
-    return table.reshape(len(rows), len(model.inputs)).T.copy()
 
 
 def run_or_skip(runtime: Runtime, model: Model, values: FloatArray) -> Outcome:
@@ -267,7 +260,7 @@ def test_no_rows_give_no_answers(runtime: Runtime, model: Model) -> None:
 
 @pytest.mark.parametrize(("runtime", "model"), PAIRS)
 def test_one_row_is_answered_as_among_many(runtime: Runtime, model: Model) -> None:
-    values = values_for(model, limit=60)
+    values = probe_values(model, 60)
     run = runtime.load(model)
     together = run(values)
     for row in range(values.shape[1]):
@@ -280,7 +273,7 @@ def test_one_row_is_answered_as_among_many(runtime: Runtime, model: Model) -> No
 def test_the_layout_of_the_values_changes_nothing(
     runtime: Runtime, model: Model
 ) -> None:
-    values = values_for(model, limit=200)
+    values = probe_values(model, 200)
     run = runtime.load(model)
     expected = run(values)
     assert_same_answers(run(np.asfortranarray(values)), expected)
@@ -290,7 +283,7 @@ def test_the_layout_of_the_values_changes_nothing(
 
 @pytest.mark.parametrize(("runtime", "model"), PAIRS)
 def test_values_are_never_changed(runtime: Runtime, model: Model) -> None:
-    values = values_for(model, limit=100)
+    values = probe_values(model, 100)
     before = values.copy()
     runtime.load(model)(values)
     np.testing.assert_array_equal(values, before)
@@ -329,7 +322,7 @@ def test_other_numbers_are_converted(runtime: Runtime, model: Model) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_relative_rules_answer_like_the_tree_in_every_native_runtime(seed: int) -> None:
     tree = random_tree(seed, leaves=60, inputs=5)
-    values = values_for(tree, limit=3000)
+    values = probe_values(tree, 3000)
     expected = find_runtime("native").load(tree)(values)
     for conjunction in ("min", "product"):
         rules = rules_from_tree(tree, conjunction=conjunction)

@@ -39,13 +39,11 @@ from fuzzytree.rulebase import (
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.runtimes.reference import load as load_reference
-from fuzzytree.testing import probes, random_tree
+from fuzzytree.testing import probe_values, random_tree
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-    from fuzzytree.contracts import FloatArray
 
     Arrays = dict[str, npt.NDArray[np.generic]]
 
@@ -129,12 +127,6 @@ def random_models(seed: int) -> tuple[Model, ...]:
     )
 
 
-def values_for(model: Model, limit: int = 1500) -> FloatArray:
-    rows = probes(model, limit=limit)
-    table = [[row[name] for row in rows] for name in model.inputs]
-    return np.array(table, np.float64).reshape(len(model.inputs), len(rows))
-
-
 def assert_equal_bits(found: Outcome, expected: Outcome) -> None:
     assert np.array_equal(found.rule, expected.rule)
     assert np.array_equal(found.status, expected.status)
@@ -145,7 +137,7 @@ def assert_equal_bits(found: Outcome, expected: Outcome) -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_double_gives_the_bits_of_the_reference(seed: int) -> None:
     for model in random_models(seed):
-        values = values_for(model, 1200 if seed % 8 < 6 else 200)
+        values = probe_values(model, 1200 if seed % 8 < 6 else 200)
         expected = load_reference(model)(values)
         variants = ("float64", "plain" if isinstance(model, FuzzyTree) else "readable")
         for variant in variants:
@@ -157,7 +149,7 @@ def test_double_gives_the_bits_of_the_reference(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_single_types_give_the_bits_of_numpy(seed: int, dtype: Dtype) -> None:
     for model in random_models(seed):
-        values = values_for(model)
+        values = probe_values(model, 1500)
         expected = find_runtime(f"native {dtype}").load(model)(values)
         found = find_runtime(f"onnxruntime {dtype}").load(model)(values)
         assert_equal_bits(found, expected)
@@ -166,7 +158,7 @@ def test_single_types_give_the_bits_of_numpy(seed: int, dtype: Dtype) -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_relative_rules_decide_as_the_tree_in_every_type(seed: int) -> None:
     tree = random_tree(seed, leaves=9, inputs=3)
-    values = values_for(tree)
+    values = probe_values(tree, 1500)
     for dtype in DTYPES:
         load = find_runtime(f"onnxruntime {dtype}").load
         rules, path = load(rules_from_tree(tree))(values), load(tree)(values)
@@ -181,7 +173,7 @@ def test_optimising_a_graph_changes_no_bit(seed: int) -> None:
         written = write(model, outputs=("rule", other))
         options = onnxruntime.SessionOptions()
         level = onnxruntime.GraphOptimizationLevel
-        table = np.ascontiguousarray(values_for(model).T)
+        table = np.ascontiguousarray(probe_values(model, 1500).T)
         answers = []
         for chosen in (level.ORT_DISABLE_ALL, level.ORT_ENABLE_ALL):
             options.graph_optimization_level = chosen
@@ -195,7 +187,7 @@ def test_optimising_a_graph_changes_no_bit(seed: int) -> None:
 def test_chunks_rows_and_orders_change_no_bit(dtype: Dtype) -> None:
     rules = rules_from_tree(random_tree(4, leaves=300, inputs=5))
     run = find_runtime(f"onnxruntime {dtype}").load(rules)
-    values = values_for(rules)
+    values = probe_values(rules, 1500)
     whole = run(values)
     assert whole.strengths is not None
     assert_equal_bits(run(np.asfortranarray(values)), whole)
@@ -242,7 +234,7 @@ def _changed(change: object, model: Model | None = None) -> bytes:
 
 def test_a_shipped_file_tells_what_it_is_and_answers_alone() -> None:
     tree = random_tree(7, leaves=9, inputs=3, semantics=Semantics(missing="class 2"))
-    values = values_for(tree)
+    values = probe_values(tree, 1500)
     for model in (tree, rules_from_tree(tree, "raw", conjunction="product")):
         written = write(model, outputs=("status", "label", "rule"), signature="all")
         found = open_onnx(written.content, "model.onnx")
@@ -465,7 +457,9 @@ def test_the_oldest_onnxruntime_gives_equal_bits(version: str, tmp_path: Path) -
                 (tmp_path / name).write_bytes(written.content)
                 kind = np.float32 if dtype == "float32" else np.float64
                 with np.errstate(over="ignore"):
-                    table = np.ascontiguousarray(values_for(model, 600).T.astype(kind))
+                    table = np.ascontiguousarray(
+                        probe_values(model, 600).T.astype(kind)
+                    )
                 values[name] = table
                 session = onnxruntime.InferenceSession(written.content)
                 names = [output.name for output in session.get_outputs()]

@@ -38,7 +38,7 @@ from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.runtimes.native import load as load_native
 from fuzzytree.runtimes.reference import RUNTIMES as REFERENCE
 from fuzzytree.runtimes.sampling import lines_bound
-from fuzzytree.testing import probes, random_tree, with_points
+from fuzzytree.testing import probe_values, random_tree, with_points
 from fuzzytree.timing.candidates import found_of, questions
 from fuzzytree.timing.peers import TREE_PEERS, engines, peers
 from fuzzytree.timing.peers.crisp import questions as asked_questions
@@ -66,11 +66,6 @@ def candidate(model: Model, name: str) -> Candidate:
 
 def answer(model: Model, name: str, values: FloatArray) -> Found:
     return candidate(model, name).load(1).answer(values)
-
-
-def rows_of(model: Model, limit: int = 400) -> FloatArray:
-    rows = probes(model, limit=limit)
-    return np.array([[row[name] for row in rows] for name in model.inputs])
 
 
 def native(model: Model, values: FloatArray) -> Found:
@@ -102,7 +97,7 @@ def in_single(tree: FuzzyTree, values: FloatArray) -> IntArray:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_peer_in_double_gives_the_trees_classes(name: str, seed: int) -> None:
     tree = random_tree(seed, leaves=5 + 4 * seed, classes=2 + seed)
-    values = rows_of(tree)
+    values = probe_values(tree, 400)
     found = answer(tree, f"{name}: tree", values)
     assert np.array_equal(found.labels, native(tree, values).labels)
 
@@ -113,7 +108,7 @@ def test_a_peer_in_single_differs_by_rounding_its_inputs_alone(
     name: str, seed: int
 ) -> None:
     tree = random_tree(seed, leaves=5 + 4 * seed, classes=2 + seed)
-    values = rows_of(tree)
+    values = probe_values(tree, 400)
     found = answer(tree, f"{name}: tree", values)
     assert np.array_equal(found.labels, in_single(tree, values))
     assert np.any(found.labels != native(tree, values).labels)
@@ -125,7 +120,7 @@ def test_a_wrong_cut_in_a_peer_is_seen(name: str) -> None:
     node = tree.nodes[0]
     moved = node.cuts[0] + 0.01 * abs(node.cuts[0])
     wrong = moved_cut(tree, moved)
-    values = rows_of(tree)
+    values = probe_values(tree, 400)
     labels = answer(wrong, f"{name}: tree", values).labels
     expected = (
         in_single(tree, values) if name in SINGLE else native(tree, values).labels
@@ -181,7 +176,9 @@ def test_a_value_beyond_float32_is_missing_there(name: str) -> None:
 @pytest.mark.parametrize("peer", [peer.name for peer in TREE_PEERS])
 def test_two_classes_are_told_apart(peer: str) -> None:
     tree = random_tree(4, leaves=6, classes=2, combinations=0.0)
-    values = np.round(rows_of(tree)[:, -150:-50] * 16.0) / 16.0  # float32 holds them
+    values = (
+        np.round(probe_values(tree, 400)[:, -150:-50] * 16.0) / 16.0
+    )  # float32 holds them
     labels = answer(tree, f"{peer}: tree", values).labels
     assert set(labels.tolist()) == {0, 1}
     assert np.array_equal(labels, native(tree, values).labels)
@@ -197,7 +194,7 @@ def test_a_model_of_one_class_has_one_answer(peer: str) -> None:
 @pytest.mark.parametrize("peer", [peer.name for peer in TREE_PEERS])
 def test_threads_and_rows_do_not_change_a_peers_classes(peer: str) -> None:
     tree = random_tree(7, leaves=20)
-    values = rows_of(tree)
+    values = probe_values(tree, 400)
     one = candidate(tree, f"{peer}: tree")
     whole = one.load(2).answer(values).labels
     single = one.load(1)
@@ -354,7 +351,7 @@ def test_an_engine_keeps_the_certified_bound_of_its_lines(
     engine: str, case: int
 ) -> None:
     rules = rules_cases()[case]
-    values = rows_of(rules, 250)
+    values = probe_values(rules, 250)
     found = answer(rules, f"{engine}: rules", values)
     want = REFERENCE[0].load(rules)(values)
     assert found.strengths is not None
@@ -375,7 +372,7 @@ def test_an_engine_keeps_the_certified_bound_of_its_lines(
 def test_relative_rules_keep_their_decisions_as_lines(engine: str) -> None:
     tree = random_tree(6, leaves=9, combinations=0.0)
     rules = rules_from_tree(tree)
-    values = rows_of(rules, 300)
+    values = probe_values(rules, 300)
     values = values[:, decide(rules, values).margin > 1e-12]
     assert values.shape[1] > 200
     labels = answer(rules, f"{engine}: rules", values).labels
@@ -388,7 +385,7 @@ def test_a_wrong_term_in_an_engine_is_seen(engine: str) -> None:
     other = Term("low", Points((0.0, 1.0), (1.0, 0.1)))
     x = replace(rules.variables[0], terms=(other, *rules.variables[0].terms[1:]))
     wrong = replace(rules, variables=(x, rules.variables[1]))
-    values = rows_of(rules, 100)
+    values = probe_values(rules, 100)
     found = answer(wrong, f"{engine}: rules", values).strengths
     want = REFERENCE[0].load(rules)(values).strengths
     assert found is not None
@@ -399,7 +396,7 @@ def test_a_wrong_term_in_an_engine_is_seen(engine: str) -> None:
 @pytest.mark.parametrize("case", range(8))
 def test_the_onnx_evaluator_gives_equal_bits(case: int) -> None:
     rules = rules_cases()[case]
-    values = rows_of(rules, 250)
+    values = probe_values(rules, 250)
     found = answer(rules, "onnx evaluator: rules", values)
     want = native(rules, values)
     assert found.strengths is not None
