@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib.metadata
 import importlib.util
 import itertools
 import random
@@ -12,6 +13,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -425,3 +427,14 @@ def test_no_distance_at_all_is_a_sentence() -> None:
 )
 def test_times_have_their_units(nanoseconds: float, text: str) -> None:
     assert time_text(nanoseconds) == text
+
+
+def test_the_picture_of_the_docs_is_that_of_its_study(tmp_path: Path) -> None:
+    docs = Path(__file__).resolve().parent.parent / "docs"
+    measured = msgspec.json.decode((docs / "bench.json").read_bytes(), type=Study)
+    drawn_by = "3.11.2"
+    if importlib.metadata.version("matplotlib") != drawn_by:
+        pytest.skip(f"drawn by matplotlib {drawn_by}, and others place letters apart")
+    again = tmp_path / "bench.svg"
+    plots.save(plots.work_precision(measured, rows=1_000_000), again)
+    assert again.read_bytes() == (docs / "bench.svg").read_bytes()

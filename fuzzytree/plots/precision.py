@@ -146,15 +146,17 @@ def _draw_floors(panels: Sequence[Panel], floors: Sequence[tuple[str, float]]) -
     first = panels[0].logs or panels[0].strip
     if first is None:
         return
+    fastest = min(floors, key=lambda floor: floor[1], default=None)
     for name, time in floors:
+        is_left = len(floors) > 1 and (name, time) == fastest  # two may nearly coincide
         first.annotate(
             name,
             (time, 1.0),
             xycoords=first.get_xaxis_transform(),
-            xytext=(2, -3),
+            xytext=(-2 if is_left else 2, -3),
             textcoords="offset points",
             rotation=90,
-            ha="left",
+            ha="right" if is_left else "left",
             va="top",
             fontsize=SIZE - 1,
             color=_GREY,

@@ -49,7 +49,10 @@ _MADE = 100_000  # rows that are made where there is no table; more are these ag
 _TRIED = 16  # rows that a child process answers
 _MOST_BYTES = 6 * 2**30  # for all layouts of the rows of a study
 _SHARE = 0.1  # of the time: what a single candidate may take at most
-_PACKAGES = ("onnx", "onnxruntime", "scikit-fuzzy", "scipy")
+_PACKAGES = (
+    *("onnx", "onnxruntime", "scikit-fuzzy", "scipy"),
+    *("m2cgen", "pyfuzzylite", "scikit-learn", "simpful", "skl2onnx", "treelite"),
+)
 
 
 class Plan(msgspec.Struct, frozen=True):

@@ -81,8 +81,11 @@ def load_treelite(tree: FuzzyTree, threads: int) -> Loaded:
 
     It is put together question by question, because treelite takes no single tree of
     scikit-learn. Its value is the leaf's class number.
+
+    Raises:
+        LossError: If it cannot have so many threads.
     """
-    from treelite import gtil
+    from treelite import TreeliteError, gtil
     from treelite.model_builder import (
         Metadata,
         ModelBuilder,
@@ -123,6 +126,13 @@ def load_treelite(tree: FuzzyTree, threads: int) -> Loaded:
         builder.end_node()
     builder.end_tree()
     model = builder.commit()
+    try:
+        gtil.predict(model, np.zeros((1, axes.count)), nthread=threads)
+    except TreeliteError as error:  # it takes no more threads than OpenMP was told
+        raise LossError(
+            f"OpenMP gives treelite fewer than {threads} threads; OMP_NUM_THREADS may "
+            "say so"
+        ) from error
 
     def ask(table: Reals) -> IntArray:
         found = gtil.predict(model, table, nthread=threads)
