@@ -27,9 +27,9 @@ from fuzzytree.cli.talk import (
     wrong_options,
 )
 from fuzzytree.contracts import Carrier, Dtype, Format, Model, Written
-from fuzzytree.errors import LossError
+from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.files import write_atomically
-from fuzzytree.rulebase import Conjunction, Kind
+from fuzzytree.rulebase import Conjunction, Kind, RuleBase
 
 if TYPE_CHECKING:
     from fuzzytree.numerics.bounds import Certificate
@@ -111,11 +111,11 @@ def command(
     )
     with wrong_options():
         written = _written(found, form.name, options, allow_loss=allow_loss)
+    proof = _certificate(found, form, dtype, written.content)
     if output == "-":
         answer_bytes(written.content)
     else:
         write_atomically(output, written.content)
-    proof = _certificate(found, form, dtype)
     can_check = form.read is not None or form.name == "onnx"
     after = shlex.join(["fuzzytree", "check", model, output]) if can_check else ""
     _tell(written, proof, form.name, output, after, as_json=as_json, quiet=quiet)
@@ -133,14 +133,33 @@ def _written(
         raise LossError(text) from error
 
 
-def _certificate(model: Model, form: Format, dtype: str | None) -> Certificate | None:
-    """Return what the file's number type can change; None if it does not compute."""
-    from fuzzytree import verbs
+def _certificate(
+    model: Model, form: Format, dtype: str | None, content: bytes
+) -> Certificate | None:
+    """Return what the file can change about the model's answers.
 
-    if form.dtype is None:
+    A file that computes is certified in its number type. One that only holds the model
+    must be read back as that model; None if it cannot be read.
+
+    Raises:
+        DisagreementError: If it is read back as another model.
+    """
+    from fuzzytree import verbs
+    from fuzzytree.numerics.bounds import Certificate
+
+    if form.dtype is not None:
+        asked = [name for name in get_args(Dtype) if name == dtype]
+        return verbs.certify(model, asked[0] if asked else form.dtype)
+    if form.read is None:
         return None
-    asked = [name for name in get_args(Dtype) if name == dtype]
-    return verbs.certify(model, asked[0] if asked else form.dtype)
+    if form.read(content, form.name) != model:
+        raise DisagreementError(
+            f"{model.name} as {form.name} is read back as another model; "
+            "nothing is written"
+        )
+    carrier: Carrier = "rules" if isinstance(model, RuleBase) else "tree"
+    origin = "read back from the file, the model is equal in every number"
+    return Certificate(None, carrier, 0.0, origin)
 
 
 def _tell(
@@ -160,7 +179,7 @@ def _tell(
         say(f"lost     {loss.where}: {loss.what}{bound}", quiet=quiet)
     say_rows(
         ("wrote", output, f"{to}, {size} bytes, sha256 {digest}"),
-        *([("bound", proof.dtype, proof.sentence)] if proof else []),
+        *([("bound", proof.dtype or "exact", proof.sentence)] if proof else []),
         *([("next", after, "")] if after else []),
         quiet=quiet or output == "-",
     )

@@ -188,10 +188,11 @@ class Certificate(msgspec.Struct, frozen=True):
     """What a number type can change about a model's answers, at most.
 
     Attributes:
-        dtype: The number type.
+        dtype: The number type; None for a file that holds the model and computes
+            nothing.
         carrier: `rules` or `tree`.
-        delta: The largest error of a strength; None for a tree, and where there is no
-            bound below 1.
+        delta: The largest error of a strength; None for a tree that computes, and
+            where there is no bound below 1.
         origin: What it is derived from, and for which values it holds.
         terms: The largest error of each term's degree.
         values: The largest error of each value that is rounded at all.
@@ -200,7 +201,7 @@ class Certificate(msgspec.Struct, frozen=True):
         unbounded: In how many rows a strength has no bound.
     """
 
-    dtype: Dtype
+    dtype: Dtype | None
     carrier: Carrier
     delta: float | None
     origin: str
@@ -213,6 +214,8 @@ class Certificate(msgspec.Struct, frozen=True):
     @property
     def sentence(self) -> str:
         """Return what it says about decisions, for people."""
+        if self.dtype is None:
+            return "no decision can differ: every number is written in full, error 0"
         if self.carrier == "tree":
             return self._of_paths()
         if self.delta is None:

@@ -7,8 +7,11 @@ import json
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 import fuzzytree as ft
+from fuzzytree.contracts import Model, Written
+from fuzzytree.exporters import yaml
 from fuzzytree.rulebase import Band, RuleBase, Term, Variable
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 from tests.cli.conftest import Call, grip
@@ -71,10 +74,37 @@ def test_the_certificate_is_that_of_the_number_type_that_was_written(
     assert f"bound    float32  {text} 7.2e-07\n" in single
 
 
-def test_a_format_that_only_holds_the_model_has_no_certificate(call: Call) -> None:
-    _, out, err = call("export", "grip.yaml", "-o", "new.yaml", "--json")
-    assert json.loads(out)["certificate"] is None
-    assert "bound" not in err
+@pytest.mark.parametrize("carrier", ["tree", "rules"])
+def test_a_file_that_holds_the_model_changes_nothing(call: Call, carrier: str) -> None:
+    words = ("export", "grip.yaml", "-o", "new.yaml", "--as", carrier, "--json")
+    code, out, err = call(*words)
+    sentence = "no decision can differ: every number is written in full, error 0"
+    assert code == 0
+    assert err.splitlines()[1] == f"bound    exact    {sentence}"
+    assert json.loads(out)["certificate"] == {
+        "sentence": sentence,
+        "dtype": None,
+        "carrier": carrier,
+        "delta": 0.0,
+        "origin": "read back from the file, the model is equal in every number",
+        "terms": [],
+        "values": [],
+        "reasons": [],
+        "rows": None,
+        "unbounded": 0,
+    }
+
+
+def test_a_file_that_is_read_back_as_another_model_is_not_written(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def planted(_: Model, /, *, allow_loss: bool = False) -> Written:
+        return yaml.write(replace(grip(), name="grasp"), allow_loss=allow_loss)
+
+    monkeypatch.setattr(yaml, "FORMAT", replace(yaml.FORMAT, write=planted))
+    message = "grip as yaml is read back as another model; nothing is written\n"
+    assert call("export", "grip.yaml", "-o", "new.yaml") == (2, "", message)
+    assert not Path("new.yaml").exists()
 
 
 @pytest.mark.parametrize(
