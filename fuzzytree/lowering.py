@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
+from typing import Literal
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
@@ -26,15 +27,18 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.tree import Branch, FuzzyTree, Use
 
-TITLES: Mapping[Use, str] = MappingProxyType(
+Form = Literal["tree", "relative rules", "raw rules", "rules"]
+"""What can be made of a model, as people call it."""
+
+TITLES: Mapping[Use, Form] = MappingProxyType(
     {"tree": "tree", "relative": "relative rules", "raw": "raw rules"}
 )
-"""What people call each form of a tree."""
+"""The form of a tree that serves each use."""
 
 
 def forms(
     model: FuzzyTree | RuleBase, uses: Iterable[Use] | None = None
-) -> dict[str, FuzzyTree | RuleBase]:
+) -> dict[Form, FuzzyTree | RuleBase]:
     """Return what can be made of a model, by the name that people call it.
 
     Args:
@@ -49,7 +53,7 @@ def forms(
     if isinstance(model, RuleBase):
         return {"rules": model}
     wanted = set(TITLES if uses is None else uses)
-    made: dict[str, FuzzyTree | RuleBase] = {}
+    made: dict[Form, FuzzyTree | RuleBase] = {}
     if "tree" in wanted:
         made[TITLES["tree"]] = model
     kinds: tuple[Kind, ...] = ("relative", "raw") if model.sets else ("relative",)

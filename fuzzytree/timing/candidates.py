@@ -11,7 +11,7 @@ import numpy as np
 from fuzzytree.answers import answers_of
 from fuzzytree.contracts import Dtype, Model, Outcome, Runtime
 from fuzzytree.exporters.python import write as write_python
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.lowering import forms
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import all_runtimes, is_installed
 from fuzzytree.runtimes.onnxruntime import Prepared, prepare
@@ -46,15 +46,7 @@ def questions(model: Model) -> dict[Question, Model]:
         >>> list(questions(random_tree(1)))
         ['tree', 'relative rules', 'raw rules']
     """
-    if isinstance(model, RuleBase):
-        return {"rules": model}
-    found: dict[Question, Model] = {
-        "tree": model,
-        "relative rules": rules_from_tree(model),
-    }
-    if model.sets:
-        found["raw rules"] = rules_from_tree(model, "raw")
-    return found
+    return forms(model)
 
 
 def title(runtime: str, question: Question) -> str:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
+from fuzzytree.lowering import Form
+
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
 
-Question = Literal["tree", "relative rules", "raw rules", "rules"]
+Question = Form
 """What a candidate computes. Errors are measured against the exact answer to it."""
 
 Kind = Literal["runtime", "variant", "peer", "floor"]

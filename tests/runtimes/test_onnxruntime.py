@@ -457,9 +457,7 @@ def test_the_oldest_onnxruntime_gives_equal_bits(version: str, tmp_path: Path) -
                 (tmp_path / name).write_bytes(written.content)
                 kind = np.float32 if dtype == "float32" else np.float64
                 with np.errstate(over="ignore"):
-                    table = np.ascontiguousarray(
-                        probe_values(model, 600).T.astype(kind)
-                    )
+                    table = probe_values(model, 600).T.astype(kind, order="C")
                 values[name] = table
                 session = onnxruntime.InferenceSession(written.content)
                 names = [output.name for output in session.get_outputs()]

@@ -176,9 +176,8 @@ def test_a_value_beyond_float32_is_missing_there(name: str) -> None:
 @pytest.mark.parametrize("peer", [peer.name for peer in TREE_PEERS])
 def test_two_classes_are_told_apart(peer: str) -> None:
     tree = random_tree(4, leaves=6, classes=2, combinations=0.0)
-    values = (
-        np.round(probe_values(tree, 400)[:, -150:-50] * 16.0) / 16.0
-    )  # float32 holds them
+    made = probe_values(tree, 400)[:, -150:-50]
+    values = np.round(made * 16.0) / 16.0  # float32 holds them
     labels = answer(tree, f"{peer}: tree", values).labels
     assert set(labels.tolist()) == {0, 1}
     assert np.array_equal(labels, native(tree, values).labels)
