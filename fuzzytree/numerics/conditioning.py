@@ -41,7 +41,8 @@ class Rise(NamedTuple):
     Attributes:
         start: Where it begins, in the variable's unit, nearer to the peak.
         end: Where it ends.
-        height: By how much the clipped degree rises, rounded up.
+        height: How much higher the clipped degree is at the end than at the start,
+            rounded up.
     """
 
     start: float

@@ -145,7 +145,7 @@ def test_a_tie_of_different_curves_is_settled_by_fractions() -> None:
     assert found.rule.tolist() == [1, 1, 2]
     assert found.status.tolist() == [TIE, DECIDED, DECIDED]
     assert found.by_fractions == 2
-    assert found.margin.tolist()[:2] == pytest.approx([0.0, 2.0**-52 / 3], rel=1e-9)
+    assert found.margin.tolist()[:2] == pytest.approx([0.0, 2.0**-52 / 3], rel=1e-9, abs=0.0)
 
 
 def test_one_wins_by_less_than_doubles_can_tell() -> None:
@@ -163,7 +163,7 @@ def test_one_wins_by_less_than_doubles_can_tell() -> None:
     found = decide(rules, row)
     # y is 2**29 below 3 * 2**80, and its flank is 3 * 2**80 wide.
     assert found.rule[0] == 2
-    assert found.margin[0] == pytest.approx(2.0**-51 / 3, rel=1e-12)
+    assert found.margin[0] == pytest.approx(2.0**-51 / 3, rel=1e-12, abs=0.0)
 
 
 def test_cover_is_decided_at_the_very_end_of_a_support() -> None:

@@ -20,7 +20,7 @@ MIX = Variable("mix", parts=(Part("a", 2.0, 1.0), Part("b", -1.0)))
 def test_a_ramp_in_double_rounds_its_place_and_a_product() -> None:
     # Place: difference, width, quotient; then c0 + nothing, times q: 2 roundings.
     bound = degree_bound(RAMP, "float64")
-    assert bound.fixed == pytest.approx(5 * 2.0**-53, rel=2e-3)
+    assert bound.fixed == pytest.approx(5 * 2.0**-53, rel=2e-3, abs=0.0)
 
 
 def test_a_ramp_in_mixed_type_rounds_place_coefficient_products_and_cap() -> None:
@@ -91,7 +91,8 @@ def test_a_value_within_a_spread_can_be_rounded_into_the_tail() -> None:
     roundings = 2 * 10 + 5 * 10 + 1  # of the body; 16 of the tail, which starts at 1
     slope = 1 * abs(-10 + 10) + 2 * 10
     bound = degree_bound(shape, "float64").fixed
-    assert bound == pytest.approx((3 * slope + roundings + 16) * 2.0**-53, rel=2e-3)
+    expected = (3 * slope + roundings + 16) * 2.0**-53
+    assert bound == pytest.approx(expected, rel=2e-3, abs=0.0)
 
 
 def test_a_value_that_is_off_has_no_bound_on_a_flank_of_next_to_no_width() -> None:
@@ -147,7 +148,7 @@ def test_a_combination_in_double_rounds_each_summand_four_times() -> None:
     line = {"a": (np.array([3.0]),) * 2, "b": (np.array([-4.0]),) * 2}
     found = value_error(MIX, "float64", line)
     assert found is not None
-    assert found.tolist() == pytest.approx([2.0**-53 * 4 * 8], rel=2e-3)
+    assert found.tolist() == pytest.approx([2.0**-53 * 4 * 8], rel=2e-3, abs=0.0)
 
 
 def test_a_combination_beyond_float32_has_no_bound() -> None:
