@@ -142,6 +142,8 @@ def command(
             progress=tell,
         )
     lines = study_lines(found, is_full=is_full)
+    if not found.points:  # a file of an earlier study is worth more
+        output, plots = None, ()
     try:
         if output:
             write_atomically(output, found.to_json().encode() + b"\n")
@@ -157,7 +159,9 @@ def _ending(found: Study, *, quiet: bool) -> int:
     from fuzzytree.timing.study import faults
 
     if found.is_interrupted:
-        say("interrupted; what was measured by then is told")
+        known = "what was measured by then is told"
+        nothing = "nothing was measured by then, and files are as they were"
+        say(f"interrupted; {known if found.points else nothing}")
         return INTERRUPTED
     if not found.points:
         say("nothing could be measured")
@@ -190,7 +194,7 @@ def _check_places(output: str | None, plots: Sequence[str]) -> None:
 
 def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
     """Draw the study for most rows; return which files were written."""
-    if not places or not found.points:
+    if not places:
         return ()
     from fuzzytree import plots
 

@@ -26,7 +26,7 @@ _HEAD = (
 Timed = dict[str, tuple[Point, Timing]]
 """What was measured at one number of rows and threads, by name."""
 
-_WIDTH = 96  # of a line of names
+_WIDTH = 96  # of a line of words
 _LEGEND = (
     "* nobody is both faster and more exact; +- the 95 % interval of the median;",
     f"speed: times as fast as {DEFAULT}; floor x: as long as reading the columns;",
@@ -177,12 +177,20 @@ def _grouped(omissions: Iterable[Omission]) -> Iterator[str]:
         names = [
             f"{k} ({', '.join(asked)})" if asked else k for k, asked in who.items()
         ]
-        yield from textwrap.wrap(f"{', '.join(names)}: {why}", _WIDTH)
+        yield f"{', '.join(names)}: {why}"
 
 
 def _section(name: str, lines: Iterable[str]) -> Iterator[str]:
+    """Yield a heading and its sentences, those that are long in several lines."""
     for position, line in enumerate(lines):
         if not position:
             yield ""
             yield name
-        yield f"  {line}"
+        yield from textwrap.wrap(
+            line,
+            _WIDTH,
+            initial_indent="  ",
+            subsequent_indent="    ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
