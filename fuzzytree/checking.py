@@ -36,7 +36,7 @@ from fuzzytree.numerics.oracle import decide
 from fuzzytree.pruning import proof_faults, pruned
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import Kind, RuleBase, fingerprint
-from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
+from fuzzytree.runtimes import chosen_runtimes, find_runtime, is_installed
 from fuzzytree.tree import FuzzyTree, Use
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def check(
         ValueError: If `data` is not of shape (inputs, rows), or a runtime is unknown.
     """
     rows = probed(model, data, limit)
-    chosen = all_runtimes() if runtimes is None else tuple(map(find_runtime, runtimes))
+    chosen = chosen_runtimes(runtimes)
     carriers = _carriers(model, rows)
     findings: list[Finding] = []
     if isinstance(model, FuzzyTree):

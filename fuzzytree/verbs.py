@@ -18,7 +18,7 @@ from fuzzytree.errors import LossError, MissingExtraError, ReadError, TableError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.rulebase import RuleBase
-from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
+from fuzzytree.runtimes import chosen_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.tables import Batch, Table, batches, read_table
 from fuzzytree.tree import FuzzyTree
@@ -511,7 +511,7 @@ def check(
     """
     from fuzzytree import checking
 
-    first = load(model) if isinstance(model, str | os.PathLike) else model
+    first = _model_of(model)
     titles = [
         names[k] if k < len(names) else _title(other, k)
         for k, other in enumerate(others)
@@ -557,7 +557,7 @@ def certify(
     if dtype not in get_args(Dtype):
         known = ", ".join(get_args(Dtype))
         raise ValueError(f"there is no number type {dtype!r}; there are {known}")
-    first = load(model) if isinstance(model, str | os.PathLike) else model
+    first = _model_of(model)
     return bounds.certify(first, dtype, rows_of(data, first, columns=columns))
 
 
@@ -612,7 +612,7 @@ def bench(
     from fuzzytree.timing import study
 
     plan = study.Plan(tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed)
-    first = load(model) if isinstance(model, str | os.PathLike) else model
+    first = _model_of(model)
     return study.bench(
         first,
         values=rows_of(data, first, columns=columns, delimiter=delimiter),
@@ -622,6 +622,10 @@ def bench(
         plan=plan,
         tell=progress,
     )
+
+
+def _model_of(model: Model | str | os.PathLike[str]) -> Model:
+    return load(model) if isinstance(model, str | os.PathLike) else model
 
 
 def _data_name(data: object) -> str:
@@ -663,8 +667,8 @@ def stability(
     """
     from fuzzytree.criteria.suite import examine
 
-    first = load(model) if isinstance(model, str | os.PathLike) else model
-    chosen = all_runtimes() if runtimes is None else tuple(map(find_runtime, runtimes))
+    first = _model_of(model)
+    chosen = chosen_runtimes(runtimes)
     return examine(
         first,
         runtimes=chosen,

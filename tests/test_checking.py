@@ -212,7 +212,7 @@ def test_a_runtime_that_gives_other_answers_is_found(
         return lie
 
     liar = msgspec.structs.replace(honest, name="liar", load=load)
-    monkeypatch.setattr("fuzzytree.checking.find_runtime", _found(liar))
+    monkeypatch.setattr("fuzzytree.runtimes.find_runtime", _found(liar))
     found = check(TREE, limit=300, runtimes=["liar"])
     assert by(found, "liar: tree")[0] == "DISAGREES"
     assert by(found, "liar: relative rules")[0] == "DISAGREES"

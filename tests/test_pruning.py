@@ -10,14 +10,13 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from fuzzytree.contracts import Model
+from fuzzytree.holding import always_holds, never_firing
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.pruning import (
     USES,
     Pruned,
     Removed,
-    always_holds,
     cannot_overflow,
-    never_firing,
     proof_faults,
     pruned,
     unguarded,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+from collections.abc import Sequence
 
 from fuzzytree.contracts import Runtime
 
@@ -39,6 +40,15 @@ def find_runtime(name: str) -> Runtime:
                 return runtime
     known = ", ".join(runtime.name for runtime in all_runtimes())
     raise ValueError(f"no runtime {name!r}; there is {known}")
+
+
+def chosen_runtimes(names: Sequence[str] | None) -> tuple[Runtime, ...]:
+    """Return the runtimes of those names; all of the table if None.
+
+    Raises:
+        ValueError: If one is unknown; the message lists all of them.
+    """
+    return all_runtimes() if names is None else tuple(map(find_runtime, names))
 
 
 def is_installed(runtime: Runtime) -> bool:
