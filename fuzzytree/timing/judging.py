@@ -16,7 +16,7 @@ from fuzzytree.numerics.oracle import (
     error_against_exact,
     strength_errors,
 )
-from fuzzytree.probing import probes
+from fuzzytree.probing import probe_values
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.timing.clock import Clock
 from fuzzytree.timing.records import Candidate, Error, Found, Loaded, Question
@@ -117,9 +117,7 @@ class Judge:
 
 
 def _edges(model: Model) -> FloatArray:
-    rows = probes(model, limit=min(MOST_PROBES, _most_rows(model)))
-    lines = [[row[name] for row in rows] for name in model.inputs]
-    return np.array(lines, np.float64).reshape(len(model.inputs), len(rows))
+    return probe_values(model, min(MOST_PROBES, _most_rows(model)))
 
 
 def _error(loaded: Loaded, sample: _Sample, bound: float | None, origin: str) -> Error:
