@@ -411,6 +411,8 @@ def _followed(
 SHARPENED = 64
 """The most rows that `strength_errors` computes in fractions."""
 
+_MOST_DEGREES = 10_000  # that it computes so: a second or so; one row at least
+
 
 def strength_errors(
     model: RuleBase, values: FloatArray, strengths: FloatArray
@@ -426,7 +428,8 @@ def strength_errors(
         A lower and an upper end of the largest distance in each row, by intervals. Rows
         of large upper ends are computed in fractions, so that their two ends are next
         to each other, until the largest of all is known to a hundredth, or `SHARPENED`
-        rows are done. A row that is missing on one side alone is 1 off.
+        rows are done, or fewer of models with more than 150 terms. A row that is
+        missing on one side alone is 1 off.
 
     Raises:
         ValueError: If the values or the strengths have another shape.
@@ -448,7 +451,9 @@ def strength_errors(
         for part in _chunks(model, values.shape[1])
     ]
     low, high = (np.concatenate(ends) for ends in zip(*parts, strict=True))
-    for row in np.argsort(-high, kind="stable")[:SHARPENED].tolist():
+    terms = sum(len(variable.terms) for variable in model.variables)
+    most = min(SHARPENED, max(_MOST_DEGREES // max(terms, 1), 1))
+    for row in np.argsort(-high, kind="stable")[:most].tolist():
         if high[row] <= 1.01 * low.max():
             break
         named = dict(zip(model.inputs, values[:, row].tolist(), strict=True))

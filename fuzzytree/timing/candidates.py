@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +17,14 @@ from fuzzytree.lowering import forms
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import all_runtimes, is_installed
 from fuzzytree.runtimes.onnxruntime import Prepared, prepare
-from fuzzytree.timing.records import Candidate, Found, Loaded, Omission, Question
+from fuzzytree.timing.records import (
+    Bound,
+    Candidate,
+    Found,
+    Loaded,
+    Omission,
+    Question,
+)
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -25,7 +34,6 @@ if TYPE_CHECKING:
 DEFAULT = "native"
 """The runtime that `fuzzytree run` uses: what the others are compared with."""
 
-Bound = tuple[float, str]
 Bounds = Callable[[RuleBase, Dtype], Bound | None]
 """The certified error of a rule base's strengths in a number type, if there is one."""
 
@@ -38,15 +46,18 @@ _SESSIONS: Mapping[str, Mapping[str, bool]] = {
 _SESSION_NOTE = "the session's call alone; the table is laid out before"
 
 
-def questions(model: Model) -> dict[Question, Model]:
+@functools.lru_cache(maxsize=1)
+def questions(model: Model) -> Mapping[Question, Model]:
     """Return what can be asked of a model, and the model that answers it.
+
+    The raw rules of a large tree take seconds to make: a study asks for them often.
 
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> list(questions(random_tree(1)))
         ['tree', 'relative rules', 'raw rules']
     """
-    return forms(model)
+    return MappingProxyType(forms(model))
 
 
 def title(runtime: str, question: Question) -> str:
@@ -120,7 +131,7 @@ def _candidate(
         question,
         "runtime",
         load,
-        bound=_bound(runtime, model, bounds),
+        bound=partial(_bound, runtime, model, bounds),
         note=_note(runtime, model),
         is_foreign=bool(runtime.modules),
         is_parallel=is_session,

@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, get_args
 from fuzzytree.contracts import Dtype, Model
 from fuzzytree.numerics.bounds import certify
 from fuzzytree.rulebase import RuleBase
-from fuzzytree.timing.candidates import Bound, Bounds, Layouts, own, questions
+from fuzzytree.timing.candidates import Bounds, Layouts, own, questions
 from fuzzytree.timing.floors import floors
+from fuzzytree.timing.judging import MOST_ROWS
 from fuzzytree.timing.peers import peers
-from fuzzytree.timing.records import Candidate, Kind, Omission, Question
+from fuzzytree.timing.records import Bound, Candidate, Kind, Omission, Question
 from fuzzytree.timing.variants import variants
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
 
 _GROUPS = (*get_args(Question), *get_args(Kind))
+_MOST_DEGREES = 10_000_000  # whose errors are bounded in about a second
 
 
 def gather(model: Model, values: FloatArray) -> tuple[list[Candidate], list[Omission]]:
@@ -26,7 +28,8 @@ def gather(model: Model, values: FloatArray) -> tuple[list[Candidate], list[Omis
 
     Args:
         model: A tree or a rule base.
-        values: The rows of the study: certified bounds hold on them.
+        values: The rows of the study: certified bounds hold on them, or on the first
+            of them where the model is large.
     """
     layouts = Layouts()
     main = next(iter(questions(model)))
@@ -107,13 +110,19 @@ def _groups(one: Candidate) -> tuple[str, str]:
 
 
 def _bounds(values: FloatArray) -> Bounds:
-    """Return what certifies rule bases on these rows, each but once."""
+    """Return what certifies rule bases on these rows, each but once.
+
+    Of many terms only the first rows are certified, which the bound's origin counts;
+    candidates are judged on fewer.
+    """
     known: dict[tuple[RuleBase, Dtype], Bound | None] = {}
 
     def bounds(rules: RuleBase, dtype: Dtype) -> Bound | None:
         key = (rules, dtype)
         if key not in known:
-            found = certify(rules, dtype, values)
+            terms = sum(len(variable.terms) for variable in rules.variables)
+            rows = max(_MOST_DEGREES // max(terms, 1), MOST_ROWS)
+            found = certify(rules, dtype, values[:, :rows])
             delta = None if found.unbounded else found.delta
             known[key] = None if delta is None else (delta, found.origin)
         return known[key]

@@ -17,6 +17,9 @@ Question = Form
 
 Kind = Literal["runtime", "variant", "peer", "floor"]
 
+Bound = tuple[float, str]
+"""The certified largest error of a strength, and where it comes from."""
+
 
 class Found(msgspec.Struct, frozen=True):
     """What a candidate answered.
@@ -39,13 +42,13 @@ class Loaded(msgspec.Struct, frozen=True):
         call: Lays out the same values as the candidate wants them, outside the timed
             part, and returns the call that is timed.
         bytes: The size of the file or code that runs, if there is one.
-        bound: The certified bound, where it is known only once it is loaded.
+        bound: As of a candidate, where it is known only once that is loaded.
     """
 
     answer: Callable[[FloatArray], Found]
     call: Callable[[FloatArray], Callable[[], object]]
     bytes: int | None = None
-    bound: tuple[float, str] | None = None
+    bound: Callable[[], Bound | None] | None = None
 
 
 class Candidate(msgspec.Struct, frozen=True):
@@ -57,9 +60,9 @@ class Candidate(msgspec.Struct, frozen=True):
         kind: A runtime of ours, a variant of the model, a peer, or a floor.
         load: Prepare it for a number of threads. Raises a FuzzyTreeError, or what the
             foreign library raises; the study lists it among the omissions.
-        bound: The certified largest error of a strength against the exact one, and
-            where it comes from; None where nothing is certified.
-        most_rows: Above so many rows it would take minutes; None: no limit.
+        bound: Certifies the largest error of a strength against the exact one, which
+            takes its time and is asked for once the candidate has answered; it gives
+            None, or is None, where nothing is certified.
         note: What a reader must know to compare it fairly.
         is_foreign: Whether code of others runs, which may crash or hang the process;
             a child process tries it before the study does. A peer always is.
@@ -71,8 +74,7 @@ class Candidate(msgspec.Struct, frozen=True):
     question: Question
     kind: Kind
     load: Callable[[int], Loaded]
-    bound: tuple[float, str] | None = None
-    most_rows: int | None = None
+    bound: Callable[[], Bound | None] | None = None
     note: str = ""
     is_foreign: bool = False
     is_parallel: bool = False

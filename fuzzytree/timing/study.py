@@ -231,6 +231,7 @@ class _Draft(msgspec.Struct):
     probes: Error | None
     row_ns: float
     timings: list[Timing] = []
+    threaded: dict[int, Loaded] = {}
 
 
 class _Run:
@@ -259,10 +260,14 @@ class _Run:
 
     def try_foreign(self, candidates: Sequence[Candidate], maker: str) -> None:
         """Leave out what ends or blocks a child process."""
-        names = [c.name for c in candidates if c.is_foreign or c.kind == "peer"]
-        few = self.values[:, :_TRIED]
+        todo = [c for c in candidates if c.is_foreign or c.kind == "peer"]
         faults = trial.tried(
-            self.model, names, few, maker=maker, tell=_part(self.tell, 0.0, 0.1)
+            self.model,
+            [c.name for c in sorted(todo, key=_rank)],
+            self.values[:, :_TRIED],
+            maker=maker,
+            left=lambda: self.plan.budget_s / 3 - self.spent_s(),
+            tell=_part(self.tell, 0.0, 0.1),
         )
         for name, why in faults.items():
             self.omit(name, why)
@@ -310,13 +315,14 @@ class _Run:
             return
         names = self._fitting(names, rows, seconds)
         values = repeated(self.values, rows)
-        calls = dict(self._calls(names, values, threads))
+        end = self.spent_s() + seconds
+        calls = dict(self._calls(names, values, threads, end))
         found = time_calls(
             calls,
             rows=rows,
             threads=threads,
             rounds=self.plan.rounds,
-            seconds=seconds,
+            seconds=max(end - self.spent_s(), 1e-3),
             seed=self.plan.seed,
             tell=tell,
             clock=self.clock,
@@ -334,11 +340,6 @@ class _Run:
         for name, draft in self.drafts.items():
             one = draft.candidate
             if not (is_first or one.is_parallel or _is_measure(one)):
-                continue
-            if one.most_rows is not None and rows > one.most_rows:
-                if is_first:
-                    most = f"more than the {one.most_rows:,} that it is given"
-                    self.omit(name, f"{rows:,} rows: {most}")
                 continue
             yield name
 
@@ -365,17 +366,31 @@ class _Run:
         return [name for name in names if name in kept]
 
     def _calls(
-        self, names: Sequence[str], values: FloatArray, threads: int
+        self, names: Sequence[str], values: FloatArray, threads: int, end: float
     ) -> Iterator[tuple[str, Call]]:
         for name in names:
             draft = self.drafts[name]
-            loaded = draft.loaded
             try:
-                if threads != min(self.plan.threads) and draft.candidate.is_parallel:
-                    loaded = draft.candidate.load(threads)
+                loaded = self._threaded(draft, threads, end)
                 yield name, loaded.call(values)
             except Exception as error:  # as above
-                self.omit(name, f"{values.shape[1]:,} rows: {trial.error_text(error)}")
+                why = trial.error_text(error)
+                self.omit(name, f"{_rows(values.shape[1])}: {why}")
+
+    def _threaded(self, draft: _Draft, threads: int, end: float) -> Loaded:
+        """Return a candidate as it is loaded for a number of threads.
+
+        Raises:
+            TimeoutError: If loading it again would take longer than there is time.
+        """
+        if threads == min(self.plan.threads) or not draft.candidate.is_parallel:
+            return draft.loaded
+        if threads not in draft.threaded:
+            if self.spent_s() + draft.load_ms / 1e3 > end:
+                why = f"loading it again for {threads} threads takes too long"
+                raise TimeoutError(f"{why} for the budget; a larger one helps")
+            draft.threaded[threads] = draft.candidate.load(threads)
+        return draft.threaded[threads]
 
     def _keep(self, found: Timed, rows: int, threads: int, count: int) -> None:
         """Take what was measured, whole or not."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 import os
 import pickle
 import queue
@@ -38,6 +39,7 @@ trial.serve()
 """
 _SECONDS = 60.0  # imports of large libraries included
 _PATIENCE_S = 5.0
+_LATE = "a third of the budget was over before it was tried; a larger one helps"
 
 
 def tried(
@@ -47,6 +49,7 @@ def tried(
     *,
     maker: str = "fuzzytree.timing.gather:foreign",
     seconds: float = _SECONDS,
+    left: Callable[[], float] = lambda: math.inf,
     tell: Callable[[str, float], None] | None = None,
 ) -> dict[str, str]:
     """Return why candidates cannot be run, by name; those that can are not in it.
@@ -57,15 +60,17 @@ def tried(
         values: A few rows, shape (inputs, rows).
         maker: The module and the function that return the candidates for a model.
         seconds: How long one candidate may take to load and to answer.
+        left: The seconds that are left for all of them; what is not tried by then is
+            not run.
         tell: Told which one is tried, and which share of them is done.
     """
     faults: dict[str, str] = {}
     todo = list(names)
-    while todo:
-        done = _one_child(model, todo, values, maker, seconds, tell)
+    while todo and left() > 0.0:
+        done = _one_child(model, todo, values, maker, seconds, left, tell)
         faults |= {name: why for name, why in done.items() if why}
         todo = [name for name in todo if name not in done]
-    return faults
+    return faults | dict.fromkeys(todo, _LATE)
 
 
 def _one_child(
@@ -74,6 +79,7 @@ def _one_child(
     values: FloatArray,
     maker: str,
     seconds: float,
+    left: Callable[[], float],
     tell: Callable[[str, float], None] | None,
 ) -> dict[str, str]:
     """Return what one child says of each candidate until it ends; "" for well."""
@@ -96,13 +102,15 @@ def _one_child(
             for position, name in enumerate(names):
                 if tell:
                     tell(f"trying {name}", position / len(names))
-                line = lines.get(timeout=seconds)
+                patience = min(seconds, max(left(), 0.0))
+                line = lines.get(timeout=patience)
                 if line is None:
                     done[name] = _end_text(child.wait(), talk)
                     break
                 done[name] = json.loads(line)
         except queue.Empty:
-            done[names[len(done)]] = f"it did not answer within {seconds:g} s"
+            late = f"it did not answer within {seconds:g} s"
+            done[names[len(done)]] = late if patience == seconds else _LATE
         finally:
             child.kill()
             reader.join(_PATIENCE_S)  # it ends with the child's last line

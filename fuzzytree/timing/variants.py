@@ -23,7 +23,7 @@ from fuzzytree.timing.candidates import (
     questions,
     title,
 )
-from fuzzytree.timing.records import Candidate, Loaded, Omission, Question
+from fuzzytree.timing.records import Bound, Candidate, Loaded, Omission, Question
 
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """Of a degree, where curves become points."""
@@ -145,8 +145,12 @@ def _load(
         loaded = load_runtime(runtime, found.model, threads)
     else:
         loaded = load_session(runtime, found.model, layouts, threads)
-    certified = bounds(found.model, runtime.dtype)
-    if certified is None:
-        return loaded
-    bound = min(found.bound + certified[0], 1.0), f"{found.origin}, and {certified[1]}"
+
+    def bound() -> Bound | None:
+        certified = bounds(found.model, runtime.dtype)
+        if certified is None:
+            return None
+        error, origin = certified
+        return min(found.bound + error, 1.0), f"{found.origin}, and {origin}"
+
     return replace(loaded, bound=bound)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.contracts import Outcome, Run, Runtime
+from fuzzytree.contracts import Dtype, Outcome, Run, Runtime
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.numerics import bounds
+from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.native import load
 from fuzzytree.runtimes.onnxruntime import prepare
@@ -29,6 +32,9 @@ from fuzzytree.timing.rows import made_rows
 from fuzzytree.timing.study import Plan, bench, faults
 from fuzzytree.timing.variants import variants
 from tests.timing.studies import error, point, timing
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
 
 TREE = random_tree(4)
 VALUES = made_rows(TREE, 60)[0]
@@ -130,7 +136,9 @@ def test_a_variant_tells_its_bound_once_it_is_loaded() -> None:
     assert "native, points 1e-03: raw rules" in names
     one = found[names.index("native, points 1e-03: raw rules")]
     assert one.bound is None
-    bound = one.load(1).bound
+    certify = one.load(1).bound
+    assert certify is not None
+    bound = certify()
     assert bound is not None
     assert 1e-6 < bound[0] <= 1e-3 + 1e-15
     assert bound[1].endswith("lines within 0.001 of the curves, and doubles")
@@ -148,6 +156,25 @@ def test_a_rule_base_without_curves_has_no_variants() -> None:
     )
     made = msgspec.structs.replace(rules, variables=flat)
     assert variants(made, lambda rules, dtype: None, Layouts()) == ([], [])
+
+
+def test_nothing_is_certified_before_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[int] = []
+
+    def certify(
+        rules: RuleBase, dtype: Dtype, values: FloatArray
+    ) -> bounds.Certificate:
+        asked.append(values.shape[1])
+        return bounds.certify(rules, dtype, values)
+
+    monkeypatch.setattr("fuzzytree.timing.gather.certify", certify)
+    found, _ = gather(TREE, VALUES)
+    assert asked == []
+    bounds_of_raw = [o.bound for o in found if o.bound and o.question == "raw rules"]
+    assert len([bound() for bound in bounds_of_raw]) > 10
+    assert asked == [VALUES.shape[1]] * 3  # once for each number type
 
 
 def test_every_runtime_that_runs_foreign_code_is_tried_apart() -> None:

@@ -475,7 +475,7 @@ def test_simpful_has_no_bound_where_a_slope_overflows() -> None:
         (Rule((Clause("x", ("low",)),), "a"), Rule((Clause("x", ("high",)),), "b")),
     )
     found, _ = peers(rules, lambda _rules, _dtype: (0.0, "the model"))
-    bounds = {one.name: one.bound for one in found}
+    bounds = {one.name: one.bound() for one in found if one.bound}
     assert bounds["simpful: rules"] is None
     assert bounds["pyfuzzylite: rules"] is not None
 
@@ -483,7 +483,7 @@ def test_simpful_has_no_bound_where_a_slope_overflows() -> None:
 def test_a_bound_names_both_of_its_parts() -> None:
     rules = rules_from_tree(random_tree(1))
     found, _ = peers(rules, lambda _rules, _dtype: (0.5, "the model's double"))
-    bounds = {one.name: one.bound for one in found}
+    bounds = {one.name: one.bound() for one in found if one.bound}
     bound = bounds["pyfuzzylite: rules"]
     assert bound is not None
     assert 0.5 < bound[0] < 0.51

@@ -81,6 +81,16 @@ def test_what_hangs_is_ended(maker: str) -> None:
     assert found == {"hang": "it did not answer within 4 s"}
 
 
+def test_what_the_budget_leaves_no_time_for_is_told(maker: str) -> None:
+    late = "a third of the budget was over before it was tried; a larger one helps"
+    names = ["hang", "well"]
+    found = tried(model(), names, rows(), maker=maker, left=lambda: 0.0)
+    assert found == dict.fromkeys(names, late)
+    times = iter([1.0, 0.5, 0.0])  # as the first begins, while it hangs, and then
+    found = tried(model(), names, rows(), maker=maker, left=lambda: next(times))
+    assert found == dict.fromkeys(names, late)
+
+
 def test_a_maker_that_is_not_there_is_the_fault_of_every_candidate() -> None:
     found = tried(model(), ["a"], rows(), maker="no_such_module_at_all:make")
     assert found == {

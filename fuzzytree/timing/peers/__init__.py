@@ -14,15 +14,13 @@ from functools import partial
 
 import msgspec
 
-from fuzzytree.contracts import Model
+from fuzzytree.contracts import Dtype, Model
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.sampling import lines_bound
-from fuzzytree.timing.candidates import Bound, Bounds, questions, title
+from fuzzytree.timing.candidates import Bounds, questions, title
 from fuzzytree.timing.peers import engines, evaluator, trees
-from fuzzytree.timing.records import Candidate, Loaded, Omission, Question
+from fuzzytree.timing.records import Bound, Candidate, Loaded, Omission, Question
 from fuzzytree.tree import FuzzyTree
-
-_MINUTE = 60.0
 
 _PYTHON = "one row after another"
 _SINGLE = "compares values rounded to float32 with cuts in double"
@@ -97,8 +95,12 @@ _EXTRAS = {
 }
 
 
+def _uncertified(rules: RuleBase, dtype: Dtype) -> None:
+    """Certify nothing."""
+
+
 def peers(
-    model: Model, bounds: Bounds | None = None
+    model: Model, bounds: Bounds = _uncertified
 ) -> tuple[list[Candidate], list[Omission]]:
     """Return a candidate for each peer and each question that it can answer.
 
@@ -150,15 +152,14 @@ def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
             is_parallel=peer.is_parallel,
         )
         found.append(one)
-    return _with_evaluator(tree, None, found, omitted)
+    return _with_evaluator(tree, lambda: None, found, omitted)
 
 
 def _of_rules(
-    rules: RuleBase, question: Question, bounds: Bounds | None
+    rules: RuleBase, question: Question, bounds: Bounds
 ) -> tuple[list[Candidate], list[Omission]]:
     found: list[Candidate] = []
     omitted: list[Omission] = []
-    certified = bounds(rules, "float64") if bounds else None
     count = len(engines.names_of(rules))
     for name, module, load, points in (
         ("pyfuzzylite", "fuzzylite", engines.load_fuzzylite, engines.FINE),
@@ -175,26 +176,23 @@ def _of_rules(
             continue
         is_rowwise = name == "simpful"
         note = f"each curved piece as {points} lines; {_LINES}"
-        terms = engines.asked_terms(rules, points)
-        bound = certified and _lines(rules, terms, certified, is_rowwise=is_rowwise)
-        seconds = engines.row_seconds(rules, terms)
+        bound = partial(_lines, rules, points, bounds, is_rowwise=is_rowwise)
         one = Candidate(
             name,
             "rules",
             "peer",
             partial(load, rules),
             bound=bound,
-            most_rows=int(_MINUTE / seconds) if is_rowwise else None,
             note=f"{_PYTHON}; {note}" if is_rowwise else note,
             is_foreign=True,
         )
         found.append(one)
-    return _with_evaluator(rules, certified, found, omitted)
+    return _with_evaluator(rules, partial(bounds, rules, "float64"), found, omitted)
 
 
 def _with_evaluator(
     model: Model,
-    certified: Bound | None,
+    bound: Callable[[], Bound | None],
     found: list[Candidate],
     omitted: list[Omission],
 ) -> tuple[list[Candidate], list[Omission]]:
@@ -209,7 +207,7 @@ def _with_evaluator(
         "rules",
         "peer",
         partial(evaluator.load_evaluator, model),
-        bound=certified,
+        bound=bound,
         note=f"{note} in double, its operators one by one in numpy",
         is_foreign=True,
     )
@@ -217,9 +215,13 @@ def _with_evaluator(
 
 
 def _lines(
-    rules: RuleBase, terms: engines.Terms, certified: Bound, *, is_rowwise: bool
+    rules: RuleBase, points: int, bounds: Bounds, *, is_rowwise: bool
 ) -> Bound | None:
     """Return the certified bound of an engine that joins points by lines."""
+    certified = bounds(rules, "float64")
+    if certified is None:
+        return None
+    terms = engines.asked_terms(rules, points)
     if is_rowwise and engines.is_steep(terms):
         return None
     errors = {key: one.error for key, one in terms.items()}
