@@ -27,7 +27,7 @@ from fuzzytree.rulebase import Variable
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.tables import batches
-from fuzzytree.timing.clock import measure
+from fuzzytree.timing.clock import time_calls
 from fuzzytree.timing.records import Timing
 from fuzzytree.tree import Use
 
@@ -297,16 +297,20 @@ def costs(
     found: list[Cost] = []
     for size, calls in groups.items():
         named = {" ".join(filter(None, key)): key for key in calls}
-        timings = measure(
+        timed = time_calls(
             {name: calls[key] for name, key in named.items()},
             rows=size,
             rounds=rounds,
             seconds=seconds / len(groups),
             tell=tell,
         )
-        found += [Cost(*named[name], timing) for name, timing in timings.items()]
+        for failure in timed.failures.values():
+            raise failure
+        if timed.is_interrupted:
+            raise KeyboardInterrupt
+        found += [Cost(*named[name], one) for name, one in timed.timings.items()]
         omissions += [
-            f"{name}: the time was over" for name in named if name not in timings
+            f"{name}: the time was over" for name in named if name not in timed.timings
         ]
     return tuple(found), tuple(dict.fromkeys(omissions))
 

@@ -259,6 +259,15 @@ def test_what_the_time_does_not_reach_is_an_omission() -> None:
     assert "as it is rules native one row: the time was over" in omissions
 
 
+def test_an_interruption_ends_the_measuring_and_is_passed_on() -> None:
+    def interrupt(text: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    rules = base((force("soft"),))
+    with pytest.raises(KeyboardInterrupt):
+        savings.costs({"as it is": rules}, (), seconds=60.0, tell=interrupt)
+
+
 def test_a_table_that_cannot_be_read_is_an_omission() -> None:
     rules = base((force("soft"),))
     _, omissions = savings.costs({"as it is": rules}, (), table="no.csv", seconds=0.05)

@@ -12,13 +12,14 @@ import importlib
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 
 import click
 
 from fuzzytree.cli.talk import say
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
+from fuzzytree.timing.interrupts import noticed
 
 VERBS = (
     "learn",
@@ -99,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     _spare_encodings()
     try:
-        with program.make_context("fuzzytree", words) as context:
+        with _interruptible(), program.make_context("fuzzytree", words) as context:
             code = program.invoke(context)
         sys.stdout.flush()
     except click.exceptions.Exit as found:
@@ -121,6 +122,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say("interrupted; files are as they were")
         return 130
     return code if isinstance(code, int) else 0
+
+
+@contextlib.contextmanager
+def _interruptible() -> Generator[None]:
+    """Tell a Ctrl-C as one, though a library that was interrupted raised another error.
+
+    An extension module that is being imported does so.
+    """
+    with noticed() as check:
+        try:
+            yield
+        except (FuzzyTreeError, click.ClickException, click.exceptions.Exit):
+            raise
+        except Exception:
+            check()
+            raise
 
 
 def _usage_text(error: click.ClickException) -> str:

@@ -15,25 +15,31 @@ def noticed() -> Generator[Callable[[], None]]:
 
     A Ctrl-C raises where it arrives, as always; but where that is in a library with an
     `except:` of its own, nothing comes of it. Whoever calls the function between its
-    steps hears of it all the same. Outside the main thread, and where the program has
-    a handler of its own, nothing is changed.
+    steps hears of it all the same. Outside the main thread nothing is changed; a
+    handler of the program's own decides what a Ctrl-C is.
     """
     seen: list[int] = []
-
-    def note(number: int, frame: FrameType | None) -> None:
-        seen.append(number)
-        signal.default_int_handler(number, frame)
+    before = signal.getsignal(signal.SIGINT)
 
     def check() -> None:
         if seen:
             raise KeyboardInterrupt
 
     is_main = threading.current_thread() is threading.main_thread()
-    if not is_main or signal.getsignal(signal.SIGINT) != signal.default_int_handler:
+    if not is_main or not callable(before):
         yield check
         return
+    raising = before
+
+    def note(number: int, frame: FrameType | None) -> None:
+        try:
+            raising(number, frame)
+        except KeyboardInterrupt:
+            seen.append(number)
+            raise
+
     signal.signal(signal.SIGINT, note)
     try:
         yield check
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, before)

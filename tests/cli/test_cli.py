@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -81,6 +82,21 @@ def test_an_unknown_option_is_a_sentence_with_a_guess(call: Call) -> None:
 def test_a_missing_argument_is_a_sentence(call: Call) -> None:
     message = "missing argument 'MODEL'\n  fuzzytree run --help tells more\n"
     assert call("run") == (2, "", message)
+
+
+def test_an_interrupt_that_becomes_another_error_ends_with_130(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def imported(*_: object, **__: object) -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            raise ImportError("initialization failed") from error
+
+    monkeypatch.setattr(run.command, "callback", imported)
+    message = "interrupted; files are as they were\n"
+    assert call("run", "grip.yaml", "grasps.csv") == (130, "", message)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_an_interrupt_ends_with_130(
