@@ -40,6 +40,7 @@ BELOW_ONE = 1.0 - 2.0**-53
 _ROUNDS = 80  # of halving; each at least quarters what is left to gain
 _ENOUGH = 1.0 + 2.0**-7  # how much above the largest difference a bound may stay
 _UNIT = 2.0**-53
+_TINY = 2.0**-1000  # more than what underflow can make
 _REACH = 1.125  # R: how large z may be
 
 
@@ -138,7 +139,7 @@ def distance(
     """
     size = max(len(p), len(r))
     p, r = _padded(p, size), np.broadcast_to(_padded(r, size), (size, len(first)))
-    slack = _slack(p) + _slack(r)
+    slack = _slack(p) + _slack(r) + _TINY
     a, b = np.minimum(first, last), np.maximum(first, last)
     found = worst = 0.0
     for _ in range(_ROUNDS):

@@ -130,7 +130,12 @@ def _exchange(powers: FloatArray, goal: FloatArray) -> FloatArray:
     found: FloatArray = np.zeros(degree)
     for _ in range(_EXCHANGES):
         system = np.column_stack([powers[reference], sign])
-        solved: FloatArray = np.linalg.solve(system, goal[reference]).astype(float)
+        try:
+            solved: FloatArray = np.linalg.solve(system, goal[reference]).astype(float)
+        except np.linalg.LinAlgError:
+            break  # so close to 0 that doubles cannot tell powers apart
+        if not np.isfinite(solved).all():
+            break
         found, level = solved[:-1], float(solved[-1])
         error = goal - powers @ found
         worst = int(np.argmax(np.abs(error)))

@@ -37,6 +37,7 @@ _GRID = 512  # places on a curve at which its bend is looked at
 _TRIES = 12  # of placing points before the bound counts as out of reach
 _SHORT = math.sqrt(0.5)  # the length of a line with an end on the curve
 _ROUNDING = 1.0 + 2.0**-40
+_TOO_COARSE = "doubles around {!r} are too coarse for them"
 _TOO_MANY = f"it would need more than {MOST_POINTS} points"
 
 
@@ -101,6 +102,8 @@ def _side_half(shape: LR, sign: int, tolerance: float) -> _Half:
     outer, inner = _double(tail.origin), _double(knee)
     if (Fraction(outer) - tail.origin) * sign < 0:
         outer = math.nextafter(outer, sign * math.inf)
+    if inner == shape.mean:
+        raise LossError(_TOO_COARSE.format(inner))
     slack = _steepness(tail) * abs(Fraction(outer) - tail.origin)
     slack += (_steepness(tail) + _steepness(body)) * abs(Fraction(inner) - knee)
     lost = float(slack) * _ROUNDING
@@ -147,7 +150,7 @@ def _joined(
         if bound <= tolerance:
             return points, bound
         share *= 0.95
-    raise LossError(f"doubles around {ends[1]!r} are too coarse for them")
+    raise LossError(_TOO_COARSE.format(ends[1]))
 
 
 def _knots(stretch: Stretch) -> list[float]:
@@ -167,7 +170,8 @@ def _knots(stretch: Stretch) -> list[float]:
 
 
 def _real_roots(p: np.polynomial.Polynomial) -> Iterator[float]:
-    for root in p.trim().roots():
+    least = 2.0**-100 * float(np.abs(p.coef).max())  # less only overflows
+    for root in p.trim(least).roots():
         if abs(root.imag) <= 2.0**-30:
             yield float(root.real)
 
@@ -185,7 +189,7 @@ def _placed(
         if 0.0 < middle < top:
             grid = np.linspace(start, end, _GRID + 1)
             bend = values_at(second, grid)
-            density = np.sqrt(np.abs(bend) / (16.0 * tolerance))
+            density = np.sqrt(np.abs(bend)) / (4.0 * math.sqrt(tolerance))
             steps = (density[1:] + density[:-1]) / 2 * (abs(end - start) / _GRID)
             needed = np.append(0.0, np.cumsum(steps))
             room = 1.0 if needed[-1] <= _SHORT else _room(float(needed[-1]))

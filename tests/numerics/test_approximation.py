@@ -294,6 +294,36 @@ def test_a_set_between_doubles_that_are_far_apart_is_refused() -> None:
     )
 
 
+def test_a_set_that_is_narrower_than_doubles_at_its_mean_is_refused() -> None:
+    level = Side(0.5, (0.0,), 1e6)  # 1 up to a spread, where no double is
+    with pytest.raises(LossError, match=r"doubles around 1e\+16 are too coarse"):
+        by_points(model_of(LR(1e16, level, level)), 0.01)
+
+
+@pytest.mark.parametrize("tolerance", [5e-324, 1e-300])
+def test_a_tolerance_below_all_roundings_needs_too_many_points(
+    tolerance: float,
+) -> None:
+    shape = Band(high=0.0, right=Flank(0.0, 1.0, (0.5, 0.5)))
+    with pytest.raises(LossError, match="it would need more than 4096 points"):
+        by_points(model_of(shape), tolerance)
+
+
+def test_a_last_coefficient_next_to_nothing_does_no_harm() -> None:
+    for curve in ((1.0, 5e-324), (0.0, 5e-324)):
+        shape = Band(high=0.0, right=Flank(0.0, 1.0, curve))
+        found = by_points(model_of(shape), 0.01)
+        (term,) = found.model.variables[0].terms
+        assert isinstance(term.shape, Points)
+        at = places(term.shape)
+        assert largest_error(term.shape, shape, at) <= Fraction(found.bound)
+
+
+def test_a_flank_that_has_hardly_begun_at_its_edge_can_be_lowered() -> None:
+    shape = Band(high=-1e-300, right=Flank(-1.0, 0.0, (1.0, 0.5, 1.0, 2.0)))
+    assert by_degree(model_of(shape), 3).bound < 1e-13
+
+
 def test_a_set_beyond_the_largest_double_is_refused() -> None:
     shape = LR(0.0, Side(1e308, (0.4,)), Side(1.0, (0.4,)))
     with pytest.raises(LossError, match="it reaches beyond the largest double"):

@@ -145,7 +145,9 @@ def test_a_tie_of_different_curves_is_settled_by_fractions() -> None:
     assert found.rule.tolist() == [1, 1, 2]
     assert found.status.tolist() == [TIE, DECIDED, DECIDED]
     assert found.by_fractions == 2
-    assert found.margin.tolist()[:2] == pytest.approx([0.0, 2.0**-52 / 3], rel=1e-9, abs=0.0)
+    assert found.margin.tolist()[:2] == pytest.approx(
+        [0.0, 2.0**-52 / 3], rel=1e-9, abs=0.0
+    )
 
 
 def test_one_wins_by_less_than_doubles_can_tell() -> None:
