@@ -129,6 +129,7 @@ class DegreeBound(NamedTuple):
     active: float = 0.0
 
 
+@functools.lru_cache(maxsize=1 << 14)  # fractions take their time
 def degree_bound(shape: Shape, dtype: Dtype) -> DegreeBound:
     """Return the largest difference of a degree from the exact one.
 
