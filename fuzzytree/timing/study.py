@@ -48,6 +48,7 @@ BUDGET_S = 300.0
 _MADE = 100_000  # rows that are made where there is no table; more are these again
 _TRIED = 16  # rows that a child process answers
 _MOST_BYTES = 6 * 2**30  # for all layouts of the rows of a study
+_MOST_THREADS = 256  # thousands of them do nothing but wait for each other
 _SHARE = 0.1  # of the time: what a single candidate may take at most
 _PACKAGES = (
     *("onnx", "onnxruntime", "scikit-fuzzy", "scipy"),
@@ -85,10 +86,13 @@ class Plan(msgspec.Struct, frozen=True):
             for value in values:
                 if value < 1:
                     raise ValueError(f"{name}: 1 is the least, not {value}")
+        if max(self.threads) > _MOST_THREADS:
+            raise ValueError(
+                f"threads: {_MOST_THREADS} is the most, not {max(self.threads)}"
+            )
         if not 0 < self.budget_s < math.inf:
             raise ValueError(
-                "the budget must be a number of seconds above 0, "
-                f"not {self.budget_s:g}"
+                f"the budget must be a number of seconds above 0, not {self.budget_s:g}"
             )
         if self.most is not None and not 0 <= self.most <= 1:
             raise ValueError(

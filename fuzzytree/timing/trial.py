@@ -85,6 +85,7 @@ def _one_child(
     """Return what one child says of each candidate until it ends; "" for well."""
     done: dict[str, str] = {}
     lines: queue.Queue[bytes | None] = queue.Queue()
+    patience = seconds
     with (
         tempfile.TemporaryFile() as talk,
         subprocess.Popen(
