@@ -430,6 +430,7 @@ def test_a_name_of_nothing_is_refused_with_what_there_is() -> None:
         ({"rows": (0,)}, "rows: 1 is the least, not 0"),
         ({"rows": ()}, "rows: name at least one number"),
         ({"threads": (1, -2)}, "threads: 1 is the least, not -2"),
+        ({"threads": (1, 5000)}, "threads: 256 is the most, not 5000"),
         ({"budget_s": -3.0}, "the budget must be a number of seconds above 0, not -3"),
         (
             {"budget_s": math.inf},
