@@ -19,7 +19,7 @@ import click
 from fuzzytree.cli.talk import say
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
-from fuzzytree.timing.interrupts import noticed
+from fuzzytree.interrupts import noticed
 
 VERBS = (
     "learn",

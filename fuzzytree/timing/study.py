@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fuzzytree.contracts import Model
+from fuzzytree.interrupts import noticed
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.timing import trial
 from fuzzytree.timing.candidates import DEFAULT, questions, title
@@ -23,7 +24,6 @@ from fuzzytree.timing.clock import (
 )
 from fuzzytree.timing.front import advice, fronts
 from fuzzytree.timing.gather import chosen, gather
-from fuzzytree.timing.interrupts import noticed
 from fuzzytree.timing.judging import Judge
 from fuzzytree.timing.machine import after, machine, noise
 from fuzzytree.timing.records import (
