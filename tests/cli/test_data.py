@@ -12,7 +12,7 @@ VERBS = (
     ("check", "grip.yaml", "--limit", "50", "--runtime", "native"),
     ("stability", "grip.yaml", "--only", "N3", "--runtime", "native"),
     ("needs", "grip.yaml"),
-    ("bench", "grip.yaml", "--rows", "2", "--budget", "0.5", "--only", "native"),
+    ("bench", "grip.yaml", "--rows", "2", "--budget", "5", "--only", "native"),
 )
 verbs = pytest.mark.parametrize("words", VERBS, ids=lambda words: words[0])
 

@@ -76,7 +76,7 @@ def test_a_flank_that_starts_off_the_edge_is_a_step_of_what_is_missing_there() -
 def test_an_lr_set_of_default_reach_costs_less_than_fifty_units(dtype: str) -> None:
     shape = LR(0.0, Side(1.0, (0.4,)), Side(1.0, (0.4,)))
     unit = 2.0**-53 if dtype == "float64" else UNIT
-    bound = degree_bound(shape, dtype)  # type: ignore[arg-type] # a parameter
+    bound = degree_bound(shape, dtype)
     assert 1 * unit < bound.fixed < 50 * unit
 
 
