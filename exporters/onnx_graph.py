@@ -130,6 +130,8 @@ class Sheet:
         value = self._mistaken.get(right)
         if value is None or np.float32(value.item()) != _NEUTRAL[op]:
             return ""
+        if op == "Sub" and left in self._mistaken:  # turned about, it is the same case
+            return self.constant(np.subtract(value, self._mistaken[left]), "minus")
         if op == "Sub":
             return self.node("Sub", right, left)
         minus = self.constant(np.negative(value), "minus")

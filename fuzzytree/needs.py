@@ -321,13 +321,16 @@ def prove(
     faults = [*proof_faults(model, found.model, uses=uses, rules=found.rules)]
     comparisons = [_proof(model, faults)]
     rows = probed(model, data, limit)
-    is_seen = _is_seen(model, found.model, rows)
+    kinds = {name: find_runtime(name).dtype for name in runtimes}
+    seen = {kind: _is_seen(model, found.model, rows, kind) for kind in kinds.values()}
     for title, carrier in whole.items():
         other = left.get(title)
         if other is None or not set(other.inputs) <= set(model.inputs):
             continue
         for name in runtimes:
-            comparisons += _compared(title, name, carrier, other, found, rows, is_seen)
+            comparisons += _compared(
+                title, name, carrier, other, found, rows, seen[kinds[name]]
+            )
     return Agreement(
         model.name, fingerprint(model), tuple(comparisons), probes=rows.probes
     )
@@ -347,13 +350,14 @@ def _proof(model: Model, faults: Sequence[str]) -> Comparison:
     )
 
 
-def _is_seen(model: Model, left: Model, rows: Rows) -> BoolArray:
+def _is_seen(model: Model, left: Model, rows: Rows, dtype: Dtype) -> BoolArray:
     """Return the rows in which nothing is missing that only the whole model sees."""
     seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
     gone = unguarded(model, left)
-    plan = plan_axes(model.variables)
+    kind = np.dtype(np.float32 if dtype == "float32" else np.float64)
+    plan = plan_axes(model.variables, kind)
     with np.errstate(invalid="ignore", over="ignore"):
-        lines = axis_lines(plan, rows.values)
+        lines = axis_lines(plan, rows.values.astype(kind))
     for name in gone:
         seen &= np.isfinite(lines[plan.line[name]])
     return seen

@@ -224,7 +224,7 @@ def _level(best: Entry, level: float) -> str:
     error = best.point.error
     if best.point.question != "tree" or error is None:
         return f"an error of at most {level:g}"
-    seen = f"in {error.rows:,} rows"
+    seen = f"in {error.rows:,} row{'' if error.rows == 1 else 's'}"
     edges = best.point.probes
     if edges is not None and edges.flips:
         seen += f" (but {edges.flips} of {edges.rows} probes at its cuts)"

@@ -13,6 +13,7 @@ from fuzzytree.rulebase import (
     Clause,
     Flank,
     Part,
+    Points,
     Rule,
     RuleBase,
     Shape,
@@ -34,6 +35,7 @@ SHAPES: dict[str, Shape] = {
     "spread": LR(0.5, Side(NEARLY_ONE, (0.75,)), Side(NEARLY_ONE, (0.75,))),
     "mean": LR(SMALL, Side(SMALL, (0.75,)), Side(SMALL, (0.75,))),
     "reach": LR(0.0, Side(1.0, (0.5,), 1.0 + NEARLY_ONE), Side(1.0, (0.5,), 2.0)),
+    "points": Points((0.0, 1.0), (1e-300, 5e-324)),
     "curve": Band(high=0.0, right=Flank(0.0, 1.0, (NEARLY_ONE, SMALL, 0.25))),
 }
 
