@@ -41,7 +41,7 @@ from fuzzytree.rulebase import (
     fingerprint,
 )
 from fuzzytree.runtimes import find_runtime
-from fuzzytree.runtimes.axes import axis_lines, plan_axes
+from fuzzytree.runtimes.axes import Real, axis_lines, plan_axes
 from fuzzytree.tree import FuzzyTree, Use
 
 if TYPE_CHECKING:
@@ -354,7 +354,9 @@ def _is_seen(model: Model, left: Model, rows: Rows, dtype: Dtype) -> BoolArray:
     """Return the rows in which nothing is missing that only the whole model sees."""
     seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
     gone = unguarded(model, left)
-    kind = np.dtype(np.float32 if dtype == "float32" else np.float64)
+    kind: Real = np.dtype(np.float64)
+    if dtype == "float32":
+        kind = np.dtype(np.float32)
     plan = plan_axes(model.variables, kind)
     with np.errstate(invalid="ignore", over="ignore"):
         lines = axis_lines(plan, rows.values.astype(kind))
