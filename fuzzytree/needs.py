@@ -41,12 +41,13 @@ from fuzzytree.rulebase import (
     fingerprint,
 )
 from fuzzytree.runtimes import find_runtime
-from fuzzytree.runtimes.axes import Real, axis_lines, plan_axes
+from fuzzytree.runtimes.axes import axis_lines, plan_axes
 from fuzzytree.tree import FuzzyTree, Use
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
     from fuzzytree.exporters.onnx import Output
+    from fuzzytree.runtimes.axes import Real
 
 DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
 
