@@ -64,6 +64,11 @@ def candidate(model: Model, name: str) -> Candidate:
     pytest.skip(f"{short}: {why}")
 
 
+def _with_all_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every package be found: listing peers imports none of them."""
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: object())
+
+
 def answer(model: Model, name: str, values: FloatArray) -> Found:
     return candidate(model, name).load(1).answer(values)
 
@@ -195,7 +200,10 @@ def test_threads_and_rows_do_not_change_a_peers_classes(peer: str) -> None:
     tree = random_tree(7, leaves=20)
     values = probe_values(tree, 400)
     one = candidate(tree, f"{peer}: tree")
-    whole = one.load(2).answer(values).labels
+    try:
+        whole = one.load(2).answer(values).labels
+    except LossError as error:
+        pytest.skip(str(error))
     single = one.load(1)
     rows = [single.answer(values[:, [k]]).labels[0] for k in range(0, 400, 9)]
     assert whole[::9].tolist() == rows
@@ -458,6 +466,7 @@ def test_engines_are_left_out_of_models_with_thousands_of_terms(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(engines, "MOST_TERMS", 5)
+    _with_all_installed(monkeypatch)
     found, omitted = peers(negated(Semantics()))
     assert [one.name for one in found] == ["onnx evaluator: rules"]
     assert [(one.name, one.why) for one in omitted] == [
@@ -466,7 +475,10 @@ def test_engines_are_left_out_of_models_with_thousands_of_terms(
     ]
 
 
-def test_simpful_has_no_bound_where_a_slope_overflows() -> None:
+def test_simpful_has_no_bound_where_a_slope_overflows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _with_all_installed(monkeypatch)
     x = Variable("x", (Term("low", Band(None, 0.0)), Term("high", Band(0.0, None))))
     rules = RuleBase(
         "zero",
@@ -480,7 +492,8 @@ def test_simpful_has_no_bound_where_a_slope_overflows() -> None:
     assert bounds["pyfuzzylite: rules"] is not None
 
 
-def test_a_bound_names_both_of_its_parts() -> None:
+def test_a_bound_names_both_of_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    _with_all_installed(monkeypatch)
     rules = rules_from_tree(random_tree(1))
     found, _ = peers(rules, lambda _rules, _dtype: (0.5, "the model's double"))
     bounds = {one.name: one.bound() for one in found if one.bound}
@@ -555,6 +568,7 @@ def test_a_peer_that_is_not_installed_is_named_with_its_extra(
 def test_generated_c_without_a_compiler_is_left_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    _with_all_installed(monkeypatch)
     monkeypatch.setattr(shutil, "which", lambda _name: None)
     _, omitted = peers(random_tree(1))
     assert [(one.name, one.why) for one in omitted] == [
