@@ -322,8 +322,9 @@ def prove(
     faults = [*proof_faults(model, found.model, uses=uses, rules=found.rules)]
     comparisons = [_proof(model, faults)]
     rows = probed(model, data, limit)
-    kinds = {name: find_runtime(name).dtype for name in runtimes}
-    seen = {kind: _is_seen(model, found.model, rows, kind) for kind in kinds.values()}
+    kinds: dict[str, Dtype] = {name: find_runtime(name).dtype for name in runtimes}
+    types: set[Dtype] = set(kinds.values())
+    seen = {dtype: _is_seen(model, found.model, rows, dtype) for dtype in types}
     for title, carrier in whole.items():
         other = left.get(title)
         if other is None or not set(other.inputs) <= set(model.inputs):
@@ -360,7 +361,7 @@ def _is_seen(model: Model, left: Model, rows: Rows, dtype: Dtype) -> BoolArray:
         kind = np.dtype(np.float32)
     plan = plan_axes(model.variables, kind)
     with np.errstate(invalid="ignore", over="ignore"):
-        lines = axis_lines(plan, rows.values.astype(kind))
+        lines = axis_lines(plan, rows.values)
     for name in gone:
         seen &= np.isfinite(lines[plan.line[name]])
     return seen
