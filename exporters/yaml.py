@@ -20,7 +20,7 @@ from fuzzytree.readers import layout
 from fuzzytree.readers.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
 from fuzzytree.readers.nodes import MOST_BYTES, MOST_NODES
 from fuzzytree.readers.sentences import Vocabulary, readings, vocabulary_of
-from fuzzytree.readers.yaml import read
+from fuzzytree.readers.yaml import reading
 from fuzzytree.rulebase import (
     LR,
     Band,
@@ -488,4 +488,4 @@ def _escaped(character: str) -> str:
     return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
-FORMAT = Format("yaml", (".yaml", ".yml"), ("tree", "rules"), write, read)
+FORMAT = Format("yaml", (".yaml", ".yml"), ("tree", "rules"), write, reading)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import msgspec
 
 from fuzzytree.rulebase import RuleBase
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -18,7 +19,12 @@ if TYPE_CHECKING:
     IntArray = npt.NDArray[np.int64]
 
 Model = FuzzyTree | RuleBase
-Carrier = Literal["tree", "rules"]
+"""What decides for a class."""
+
+Document = FuzzyTree | RuleBase | FuzzySystem
+"""What a file can hold."""
+
+Carrier = Literal["tree", "rules", "system"]
 Dtype = Literal["float64", "mixed", "float32"]
 
 
@@ -37,16 +43,42 @@ class Loss(msgspec.Struct, frozen=True):
 
 
 class Written(msgspec.Struct, frozen=True):
-    """What a writer made: the content, and what was lost on the way."""
+    """What a writer made.
+
+    Attributes:
+        content: The file.
+        losses: What was lost on the way, and can change an answer.
+        remarks: What else is worth knowing, a sentence each, such as facts that the
+            file has no place for and no answer depends on.
+    """
 
     content: bytes
     losses: tuple[Loss, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+class Reading(msgspec.Struct, frozen=True):
+    """What a reader made of a file.
+
+    Attributes:
+        model: A tree, a rule base or a system.
+        losses: What the file says that the model cannot hold, and what stands in its
+            place.
+        remarks: What else is worth knowing, such as the dialect that was detected.
+    """
+
+    model: Document
+    losses: tuple[Loss, ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 class Writer(Protocol):
-    """A writer: a model to bytes; options are the writer's own, by keyword."""
+    """A writer: a model to bytes; options are the writer's own, by keyword.
 
-    def __call__(self, model: Model, /, *, allow_loss: bool = False) -> Written:
+    It gets only what its format says that it carries.
+    """
+
+    def __call__(self, model: Any, /, *, allow_loss: bool = False) -> Written:
         """Write a model, or raise LossError when something would be lost."""
         ...
 
@@ -59,7 +91,8 @@ class Format(msgspec.Struct, frozen=True):
         suffixes: With the dot; the first is the usual one.
         carries: What the format can hold.
         write: Model to bytes.
-        read: Bytes and a name for messages to a model; None if it cannot be read.
+        read: Bytes and a name for messages to a reading; None if it cannot be read.
+            Raises ReadError with all mistakes of the file.
         cannot: What it cannot hold, a sentence each.
         extra: The optional packages it needs, if any.
         dtype: The number type in which a file of it computes, unless the writer's
@@ -70,7 +103,7 @@ class Format(msgspec.Struct, frozen=True):
     suffixes: tuple[str, ...]
     carries: tuple[Carrier, ...]
     write: Writer
-    read: Callable[[bytes, str], Model] | None = None
+    read: Callable[[bytes, str], Reading] | None = None
     cannot: tuple[str, ...] = ()
     extra: str | None = None
     dtype: Dtype | None = None

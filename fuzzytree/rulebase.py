@@ -298,7 +298,7 @@ def naming_mistakes(
         yield ("name",), f"the name {name!r} cannot be written as UTF-8"
     if not classes:
         yield ("classes",), "a model needs at least one class"
-    yield from _repeated(("classes",), "class", classes)
+    yield from name_mistakes(("classes",), "class", classes)
     for position, label in enumerate(classes):
         if not label:
             yield ("classes", position), "a class name cannot be empty"
@@ -308,7 +308,7 @@ def naming_mistakes(
             yield (
                 ("semantics", field),
                 f"the answer for {field} is no class: {answer!r}; "
-                f"{_choice(answer, classes)}",
+                f"{name_choice(answer, classes)}",
             )
 
 
@@ -316,8 +316,8 @@ def variable_mistakes(
     variables: tuple[Variable, ...], columns: tuple[str, ...] = ()
 ) -> Iterator[Mistake]:
     """Yield what is wrong with variables: names, ranges, shapes, combinations."""
-    yield from _repeated(("variables",), "variable", [v.name for v in variables])
-    yield from _repeated(("columns",), "column", columns)
+    yield from name_mistakes(("variables",), "variable", [v.name for v in variables])
+    yield from name_mistakes(("columns",), "column", columns)
     named = set(columns)
     known: dict[str, bool] = {}
     for position, variable in enumerate(variables):
@@ -328,12 +328,12 @@ def variable_mistakes(
             yield (
                 (*path, "name"),
                 f"input {variable.name!r} is not among the columns; "
-                f"{_choice(variable.name, columns)}",
+                f"{name_choice(variable.name, columns)}",
             )
-        yield from _range_mistakes(path, variable)
-        yield from _part_mistakes(path, variable, known)
+        yield from range_mistakes(path, variable.name, variable.low, variable.high)
+        yield from part_mistakes(path, variable.name, variable.parts, known)
         names = [term.name for term in variable.terms]
-        yield from _repeated((*path, "terms"), f"term of {variable.name!r}", names)
+        yield from name_mistakes((*path, "terms"), f"term of {variable.name!r}", names)
         for index, term in enumerate(variable.terms):
             where = f"term {term.name!r} of {variable.name!r}"
             if not term.name:
@@ -346,43 +346,51 @@ def variable_mistakes(
         known[variable.name] = bool(variable.parts)
 
 
-def _range_mistakes(path: Path, variable: Variable) -> Iterator[Mistake]:
-    for field in ("low", "high"):
-        value: float | None = getattr(variable, field)
+def range_mistakes(
+    path: Path, name: str, low: float | None, high: float | None
+) -> Iterator[Mistake]:
+    """Yield what is wrong with the range of a variable."""
+    for field, value in (("low", low), ("high", high)):
         if value is not None and not math.isfinite(value):
-            yield (*path, field), f"the range of {variable.name!r} must be finite"
+            yield (*path, field), f"the range of {name!r} must be finite"
             return
-    low, high = variable.low, variable.high
     if low is not None and high is not None and low > high:
         yield (
             (*path, "low"),
-            f"the range of {variable.name!r} starts at {low!r} "
-            f"and ends below it, at {high!r}",
+            f"the range of {name!r} starts at {low!r} and ends below it, at {high!r}",
         )
 
 
-def _part_mistakes(
-    path: Path, variable: Variable, known: dict[str, bool]
+def part_mistakes(
+    path: Path, name: str, parts: tuple[Part, ...], known: Mapping[str, bool]
 ) -> Iterator[Mistake]:
-    for index, part in enumerate(variable.parts):
+    """Yield what is wrong with a combination.
+
+    Args:
+        path: Where it stands.
+        name: What it is called.
+        parts: Its summands.
+        known: The variables before it, and whether each is a combination itself.
+    """
+    for index, part in enumerate(parts):
         where = (*path, "parts", index)
         if known.get(part.input, True):
-            inputs = [name for name, combined in known.items() if not combined]
+            inputs = [one for one, combined in known.items() if not combined]
             yield (
                 (*where, "input"),
-                f"combination {variable.name!r} needs input {part.input!r}, "
-                f"which does not stand before it; {_choice(part.input, inputs)}",
+                f"combination {name!r} needs input {part.input!r}, "
+                f"which does not stand before it; {name_choice(part.input, inputs)}",
             )
         if not math.isfinite(part.weight) or part.weight == 0.0:
             yield (
                 (*where, "weight"),
-                f"the weight of {part.input!r} in {variable.name!r} must be finite "
+                f"the weight of {part.input!r} in {name!r} must be finite "
                 f"and not 0, not {part.weight!r}",
             )
         if not math.isfinite(part.centre):
             yield (
                 (*where, "centre"),
-                f"the centre of {part.input!r} in {variable.name!r} must be finite",
+                f"the centre of {part.input!r} in {name!r} must be finite",
             )
 
 
@@ -486,7 +494,7 @@ def clause_mistakes(
         yield (
             (*path, "variable"),
             f"{where}: no variable {clause.variable!r}; "
-            f"{_choice(clause.variable, list(terms))}",
+            f"{name_choice(clause.variable, list(terms))}",
         )
         return
     if not clause.terms:
@@ -500,9 +508,9 @@ def clause_mistakes(
             yield (
                 (*path, "terms", index),
                 f"{where}: {clause.variable!r} has no term {term!r}; "
-                f"{_choice(term, known)}",
+                f"{name_choice(term, known)}",
             )
-    yield from _repeated((*path, "terms"), f"term in {where}", clause.terms)
+    yield from name_mistakes((*path, "terms"), f"term in {where}", clause.terms)
 
 
 def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
@@ -517,7 +525,7 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
             yield (
                 (*path, "then"),
                 f"rule {number}: no class {rule.then!r}; "
-                f"{_choice(rule.then, rules.classes)}",
+                f"{name_choice(rule.then, rules.classes)}",
             )
         if rule.support is not None and rule.support < 0:
             yield (*path, "support"), f"rule {number}: the support cannot be below 0"
@@ -529,7 +537,8 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
                 )
 
 
-def _repeated(path: Path, what: str, names: Iterable[str]) -> Iterator[Mistake]:
+def name_mistakes(path: Path, what: str, names: Iterable[str]) -> Iterator[Mistake]:
+    """Yield which names stand twice or cannot be written."""
     seen: set[str] = set()
     for position, name in enumerate(names):
         if not _is_writable(name):
@@ -547,7 +556,7 @@ def _is_writable(name: str) -> bool:
     return True
 
 
-def _choice(wrong: str, names: Iterable[str]) -> str:
+def name_choice(wrong: str, names: Iterable[str]) -> str:
     """Return `there is a, b (did you mean 'a'?)`, at most a dozen names long."""
     import difflib
 

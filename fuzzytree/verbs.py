@@ -20,6 +20,7 @@ from fuzzytree.files import read_bounded, write_atomically
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import chosen_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tables import Batch, Table, batches, read_table
 from fuzzytree.tree import FuzzyTree
 
@@ -190,7 +191,10 @@ def load(path: str | os.PathLike[str]) -> Model:
             f"{name}: a file in the format {form.name} is not read back as a model; "
             "keep the YAML file beside it"
         )
-    return form.read(read_bounded(path), name)
+    found = form.read(read_bounded(path), name).model
+    if isinstance(found, FuzzySystem):
+        raise ReadError(f"{name}: is a fuzzy system, which decides for no class")
+    return found
 
 
 def opened(source: Carried) -> Model | OnnxModel:

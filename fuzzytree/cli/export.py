@@ -152,7 +152,7 @@ def _certificate(
         return verbs.certify(model, asked[0] if asked else form.dtype)
     if form.read is None:
         return None
-    if form.read(content, form.name) != model:
+    if form.read(content, form.name).model != model:
         raise DisagreementError(
             f"{model.name} as {form.name} is read back as another model; "
             "nothing is written"

@@ -16,6 +16,7 @@ from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.python import load_content
+from fuzzytree.system import FuzzySystem
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -99,9 +100,11 @@ def _read_again(
         raise ValueError(f"{one.name} is not read")
     content = one.write(form).content
     try:
-        back = one.read(content, title)
+        back = one.read(content, title).model
     except ReadError as error:
         return 1, 1.0, f"{title}: it cannot be read again: {first_line(error)}"
+    if isinstance(back, FuzzySystem):
+        return 1, 1.0, f"{title}: another model comes back"
     if back != form:
         native = find_runtime("native").load
         if back.inputs != form.inputs or type(back) is not type(form):

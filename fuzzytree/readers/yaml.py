@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final, TypeVar
 
-from fuzzytree.contracts import Model
+from fuzzytree.contracts import Model, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers import layout, values
 from fuzzytree.readers.binding import Entries, bind, entries, not_a_list, record
@@ -86,6 +86,15 @@ def read(content: bytes, name: str) -> Model:
     if found or model is None:
         raise report(name, found)
     return model
+
+
+def reading(content: bytes, name: str) -> Reading:
+    """Return what `read` makes of a file; nothing of it is lost.
+
+    Raises:
+        ReadError: As `read`.
+    """
+    return Reading(read(content, name))
 
 
 class _UnreadableError(Exception):

@@ -11,7 +11,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzytree.contracts import Model
+from fuzzytree.contracts import Model, Reading
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.yaml import FORMAT, write
 from fuzzytree.lowering import rules_from_tree
@@ -327,4 +327,6 @@ def test_the_format_says_what_it_carries() -> None:
     assert FORMAT.carries == ("tree", "rules")
     assert FORMAT.cannot == ()
     assert FORMAT.write is write
-    assert FORMAT.read is read
+    assert FORMAT.read is not None
+    tree = random_tree(1)
+    assert FORMAT.read(write(tree).content, "tree.yaml") == Reading(tree)

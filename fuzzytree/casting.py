@@ -1,0 +1,1 @@
+"""Rule bases as systems with numeric outputs, and the way back."""
