@@ -1,47 +1,73 @@
-"""Writers of rule bases and trees, one module per format, and the table of formats.
+"""Writers of models, one module per format, and the table of formats.
 
-A format is a module with a constant `FORMAT` (see `fuzzytree.contracts.Format`) and a
-line in `TABLE`. A module is imported when its format is asked for.
+A format is a module here with a constant `FORMAT` (see `fuzzytree.contracts.Format`)
+and a line in `TABLE`; `docs/add-a-format.md` shows how to add one. Packages of others
+offer theirs by the entry point group `fuzzytree.formats`. A module is imported when its
+format is asked for, and a package of others only for a format that is not ours.
 """
 
 from __future__ import annotations
 
+import difflib
 import importlib
 from collections.abc import Mapping
 from types import MappingProxyType
 
 from fuzzytree.contracts import Format
 
-TABLE: Mapping[str, str] = MappingProxyType(
+TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "yaml": "fuzzytree.exporters.yaml",
-        "onnx": "fuzzytree.exporters.onnx",
-        "python": "fuzzytree.exporters.python",
+        "yaml": (".yaml", ".yml"),
+        "onnx": (".onnx",),
+        "python": (".py",),
     }
 )
-"""Each format's name and the module that holds its `FORMAT`."""
+"""Each format's name and its suffixes, the usual one first.
+
+The module of a format has its name, with `_` for `-`. No two formats share a suffix.
+"""
 
 
 def find_format(name: str) -> Format:
     """Return the format of a name such as `yaml`, or of a suffix such as `.onnx`.
 
+    Args:
+        name: A name, or a suffix with its dot, in large or small letters.
+
     Raises:
-        ValueError: If there is none; the message lists all of them.
+        ValueError: If there is none; the message lists all of them and the nearest.
         ImportError: If a package that the format's module needs is not installed.
+
+    Example:
+        >>> find_format(".YML").name
+        'yaml'
     """
-    if name in TABLE:
-        return _load(name)
-    for known in TABLE if name.startswith(".") else ():
-        if name.lower() in _load(known).suffixes:
+    wanted = name.lower() if name.startswith(".") else name
+    for known, suffixes in TABLE.items():
+        if wanted == known or wanted in suffixes:
             return _load(known)
-    raise ValueError(f"no format {name!r}; there is {', '.join(TABLE)}")
+    from fuzzytree.exporters.plugins import Plugin, find_plugin, plugin_names
+
+    found = find_plugin(wanted)
+    if isinstance(found, Plugin) and found.format is not None:
+        return found.format
+    if isinstance(found, Plugin):
+        raise ValueError(f"the format {name!r} cannot be used: {found.fault}")
+    names = [*TABLE, *plugin_names()]
+    suffixes = [one for several in TABLE.values() for one in several]
+    pool = suffixes if name.startswith(".") else names
+    cutoff = 0.7 if name.startswith(".") else 0.6
+    close = difflib.get_close_matches(wanted[:100], pool, n=1, cutoff=cutoff)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    raise ValueError(f"no format {name!r}; there is {', '.join(names)}{hint}")
 
 
 def all_formats() -> tuple[Format, ...]:
-    """Return every format of the table, in its order."""
+    """Return every format of the table, in its order, and none of others."""
     return tuple(map(_load, TABLE))
 
 
 def _load(name: str) -> Format:
-    loaded: Format = importlib.import_module(TABLE[name]).FORMAT
+    module = importlib.import_module(f"fuzzytree.exporters.{name.replace('-', '_')}")
+    loaded: Format = module.FORMAT
     return loaded

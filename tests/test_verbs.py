@@ -15,6 +15,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree import verbs
 from fuzzytree.errors import LossError, ReadError, TableError
+from fuzzytree.exporters import TABLE
 from fuzzytree.learning import Settings
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.onnxruntime import open_onnx
@@ -153,14 +154,15 @@ def test_a_file_without_a_known_suffix_is_no_model(tmp_path: Path) -> None:
     with pytest.raises(ReadError) as caught:
         ft.load("model.txt")
     assert str(caught.value) == (
-        "model.txt: has the suffix '.txt'; there is yaml, onnx, python"
+        f"model.txt: has the suffix '.txt'; there is {', '.join(TABLE)}"
     )
 
 
 def test_an_unknown_format_is_refused() -> None:
     with pytest.raises(ValueError, match="no format") as caught:
-        ft.export(TREE, "fcl")
-    assert str(caught.value) == "no format 'fcl'; there is yaml, onnx, python"
+        ft.export(TREE, "turtle")
+    known = ", ".join(TABLE)
+    assert str(caught.value) == f"no format 'turtle'; there is {known}"
 
 
 def test_an_option_that_a_writer_does_not_have_is_refused() -> None:

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.contracts import Model, Written
-from fuzzytree.exporters import yaml
+from fuzzytree.exporters import TABLE, yaml
 from fuzzytree.rulebase import Band, RuleBase, Term, Variable
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 from tests.cli.conftest import Call, grip
@@ -154,12 +154,13 @@ def test_raw_rules_of_a_tree_without_sets_are_refused(call: Call) -> None:
             "--terms and --conjunction are for --as rules",
         ),
         (
-            ("grip.yaml", "-o", "x.fcl"),
-            "no format '.fcl'; there is yaml, onnx, python; name one of them with --to",
+            ("grip.yaml", "-o", "x.turtle"),
+            f"no format '.turtle'; there is {', '.join(TABLE)}; "
+            "name one of them with --to",
         ),
         (
-            ("grip.yaml", "-o", "x.yaml", "--to", "fcl"),
-            "no format 'fcl'; there is yaml, onnx, python",
+            ("grip.yaml", "-o", "x.yaml", "--to", "turtle"),
+            f"no format 'turtle'; there is {', '.join(TABLE)}",
         ),
         (
             ("grip.yaml", "-o", "x.onnx", "--opset", "3"),

@@ -9,6 +9,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree import needs
+from fuzzytree.exporters import TABLE
 from fuzzytree.pruning import Pruned, pruned
 from fuzzytree.rulebase import Band, Term, Variable
 from fuzzytree.testing import random_tree
@@ -141,7 +142,7 @@ def test_a_pruned_model_that_differs_is_not_written(
         ),
         (
             ("needs", "grip.yaml", "-o", "left.doc"),
-            "no format '.doc'; there is yaml, onnx, python\n"
+            f"no format '.doc'; there is {', '.join(TABLE)}\n"
             "  fuzzytree needs --help tells more\n",
         ),
         (

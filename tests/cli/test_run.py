@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fuzzytree import tables
+from fuzzytree.exporters import TABLE
 from tests.cli.conftest import GRASPS, Call
 
 ANSWERS = (
@@ -198,10 +199,10 @@ def test_a_missing_column_is_named(call: Call) -> None:
     [
         ("absent.yaml", "absent.yaml: cannot be read: no such file or directory\n"),
         ("absent.onnx", "absent.onnx: cannot be read: no such file or directory\n"),
-        ("grip", "grip: has no suffix; there is yaml, onnx, python\n"),
+        ("grip", f"grip: has no suffix; there is {', '.join(TABLE)}\n"),
         (
             "grasps.csv",
-            "grasps.csv: has the suffix '.csv'; there is yaml, onnx, python\n",
+            f"grasps.csv: has the suffix '.csv'; there is {', '.join(TABLE)}\n",
         ),
         (
             "grip.py",
