@@ -1,0 +1,292 @@
+"""The operations that programs consist of, and what each does to one number.
+
+The functions here are the meaning: IEEE double, each rounded once where the operation
+is one of arithmetic. Where Python would raise, they answer as C does: division by zero
+and overflow give infinities, the square root of a negative number gives NaN. Functions
+beyond `square_root` are those of the C library; elsewhere they may differ by a few
+units in the last place, which is what `INEXACT` is for.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from bisect import bisect_left
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+import msgspec
+
+Kind = Literal["number", "truth"]
+
+
+class Operation(msgspec.Struct, frozen=True):
+    """What an operation takes and gives.
+
+    Attributes:
+        takes: The kind of each argument.
+        gives: The kind of its result.
+        says: The result in words, of arguments a, b, c.
+    """
+
+    takes: tuple[Kind, ...]
+    gives: Kind
+    says: str
+
+
+def _numbers(count: int, says: str, gives: Kind = "number") -> Operation:
+    kind: Kind = "number"
+    return Operation((kind,) * count, gives, says)
+
+
+def _truths(count: int, says: str) -> Operation:
+    kind: Kind = "truth"
+    return Operation((kind,) * count, kind, says)
+
+
+OPERATIONS: Mapping[str, Operation] = {
+    "constant": _numbers(0, "the step's number"),
+    "input": _numbers(0, "the value of the input of the step's name"),
+    "index": _numbers(0, "0, 1, 2, ... for the samples, in order"),
+    "add": _numbers(2, "a + b"),
+    "subtract": _numbers(2, "a - b"),
+    "multiply": _numbers(2, "a b"),
+    "divide": _numbers(2, "a / b"),
+    "minimum": _numbers(2, "a, unless b < a: then b"),
+    "maximum": _numbers(2, "a, unless b > a: then b"),
+    "negate": _numbers(1, "-a"),
+    "absolute": _numbers(1, "|a|"),
+    "floor": _numbers(1, "the largest whole number up to a"),
+    "ceiling": _numbers(1, "the smallest whole number from a on"),
+    "round": _numbers(1, "the nearest whole number, halves away from 0"),
+    "square_root": _numbers(1, "the square root of a"),
+    "exponential": _numbers(1, "e to the power a"),
+    "logarithm": _numbers(1, "the natural logarithm of a"),
+    "logarithm_10": _numbers(1, "the logarithm of a to base 10"),
+    "logarithm_1p": _numbers(1, "the natural logarithm of 1 + a"),
+    "sine": _numbers(1, "sin a"),
+    "cosine": _numbers(1, "cos a"),
+    "tangent": _numbers(1, "tan a"),
+    "arc_sine": _numbers(1, "asin a"),
+    "arc_cosine": _numbers(1, "acos a"),
+    "arc_tangent": _numbers(1, "atan a"),
+    "hyperbolic_sine": _numbers(1, "sinh a"),
+    "hyperbolic_cosine": _numbers(1, "cosh a"),
+    "hyperbolic_tangent": _numbers(1, "tanh a"),
+    "area_sine": _numbers(1, "asinh a"),
+    "area_cosine": _numbers(1, "acosh a"),
+    "area_tangent": _numbers(1, "atanh a"),
+    "power": _numbers(2, "a to the power b"),
+    "remainder": _numbers(2, "a - b trunc(a / b), exact; of the sign of a"),
+    "arc_tangent_2": _numbers(2, "the angle of the point (b, a)"),
+    "below": _numbers(1, "how many numbers of the step's rising table are below a"),
+    "pick": _numbers(1, "the number of the step's table at place a, from 0"),
+    "less": _numbers(2, "a < b", "truth"),
+    "at_most": _numbers(2, "a <= b", "truth"),
+    "equal": _numbers(2, "a = b", "truth"),
+    "is_finite": _numbers(1, "a is neither infinite nor NaN", "truth"),
+    "and": _truths(2, "both a and b"),
+    "or": _truths(2, "a or b or both"),
+    "not": _truths(1, "not a"),
+    "where": Operation(("truth", "number", "number"), "number", "b if a, else c"),
+    "total": _numbers(1, "the sum over the samples, by halves"),
+    "running": _numbers(1, "the sum of the samples up to each, in order"),
+    "highest": _numbers(1, "the largest of the samples"),
+    "lowest": _numbers(1, "the smallest of the samples"),
+}
+"""Every operation by name. `total` pads the samples with zeros up to a power of two
+and adds the second half to the first until one number is left."""
+
+OVER_SAMPLES = frozenset(("total", "highest", "lowest"))
+"""Operations that make one number of all samples."""
+
+INEXACT = frozenset(
+    (
+        "exponential",
+        "logarithm",
+        "logarithm_10",
+        "logarithm_1p",
+        "sine",
+        "cosine",
+        "tangent",
+        "arc_sine",
+        "arc_cosine",
+        "arc_tangent",
+        "hyperbolic_sine",
+        "hyperbolic_cosine",
+        "hyperbolic_tangent",
+        "area_sine",
+        "area_cosine",
+        "area_tangent",
+        "power",
+        "arc_tangent_2",
+    )
+)
+"""Operations whose last digits are the library's own; all others have one result."""
+
+
+def divide(a: float, b: float) -> float:
+    """Return a / b as IEEE 754 has it, also for b = 0.
+
+    Example:
+        >>> divide(1.0, -0.0), divide(0.0, 0.0)
+        (-inf, nan)
+    """
+    if b:
+        return a / b
+    if not a or math.isnan(a) or math.isnan(b):
+        return math.nan
+    return math.copysign(math.inf, a) * math.copysign(1.0, b)
+
+
+def power(a: float, b: float) -> float:
+    """Return a to the power b as C has it."""
+    try:
+        return math.pow(a, b)
+    except OverflowError:
+        is_negative = a < 0.0 and math.fmod(b, 2.0) != 0.0
+        return -math.inf if is_negative else math.inf
+    except ValueError:  # 0 to a negative power, or a root of a negative number
+        if a != 0.0:
+            return math.nan
+        is_negative = math.copysign(1.0, a) < 0.0 and abs(math.fmod(b, 2.0)) == 1.0
+        return -math.inf if is_negative else math.inf
+
+
+def rounded(a: float) -> float:
+    """Return the nearest whole number, halves away from 0.
+
+    Example:
+        >>> rounded(2.5), rounded(-0.5), rounded(0.49999999999999994)
+        (3.0, -1.0, 0.0)
+    """
+    size = abs(a)
+    whole = _floor(size)
+    if size - whole >= 0.5:
+        whole = whole + 1.0
+    return math.copysign(whole, a)
+
+
+def picked(table: tuple[float, ...], place: float) -> float:
+    """Return the number of a table at a place, its first one if there is none."""
+    inside = 0.0 <= place < len(table)
+    return table[int(place) if inside else 0]
+
+
+def _floor(a: float) -> float:
+    return float(math.floor(a)) if math.isfinite(a) else a
+
+
+def _ceiling(a: float) -> float:
+    return float(math.ceil(a)) if math.isfinite(a) else a
+
+
+def _quiet(function: Callable[[float], float]) -> Callable[[float], float]:
+    """Return a function that answers NaN outside its domain and inf on overflow."""
+
+    def quiet(a: float) -> float:
+        try:
+            return function(a)
+        except ValueError:
+            return math.nan
+        except OverflowError:
+            return math.copysign(math.inf, a) if function is math.sinh else math.inf
+
+    return quiet
+
+
+def _logarithm(function: Callable[[float], float], pole: float) -> Callable[..., float]:
+    quiet = _quiet(function)
+
+    def logarithm(a: float) -> float:
+        return -math.inf if a == pole else quiet(a)
+
+    return logarithm
+
+
+def _area_tangent(a: float) -> float:
+    return math.copysign(math.inf, a) if abs(a) == 1.0 else _ATANH(a)
+
+
+_ATANH = _quiet(math.atanh)
+
+
+def _remainder(a: float, b: float) -> float:
+    try:
+        return math.fmod(a, b)
+    except ValueError:
+        return math.nan
+
+
+def _where(a: bool, b: float, c: float) -> float:
+    return b if a else c
+
+
+NUMERIC: Mapping[str, Callable[..., float]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": divide,
+    "minimum": min,  # keeps the first, unless the second is less
+    "maximum": max,
+    "negate": operator.neg,
+    "absolute": abs,
+    "floor": _floor,
+    "ceiling": _ceiling,
+    "round": rounded,
+    "square_root": _quiet(math.sqrt),
+    "exponential": _quiet(math.exp),
+    "logarithm": _logarithm(math.log, 0.0),
+    "logarithm_10": _logarithm(math.log10, 0.0),
+    "logarithm_1p": _logarithm(math.log1p, -1.0),
+    "sine": _quiet(math.sin),
+    "cosine": _quiet(math.cos),
+    "tangent": _quiet(math.tan),
+    "arc_sine": _quiet(math.asin),
+    "arc_cosine": _quiet(math.acos),
+    "arc_tangent": math.atan,
+    "hyperbolic_sine": _quiet(math.sinh),
+    "hyperbolic_cosine": _quiet(math.cosh),
+    "hyperbolic_tangent": math.tanh,
+    "area_sine": math.asinh,
+    "area_cosine": _quiet(math.acosh),
+    "area_tangent": _area_tangent,
+    "power": power,
+    "remainder": _remainder,
+    "arc_tangent_2": math.atan2,
+    "where": _where,
+}
+"""What each operation makes of numbers."""
+
+LOGICAL: Mapping[str, Callable[..., bool]] = {
+    "less": operator.lt,
+    "at_most": operator.le,
+    "equal": operator.eq,
+    "is_finite": math.isfinite,
+    "and": operator.and_,
+    "or": operator.or_,
+    "not": operator.not_,
+}
+"""What each operation that gives a truth makes of its arguments."""
+
+
+def of_table(operation: str, table: tuple[float, ...], a: float) -> float:
+    """Return what `below` or `pick` makes of a number."""
+    if operation == "below":
+        return float(bisect_left(table, a))
+    return picked(table, a)
+
+
+def total(samples: list[float]) -> float:
+    """Return the sum by halves (see `OPERATIONS`).
+
+    Example:
+        >>> total([1.0, 2.0, 4.0])
+        7.0
+    """
+    size = 1 << max(len(samples) - 1, 0).bit_length()
+    padded = samples + [0.0] * (size - len(samples))
+    while size > 1:
+        size //= 2
+        padded = [padded[i] + padded[i + size] for i in range(size)]
+    return padded[0]

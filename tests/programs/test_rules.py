@@ -1,0 +1,48 @@
+"""Programs of rule bases: their bits are those of the reference."""
+
+import math
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.programs.evaluate import evaluate
+from fuzzytree.programs.rules import from_rules
+from fuzzytree.reference import evaluate as refer
+from fuzzytree.rulebase import Rule, RuleBase, Semantics
+from fuzzytree.testing import probes, random_tree, with_points
+
+
+def bases(seed: int) -> list[RuleBase]:
+    tree = random_tree(seed, leaves=5 + seed % 7)
+    raw = rules_from_tree(tree, "raw", conjunction="product")
+    relative = rules_from_tree(tree)
+    answers = Semantics("product", uncovered="class 1", missing="class 2")
+    pointed = replace(with_points(relative, seed), semantics=answers)
+    return [relative, raw, pointed, replace(with_points(raw, seed + 1), name="other")]
+
+
+def assert_equal(rules: RuleBase, rows: list[dict[str, float]]) -> None:
+    program = from_rules(rules)
+    for row in rows:
+        found, right = evaluate(program, row), refer(rules, row)
+        pairs = zip(found.of("strength"), right.strengths, strict=True)
+        for one, two in pairs:
+            assert one == two or (math.isnan(one) and math.isnan(two)), row
+        assert found.of("rule") == (right.rule,)
+        assert found.of("status") == (right.status,)
+        label = -1 if right.label is None else rules.classes.index(right.label)
+        assert found.of("class") == (label,)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_strengths_rule_status_and_class_are_those_of_the_reference(seed: int) -> None:
+    for rules in bases(seed):
+        assert_equal(rules, probes(rules, limit=220, seed=seed))
+
+
+def test_a_rule_without_a_clause_always_holds() -> None:
+    rules = RuleBase("one", ("a",), (), (Rule((), "a"), Rule((), "a")))
+    found = evaluate(from_rules(rules), {})
+    assert found.of("strength") == (1.0, 1.0)
+    assert (found.of("rule"), found.of("status")) == ((1.0,), (1.0,))
