@@ -1,1 +1,221 @@
-"""Names that a target accepts, and the way back to the names of the model."""
+"""Names that a target accepts, and the way back to the names of the model.
+
+A name that is accepted as it is stays. Any other is made of the same letters as far as
+they are accepted, and is unlike all others. What happens to a character: accents are
+taken off (`é` is `e`), ligatures and letters of Greek and Cyrillic become their Latin
+names (`ß` is `ss`, `λ` is `lamda`), other letters and symbols their number (`度` is
+`u5ea6`); blanks and ASCII signs become the filler.
+"""
+
+from __future__ import annotations
+
+import string
+import unicodedata
+from collections.abc import Collection, Iterable, Iterator
+
+import msgspec
+
+LETTERS = string.ascii_letters
+DIGITS = string.digits
+
+_SPELT = {
+    "ß": "ss",
+    "æ": "ae",
+    "œ": "oe",
+    "ø": "o",
+    "đ": "d",
+    "ð": "d",
+    "ł": "l",
+    "þ": "th",
+    "\u0131": "i",
+}
+
+
+class Names(msgspec.Struct, frozen=True):
+    """A map from the names of a model to names of a target, and back.
+
+    Attributes:
+        accepted: The target's name for each of the model's, in their order.
+    """
+
+    accepted: dict[str, str]
+
+    @staticmethod
+    def of(
+        names: Iterable[str],
+        *,
+        first: str = LETTERS + "_",
+        rest: str = LETTERS + DIGITS + "_",
+        filler: str = "_",
+        reserved: Iterable[str] = (),
+        longest: int | None = None,
+        taken: Iterable[str] = (),
+        ignores_case: bool = False,
+    ) -> Names:
+        """Return a map for some names; a name that stands twice has one entry.
+
+        Names that are accepted as they are keep themselves, wherever they stand; of
+        those that would become alike the first gets the plain name, the others a
+        number, as in `petal_length_2`.
+
+        Args:
+            names: The model's names.
+            first: The characters with which a name may start.
+            rest: The characters of which the rest may be; with all digits.
+            filler: What stands for other characters, among `rest`; may be empty.
+            reserved: Words that are no names, in upper or lower case.
+            longest: The largest number of characters of a name; 8 at least.
+            taken: Names that others have already.
+            ignores_case: Whether names that differ only in case count as alike.
+
+        Example:
+            >>> names = Names.of(["fore arm", "fore-arm", "if"], reserved=["IF"])
+            >>> list(names.accepted.values())
+            ['fore_arm', 'fore_arm_2', 'if_']
+            >>> names.restored("fore_arm_2")
+            'fore-arm'
+            >>> list(Names.of(["Größe (µm)", "β"]).accepted.values())
+            ['Grosse_mum', 'beta']
+        """
+        allowed = _Allowed(first, rest, filler, longest or 0, ignores_case)
+        words = {word.casefold() for word in reserved}
+        used = {allowed.key(name) for name in taken}
+        given = list(dict.fromkeys(names))
+        found: dict[str, str] = {}
+        for name in given:
+            if allowed.takes(name) and name.casefold() not in words:
+                key = allowed.key(name)
+                if key not in used:
+                    used.add(key)
+                    found[name] = name
+        counts: dict[str, int] = {}
+        for name in given:
+            if name not in found:
+                found[name] = _unlike(allowed, allowed.made(name), words, used, counts)
+                used.add(allowed.key(found[name]))
+        return Names({name: found[name] for name in given})
+
+    def __getitem__(self, name: str) -> str:
+        """Return the target's name for one of the model's."""
+        return self.accepted[name]
+
+    def restored(self, accepted: str) -> str:
+        """Return the model's name for one of the target's.
+
+        Raises:
+            KeyError: If no name became that one.
+        """
+        for name, one in self.accepted.items():
+            if one == accepted:
+                return name
+        raise KeyError(accepted)
+
+    @property
+    def changed(self) -> dict[str, str]:
+        """The names that are not what they were, in order."""
+        return {name: one for name, one in self.accepted.items() if name != one}
+
+
+def unlike(name: str, taken: Collection[str]) -> str:
+    """Return a name as it is, or with the first number that makes it unlike others.
+
+    Example:
+        >>> unlike("class", ["class", "class 2"])
+        'class 3'
+    """
+    found, count = name, 1
+    while found in taken:
+        count += 1
+        found = f"{name} {count}"
+    return found
+
+
+class _Allowed(msgspec.Struct, frozen=True):
+    """What a name may be."""
+
+    first: str
+    rest: str
+    filler: str
+    longest: int
+    ignores_case: bool
+
+    def key(self, name: str) -> str:
+        """Return what makes two names alike."""
+        return name.casefold() if self.ignores_case else name
+
+    def takes(self, name: str) -> bool:
+        """Return whether a name is accepted as it is."""
+        return (
+            bool(name)
+            and name[0] in self.first
+            and all(character in self.rest for character in name)
+            and not self.is_too_long(name)
+        )
+
+    def is_too_long(self, name: str) -> bool:
+        return bool(self.longest) and len(name) > self.longest
+
+    def made(self, name: str) -> str:
+        """Return an accepted name that reads like another."""
+        text = "".join(self._kept(name))
+        if self.filler:
+            parts = [part for part in text.split(self.filler) if part]
+            text = self.filler.join(parts)
+        if not text or text[0] not in self.first:
+            start = "x" if "x" in self.first else self.first[0]
+            text = start + (self.filler if text else "") + text
+        return text[: self.longest] if self.longest else text
+
+    def _kept(self, name: str) -> Iterator[str]:
+        for character in name:
+            if character in self.rest:
+                yield character
+                continue
+            for one in _plain(character):
+                yield one if one in self.rest else self.filler
+
+
+def _plain(character: str) -> str:
+    """Return ASCII in the place of a character."""
+    if character.isascii():
+        return character
+    lower = character.lower()
+    if lower in _SPELT:
+        spelt = _SPELT[lower]
+        return spelt if character == lower else spelt.capitalize()
+    found: list[str] = []
+    for one in unicodedata.normalize("NFKD", character):
+        if one.isascii():
+            found.append(one)
+        elif not unicodedata.combining(one):
+            found.append(_letter_name(one))
+    return "".join(found) or f"u{ord(character):04x}"
+
+
+def _letter_name(character: str) -> str:
+    words = unicodedata.name(character, "").split()
+    if len(words) == 4 and words[0] in ("GREEK", "CYRILLIC") and words[2] == "LETTER":
+        name = words[3].lower()
+        return name.capitalize() if words[1] == "CAPITAL" else name
+    return f"u{ord(character):04x}"
+
+
+def _unlike(
+    allowed: _Allowed,
+    plain: str,
+    words: set[str],
+    used: set[str],
+    counts: dict[str, int],
+) -> str:
+    """Return a name, with the first number that makes it unlike all others."""
+    if plain.casefold() in words and not allowed.is_too_long(plain + allowed.filler):
+        plain += allowed.filler
+    found = plain
+    count = counts.get(plain, 1)
+    while allowed.key(found) in used or found.casefold() in words:
+        count += 1
+        end = f"{allowed.filler}{count}"
+        room = allowed.longest - len(end) if allowed.longest else len(plain)
+        found = plain[:room] + end
+    counts[plain] = count
+    return found
