@@ -298,10 +298,11 @@ Hedge = Literal[
     "very very",
     "plus",
     "minus",
+    "cube root",
 ]
 """What is done to a degree d: 1; 1 - d; d d; sqrt(d); 2 d d up to 1/2, then
 1 - 2 (1 - d)(1 - d); sqrt(d / 2) up to 1/2, then 1 - sqrt((1 - d) / 2); d d d;
-(d d)(d d); d^1.25; d^0.75."""
+(d d)(d d); d^1.25; d^0.75; d^(1/3)."""
 
 
 class Is(Value, frozen=True, tag="is"):
@@ -419,7 +420,9 @@ class Defuzzifier(Value, frozen=True):
         method: The method.
         samples: At how many values; of no meaning for weighted ones.
         grid: `middle`: in the middle of as many equal pieces of the range. `ends`: the
-            first at its low end and the last at its high end.
+            first at its low end and the last at its high end. `half ends`: like
+            `ends`, and the first and the last count half in areas (the trapezoidal
+            rule); of no other meaning for maxima.
     """
 
     method: Literal[
@@ -432,7 +435,7 @@ class Defuzzifier(Value, frozen=True):
         "weighted sum",
     ]
     samples: int = 100
-    grid: Literal["middle", "ends"] = "middle"
+    grid: Literal["middle", "ends", "half ends"] = "middle"
 
     @property
     def is_weighted(self) -> bool:
