@@ -20,6 +20,7 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "yaml": (".yaml", ".yml"),
         "onnx": (".onnx",),
         "python": (".py",),
+        "sql": (".sql",),
     }
 )
 """Each format's name and its suffixes, the usual one first.
@@ -54,8 +55,8 @@ def find_format(name: str) -> Format:
     if isinstance(found, Plugin):
         raise ValueError(f"the format {name!r} cannot be used: {found.fault}")
     names = [*TABLE, *plugin_names()]
-    suffixes = [one for several in TABLE.values() for one in several]
-    pool = suffixes if name.startswith(".") else names
+    every = [suffix for suffixes in TABLE.values() for suffix in suffixes]
+    pool = every if name.startswith(".") else names
     cutoff = 0.7 if name.startswith(".") else 0.6
     close = difflib.get_close_matches(wanted[:100], pool, n=1, cutoff=cutoff)
     hint = f" (did you mean {close[0]!r}?)" if close else ""

@@ -1,0 +1,334 @@
+"""SQL: a tree as nested CASE, a rule base as expressions, in one query.
+
+The query answers every row of a table. It performs the reference's operations in the
+reference's order on doubles, in steps: columns, combinations, degrees, strengths,
+answer; each step is a common table expression, so a person can follow it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Literal, get_args
+
+from fuzzytree.contracts import Format, Model, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.sql_degrees import Degrees
+from fuzzytree.exporters.sql_dialects import Query
+from fuzzytree.rulebase import (
+    Clause,
+    RuleBase,
+    fingerprint,
+    sentence,
+    shapes_of,
+)
+from fuzzytree.tree import FuzzyTree, Node
+
+Dialect = Literal["sqlite", "duckdb", "postgresql", "spark"]
+
+MOST_RULES = 400
+"""Engines hold some 1,600 columns in a step, and one rule takes up to three."""
+
+MOST_LEVELS = 100
+"""How deep CASE may be nested; SQLite takes 1,000 levels of any expression."""
+
+_LARGEST = "1.7976931348623157e308"
+
+
+def write(
+    model: Model,
+    /,
+    *,
+    allow_loss: bool = False,
+    dialect: str = "sqlite",
+    table: str = "data",
+    keep: Sequence[str] = (),
+    strengths: bool = False,
+) -> Written:
+    """Return a model as the text of one SQL query, in UTF-8.
+
+    The query gives, for each row of the table, the columns kept, then `class` (NULL for
+    no class), `rule` (the number of the winning rule or leaf, 0 for none) and `status`
+    (0 decided, 1 tie, 2 uncovered, 3 missing). NULL, NaN and infinities are missing.
+
+    Args:
+        model: A tree or a rule base.
+        allow_loss: Of no effect: nothing is lost.
+        dialect: `sqlite`, `duckdb`, `postgresql` or `spark`.
+        table: The name of the table or view; its columns are named as the inputs.
+        keep: Columns of the table to give beside the answer, such as its key; the
+            inputs unless given.
+        strengths: Whether to give the strength of each rule as well.
+
+    Raises:
+        LossError: If the model is beyond what engines hold.
+        ValueError: If there is no such dialect.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> text = write(random_tree(0), table="grasps").content.decode()
+        >>> "FROM grasps" in text
+        True
+    """
+    del allow_loss
+    known = get_args(Dialect)
+    if dialect not in known:
+        raise ValueError(f"sql has no dialect {dialect!r}; there is {', '.join(known)}")
+    names = (keep,) if isinstance(keep, str) else tuple(keep)
+    query = Query(dialect, table, names or model.inputs)
+    if isinstance(model, RuleBase):
+        _refuse_large(model)
+        steps = _rule_steps(query, model, with_strengths=strengths)
+    else:
+        if strengths:
+            raise ValueError("sql: a tree has no strengths; its rules have")
+        _refuse_deep(model)
+        steps = _tree_steps(query, model)
+    text = "\n".join([*_heading(model, dialect), *_axes(query, model), *steps, ""])
+    return Written(text.encode("utf-8"), remarks=_remarks(dialect))
+
+
+def _remarks(dialect: str) -> tuple[str, ...]:
+    if dialect == "postgresql":
+        return (
+            "PostgreSQL raises an error where a number overflows or a product "
+            "underflows, and other engines go on",
+        )
+    return ()
+
+
+def _refuse_large(rules: RuleBase) -> None:
+    if len(rules.rules) > MOST_RULES:
+        raise LossError(
+            f"cannot write {rules.name} as sql: it has {len(rules.rules)} rules, and "
+            f"engines hold {MOST_RULES} as columns of a query; write the tree instead"
+        )
+
+
+def _refuse_deep(tree: FuzzyTree) -> None:
+    depths = [0] * (len(tree.nodes) + 1)
+    for number, node in enumerate(tree.nodes, 1):
+        here = depths[number] + len(node.cuts).bit_length()
+        if here > MOST_LEVELS:
+            raise LossError(
+                f"cannot write {tree.name} as sql: its CASE would be nested deeper "
+                f"than {MOST_LEVELS} levels"
+            )
+        for branch in node.branches:
+            if branch.node is not None:
+                depths[branch.node] = here
+
+
+def _heading(model: Model, dialect: str) -> Iterator[str]:
+    kind = "rule base" if isinstance(model, RuleBase) else "tree"
+    yield f"-- A fuzzy {kind}, named {model.name!r}, in SQL for {dialect}."
+    yield f"-- Written by fuzzytree. Fingerprint: {fingerprint(model)}"
+    yield f"-- Classes: {', '.join(map(repr, model.classes))}"
+    yield "-- status: 0 decided, 1 tie, 2 uncovered, 3 missing"
+
+
+def _listed(lines: Iterable[str]) -> str:
+    return ",\n".join(f"  {line}" for line in lines)
+
+
+def _axes(query: Query, model: Model) -> Iterator[str]:
+    """Yield the first steps: doubles, combinations, and whether all are there."""
+    lines: dict[str, str] = {}
+    kept = [f"{query.name(n)} AS kept_{k}" for k, n in enumerate(query.keep, 1)]
+    columns: list[str] = []
+    mixes: list[str] = []
+    for number, variable in enumerate(model.variables, 1):
+        name = lines[variable.name] = f"x_{number}"
+        if variable.parts:
+            terms = [
+                f"{query.number(p.weight)} * ({lines[p.input]} - "
+                f"{query.number(p.centre)})"
+                for p in variable.parts
+            ]
+            mixes.append(f"{' + '.join(terms)} AS {name}")
+        else:
+            columns.append(f"{query.column(variable.name)} AS {name}")
+    yield "WITH"
+    yield query.step("columns")
+    yield f"  SELECT\n{_listed([*kept, *columns] or ['1 AS x_0'])}"
+    yield f"  FROM {query.name(query.table)}\n),"
+    yield query.step("axes")
+    yield f"  SELECT\n{_listed(['columns.*', *mixes])}\n  FROM columns\n),"
+    finite = [f"{line} BETWEEN -{_LARGEST} AND {_LARGEST}" for line in lines.values()]
+    test = " AND\n    ".join(finite) or "1 = 1"
+    yield query.step("known", is_heavy=True)
+    yield f"  SELECT axes.*,\n  CASE WHEN {test}\n    THEN 1 ELSE 0 END AS is_known"
+    yield "  FROM axes\n),"
+
+
+def _tree_steps(query: Query, tree: FuzzyTree) -> Iterator[str]:
+    line = {v.name: f"x_{number}" for number, v in enumerate(tree.variables, 1)}
+    yield query.step("answers", is_heavy=True)
+    yield "  SELECT known.*,\n  CASE WHEN is_known = 0 THEN 0 ELSE"
+    yield _case(query, tree, line, 1, 1) if tree.nodes else "  1"
+    yield "  END AS leaf\n  FROM known\n)"
+    ends = [
+        f"WHEN {number} THEN {query.text(leaf.label)}"
+        for number, leaf in enumerate(tree.leaves, 1)
+    ]
+    label = "\n    ".join(
+        ["CASE leaf", f"WHEN 0 THEN {query.text(tree.semantics.missing)}", *ends, "END"]
+    )
+    yield from _last(query, label, "leaf", "CASE WHEN is_known = 1 THEN 0 ELSE 3 END")
+
+
+def _case(
+    query: Query, tree: FuzzyTree, line: dict[str, str], number: int, level: int
+) -> str:
+    node = tree.nodes[number - 1]
+    return _halves(query, tree, line, node, (0, len(node.cuts)), level)
+
+
+def _halves(
+    query: Query,
+    tree: FuzzyTree,
+    line: dict[str, str],
+    node: Node,
+    span: tuple[int, int],
+    level: int,
+) -> str:
+    """Return the leaf for a stretch of a node's intervals, by bisection."""
+    low, high = span
+    pad = "  " * (level % 20)
+    owners = {node.owners[k] for k in range(low, high + 1)}
+    if len(owners) == 1:
+        branch = node.branches[owners.pop()]
+        if branch.leaf is not None:
+            return f"{pad}{branch.leaf}"
+        return _case(query, tree, line, branch.node or 0, level)
+    middle = (low + high) // 2
+    cut = query.number(node.cuts[middle])
+    below = _halves(query, tree, line, node, (low, middle), level + 1)
+    above = _halves(query, tree, line, node, (middle + 1, high), level + 1)
+    asked = _comment(node.variable)
+    return (
+        f"{pad}CASE WHEN {line[node.variable]} <= {cut} THEN{asked}\n{below}\n"
+        f"{pad}ELSE\n{above}\n{pad}END"
+    )
+
+
+def _comment(text: str) -> str:
+    return f" -- {text!r}"
+
+
+def _last(query: Query, label: str, rule: str, status: str) -> Iterator[str]:
+    kept = [f"kept_{k} AS {query.name(n)}" for k, n in enumerate(query.keep, 1)]
+    found = [f"{label} AS {query.name('class')}"]
+    found += [f"{rule} AS {query.name('rule')}", f"{status} AS {query.name('status')}"]
+    yield f"SELECT\n{_listed([*kept, *found])}\nFROM answers"
+
+
+def _rule_steps(
+    query: Query, rules: RuleBase, *, with_strengths: bool
+) -> Iterator[str]:
+    line = {v.name: f"x_{number}" for number, v in enumerate(rules.variables, 1)}
+    shapes = shapes_of(rules.variables)
+    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
+    keys = list(dict.fromkeys((c.variable, term) for c in clauses for term in c.terms))
+    place = {clause: f"d_{number}" for number, clause in enumerate(clauses, 1)}
+    helpers = Degrees(query)
+    degrees = {key: f"m_{number}" for number, key in enumerate(keys, 1)}
+    texts = [
+        f"{helpers.degree(shapes[key], line[key[0]])} AS {degrees[key]}"
+        f" -- {key[0]!r} is {key[1]!r}"
+        for key in keys
+    ]
+    before = "known"
+    for name, columns in zip(("places", "parts"), helpers.columns, strict=True):
+        yield query.step(name, is_heavy=True)
+        yield f"  SELECT\n{_listed([f'{before}.*', *columns])}\n  FROM {before}\n),"
+        before = name
+    yield query.step("terms", is_heavy=True)
+    yield _commented(["parts.*", *texts]) + "\n  FROM parts\n),"
+    yield query.step("clauses", is_heavy=True)
+    found = [f"{_clause(query, c, degrees)} AS {place[c]}" for c in clauses]
+    yield f"  SELECT\n{_listed(['terms.*', *found])}\n  FROM terms\n),"
+    yield query.step("fired", is_heavy=True)
+    fired = [
+        f"{_strength(query, rules, [place[c] for c in rule.when])} AS s_{number}"
+        f" -- {sentence(rule)!r}"
+        for number, rule in enumerate(rules.rules, 1)
+    ]
+    yield _commented(["clauses.*", *fired]) + "\n  FROM clauses\n),"
+    yield from _decision(query, rules, with_strengths=with_strengths)
+
+
+def _commented(lines: Sequence[str]) -> str:
+    """Return a SELECT whose lines may end in a comment, behind the comma."""
+    shown: list[str] = []
+    for number, line in enumerate(lines, 1):
+        code, mark, comment = line.partition(" -- ")
+        comma = "," if number < len(lines) else ""
+        shown.append(f"  {code}{comma}{mark}{comment}")
+    return "  SELECT\n" + "\n".join(shown)
+
+
+def _clause(query: Query, clause: Clause, degrees: dict[tuple[str, str], str]) -> str:
+    highest = query.greatest(*(degrees[clause.variable, t] for t in clause.terms))
+    return f"1e0 - {highest}" if clause.negated else highest
+
+
+def _strength(query: Query, rules: RuleBase, degrees: list[str]) -> str:
+    if not degrees:
+        return "1e0"
+    if rules.semantics.conjunction == "product":
+        return " * ".join(degrees)
+    return query.least(*degrees)
+
+
+def _decision(query: Query, rules: RuleBase, *, with_strengths: bool) -> Iterator[str]:
+    numbers = range(1, len(rules.rules) + 1)
+    yield query.step("best", is_heavy=True)
+    best = query.greatest(*(f"s_{k}" for k in numbers))
+    yield f"  SELECT fired.*,\n  {best} AS best\n  FROM fired\n),"
+    yield query.step("answers", is_heavy=True)
+    wins = "\n    ".join(f"WHEN s_{k} = best THEN {k}" for k in numbers)
+    ties = " +\n    ".join(f"CASE WHEN s_{k} = best THEN 1 ELSE 0 END" for k in numbers)
+    yield (
+        "  SELECT best.*,\n  CASE WHEN is_known = 0 THEN 0\n"
+        "    WHEN best = 0e0 THEN 0\n"
+        f"    {wins}\n  END AS winner,\n    {ties}\n  AS equals\n  FROM best\n)"
+    )
+    ends = [
+        f"WHEN winner = {number} THEN {query.text(rule.then)}"
+        for number, rule in enumerate(rules.rules, 1)
+    ]
+    missing, uncovered = rules.semantics.missing, rules.semantics.uncovered
+    label = "\n    ".join(
+        [
+            f"CASE WHEN is_known = 0 THEN {query.text(missing)}",
+            f"WHEN winner = 0 THEN {query.text(uncovered)}",
+            *ends,
+            "END",
+        ]
+    )
+    status = (
+        "CASE WHEN is_known = 0 THEN 3 WHEN winner = 0 THEN 2 "
+        "WHEN equals > 1 THEN 1 ELSE 0 END"
+    )
+    lines = list(_last(query, label, "winner", status))
+    if with_strengths:
+        shown = [
+            f"CASE WHEN is_known = 1 THEN s_{k} END AS strength_{k}" for k in numbers
+        ]
+        head, mark, tail = lines[0].rpartition("\nFROM")
+        lines = [f"{head},\n{_listed(shown)}{mark}{tail}"]
+    yield from lines
+
+
+FORMAT = Format(
+    name="sql",
+    suffixes=(".sql",),
+    carries=("tree", "rules"),
+    write=write,
+    cannot=(
+        "an sql file runs, but is not read back as a tree or rule base",
+        f"more than {MOST_RULES} rules: engines hold so many columns in a query",
+        "overflow and underflow in PostgreSQL: it raises an error there",
+    ),
+    dtype="float64",
+)
