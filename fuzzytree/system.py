@@ -9,8 +9,9 @@ that could change an answer stands in the values below.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import Literal
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import Final, Literal
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
@@ -196,7 +197,11 @@ class Number(Value, frozen=True, tag="number"):
 
 
 class Name(Value, frozen=True, tag="name"):
-    """A variable of a formula: an input, an output before this one, or `x` itself."""
+    """A variable of a formula: an input, an output before this one, or `x` itself.
+
+    `x` is the value whose degree is asked for; in a weighted conclusion it is the
+    conclusion's degree. A term of an input may name inputs only.
+    """
 
     name: str
 
@@ -204,7 +209,7 @@ class Name(Value, frozen=True, tag="name"):
 class Call(Value, frozen=True, tag="call"):
     """An operation or a function of a formula, such as `+`, `^`, `sqrt` or `max`.
 
-    `fuzzytree.inference.FUNCTIONS` lists them.
+    `FUNCTIONS` lists them, and `fuzzytree.formulas` says what they do.
     """
 
     function: str
@@ -212,6 +217,20 @@ class Call(Value, frozen=True, tag="call"):
 
 
 Expression = Number | Name | Call
+
+_OF_TWO: tuple[str, ...] = (
+    *("+", "-", "*", "/", "%", "^", "and", "or", "lt", "le", "gt", "ge", "eq", "neq"),
+    *("min", "max", "atan2", "fmod"),
+)
+_OF_ONE: tuple[str, ...] = (
+    *("negate", "not", "abs", "sqrt", "exp", "log", "log10", "log1p", "floor", "ceil"),
+    *("round", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
+    *("asinh", "acosh", "atanh"),
+)
+FUNCTIONS: Final[Mapping[str, int]] = MappingProxyType(
+    {**dict.fromkeys(_OF_TWO, 2), **dict.fromkeys(_OF_ONE, 1)}
+)
+"""How many arguments each function of a formula takes."""
 
 
 class Formula(Value, frozen=True, tag="formula"):
@@ -341,7 +360,11 @@ Condition = Is | And | Or | Not
 
 
 class Conclusion(Value, frozen=True):
-    """`output is hedge ... label`; hedges change the degree of activation."""
+    """`output is hedge ... label`; hedges change the degree of activation.
+
+    They act on the conclusions of the rule that stand behind it too, as in fuzzylite:
+    of `a is very high and b is low` both get the square of the rule's degree.
+    """
 
     output: str
     label: str
@@ -352,7 +375,11 @@ class SystemRule(Value, frozen=True):
     """IF a condition holds THEN some conclusions are activated.
 
     Attributes:
-        when: The condition; None holds always.
+        when: The condition; None holds always. It may ask an output: of a label of it
+            the degrees concluded so far, joined by the output's aggregation (summed if
+            None), by earlier blocks, and by rules of this block that were run before,
+            unless its activation must know all degrees first (`highest`, `lowest`,
+            `proportional`).
         then: The conclusions.
         weight: What the degree of the condition is multiplied by, in [0, 1].
         name: For people; may be empty.
@@ -369,7 +396,8 @@ class Activation(Value, frozen=True):
 
     Attributes:
         method: `general`: all. `first`, `last`: at most `count` of them in the order of
-            the rules or against it, whose degree is at least `threshold`. `highest`,
+            the rules or against it, whose degree is at least `threshold`; the block is
+            run in that order. `highest`,
             `lowest`: at most `count` of them by degree, the first of equals first.
             `proportional`: all, each degree divided by their sum. `threshold`: those
             whose degree stands in `relation` to `threshold`.
@@ -413,8 +441,9 @@ class Defuzzifier(Value, frozen=True):
     `centroid`, `bisector`, `smallest of maximum`, `largest of maximum` and `mean of
     maximum` look at the aggregated curve at `samples` values of the output's range.
     `weighted average` and `weighted sum` weight each conclusion's number with its
-    degree of activation: a singleton's, a linear one's or a formula's own, and for
-    other curves the value whose degree is the activation's (after Tsukamoto).
+    degree of activation: a singleton's, a linear one's or a formula's own; for a
+    monotone curve the value whose degree is the activation's (after Tsukamoto, see
+    `fuzzytree.inference.value_at`); for any other the curve's degree at the activation.
 
     Attributes:
         method: The method.
@@ -451,7 +480,8 @@ class SystemInput(Value, frozen=True):
         labels: Its terms.
         low: The low end of its range, if known and finite.
         high: The high end.
-        clips: Whether values are first moved into the range.
+        clips: Whether values are first moved into the range, of which one end may be
+            open.
         unit: For people.
         parts: Empty for a column; the summands of a combination, as in
             `fuzzytree.rulebase.Variable`, of inputs that stand before it.
@@ -478,8 +508,9 @@ class SystemOutput(Value, frozen=True):
         aggregation: How conclusions of it are joined. Curves need one. Weighted numbers
             are summed one by one if None; otherwise the activations of each label are
             joined by it first.
-        default: The answer where no rule concludes it; None answers NaN.
-        clips: Whether the answer is moved into the range.
+        default: The answer where it has no number of its own: no rule concludes it, its
+            curve has no area, or a formula no value. None answers NaN.
+        clips: Whether the answer is moved into the range, the default too.
         unit: For people.
     """
 
@@ -576,24 +607,34 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
         path: Path = ("inputs", position)
         yield from range_mistakes(path, one.name, one.low, one.high)
         yield from part_mistakes(path, one.name, one.parts, known)
-        yield from _label_mistakes(path, one, system)
+        yield from _label_mistakes(path, one, system, [i.name for i in system.inputs])
+        if one.clips and one.low is None and one.high is None:
+            yield path, f"input {one.name!r} is clipped to a range that it lacks"
         known[one.name] = bool(one.parts)
+    names = [one.name for one in system.inputs]
     for position, output in enumerate(system.outputs):
         path = ("outputs", position)
         yield from range_mistakes(path, output.name, output.low, output.high)
-        yield from _label_mistakes(path, output, system)
+        yield from _label_mistakes(path, output, system, names)
+        names.append(output.name)
         yield from _defuzzifier_mistakes(path, output)
     for position, block in enumerate(system.blocks):
         yield from _block_mistakes(("blocks", position), block, system)
 
 
 def _label_mistakes(
-    path: Path, variable: SystemInput | SystemOutput, system: FuzzySystem
+    path: Path,
+    variable: SystemInput | SystemOutput,
+    system: FuzzySystem,
+    nameable: list[str],
 ) -> Iterator[Mistake]:
+    """Yield what is wrong with terms, whose formulas may use some names."""
     labels = variable.labels
     where = f"term of {variable.name!r}"
     yield from name_mistakes((*path, "labels"), where, [one.name for one in labels])
-    names = {one.name for one in system.variables}
+    is_weighted = (
+        isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted
+    )
     for index, label in enumerate(labels):
         place = (*path, "labels", index)
         where = f"term {label.name!r} of {variable.name!r}"
@@ -603,13 +644,22 @@ def _label_mistakes(
             given, needed = len(label.curve.weights), len(system.columns)
             if given != needed:
                 yield place, f"{where}: {given} weights for {needed} inputs"
-        if isinstance(label.curve, Formula):
-            for name in names_in(label.curve.expression):
-                if name != "x" and name not in names:
-                    text = f"{where}: no variable {name!r}; {name_choice(name, names)}"
-                    yield place, text
-        for text in curve_mistakes(label.curve):
+            if not is_weighted:
+                text = "only a weighted average or sum takes a linear term"
+                yield place, f"{where}: {text}"
+        texts = [*curve_mistakes(label.curve)]
+        if isinstance(label.curve, Formula) and not texts:
+            texts += _name_mistakes(label.curve.expression, nameable)
+        for text in texts:
             yield place, f"{where}: {text}"
+
+
+def _name_mistakes(expression: Expression, names: list[str]) -> Iterator[str]:
+    for name in dict.fromkeys(names_in(expression)):
+        if name == "x" and name in names:
+            yield "'x' is a variable, and in a formula it is the value itself"
+        elif name != "x" and name not in names:
+            yield f"no variable {name!r}; {name_choice(name, names)}"
 
 
 def curve_mistakes(curve: Curve) -> Iterator[str]:
@@ -636,8 +686,26 @@ def curve_mistakes(curve: Curve) -> Iterator[str]:
         case Formula(expression=expression):
             if _depth(expression) > MOST_LEVELS:
                 yield f"the formula is nested deeper than {MOST_LEVELS} levels"
+            else:
+                yield from _formula_mistakes(expression)
         case _:
             yield from _number_mistakes(curve)
+
+
+def _formula_mistakes(expression: Expression) -> Iterator[str]:
+    match expression:
+        case Number(value=value) if not math.isfinite(value):
+            yield f"the numbers of a formula must be finite, not {value!r}"
+        case Call(function=function, arguments=arguments):
+            needed = FUNCTIONS.get(function)
+            if needed is None:
+                yield f"no function {function!r}; {name_choice(function, FUNCTIONS)}"
+            elif len(arguments) != needed:
+                yield f"{function!r} takes {needed} arguments, not {len(arguments)}"
+            for argument in arguments:
+                yield from _formula_mistakes(argument)
+        case _:
+            return
 
 
 _ABOVE_ZERO = {"deviation", "left_deviation", "right_deviation", "width"}
@@ -651,10 +719,28 @@ def _number_mistakes(curve: Curve) -> Iterator[str]:
             yield f"the {name} must be finite, not {value!r}"
         elif field in _ABOVE_ZERO and value <= 0.0:
             yield f"the {name} must be above 0, not {value!r}"
-    if isinstance(curve, PiCurve) and not curve.a <= curve.b <= curve.c <= curve.d:
-        yield (
-            f"the corners must rise: {curve.a!r}, {curve.b!r}, {curve.c!r}, {curve.d!r}"
-        )
+    match curve:
+        case PiCurve(a=a, b=b, c=c, d=d):
+            if not a <= b <= c <= d:
+                yield f"the corners must rise: {a!r}, {b!r}, {c!r}, {d!r}"
+            yield from _width_mistakes(a, d)
+        case SCurve(start=start, end=end) | Concave(inflection=start, end=end):
+            yield from _width_mistakes(start, end)
+        case Arc(start=start, end=end):
+            if start == end:
+                yield f"an arc must start and end at different values, not at {end!r}"
+            yield from _width_mistakes(start, end)
+        case SemiEllipse(start=start, end=end):
+            if start >= end:
+                yield f"the end must lie above the start {start!r}, not at {end!r}"
+            yield from _width_mistakes(start, end)
+        case _:
+            return
+
+
+def _width_mistakes(start: float, end: float) -> Iterator[str]:
+    if math.isfinite(start) and math.isfinite(end) and not math.isfinite(end - start):
+        yield f"{start!r} and {end!r} are too far apart"
 
 
 def _depth(expression: Expression) -> int:
@@ -671,12 +757,14 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
     how = output.defuzzifier
     if output.default is not None and not math.isfinite(output.default):
         yield (*path, "default"), f"the default of {output.name!r} must be finite"
-    if output.clips and (output.low is None or output.high is None):
+    if output.clips and output.low is None and output.high is None:
         yield path, f"output {output.name!r} is clipped to a range that it lacks"
     if how.is_weighted:
         return
     if output.low is None or output.high is None or output.low >= output.high:
         yield path, f"output {output.name!r} needs a range for its {how.method}"
+    else:
+        yield from ((path, text) for text in _width_mistakes(output.low, output.high))
     if output.aggregation is None:
         yield path, f"output {output.name!r} needs an aggregation for its {how.method}"
     if not 2 <= how.samples <= MOST_SAMPLES:
