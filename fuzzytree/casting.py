@@ -1,1 +1,0 @@
-"""Rule bases as systems with numeric outputs, and the way back."""

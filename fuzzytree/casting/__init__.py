@@ -1,0 +1,26 @@
+"""Rule bases as systems with numeric outputs, the way back, and points for curves."""
+
+from __future__ import annotations
+
+from fuzzytree.casting.facts import as_rules, facts_of
+from fuzzytree.casting.scores import (
+    Always,
+    Scores,
+    as_system,
+    cast_losses,
+    cast_remarks,
+    flattened,
+    winner,
+)
+
+__all__ = [
+    "Always",
+    "Scores",
+    "as_rules",
+    "as_system",
+    "cast_losses",
+    "cast_remarks",
+    "facts_of",
+    "flattened",
+    "winner",
+]
