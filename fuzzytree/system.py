@@ -391,6 +391,12 @@ class SystemRule(Value, frozen=True):
     name: str = ""
 
 
+ActivationMethod = Literal[
+    "general", "first", "last", "highest", "lowest", "proportional", "threshold"
+]
+Relation = Literal["<", "<=", "==", "!=", ">=", ">"]
+
+
 class Activation(Value, frozen=True):
     """Which of a block's rules are activated, of those whose degree is above 0.
 
@@ -406,12 +412,10 @@ class Activation(Value, frozen=True):
         relation: How a degree must compare with the threshold.
     """
 
-    method: Literal[
-        "general", "first", "last", "highest", "lowest", "proportional", "threshold"
-    ] = "general"
+    method: ActivationMethod = "general"
     count: int = 1
     threshold: float = 0.0
-    relation: Literal["<", "<=", "==", "!=", ">=", ">"] = ">="
+    relation: Relation = ">="
 
 
 class RuleBlock(Value, frozen=True):
@@ -435,6 +439,18 @@ class RuleBlock(Value, frozen=True):
     name: str = ""
 
 
+DefuzzifierMethod = Literal[
+    "centroid",
+    "bisector",
+    "smallest of maximum",
+    "largest of maximum",
+    "mean of maximum",
+    "weighted average",
+    "weighted sum",
+]
+Grid = Literal["middle", "ends", "half ends"]
+
+
 class Defuzzifier(Value, frozen=True):
     """How an output's activated conclusions become a number.
 
@@ -454,17 +470,9 @@ class Defuzzifier(Value, frozen=True):
             rule); of no other meaning for maxima.
     """
 
-    method: Literal[
-        "centroid",
-        "bisector",
-        "smallest of maximum",
-        "largest of maximum",
-        "mean of maximum",
-        "weighted average",
-        "weighted sum",
-    ]
+    method: DefuzzifierMethod
     samples: int = 100
-    grid: Literal["middle", "ends", "half ends"] = "middle"
+    grid: Grid = "middle"
 
     @property
     def is_weighted(self) -> bool:
@@ -775,6 +783,13 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
         )
 
 
+def _emptiness(condition: Condition | None) -> bool:
+    """Return whether a condition joins nothing anywhere."""
+    if isinstance(condition, And | Or) and not condition.parts:
+        return True
+    return any(map(_emptiness, _parts(condition)))
+
+
 def _block_mistakes(
     path: Path, block: RuleBlock, system: FuzzySystem
 ) -> Iterator[Mistake]:
@@ -795,6 +810,8 @@ def _block_mistakes(
         if _levels(rule.when) > MOST_LEVELS:
             yield place, f"{where}: nested deeper than {MOST_LEVELS} levels"
             continue
+        if _emptiness(rule.when):
+            yield place, f"{where} joins no conditions at all"
         for asked in questions(rule.when):
             if asked.label is None and asked.variable in terms:
                 if not asked.hedges or asked.hedges[-1] != "any":

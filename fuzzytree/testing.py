@@ -2,6 +2,7 @@
 
 `random_tree` makes valid trees of any size from a seed; `probes` (from
 `fuzzytree.probing`) the rows that matter for a model, `probe_values` as an array.
+`random_system` makes fuzzy systems with numeric outputs, `random_rows` rows for them.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Sequence
 from msgspec.structs import replace
 
 from fuzzytree.probing import SPECIAL, landmarks, probe_values, probes
+from fuzzytree.random_systems import random_rows, random_system
 from fuzzytree.rulebase import (
     LR,
     Band,
@@ -36,7 +38,15 @@ from fuzzytree.tree import (
     intervals,
 )
 
-__all__ = ["SPECIAL", "probe_values", "probes", "random_tree", "with_points"]
+__all__ = [
+    "SPECIAL",
+    "probe_values",
+    "probes",
+    "random_rows",
+    "random_system",
+    "random_tree",
+    "with_points",
+]
 
 
 def random_tree(
