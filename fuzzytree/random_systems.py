@@ -374,11 +374,7 @@ class _Maker:
         chance = self.chance
         if levels == 0 or chance.random() < 0.2:
             return self._leaf(nameable)
-        known = (
-            FUNCTIONS
-            if self.formulas == "wild"
-            else dict.fromkeys(_TAME_ONE, 1) | (dict.fromkeys(_TAME_TWO, 2))
-        )
+        known = FUNCTIONS if self.formulas == "wild" else _TAME
         function = chance.choice(list(known))
         arguments = [
             self._expression(nameable, levels - 1) for _ in range(known[function])
