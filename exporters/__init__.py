@@ -21,6 +21,7 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "onnx": (".onnx",),
         "python": (".py",),
         "sql": (".sql",),
+        "c": (".c",),
     }
 )
 """Each format's name and its suffixes, the usual one first.

@@ -1,0 +1,280 @@
+"""C99: a tree or rule base as one file of tables, for microcontrollers and others.
+
+The file needs no library, no memory beyond the stack, and no recursion. In double, its
+answers and strengths have the reference's bits; in float, those of `native float32`.
+With a macro it is a program that tests itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+from fuzzytree.contracts import Format, Loss, Model, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.c_axes import axes_code, lines_of, taking
+from fuzzytree.exporters.c_examples import examples_of, number_of, selftest_code
+from fuzzytree.exporters.c_rules import Tables, rules_code, tables_of
+from fuzzytree.exporters.c_text import (
+    DOUBLE,
+    SINGLE,
+    Numbers,
+    constants,
+    fill,
+    prefix_of,
+    remark,
+)
+from fuzzytree.exporters.c_tree import Question, questions_of, tree_code
+from fuzzytree.numerics.narrowing import losses
+from fuzzytree.rulebase import RuleBase, fingerprint, sentence
+from fuzzytree.tree import FuzzyTree, outline
+
+_NUMBERS = {"float64": DOUBLE, "float32": SINGLE}
+
+_USE = """\
+ *
+ * Compile this file; where its functions are called, include it behind
+ * #define NAME_HEADER, which leaves the declarations. With -DNAME_SELFTEST it is a
+ * program that compares its answers with the expected ones; it returns 0 if all equal.
+ */
+
+"""
+
+_LIMITS = """\
+#include <float.h>
+#include <stdint.h>
+
+#if FLT_RADIX != 2 || LIMITS
+#error "KIND is no IEEE number here"
+#endif
+"""
+
+_ARITHMETIC = """\
+/* Each operation must be rounded once, to KIND. */
+#if defined(FLT_EVAL_METHOD)
+#if !(EVALUATION)
+#error "numbers have other digits here: on x86 compile with -msse2 -mfpmath=sse"
+#endif
+#elif !defined(__TINYC__) || defined(__i386__)
+#error "float.h of C99 must define FLT_EVAL_METHOD"
+#endif
+#if defined(__FAST_MATH__)
+#error "compile without -ffast-math"
+#endif
+#if defined(_MSC_VER)
+#pragma fp_contract(off)
+#elif defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && defined(FUSES) && !defined(__STRICT_ANSI__)
+#if !defined(NAME_NOT_FUSED)
+#error "compile with -std=c99, or with -ffp-contract=off -DNAME_NOT_FUSED"
+#endif
+#endif
+"""
+
+_TYPES = """
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* How an answer came about. */
+enum name_status {
+    NAME_DECIDED = 0,
+    NAME_TIE = 1, /* the first of equally strong rules */
+    NAME_UNCOVERED = 2, /* no rule fires */
+    NAME_MISSING = 3 /* a value is infinite, or not a number */
+};
+
+typedef struct {
+    int label; /* an enum name_class */
+    long rule; /* the number of the RULE, from 1; 0 for none */
+    int status; /* an enum name_status */
+} name_answer;
+
+/* Return the answer for NAME_INPUTS values. */
+name_answer name_decide(const name_real *x);
+"""
+
+_STRENGTHS_TYPE = """
+/* Fire every rule, fill in NAME_RULES strengths (no numbers if a value is missing), and
+ * return the answer, which is that of name_decide. */
+name_answer name_strengths(const name_real *x, name_real *strengths);
+"""
+
+
+def write(
+    model: Model,
+    /,
+    *,
+    allow_loss: bool = False,
+    dtype: Literal["float64", "float32"] = "float64",
+    name: str | None = None,
+) -> Written:
+    """Return a model as the text of a C file, in ASCII.
+
+    The file offers `NAME_decide(x)`, which returns class, rule (or leaf) and status;
+    for a rule base also `NAME_strengths(x, strengths)`.
+
+    Args:
+        model: A tree or a rule base.
+        allow_loss: Whether to write what float32 cannot hold as near as it can.
+        dtype: The type of all numbers: double, or float.
+        name: The beginning of all names in the file; that of the model unless given.
+
+    Raises:
+        LossError: If float32 cannot hold a number of the model, unless allowed.
+        ValueError: If the number type or the name is not one of C.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> text = write(random_tree(0), name="grip").content.decode()
+        >>> "grip_answer grip_decide(const grip_real *x)" in text
+        True
+    """
+    if dtype not in _NUMBERS:
+        raise ValueError(f"C has float64 and float32, not {dtype!r}")
+    prefix = prefix_of(model.name if name is None else name)
+    if name is not None and prefix != name:
+        raise ValueError(
+            f"the name {name!r} cannot begin the names of C; {prefix!r} can"
+        )
+    lost = losses(model, dtype)
+    if lost and not allow_loss:
+        raise LossError(_loss_text(model, lost))
+    made = _Made(model, _NUMBERS[dtype], prefix)
+    return Written("".join(made.text()).encode("ascii"), lost)
+
+
+def _loss_text(model: Model, lost: Sequence[Loss]) -> str:
+    lines = [f"{loss.where}: {loss.what}" for loss in lost]
+    more = [f"and {len(lines) - 10} more"] if len(lines) > 10 else []
+    hint = "pass allow_loss=True to write it as stated, or choose dtype 'float64'"
+    head = f"cannot write {model.name} as c float32: "
+    return head + "\n  ".join([*lines[:10], *more, hint])
+
+
+class _Made:
+    """A file in the making: the model, and its tables, which several parts read."""
+
+    def __init__(self, model: Model, numbers: Numbers, prefix: str) -> None:
+        self.model, self.numbers, self.prefix = model, numbers, prefix
+        self.line = lines_of(model.variables)
+        self.asked: list[Question] = []
+        self.tables: Tables | None = None
+        if isinstance(model, RuleBase):
+            self.tables = tables_of(model, self.line, numbers)
+        else:
+            self.asked = questions_of(model, self.line)
+
+    def text(self) -> Iterator[str]:
+        """Yield the file."""
+        guard = "#ifndef NAME_DECLARED\n#define NAME_DECLARED\n\n"
+        yield from _heading(self.model)
+        yield self._fill(_USE) + self._fill(guard)
+        yield from self._declarations()
+        yield self._fill("\n#endif\n\n#ifndef NAME_HEADER\n\n")
+        yield from self._checks()
+        yield from self._defaults()
+        variables = self.model.variables
+        yield from axes_code(variables, self.line, self.numbers, self.prefix)
+        yield from self._code(taking(variables))
+        yield from selftest_code(
+            examples_of(self.model, self.asked, self.tables, self.line, self.numbers),
+            self.numbers,
+            self.prefix,
+            has_strengths=self.tables is not None,
+        )
+        yield "\n#endif\n"
+
+    def _fill(self, template: str) -> str:
+        return fill(template, self.prefix)
+
+    def _declarations(self) -> Iterator[str]:
+        model, rules = self.model, isinstance(self.model, RuleBase)
+        count = len(model.rules) if isinstance(model, RuleBase) else len(model.leaves)
+        mixed = [v for v in model.variables if v.parts]
+        yield self._fill(f"typedef {self.numbers.name} name_real;\n\n")
+        for what, size in (
+            ("INPUTS", len(model.inputs)),
+            ("VARIABLES", len(model.variables) if mixed else None),
+            ("CLASSES", len(model.classes)),
+            ("RULES" if rules else "LEAVES", count),
+        ):
+            if size is not None:
+                yield self._fill(f"#define NAME_{what} {size}u\n")
+        yield self._fill("\nenum name_class {\n    NAME_NO_CLASS = -1")
+        labels = constants(self._fill("NAME_CLASS_"), model.classes)
+        for place, label in enumerate(labels):
+            yield f",\n    {label} = {place} /* {remark(model.classes[place])} */"
+        yield "\n};\n"
+        yield self._fill(_TYPES).replace("RULE,", "rule," if rules else "leaf,")
+        yield self._fill(_STRENGTHS_TYPE) if rules else ""
+        yield "\n#ifdef __cplusplus\n}\n#endif\n"
+
+    def _checks(self) -> Iterator[str]:
+        is_double = self.numbers.name == "double"
+        limits = "DBL_MANT_DIG != 53 || DBL_MAX_EXP != 1024"
+        if not is_double:
+            limits = "FLT_MANT_DIG != 24 || FLT_MAX_EXP != 128"
+        exact = "FLT_EVAL_METHOD == 0" + (" || FLT_EVAL_METHOD == 1" * is_double)
+        text = _LIMITS.replace("LIMITS", limits)
+        if self.tables is not None or any(v.parts for v in self.model.variables):
+            text += _ARITHMETIC.replace("EVALUATION", exact)
+        fuses = "__FP_FAST_FMA" if is_double else "__FP_FAST_FMAF"
+        text = text.replace("KIND", self.numbers.name).replace("FUSES", fuses)
+        yield self._fill(text)
+
+    def _defaults(self) -> Iterator[str]:
+        semantics = self.model.semantics
+        given = {"MISSING": semantics.missing}
+        if self.tables is not None:
+            given["UNCOVERED"] = semantics.uncovered
+        yield "\n/* The class where a value is missing, or no rule fires. */\n"
+        for word, label in given.items():
+            yield self._fill(
+                f"#define NAME_WHEN_{word} {number_of(label, self.model)}\n"
+            )
+
+    def _code(self, axes: str) -> Iterator[str]:
+        model = self.model
+        if isinstance(model, FuzzyTree):
+            yield from tree_code(model, self.line, self.numbers, self.prefix, axes)
+        elif self.tables is not None:
+            is_product = model.semantics.conjunction == "product"
+            yield from rules_code(
+                self.tables, self.numbers, self.prefix, axes, is_product=is_product
+            )
+
+
+def _heading(model: Model) -> Iterator[str]:
+    is_rules = isinstance(model, RuleBase)
+    kind = "rule base" if is_rules else "tree"
+    yield f'/* A fuzzy {kind}, named "{remark(model.name)}". Written by fuzzytree.\n'
+    yield f" * Fingerprint: {fingerprint(model)}\n *\n * Inputs, in order:\n"
+    inputs = [variable for variable in model.variables if not variable.parts]
+    for place, variable in enumerate(inputs):
+        unit = f" ({remark(variable.unit)})" if variable.unit else ""
+        yield f" *   x[{place}] {remark(variable.name)}{unit}\n"
+    for variable in model.variables:
+        if variable.parts:
+            parts = " + ".join(
+                f"{p.weight!r} ({remark(p.input)} - {p.centre!r})"
+                for p in variable.parts
+            )
+            yield f" * {remark(variable.name)}: {parts}\n"
+    yield " *\n"
+    if isinstance(model, RuleBase):
+        for number, rule in enumerate(model.rules, 1):
+            yield f" * {number}. {remark(sentence(rule))}\n"
+    else:
+        for line in outline(model):
+            yield f" * {remark(line)}\n"
+
+
+FORMAT = Format(
+    name="c",
+    suffixes=(".c",),
+    carries=("tree", "rules"),
+    write=write,
+    dtype="float64",
+)

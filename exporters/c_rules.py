@@ -1,0 +1,579 @@
+"""Rules as C: tables of terms, clauses and rules, and functions that fire them.
+
+Rules that begin with the same clauses share places of a tree. All are fired by going
+through the places in order. The winner alone is found by leaving out what lies below a
+strength that is exceeded already: minimum and product never grow along a path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from fuzzytree.exporters.c_text import (
+    Numbers,
+    fill,
+    place_type,
+    real_table,
+    whole_table,
+)
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    shapes_of,
+)
+
+LOW_END, HIGH_END, LEFT_SIDE, RIGHT_SIDE, POINTS = range(5)
+
+_MANY_RULES = 16  # from which a first guess at the winner pays
+_MOST_KEPT = 512  # clauses whose degrees are kept while rules are looked at
+
+
+@dataclass(slots=True)
+class Places:
+    """The beginnings of all rules, each once, in the order of a walk.
+
+    Attributes:
+        clause: The last clause of each.
+        skip: The place behind all that begin with it.
+        rule: The rule that it is the whole of, from 1, or 0.
+        depth: How many clauses it has.
+    """
+
+    clause: list[int] = field(default_factory=list[int])
+    skip: list[int] = field(default_factory=list[int])
+    rule: list[int] = field(default_factory=list[int])
+    depth: list[int] = field(default_factory=list[int])
+
+
+@dataclass(slots=True)
+class Tables:
+    """A rule base as lists of numbers, which C and Python read alike.
+
+    An atom is one end of a band, one side of an LR set, or points; the degree of a term
+    is the smallest of its atoms, of a clause the largest of its terms.
+
+    Attributes:
+        number: The numbers of all atoms.
+        kind: The kind of each atom.
+        count: How many coefficients or points it has.
+        first: Where its numbers begin.
+        term_first: Where the atoms of each term begin; one more entry than terms.
+        clause_line: The value that each clause asks about.
+        clause_first: Where the terms of each clause begin; one more entry.
+        clause_term: The terms of all clauses.
+        negated: 1 where a clause is negated.
+        places: The rules.
+        label: The class of each rule.
+    """
+
+    number: list[float]
+    kind: list[int]
+    count: list[int]
+    first: list[int]
+    term_first: list[int]
+    clause_line: list[int]
+    clause_first: list[int]
+    clause_term: list[int]
+    negated: list[int]
+    places: Places
+    label: list[int]
+
+
+_ALWAYS = Clause("", ())
+
+
+def tables_of(rules: RuleBase, line: Mapping[str, int], numbers: Numbers) -> Tables:
+    """Return a rule base as lists of numbers of a type."""
+    shapes = shapes_of(rules.variables)
+    places, clauses = _places(rules)
+    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    at = {key: place for place, key in enumerate(keys)}
+    labels = {label: place for place, label in enumerate(rules.classes)}
+    found = Tables([], [], [], [], [0], [], [0], [], [], places, [])
+    for key in keys:
+        _add_term(found, shapes[key], numbers)
+    for clause in clauses:
+        found.clause_line.append(line.get(clause.variable, 0))
+        found.clause_term += [at[clause.variable, term] for term in clause.terms]
+        found.clause_first.append(len(found.clause_term))
+        found.negated.append(int(clause.negated))
+    found.label = [labels[rule.then] for rule in rules.rules]
+    return found
+
+
+def _places(rules: RuleBase) -> tuple[Places, list[Clause]]:
+    """Return the tree of the rules' beginnings, and the distinct clauses.
+
+    A rule whose clauses are another's beginning gets a place of its own below, whose
+    clause always holds.
+    """
+    children: list[dict[Clause, int]] = [{}]
+    ending: list[list[int]] = [[]]
+    for number, one in enumerate(rules.rules, 1):
+        here = 0
+        for clause in one.when:
+            if clause not in children[here]:
+                children[here][clause] = len(children)
+                children.append({})
+                ending.append([])
+            here = children[here][clause]
+        ending[here].append(number)
+    clauses: dict[Clause, int] = {}
+    found = Places()
+    todo: list[tuple[Clause, int, int, int]] = []  # clause, fork or -1, rule, depth
+
+    def expand(fork: int, depth: int) -> None:
+        own = ending[fork] if fork == 0 or children[fork] else ending[fork][1:]
+        below = [(_ALWAYS, -1, rule, depth) for rule in own]
+        for clause, child in children[fork].items():
+            is_whole = not children[child]
+            below.append((clause, child, ending[child][0] if is_whole else 0, depth))
+        todo.extend(reversed(below))
+
+    expand(0, 1)
+    while todo:
+        clause, fork, rule, depth = todo.pop()
+        found.clause.append(clauses.setdefault(clause, len(clauses)))
+        found.rule.append(rule)
+        found.depth.append(depth)
+        if fork >= 0:
+            expand(fork, depth + 1)
+    _add_skips(found)
+    return found, list(clauses)
+
+
+def _add_skips(places: Places) -> None:
+    places.skip = [len(places.depth)] * len(places.depth)
+    open_ones: list[int] = []
+    for place, depth in enumerate(places.depth):
+        while open_ones and places.depth[open_ones[-1]] >= depth:
+            places.skip[open_ones.pop()] = place
+        open_ones.append(place)
+
+
+def _add_term(found: Tables, shape: Shape, numbers: Numbers) -> None:
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            ends = ((LOW_END, low, left), (HIGH_END, high, right))
+            for kind, bound, flank in ends:
+                if bound is not None:
+                    curve = flank.curve if flank else ()
+                    _add(found, kind, len(curve), _edge(bound, flank, numbers))
+        case LR(mean=mean, left=below, right=above):
+            for kind, sign, side in (
+                (LEFT_SIDE, -1.0, below),
+                (RIGHT_SIDE, 1.0, above),
+            ):
+                _add(found, kind, len(side.curve), _side(mean, sign, side, numbers))
+        case Points(values=values):
+            _add(found, POINTS, len(values), _points(shape, numbers))
+    found.term_first.append(len(found.kind))
+
+
+def _add(found: Tables, kind: int, count: int, own: list[float]) -> None:
+    found.kind.append(kind)
+    found.count.append(count)
+    found.first.append(len(found.number))
+    found.number += own
+
+
+def _edge(bound: float, flank: Flank | None, numbers: Numbers) -> list[float]:
+    """Return the bound; with a flank also its end, its width and its curve."""
+    if flank is None:
+        return numbers.nearest([bound])
+    return [
+        *numbers.nearest([bound, flank.end]),
+        *numbers.nearest([flank.start - flank.end], is_divisor=True),
+        *numbers.nearest(flank.curve),
+    ]
+
+
+def _side(mean: float, sign: float, side: Side, numbers: Numbers) -> list[float]:
+    """Return mean, signed spread, reach, length of the tail, and the curve."""
+    return [
+        *numbers.nearest([mean]),
+        *numbers.nearest([sign * side.spread], is_divisor=True),
+        *numbers.nearest([side.reach]),
+        *numbers.nearest([side.reach - 1.0], is_divisor=True),
+        *numbers.nearest(side.curve),
+    ]
+
+
+def _points(points: Points, numbers: Numbers) -> list[float]:
+    """Return the values of points, then their degrees; below 1 they stay below 1."""
+    degrees = [
+        min(near, numbers.below_one) if exact < 1.0 else near
+        for exact, near in zip(
+            points.degrees, numbers.nearest(points.degrees), strict=True
+        )
+    ]
+    return [*numbers.nearest(points.values), *degrees]
+
+
+_HELPERS = """
+static name_real name_held(name_real value, name_real low, name_real high)
+{
+    value = value > low ? value : low;
+    return value < high ? value : high;
+}
+"""
+
+_HORNER = """
+/* c0 + x (c1 + x (c2 + ...)), from the inside out. */
+static name_real name_curve(const name_real *c, unsigned count, name_real x)
+{
+    name_real total = c[--count];
+    while (count > 0)
+        total = total * x + c[--count];
+    return total;
+}
+"""
+
+_FLANK = """
+/* Off a plateau: falls from start to end, always below 1. */
+static name_real name_flank(const name_real *n, unsigned count, name_real x)
+{
+    name_real q;
+    if (count == 0)
+        return 0;
+    q = name_held((x - n[1]) / n[2], 0, 1);
+    return name_held(name_curve(n + 3, count, q) * q, 0, NAME_BELOW_ONE);
+}
+"""
+
+_SIDE = """
+/* One side of a set: falls with the distance from the mean. */
+static name_real name_side(const name_real *n, unsigned count, name_real x)
+{
+    name_real u = name_held((x - n[0]) / n[1], 0, n[2]);
+    name_real t = u < 1 ? u : 1;
+    name_real body = name_held(1 - t * name_curve(n + 4, count, 2 * t - 1), 0, 1);
+    name_real w = name_held((n[2] - u) / n[3], 0, 1);
+    name_real square = w * w;
+    return body * (square * square);
+}
+"""
+
+_LINES = """
+/* On the line between the points beside x: values, then degrees. */
+static name_real name_line(const name_real *n, unsigned count, name_real x)
+{
+    const name_real *degree = n + count;
+    unsigned low = 0, high = count, near, far;
+    name_real width, found;
+    while (low < high) { /* n[low - 1] < x <= n[low], by halves */
+        unsigned middle = (low + high) / 2;
+        if (x > n[middle])
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    if (low == 0)
+        return degree[0];
+    if (low == count)
+        return degree[count - 1];
+    near = degree[low - 1] > 0 ? low : low - 1;
+    far = near == low ? low - 1 : low;
+    if (!(degree[near] < degree[far] || degree[near] > degree[far]))
+        return degree[near];
+    width = name_held(n[far] - n[near], -NAME_LARGEST, NAME_LARGEST);
+    found = degree[near] + (x - n[near]) / width * (degree[far] - degree[near]);
+    if (degree[near] < degree[far])
+        return name_held(found, degree[near], degree[far]);
+    return name_held(found, degree[far], degree[near]);
+}
+"""
+
+_CASES = {
+    LOW_END: "x > n[0] ? 1 : name_flank(n, count, x); /* low end of a plateau */",
+    HIGH_END: "x > n[0] ? name_flank(n, count, x) : 1; /* high end of a plateau */",
+    LEFT_SIDE: "name_side(n, count, x); /* left of a mean, with a spread below 0 */",
+    RIGHT_SIDE: "name_side(n, count, x); /* right of a mean */",
+    POINTS: "name_line(n, count, x); /* points */",
+}
+
+_ATOM_START = """
+static name_real name_atom(AT atom, name_real x)
+{
+    const name_real *n = name_number + name_first[atom];
+    unsigned count = name_count[atom];
+    switch (name_kind[atom]) {
+"""
+
+_NO_ATOM = """
+static name_real name_atom(AT atom, name_real x)
+{
+    (void)atom;
+    (void)x;
+    return 1;
+}
+"""
+
+_CLAUSE = """
+/* The largest degree of a clause's terms; of a term the smallest of its atoms. */
+static name_real name_degree(AT clause, const name_real *value)
+{
+    name_real largest = 0;
+    AT part = name_clause_first[clause], end = name_clause_first[clause + 1];
+    if (part == end)
+        return 1;
+    for (; part < end; part++) {
+        AT term = name_clause_term[part];
+        AT atom = name_term_first[term], last = name_term_first[term + 1];
+        name_real least = 1;
+        for (; atom < last && least > largest; atom++) {
+            name_real one = name_atom(atom, value[name_clause_line[clause]]);
+            least = one < least ? one : least;
+        }
+        largest = least > largest ? least : largest;
+    }
+    return NEGATED;
+}
+"""
+
+_JOIN = """
+static name_real name_join(name_real a, name_real b)
+{
+    return JOIN;
+}
+"""
+
+_KEPT = """
+/* The same; each clause is looked at once, and kept is below 0 until it was. */
+static name_real name_once(AT clause, const name_real *value, name_real *kept)
+{
+    if (kept[clause] < 0)
+        kept[clause] = name_degree(clause, value);
+    return kept[clause];
+}
+"""
+
+_FORGET = """\
+    for (place = 0; place < NAME_CLAUSES; place++)
+        kept[place] = -1;
+"""
+
+_CONCLUDE = """
+/* Enter a rule that is as strong as the strongest so far, or stronger. */
+static void name_enter(name_answer *found, long rule, int is_stronger)
+{
+    if (is_stronger || found->rule == 0) {
+        found->rule = rule;
+        found->status = NAME_DECIDED;
+    } else {
+        found->rule = rule < found->rule ? rule : found->rule;
+        found->status = NAME_TIE;
+    }
+    found->label = name_label[found->rule - 1];
+}
+"""
+
+_NO_NUMBER = """
+static name_real name_no_number(void)
+{
+    union { UINT bits; name_real value; } made;
+    made.bits = QUIET;
+    return made.value;
+}
+"""
+
+_STRENGTHS = """
+name_answer name_strengths(const name_real *x, name_real *strengths)
+{
+    name_answer answer = {NAME_WHEN_MISSING, 0, NAME_MISSING};
+    name_real path[NAME_DEPTH + 1], best = 0;
+    AT place;
+DECLARE_KEPT
+    for (place = 0; place < NAME_RULES; place++)
+        strengths[place] = name_no_number();
+TAKE_AXES
+FORGET
+    answer.label = NAME_WHEN_UNCOVERED;
+    answer.status = NAME_UNCOVERED;
+    path[0] = 1;
+    for (place = 0; place < NAME_PLACES; place++) {
+        unsigned depth = name_depth[place];
+        long rule = (long)name_rule[place];
+        name_real one = name_join(path[depth - 1], DEGREE(name_clause[place]));
+        path[depth] = one;
+        if (rule == 0)
+            continue;
+        strengths[rule - 1] = one;
+        if (one > 0 && one >= best) {
+            name_enter(&answer, rule, one > best);
+            best = one;
+        }
+    }
+    return answer;
+}
+"""
+
+_GUESS = """
+    /* Follow the best places down to a rule: no winner is weaker than that. */
+    for (place = 0, end = NAME_PLACES; place < end;) {
+        name_real most = -1;
+        AT best_place = place;
+        for (; place < end; place = name_skip[place]) {
+            name_real one = name_join(path[0], DEGREE(name_clause[place]));
+            if (one > most) {
+                most = one;
+                best_place = place;
+            }
+        }
+        path[0] = most;
+        place = best_place + 1;
+        end = name_skip[best_place];
+    }
+    best = path[0];
+    path[0] = 1;
+"""
+
+_DECIDE = """
+name_answer name_decide(const name_real *x)
+{
+    name_answer answer = {NAME_WHEN_MISSING, 0, NAME_MISSING};
+    name_real path[NAME_DEPTH + 1], best = 0;
+    AT placeDECLARE_END;
+DECLARE_KEPT
+TAKE_AXES
+FORGET
+    answer.label = NAME_WHEN_UNCOVERED;
+    answer.status = NAME_UNCOVERED;
+    path[0] = 1;
+GUESS
+    for (place = 0; place < NAME_PLACES;) {
+        unsigned depth = name_depth[place];
+        long rule = (long)name_rule[place];
+        name_real one = name_join(path[depth - 1], DEGREE(name_clause[place]));
+        if (!(one > 0 && one >= best)) { /* nor are those that begin with it */
+            place = name_skip[place];
+            continue;
+        }
+        path[depth] = one;
+        if (rule != 0) {
+            name_enter(&answer, rule, one > best);
+            best = one;
+        }
+        place++;
+    }
+    return answer;
+}
+"""
+
+
+def rules_code(
+    tables: Tables,
+    numbers: Numbers,
+    prefix: str,
+    axes: str,
+    *,
+    is_product: bool,
+) -> Iterator[str]:
+    """Yield the tables of a rule base and the functions that fire it.
+
+    Args:
+        tables: The rule base.
+        numbers: The type of all numbers.
+        prefix: The beginning of all names.
+        axes: Statements that put the values of the variables into `value`, or return.
+        is_product: Whether degrees are multiplied.
+    """
+    yield from _data(tables, numbers, prefix)
+    for template in _functions(tables, numbers):
+        text = template.replace("JOIN", "a * b" if is_product else "b < a ? b : a")
+        text = text.replace("TAKE_AXES\n", axes)
+        text = text.replace("AT ", f"{_place_type(tables)} ")
+        yield fill(text, prefix)
+
+
+def _place_type(tables: Tables) -> str:
+    tallest = max(len(tables.number), len(tables.clause_term))
+    return place_type(max(tallest, len(tables.places.clause), len(tables.label)))
+
+
+def _data(tables: Tables, numbers: Numbers, prefix: str) -> Iterator[str]:
+    places = tables.places
+    for name, size in (
+        ("RULES", len(tables.label)),
+        ("PLACES", len(places.clause)),
+        ("DEPTH", max(places.depth)),
+        ("CLAUSES", len(tables.negated)),
+    ):
+        if name != "RULES":  # declared already
+            yield fill(f"#define NAME_{name} {size}u\n", prefix)
+    about = "The numbers of ends of plateaus, of sides of sets, and of points."
+    yield "\n"
+    yield from real_table(f"{prefix}_number", tables.number or [0.0], about, numbers)
+    for name, values, about in (
+        ("kind", tables.kind, "What each of them is."),
+        ("count", tables.count, "How many coefficients or points it has."),
+        ("first", tables.first, "Where its numbers begin."),
+        ("term_first", tables.term_first, "Where each term begins among them."),
+        ("clause_first", tables.clause_first, "Where the terms of a clause begin."),
+        ("clause_term", tables.clause_term, "The terms of all clauses."),
+        ("clause_line", tables.clause_line, "The value that a clause asks about."),
+        ("negated", tables.negated if any(tables.negated) else None, "1: is not."),
+        ("clause", places.clause, "Beginnings of rules, in order: the last clause,"),
+        ("depth", places.depth, "how many there are,"),
+        ("skip", places.skip, "the place behind all rules that begin so,"),
+        ("rule", places.rule, "and the number of the rule that it is, or 0."),
+        ("label", tables.label, "The class of each rule."),
+    ):
+        if values is not None:
+            yield from whole_table(f"{prefix}_{name}", values or [0], about)
+
+
+def _functions(tables: Tables, numbers: Numbers) -> Iterator[str]:
+    kinds = set(tables.kind)
+    has_flank, has_side = kinds & {LOW_END, HIGH_END}, kinds & {LEFT_SIDE, RIGHT_SIDE}
+    if has_flank:
+        yield f"\n#define NAME_BELOW_ONE {numbers.text(numbers.below_one)}\n"
+    if POINTS in kinds:
+        yield f"\n#define NAME_LARGEST {numbers.text(numbers.largest)}\n"
+    yield _HELPERS if kinds else ""
+    yield _HORNER if has_flank or has_side else ""
+    yield _FLANK if has_flank else ""
+    yield _SIDE if has_side else ""
+    yield _LINES if POINTS in kinds else ""
+    yield _atom(sorted(kinds)) if kinds else _NO_ATOM
+    is_negated = "name_negated[clause] ? 1 - largest : largest"
+    yield _CLAUSE.replace("NEGATED", is_negated if any(tables.negated) else "largest")
+    yield _JOIN
+    yield _CONCLUDE
+    clauses, places = len(tables.negated), len(tables.places.clause)
+    is_kept = clauses <= _MOST_KEPT and 2 * places >= 3 * clauses
+    yield _KEPT if is_kept else ""
+    is_double = numbers.name == "double"
+    quiet = _NO_NUMBER.replace("UINT", "uint64_t" if is_double else "uint32_t")
+    bits = "UINT64_C(0x7ff8000000000000)" if is_double else "UINT32_C(0x7fc00000)"
+    yield quiet.replace("QUIET", bits)
+    yield _settled(_STRENGTHS, is_kept=is_kept)
+    is_guessed = len(tables.label) >= _MANY_RULES
+    decide = _DECIDE.replace("GUESS\n", _GUESS.lstrip("\n") if is_guessed else "")
+    decide = decide.replace("DECLARE_END", ", end" if is_guessed else "")
+    yield _settled(decide, is_kept=is_kept)
+
+
+def _atom(kinds: list[int]) -> str:
+    lines = [f"    case {kind}: return {_CASES[kind]}\n" for kind in kinds[:-1]]
+    lines.append(f"    default: return {_CASES[kinds[-1]]}\n")
+    return "".join([_ATOM_START, *lines, "    }\n}\n"])
+
+
+def _settled(function: str, *, is_kept: bool) -> str:
+    """Return a function that keeps the degrees of clauses, or does not."""
+    look = "name_clause[place], value"
+    text = function.replace(
+        "DEGREE(name_clause[place])",
+        f"name_once({look}, kept)" if is_kept else f"name_degree({look})",
+    )
+    declared = "    name_real kept[NAME_CLAUSES];\n" if is_kept else ""
+    text = text.replace("DECLARE_KEPT\n", declared)
+    return text.replace("FORGET\n", _FORGET if is_kept else "")

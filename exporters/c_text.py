@@ -1,0 +1,161 @@
+"""Pieces of C: numbers, tables, names and comments, each safe whatever a model says.
+
+Text of a model enters C only through `remark` (comments) and `constants` (names of
+enumerators), so that nothing in it can be mistaken for code.
+"""
+
+from __future__ import annotations
+
+import string
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.naming import DIGITS, LETTERS, Names
+from fuzzytree.numerics.narrowing import rounded
+
+_WIDTH = 88
+_LONGEST_PREFIX = 20  # C99 promises that 31 letters of a global name count
+_LONGEST_CONSTANT = 63  # and 63 of others
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """A number type of C.
+
+    Attributes:
+        name: In C.
+        kind: In numpy.
+        suffix: Behind a constant.
+        below_one: The largest number below 1.
+        largest: The largest number.
+    """
+
+    name: str
+    kind: type[np.float64] | type[np.float32]
+    suffix: str
+    below_one: float
+    largest: float
+
+    def nearest(self, values: Sequence[float], *, is_divisor: bool = False) -> Reals:
+        """Return numbers of the type, never infinite; a divisor is never 0."""
+        found: Reals = rounded(values, self.kind, is_divisor=is_divisor).tolist()
+        return found
+
+    def text(self, value: float) -> str:
+        """Return a finite number of the type as a constant.
+
+        Example:
+            >>> DOUBLE.text(0.1), SINGLE.text(-2.0)
+            ('0x1.999999999999ap-4', '-0x1p+1f')
+        """
+        digits, exponent = float(value).hex().split("p")
+        if "." in digits:
+            digits = digits.rstrip("0").rstrip(".")
+        return f"{digits}p{exponent}{self.suffix}"
+
+    def shown(self, value: float) -> str:
+        """Return a number with the fewest decimal digits that give it back."""
+        return str(self.kind(value))
+
+
+Reals = list[float]
+
+DOUBLE = Numbers("double", np.float64, "", 1.0 - 2.0**-53, float(np.finfo("d").max))
+SINGLE = Numbers("float", np.float32, "f", 1.0 - 2.0**-24, float(np.finfo("f").max))
+
+
+def fill(template: str, prefix: str) -> str:
+    """Return a template with a prefix for `name_`, and its capitals for `NAME_`."""
+    capital = template.replace("NAME_", f"{prefix.upper()}_")
+    return capital.replace("name_", f"{prefix}_")
+
+
+def prefix_of(name: str) -> str:
+    """Return the beginning of all names of a file, made from that of a model.
+
+    Example:
+        >>> prefix_of("Größe 2"), prefix_of("2nd")
+        ('grosse_2', 'model_2nd')
+    """
+    small = name.lower()
+    if not small[:1].isalpha():
+        small = f"model_{small}"
+    letters = string.ascii_lowercase
+    rest = letters + DIGITS + "_"
+    found = Names.of([small], first=letters, rest=rest, longest=_LONGEST_PREFIX)
+    return found[small].rstrip("_")
+
+
+def constants(prefix: str, names: Sequence[str]) -> list[str]:
+    """Return a constant's name for each name: unlike each other, and 63 letters long.
+
+    Example:
+        >>> constants("GRIP_CLASS_", ["soft hand", "Soft-hand", "1st"])
+        ['GRIP_CLASS_SOFT_HAND', 'GRIP_CLASS_SOFT_HAND_2', 'GRIP_CLASS_1ST']
+    """
+    every = LETTERS + DIGITS + "_"
+    longest = _LONGEST_CONSTANT - len(prefix)
+    found = Names.of(names, first=every, longest=longest, ignores_case=True)
+    return [prefix + found[name].upper() for name in names]
+
+
+def remark(text: str) -> str:
+    r"""Return text that may stand in a comment: one line of ASCII that cannot end it.
+
+    Example:
+        >>> remark("a */ b ??/ é\n")
+        'a * / b ? ?/ \\xe9\\n'
+    """
+    plain = text.encode("unicode_escape").decode("ascii")
+    for pair in ("*/", "/*", "??"):
+        while pair in plain:
+            plain = plain.replace(pair, f"{pair[0]} {pair[1]}")
+    return plain
+
+
+def integer_type(largest: int) -> str:
+    """Return the smallest type of whole numbers from 0 on.
+
+    Example:
+        >>> integer_type(255), integer_type(256)
+        ('uint8_t', 'uint16_t')
+    """
+    return next(f"uint{b}_t" for b in (8, 16, 32) if largest < 1 << b)
+
+
+def place_type(largest: int) -> str:
+    """Return a quick type of whole numbers from 0 on."""
+    return f"uint_fast{16 if largest < 1 << 16 else 32}_t"
+
+
+def whole_table(name: str, values: Sequence[int], about: str) -> Iterator[str]:
+    """Yield a table of whole numbers of the smallest type, with a comment before."""
+    yield f"/* {about} */\n"
+    kind = integer_type(max(values))
+    yield f"static const {kind} {name}[{len(values)}] = {{\n"
+    yield from _wrapped(f"{value}," for value in values)
+    yield "};\n"
+
+
+def real_table(
+    name: str, values: Iterable[float], about: str, numbers: Numbers
+) -> Iterator[str]:
+    """Yield a table of numbers, each with its decimal digits beside it."""
+    entries = [f"{numbers.text(v)}, /* {numbers.shown(v)} */" for v in values]
+    yield f"/* {about} */\n"
+    yield f"static const {numbers.name} {name}[{len(entries)}] = {{\n"
+    yield from _wrapped(entries)
+    yield "};\n"
+
+
+def _wrapped(entries: Iterable[str]) -> Iterator[str]:
+    line = "   "
+    for entry in entries:
+        if len(line) + 1 + len(entry) > _WIDTH and line.strip():
+            yield f"{line}\n"
+            line = "   "
+        line += f" {entry}"
+    if line.strip():
+        yield f"{line}\n"

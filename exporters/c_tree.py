@@ -1,0 +1,135 @@
+"""A tree as C: a table of questions `x > cut` and a walk through it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from fuzzytree.exporters.c_text import (
+    Numbers,
+    fill,
+    place_type,
+    real_table,
+    whole_table,
+)
+from fuzzytree.tree import FuzzyTree, Node
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """Whether a value lies above a cut, and where no and yes lead.
+
+    A place below the number of questions is a question, and k places behind is leaf
+    k + 1.
+    """
+
+    line: int
+    cut: float
+    no: int
+    yes: int
+
+
+def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[Question]:
+    """Return the questions of a tree; the first is asked first.
+
+    A node of several cuts becomes several questions, by halves.
+
+    Args:
+        tree: The tree.
+        line: The place of each variable's value.
+    """
+    starts, count = [0], 0
+    for node in tree.nodes:
+        count += len(node.cuts)
+        starts.append(count)
+    found: list[Question] = []
+    for node in tree.nodes:
+        targets = [
+            count + branch.leaf - 1 if branch.leaf else starts[(branch.node or 1) - 1]
+            for branch in node.branches
+        ]
+        ends = [targets[owner] for owner in node.owners]
+        found += _halved(node, line[node.variable], ends, len(found))
+    return found
+
+
+def _halved(node: Node, line: int, ends: list[int], start: int) -> list[Question]:
+    """Return a node's questions, numbered from `start`, each half behind its whole."""
+
+    def lay(first: int, last: int, place: int) -> list[Question]:
+        middle = (first + last) // 2
+        left = lay(first, middle, place + 1) if first < middle else []
+        behind = place + 1 + len(left)
+        right = lay(middle + 1, last, behind) if middle + 1 < last else []
+        no = place + 1 if left else ends[first]
+        yes = behind if right else ends[last]
+        return [Question(line, node.cuts[middle], no, yes), *left, *right]
+
+    return lay(0, len(node.cuts), start)
+
+
+_WALK = """
+name_answer name_decide(const name_real *x)
+{
+    name_answer answer = {NAME_WHEN_MISSING, 0, NAME_MISSING};
+    PLACE_TYPE place = 0;
+TAKE_AXES
+    do
+        place = name_next[2 * place + (value[name_line[place]] > name_cut[place])];
+    while (place < NAME_QUESTIONS);
+    answer.label = name_label[place - NAME_QUESTIONS];
+    answer.rule = (long)(place - NAME_QUESTIONS) + 1;
+    answer.status = NAME_DECIDED;
+    return answer;
+}
+"""
+
+_ONE_LEAF = """
+name_answer name_decide(const name_real *x)
+{
+    name_answer answer = {NAME_WHEN_MISSING, 0, NAME_MISSING};
+TAKE_AXES
+    answer.label = name_label[0];
+    answer.rule = 1;
+    answer.status = NAME_DECIDED;
+    return answer;
+}
+"""
+
+
+def tree_code(
+    tree: FuzzyTree,
+    line: Mapping[str, int],
+    numbers: Numbers,
+    prefix: str,
+    axes: str,
+) -> Iterator[str]:
+    """Yield the tables of a tree and the function that walks through them.
+
+    Args:
+        tree: The tree.
+        line: The place of each variable's value.
+        numbers: The type of values and cuts.
+        prefix: The beginning of all names.
+        axes: Statements that put the values of the variables into `value`, or return.
+    """
+    asked = questions_of(tree, line)
+    labels = [tree.classes.index(leaf.label) for leaf in tree.leaves]
+    yield from whole_table(f"{prefix}_label", labels, "The class of each leaf.")
+    if not asked:
+        plain = axes.replace("    const name_real *value = x;\n", "")
+        yield fill(_ONE_LEAF.replace("TAKE_AXES\n", plain), prefix)
+        return
+    ends = [place for question in asked for place in (question.no, question.yes)]
+    cuts = numbers.nearest([question.cut for question in asked])
+    lines = [question.line for question in asked]
+    yield fill(f"#define NAME_QUESTIONS {len(asked)}u\n\n", prefix)
+    yield from real_table(
+        f"{prefix}_cut", cuts, "Each question: is the value above this?", numbers
+    )
+    yield from whole_table(f"{prefix}_line", lines, "The value that it asks about.")
+    about = "Where no and yes lead: to a question, or NAME_QUESTIONS + leaf - 1."
+    yield from whole_table(f"{prefix}_next", ends, fill(about, prefix))
+    kind = place_type(2 * len(asked) + len(labels))
+    walk = _WALK.replace("PLACE_TYPE", kind).replace("TAKE_AXES\n", axes)
+    yield fill(walk, prefix)
