@@ -15,15 +15,19 @@ if TYPE_CHECKING:
     from fuzzytree.errors import FuzzyTreeError
     from fuzzytree.estimator import FuzzyTreeClassifier
     from fuzzytree.lowering import rules_from_tree
+    from fuzzytree.outputs import Outputs
     from fuzzytree.rulebase import RuleBase
+    from fuzzytree.system import FuzzySystem
     from fuzzytree.tree import FuzzyTree
     from fuzzytree.verbs import (
         bench,
         certify,
         check,
+        convert,
         export,
         learn,
         load,
+        read,
         run,
         save,
         stability,
@@ -34,17 +38,21 @@ if TYPE_CHECKING:
 __all__ = [
     "Agreement",
     "Answers",
+    "FuzzySystem",
     "FuzzyTree",
     "FuzzyTreeClassifier",
     "FuzzyTreeError",
+    "Outputs",
     "RuleBase",
     "__version__",
     "bench",
     "certify",
     "check",
+    "convert",
     "export",
     "learn",
     "load",
+    "read",
     "rules_from_tree",
     "run",
     "save",
@@ -54,16 +62,20 @@ __all__ = [
 _HOMES = {
     "Agreement": "fuzzytree.agreement",
     "Answers": "fuzzytree.answers",
+    "FuzzySystem": "fuzzytree.system",
     "FuzzyTree": "fuzzytree.tree",
     "FuzzyTreeClassifier": "fuzzytree.estimator",
     "FuzzyTreeError": "fuzzytree.errors",
+    "Outputs": "fuzzytree.outputs",
     "RuleBase": "fuzzytree.rulebase",
     "bench": "fuzzytree.verbs",
     "certify": "fuzzytree.verbs",
     "check": "fuzzytree.verbs",
+    "convert": "fuzzytree.verbs",
     "export": "fuzzytree.verbs",
     "learn": "fuzzytree.verbs",
     "load": "fuzzytree.verbs",
+    "read": "fuzzytree.verbs",
     "rules_from_tree": "fuzzytree.lowering",
     "run": "fuzzytree.verbs",
     "save": "fuzzytree.verbs",

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast, get_args
+from typing import TYPE_CHECKING, Generic, Literal, TypeVar, get_args, overload
 
 import msgspec
 import numpy as np
 
 from fuzzytree.agreement import Agreement
 from fuzzytree.answers import Answers, answers_of, joined
-from fuzzytree.contracts import Dtype, Format, Model, Run, Written
+from fuzzytree.contracts import Document, Dtype, Model, Run, Written
+from fuzzytree.converting import (
+    Conversion,
+    convert,
+    deciding,
+    export,
+    load,
+    read,
+)
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, TableError
-from fuzzytree.exporters import all_formats, find_format
+from fuzzytree.exporters import all_formats
 from fuzzytree.files import read_bounded, write_atomically
+from fuzzytree.inference import infer
+from fuzzytree.options import Option
+from fuzzytree.outputs import Outputs, joined_outputs
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import chosen_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
@@ -33,10 +43,30 @@ if TYPE_CHECKING:
     from fuzzytree.numerics.bounds import Certificate
     from fuzzytree.timing.records import Study
 
-Carried = Model | OnnxModel | bytes | str | os.PathLike[str]
+__all__ = [
+    "Answering",
+    "Carried",
+    "Conversion",
+    "answering",
+    "bench",
+    "certify",
+    "check",
+    "convert",
+    "export",
+    "learn",
+    "learn_table",
+    "load",
+    "opened",
+    "read",
+    "rows_of",
+    "run",
+    "save",
+    "stability",
+]
+
+Carried = Document | OnnxModel | bytes | str | os.PathLike[str]
 """A model, an ONNX file opened or as bytes, or the path of a file of either."""
 
-Option = str | int | float | bool | Sequence[str]
 Progress = Callable[[str, float], None]
 
 _BLOCK = 1 << 16  # rows answered at a time
@@ -177,31 +207,16 @@ def _name_of(table: object) -> str:
     return "tree"
 
 
-def load(path: str | os.PathLike[str]) -> Model:
-    """Read a tree or a rule base from a file; the suffix names its format.
-
-    Raises:
-        ReadError: If the file cannot be read, or says something wrong; the message
-            lists all mistakes with their lines.
-    """
-    name = os.fspath(path)
-    form = _format_of(path)
-    if form.read is None:
-        raise ReadError(
-            f"{name}: a file in the format {form.name} is not read back as a model; "
-            "keep the YAML file beside it"
-        )
-    found = form.read(read_bounded(path), name).model
-    if isinstance(found, FuzzySystem):
-        raise ReadError(f"{name}: is a fuzzy system, which decides for no class")
-    return found
-
-
-def opened(source: Carried) -> Model | OnnxModel:
+def opened(source: Carried, *, allow_loss: bool = False) -> Document | OnnxModel:
     """Return a model as it is, and whatever a file or bytes hold ready to run.
+
+    Args:
+        source: A model, an ONNX file opened or as bytes, or the path of a file.
+        allow_loss: As in `load`.
 
     Raises:
         ReadError: If the file cannot be read, or is not ours.
+        LossError: As `load`.
         MissingExtraError: If it is an ONNX file and onnxruntime is not installed.
     """
     match source:
@@ -210,69 +225,13 @@ def opened(source: Carried) -> Model | OnnxModel:
         case str() | os.PathLike():
             if Path(source).suffix.lower() == ".onnx":
                 return open_onnx(read_bounded(source), os.fspath(source))
-            return load(source)
+            return load(source, allow_loss=allow_loss)
         case _:
             return source
 
 
-def _format_of(path: str | os.PathLike[str]) -> Format:
-    suffix = Path(path).suffix
-    try:
-        return find_format(suffix.lower())
-    except ValueError as error:
-        shown = f"the suffix {suffix!r}" if suffix else "no suffix"
-        raise ReadError(f"{os.fspath(path)}: has {shown}; {_known(error)}") from error
-
-
-def _known(error: ValueError) -> str:
-    return str(error).rpartition("; ")[2]
-
-
-def export(
-    model: Model, to: str = "yaml", *, allow_loss: bool = False, **options: Option
-) -> Written:
-    """Write a model in a format, as bytes.
-
-    Args:
-        model: A tree or a rule base.
-        to: The name of a format, or a suffix such as `.onnx`.
-        allow_loss: Whether to write what the format cannot hold as near as it can.
-        options: The writer's own options, such as `dtype` for onnx.
-
-    Returns:
-        The content and what was lost.
-
-    Raises:
-        LossError: If something would be lost, unless allowed.
-        MissingExtraError: If a package is missing; the message names the extra.
-        ValueError: If there is no such format or option.
-    """
-    form = find_format(to)
-    carrier = "rules" if isinstance(model, RuleBase) else "tree"
-    if carrier not in form.carries:
-        carried = " or ".join(form.carries)
-        raise LossError(
-            f"cannot write {model.name} as {form.name}: it carries {carried}, "
-            f"and this is a {'rule base' if carrier == 'rules' else 'tree'}"
-        )
-    known = [
-        name
-        for name, parameter in inspect.signature(form.write).parameters.items()
-        if parameter.kind is parameter.KEYWORD_ONLY and name != "allow_loss"
-    ]
-    for name in options:
-        if name not in known:
-            raise ValueError(
-                f"{form.name} has no option {name!r}; "
-                f"it has {', '.join(known) or 'none'}"
-            )
-    # Each writer checks its own options; the protocol knows the common one alone.
-    write = cast("Callable[..., Written]", form.write)
-    return write(model, allow_loss=allow_loss, **options)
-
-
 def save(
-    model: Model,
+    model: Document,
     path: str | os.PathLike[str],
     *,
     to: str | None = None,
@@ -282,7 +241,7 @@ def save(
     """Write a model to a file whole, or leave what stood there.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         path: The file.
         to: The format; the one of the suffix unless given.
         allow_loss: As in `export`.
@@ -300,6 +259,31 @@ def save(
     return written
 
 
+@overload
+def run(
+    model: FuzzySystem,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+    allow_loss: bool = False,
+) -> Outputs: ...
+
+
+@overload
+def run(
+    model: Model | OnnxModel | bytes,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+    allow_loss: bool = False,
+) -> Answers: ...
+
+
+@overload
 def run(
     model: Carried,
     table: object,
@@ -307,8 +291,20 @@ def run(
     runtime: str | None = None,
     columns: Sequence[str] | None = None,
     with_strengths: bool = True,
-) -> Answers:
-    """Answer the rows of a table.
+    allow_loss: bool = False,
+) -> Answers | Outputs: ...
+
+
+def run(
+    model: Carried,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+    allow_loss: bool = False,
+) -> Answers | Outputs:
+    """Answer the rows of a table: classes, or the numbers of a fuzzy system.
 
     Args:
         model: The model; see `Carried`.
@@ -318,29 +314,41 @@ def run(
             always executed by onnxruntime.
         columns: The names of an array's columns; unless given those of the table
             that the model was learnt from.
-        with_strengths: Whether to keep the strengths of a rule base's rules, 8 bytes
-            for each rule and row.
+        with_strengths: Whether to keep the strengths of the rules, 8 bytes for each
+            rule and row.
+        allow_loss: As in `load`.
 
     Raises:
         TableError: If a column is absent or holds text.
         MissingExtraError: If the runtime is not installed.
-        LossError: If the runtime cannot carry the model.
+        LossError: If the runtime cannot carry the model, or as `load`.
         ValueError: If there is no such runtime.
     """
-    answer = answering(opened(model), runtime, with_strengths=with_strengths)
-    return joined([found for _, found in answer(table, columns=columns)])
+    found = opened(model, allow_loss=allow_loss)
+    if isinstance(found, FuzzySystem):
+        numbers = answering(found, runtime, with_strengths=with_strengths)
+        return numbers.join([one for _, one in numbers(table, columns=columns)])
+    classes = answering(found, runtime, with_strengths=with_strengths)
+    return classes.join([one for _, one in classes(table, columns=columns)])
 
 
-class Answering(msgspec.Struct, frozen=True):
+Found = TypeVar("Found", Answers, Outputs)
+
+
+class Answering(msgspec.Struct, Generic[Found], frozen=True):
     """A model made ready, which answers tables piece by piece.
 
     Attributes:
-        model: The model.
+        inputs: The columns that it needs, in order.
+        trained: The columns of the table that it was learnt from, if any.
         answer: Answers to values of shape (inputs, rows).
+        join: Makes one of the answers to several pieces.
     """
 
-    model: Model | OnnxModel
-    answer: Callable[[FloatArray], Answers]
+    inputs: tuple[str, ...]
+    trained: tuple[str, ...]
+    answer: Callable[[FloatArray], Found]
+    join: Callable[[Sequence[Found]], Found]
 
     def __call__(
         self,
@@ -350,7 +358,7 @@ class Answering(msgspec.Struct, frozen=True):
         delimiter: str | None = None,
         name: str | None = None,
         with_others: bool = False,
-    ) -> Iterator[tuple[Batch, Answers]]:
+    ) -> Iterator[tuple[Batch, Found]]:
         """Yield the rows of a table in batches, with the answers to them.
 
         The arguments are those of `fuzzytree.tables.batches`.
@@ -360,8 +368,8 @@ class Answering(msgspec.Struct, frozen=True):
         """
         for batch in batches(
             table,
-            self.model.inputs,
-            trained=self.model.columns,
+            self.inputs,
+            trained=self.trained,
             columns=columns,
             delimiter=delimiter,
             name=name,
@@ -370,12 +378,36 @@ class Answering(msgspec.Struct, frozen=True):
             rows = batch.values.shape[1]
             starts = range(0, max(rows, 1), _BLOCK)
             found = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
-            yield batch, joined(found)
+            yield batch, self.join(found)
+
+
+@overload
+def answering(
+    model: FuzzySystem, runtime: str | None = None, *, with_strengths: bool = True
+) -> Answering[Outputs]: ...
+
+
+@overload
+def answering(
+    model: Model | OnnxModel, runtime: str | None = None, *, with_strengths: bool = True
+) -> Answering[Answers]: ...
+
+
+@overload
+def answering(
+    model: Document | OnnxModel,
+    runtime: str | None = None,
+    *,
+    with_strengths: bool = True,
+) -> Answering[Answers] | Answering[Outputs]: ...
 
 
 def answering(
-    model: Model | OnnxModel, runtime: str | None = None, *, with_strengths: bool = True
-) -> Answering:
+    model: Document | OnnxModel,
+    runtime: str | None = None,
+    *,
+    with_strengths: bool = True,
+) -> Answering[Answers] | Answering[Outputs]:
     """Make a model ready to answer.
 
     Raises:
@@ -385,6 +417,8 @@ def answering(
     """
     if isinstance(model, OnnxModel):
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
+    if isinstance(model, FuzzySystem):
+        return _answering_system(model, runtime, with_strengths=with_strengths)
     execute = _loaded(model, runtime or "native")
     if isinstance(model, RuleBase):
         ends = [rule.then for rule in model.rules]
@@ -400,12 +434,35 @@ def answering(
             with_strengths=with_strengths,
         )
 
-    return Answering(model, answer)
+    return Answering(model.inputs, model.columns, answer, joined)
+
+
+def _answering_system(
+    system: FuzzySystem, runtime: str | None, *, with_strengths: bool
+) -> Answering[Outputs]:
+    del runtime
+    names = tuple(one.name for one in system.outputs)
+
+    def answer(values: FloatArray) -> Outputs:
+        found = [
+            infer(system, dict(zip(system.columns, row, strict=True)))
+            for row in values.T.tolist()
+        ]
+        numbers = np.array([one.outputs for one in found], np.float64)
+        degrees = np.array([one.activations for one in found], np.float64)
+        return Outputs(
+            names,
+            numbers.reshape(len(found), len(names)).T,
+            np.array([one.status for one in found], np.int64),
+            degrees.reshape(len(found), -1).T if with_strengths else None,
+        )
+
+    return Answering(system.columns, (), answer, joined_outputs)
 
 
 def _answering_onnx(
     model: OnnxModel, runtime: str | None, *, with_strengths: bool
-) -> Answering:
+) -> Answering[Answers]:
     if runtime is not None:
         raise ValueError(
             f"runtime {runtime!r}: an ONNX file runs in onnxruntime; "
@@ -426,7 +483,7 @@ def _answering_onnx(
             strengths=outcome.strengths if with_strengths else None,
         )
 
-    return Answering(model, answer)
+    return Answering(model.inputs, model.columns, answer, joined)
 
 
 def _loaded(model: Model, name: str) -> Run:
@@ -515,14 +572,14 @@ def check(
     """
     from fuzzytree import checking
 
-    first = _model_of(model)
+    first = _model_of(model, "check")
     titles = [
         names[k] if k < len(names) else _title(other, k)
         for k, other in enumerate(others)
     ]
     return checking.check(
         first,
-        *map(opened, others),
+        *(_deciding(other) for other in others),
         data=rows_of(data, first, columns=columns, delimiter=delimiter),
         names=titles,
         runtimes=runtimes,
@@ -561,7 +618,7 @@ def certify(
     if dtype not in get_args(Dtype):
         known = ", ".join(get_args(Dtype))
         raise ValueError(f"there is no number type {dtype!r}; there are {known}")
-    first = _model_of(model)
+    first = _model_of(model, "certify")
     return bounds.certify(first, dtype, rows_of(data, first, columns=columns))
 
 
@@ -616,7 +673,7 @@ def bench(
     from fuzzytree.timing import study
 
     plan = study.Plan(tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed)
-    first = _model_of(model)
+    first = _model_of(model, "bench")
     return study.bench(
         first,
         values=rows_of(data, first, columns=columns, delimiter=delimiter),
@@ -628,8 +685,14 @@ def bench(
     )
 
 
-def _model_of(model: Model | str | os.PathLike[str]) -> Model:
-    return load(model) if isinstance(model, str | os.PathLike) else model
+def _model_of(model: Document | str | os.PathLike[str], verb: str) -> Model:
+    found = load(model) if isinstance(model, str | os.PathLike) else model
+    return deciding(found, verb)
+
+
+def _deciding(source: Carried) -> Model | OnnxModel:
+    found = opened(source)
+    return found if isinstance(found, OnnxModel) else deciding(found, "check")
 
 
 def _data_name(data: object) -> str:
@@ -671,7 +734,7 @@ def stability(
     """
     from fuzzytree.criteria.suite import examine
 
-    first = _model_of(model)
+    first = _model_of(model, "stability")
     chosen = chosen_runtimes(runtimes)
     return examine(
         first,

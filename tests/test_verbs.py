@@ -109,7 +109,9 @@ def test_every_carrier_of_a_tree_answers_alike(
         str(path),
         open_onnx(content, "tree.onnx"),
     ):
-        assert ft.run(carrier, rows).classes == expected
+        found = ft.run(carrier, rows)
+        assert isinstance(found, ft.Answers)
+        assert found.classes == expected
 
 
 def test_many_rows_are_answered_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,7 +172,7 @@ def test_an_option_that_a_writer_does_not_have_is_refused() -> None:
         ft.export(TREE, "onnx", dtpe="float32")
     assert str(caught.value) == (
         "onnx has no option 'dtpe'; it has dtype, opset, ir, signature, outputs, "
-        "readable, plain, verify"
+        "readable, plain, verify (did you mean 'dtype'?)"
     )
 
 

@@ -25,6 +25,7 @@ VERBS = (
     "learn",
     "show",
     "export",
+    "convert",
     "run",
     "check",
     "bench",

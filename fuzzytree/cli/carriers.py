@@ -6,16 +6,16 @@ from pathlib import Path
 
 import click
 
-from fuzzytree.contracts import Carrier, Format, Model
+from fuzzytree.contracts import Carrier, Document, Format
+from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters import find_format
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Conjunction, Kind, RuleBase
+from fuzzytree.rulebase import Conjunction, Kind
 
 as_option = click.option(
     "--as",
     "carrier",
-    type=click.Choice(["tree", "rules"]),
-    help="Write the tree, or rules made from it.",
+    type=click.Choice(["tree", "rules", "system"]),
+    help="Write the tree, rules made from it, or the system that decides alike.",
 )
 terms_option = click.option(
     "--terms",
@@ -45,51 +45,26 @@ def wanted_format(output: str, to: str | None) -> Format:
 
 
 def carried(
-    model: Model,
+    model: Document,
+    form: Format,
     *,
     carrier: Carrier | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
-    form: Format,
-) -> Model:
-    """Return the form of a model that was asked for.
-
-    Unless told otherwise a model stays what it is, and a tree becomes rules where the
-    format carries no tree.
+) -> Document:
+    """Return the form of a model that was asked for; see `converting.formed`.
 
     Raises:
         click.UsageError: If the model cannot be had in that form.
+        LossError: If the format does not carry it in any form.
     """
-    if isinstance(model, RuleBase):
-        _refuse_remaking(model, carrier, kind, conjunction)
-        return model
-    wants_rules = kind is not None or conjunction is not None
-    if carrier == "tree" and wants_rules:
+    from fuzzytree.converting import formed
+
+    if carrier == "tree" and (kind is not None or conjunction is not None):
         raise click.UsageError("--terms and --conjunction are for --as rules")
-    if carrier is None:
-        is_lost = "tree" not in form.carries
-        carrier = "rules" if wants_rules or is_lost else "tree"
-    if carrier == "tree":
-        return model
-    return rules_from_tree(model, kind or "relative", conjunction=conjunction)
-
-
-def _refuse_remaking(
-    rules: RuleBase,
-    carrier: Carrier | None,
-    kind: Kind | None,
-    conjunction: Conjunction | None,
-) -> None:
-    if carrier == "tree":
-        raise click.UsageError(
-            f"--as tree: {rules.name} is a rule base, and no tree can be made of it"
-        )
-    for option, wanted, found in (
-        ("--terms", kind, rules.kind),
-        ("--conjunction", conjunction, rules.semantics.conjunction),
-    ):
-        if wanted is not None and wanted != found:
-            raise click.UsageError(
-                f"{option} {wanted}: {rules.name} is a rule base with "
-                f"{found or 'other'}; other rules are made from the tree"
-            )
+    try:
+        return formed(model, form, carrier=carrier, kind=kind, conjunction=conjunction)
+    except FuzzyTreeError:
+        raise
+    except ValueError as error:
+        raise click.UsageError(f"--{error}") from error

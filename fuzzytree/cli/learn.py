@@ -180,7 +180,7 @@ def command(
             tested = accuracy(found, settings, seed=settings.seed, progress=tell)
         tell_rows(("tested", "accuracy", _tested_text(tested)))
     model = carried(
-        learnt.tree, carrier=carrier, kind=kind, conjunction=conjunction, form=form
+        learnt.tree, form, carrier=carrier, kind=kind, conjunction=conjunction
     )
     content = export(model, form.name).content
     if output == "-":

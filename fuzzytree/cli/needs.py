@@ -73,11 +73,12 @@ def command(
     from pathlib import Path
 
     from fuzzytree import savings, verbs
+    from fuzzytree.converting import deciding
     from fuzzytree.exporters import find_format
     from fuzzytree.pruning import pruned
     from fuzzytree.report.needs import report_lines
 
-    first = verbs.load(model)
+    first = deciding(verbs.load(model), "needs")
     wanted = tuple(uses) or ("tree", "relative")
     with wrong_options():
         find_format(Path(output or "").suffix or "yaml")  # before any work

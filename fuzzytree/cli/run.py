@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO, TextIO
 import click
 
 from fuzzytree.cli.talk import (
+    allow_loss_option,
     delimiter_option,
     quiet_option,
     say_rows,
@@ -24,11 +25,13 @@ from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import RuleBase
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     from fuzzytree.answers import Answers, By
-    from fuzzytree.contracts import Model
+    from fuzzytree.contracts import Document
+    from fuzzytree.outputs import Outputs
     from fuzzytree.runtimes.onnxruntime import OnnxModel
     from fuzzytree.tables import Batch
 
@@ -60,6 +63,7 @@ Columns = dict[str, Sequence[object]]
     is_flag=True,
     help="Write JSON lines, not CSV; null for nothing.",
 )
+@allow_loss_option
 @quiet_option
 def command(
     model: str,
@@ -71,21 +75,29 @@ def command(
     runtime: str | None,
     delimiter: str | None,
     as_json: bool,
+    allow_loss: bool,
     quiet: bool,
 ) -> None:
     """Answer the rows of TABLE: a class, a rule number and a status for each.
 
-    MODEL is a YAML or ONNX file; TABLE is CSV or Parquet, or `-` for standard input.
-    Columns are found by name. Rule numbers count from 1; 0 is no rule.
+    A fuzzy system answers a number for each output, and a status. MODEL is a file in
+    any format that can be read, or ONNX; TABLE is CSV or Parquet, or `-` for standard
+    input. Columns are found by name. Rule numbers count from 1; 0 is no rule.
     """
     from fuzzytree import verbs
 
-    found = verbs.opened(model)
+    found = verbs.opened(model, allow_loss=allow_loss)
     reason = _reasons(model, found) if why else None
     if strengths and isinstance(found, FuzzyTree):
         found = rules_from_tree(found)
+    if strengths == "class" and isinstance(found, FuzzySystem):
+        raise click.UsageError(
+            f"--strengths class: {found.name} is a fuzzy system, which decides for no "
+            "class; there is --strengths rule"
+        )
+    is_weighed = strengths is not None or (why and isinstance(found, FuzzySystem))
     with wrong_options():
-        answer = verbs.answering(found, runtime, with_strengths=strengths is not None)
+        answer = verbs.answering(found, runtime, with_strengths=is_weighed)
     source = table_source(table)
     name = "standard input" if table == "-" else table
     tally = _Tally(_tells_ties(found))
@@ -102,7 +114,11 @@ def command(
     tally.tell(output, quiet=quiet)
 
 
-def _answered(answers: Answers, strengths: By | None, model: str) -> Columns:
+def _answered(answers: Answers | Outputs, strengths: By | None, model: str) -> Columns:
+    from fuzzytree.outputs import Outputs
+
+    if isinstance(answers, Outputs):
+        return answers.columns(with_activations=strengths is not None)
     try:
         return answers.columns(strengths)
     except ValueError as error:
@@ -132,26 +148,34 @@ def _add(columns: Columns, more: Columns, name: str) -> None:
     columns.update(more)
 
 
-def _tells_ties(model: Model | OnnxModel) -> bool:
-    if isinstance(model, FuzzyTree | RuleBase):
+def _tells_ties(model: Document | OnnxModel) -> bool:
+    if isinstance(model, FuzzyTree | RuleBase | FuzzySystem):
         return True
     return "status" in model.outputs
 
 
 def _reasons(
-    path: str, model: Model | OnnxModel
-) -> Callable[[Batch, Answers], list[str]]:
-    from fuzzytree.answers import reasons
+    path: str, model: Document | OnnxModel
+) -> Callable[[Batch, Answers | Outputs], list[str]]:
+    from fuzzytree.answers import Answers, reasons
+    from fuzzytree.outputs import Outputs
+    from fuzzytree.report.systems import system_reasons
+    from fuzzytree.runtimes.onnxruntime import OnnxModel
 
-    if isinstance(model, FuzzyTree):
-        rules = rules_from_tree(model)
-    elif isinstance(model, RuleBase):
-        rules = model
-    else:
+    if isinstance(model, OnnxModel):
         raise click.UsageError(
             f"--why: {path} does not hold the rules in words; run the YAML file"
         )
-    return lambda batch, answers: reasons(rules, batch.values, answers)
+    rules = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
+
+    def reason(batch: Batch, found: Answers | Outputs) -> list[str]:
+        if isinstance(rules, FuzzySystem):
+            assert isinstance(found, Outputs)  # a system answers nothing else
+            return system_reasons(rules, found)
+        assert isinstance(found, Answers)
+        return reasons(rules, batch.values, found)
+
+    return reason
 
 
 @contextlib.contextmanager
@@ -204,32 +228,47 @@ class _Tally:
     def __init__(self, tells_ties: bool) -> None:
         self.tells_ties = tells_ties
         self.rows = self.cells = self.extras = 0
+        self.is_numeric = False
         self.classes: dict[str, int] = {}
+        self.spans: dict[str, tuple[float, float]] = {}
         self.statuses: dict[int, int] = {}
 
-    def add(self, batch: Batch, answers: Answers) -> None:
+    def add(self, batch: Batch, answers: Answers | Outputs) -> None:
         """Take the answers to a piece."""
+        from fuzzytree.outputs import Outputs
+
         self.rows += len(answers)
         self.cells += batch.missing
         self.extras = batch.extras
-        for name, count in answers.class_counts().items():
-            self.classes[name] = self.classes.get(name, 0) + count
+        if isinstance(answers, Outputs):
+            self.is_numeric = True
+            for name, (low, high) in answers.spans().items():
+                known = self.spans.get(name, (low, high))
+                self.spans[name] = (min(low, known[0]), max(high, known[1]))
+        else:
+            for name, count in answers.class_counts().items():
+                self.classes[name] = self.classes.get(name, 0) + count
         for status in range(4):
             self.statuses[status] = self.statuses.get(status, 0) + answers.count(status)
 
     def tell(self, output: str, *, quiet: bool) -> None:
         """Say on stderr what was answered and what was out of the ordinary."""
-        from fuzzytree.report.text import counted
+        from fuzzytree.report.text import counted, number
 
-        counts = ", ".join(f"{name} {count}" for name, count in self.classes.items())
+        counts = [f"{name} {count}" for name, count in self.classes.items()]
+        counts += [
+            f"{name} {number(low)} to {number(high)}"
+            for name, (low, high) in self.spans.items()
+        ]
         _, ties, uncovered, missing = (self.statuses.get(k, 0) for k in range(4))
-        tied = f"{ties} decided by the order of the rules"
-        odd = (
-            f"{tied if self.tells_ties else 'ties not told'}, {uncovered} uncovered, "
-            f"{missing} without a needed value"
-        )
+        tied = f"{ties} decided by the order of the rules, "
+        if self.is_numeric:
+            tied = ""
+        elif not self.tells_ties:
+            tied = "ties not told, "
+        odd = f"{tied}{uncovered} uncovered, {missing} without a needed value"
         say_rows(
-            ("answered", counted(self.rows, "row"), counts),
+            ("answered", counted(self.rows, "row"), ", ".join(counts)),
             ("of them", odd, ""),
             *([("ignored", counted(self.extras, "column"), "")] if self.extras else []),
             *([("wrote", output, "")] if output != "-" else []),

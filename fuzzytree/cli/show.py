@@ -2,43 +2,92 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
-from fuzzytree.cli.talk import answer, answer_json, json_option
+from fuzzytree.cli.talk import answer, answer_json, json_option, quiet_option, say
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import Document, Reading
 
 
-@click.command("show", short_help="Show a tree and its rules.")
+@click.command("show", short_help="Show a model and its rules.")
 @click.argument("model", metavar="MODEL")
 @json_option
-def command(model: str, as_json: bool) -> None:
-    """Show a tree and its rules, with the numbers behind the words.
+@quiet_option
+def command(model: str, as_json: bool, quiet: bool) -> None:
+    """Show a tree, a rule base or a fuzzy system, with the numbers behind the words.
 
-    MODEL is a file that fuzzytree wrote, YAML or ONNX.
+    MODEL is a file in any format that can be read, or ONNX. What a model cannot hold
+    of the file is told on stderr.
     """
-    import msgspec
+    from pathlib import Path
 
     from fuzzytree import verbs
     from fuzzytree.report import text
-    from fuzzytree.rulebase import RuleBase, fingerprint
     from fuzzytree.runtimes.onnxruntime import OnnxModel
 
-    found = verbs.opened(model)
-    if isinstance(found, OnnxModel):
-        facts = text.onnx_facts(found)
+    if Path(model).suffix.lower() == ".onnx":
+        opened = verbs.opened(model)
+        assert isinstance(opened, OnnxModel)
+        facts = text.onnx_facts(opened)
         if as_json:
             answer_json(facts)
         else:
             answer("\n".join(text.fact_lines(facts)))
         return
-    if not as_json:
-        answer("\n".join(text.model_lines(found)))
-        return
-    answer_json(
-        {
-            "carrier": "rules" if isinstance(found, RuleBase) else "tree",
-            "fingerprint": fingerprint(found),
-            "inputs": found.inputs,
-            "rules": text.rule_facts(found),
-            "model": msgspec.to_builtins(found),
-        }
-    )
+    found = verbs.read(model)
+    _tell(found, quiet=quiet)
+    if as_json:
+        answer_json(_facts(found))
+    else:
+        answer("\n".join(_lines(found.model)))
+
+
+def _tell(found: Reading, *, quiet: bool) -> None:
+    """Say on stderr what is not shown."""
+    from fuzzytree.converting import loss_text
+
+    for loss in found.losses:
+        say(f"lost     {loss_text(loss)}")
+    for remark in found.remarks:
+        say(f"remark   {remark}", quiet=quiet)
+
+
+def _lines(model: Document) -> list[str]:
+    from fuzzytree.report.systems import system_lines
+    from fuzzytree.report.text import model_lines
+    from fuzzytree.system import FuzzySystem
+
+    if isinstance(model, FuzzySystem):
+        return [*system_lines(model)]
+    return [*model_lines(model)]
+
+
+def _facts(found: Reading) -> dict[str, object]:
+    import msgspec
+
+    from fuzzytree.converting import carrier_of
+    from fuzzytree.report import systems, text
+    from fuzzytree.rulebase import fingerprint
+    from fuzzytree.system import FuzzySystem
+
+    model = found.model
+    facts: dict[str, object] = {
+        "carrier": carrier_of(model),
+        "fingerprint": fingerprint(model),
+    }
+    if isinstance(model, FuzzySystem):
+        facts["inputs"] = model.columns
+        facts["outputs"] = [one.name for one in model.outputs]
+        facts["rules"] = systems.rule_facts(model)
+    else:
+        facts["inputs"] = model.inputs
+        facts["rules"] = text.rule_facts(model)
+    return {
+        **facts,
+        "losses": found.losses,
+        "remarks": found.remarks,
+        "model": msgspec.to_builtins(model),
+    }

@@ -30,6 +30,12 @@ delimiter_option = click.option(
     help="Between the cells of a CSV file, if its first line does not tell.",
 )
 
+allow_loss_option = click.option(
+    "--allow-loss",
+    is_flag=True,
+    help="Read what a model cannot hold as near as it can.",
+)
+
 data_option = click.option(
     "--data", metavar="TABLE", help="Rows of your own, beside the probes."
 )
@@ -75,7 +81,20 @@ def answer_bytes(content: bytes) -> None:
 
 def table_source(name: Name) -> Name | BinaryIO:
     """Return where to read a table: behind `-` is standard input."""
-    return sys.stdin.buffer if name == "-" else name
+    return standard_input() if name == "-" else name
+
+
+def standard_input() -> BinaryIO:
+    """Return standard input, if something comes from it.
+
+    Raises:
+        click.UsageError: If it is a terminal, at which nobody types a file.
+    """
+    if sys.stdin.buffer.isatty():
+        raise click.UsageError(
+            "`-` reads standard input, which is a terminal; name a file, or pipe one in"
+        )
+    return sys.stdin.buffer
 
 
 @contextlib.contextmanager

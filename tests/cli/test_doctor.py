@@ -13,7 +13,7 @@ import pytest
 
 from fuzzytree.answers import Answers
 from fuzzytree.cli.doctor import CORE, EXTRAS
-from fuzzytree.exporters import all_formats
+from fuzzytree.exporters import TABLE, all_formats
 from fuzzytree.runtimes import all_runtimes
 from tests.cli.conftest import Call
 
@@ -57,7 +57,7 @@ def test_every_format_and_runtime_is_listed(call: Call) -> None:
 
 def test_formats_are_told_to_programs(call: Call) -> None:
     facts = json.loads(call("formats", "--json")[1])
-    assert [one["name"] for one in facts["formats"]] == ["yaml", "onnx", "python"]
+    assert [one["name"] for one in facts["formats"]] == [*TABLE]
     assert all(one["is_installed"] for one in facts["runtimes"])
 
 

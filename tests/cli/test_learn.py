@@ -204,9 +204,11 @@ def test_classes_that_look_like_words_or_numbers_are_answered_as_they_are(
     Path("odd.csv").write_text("\n".join(["a,grip", *rows, ""]), "utf-8")
     words = ("--target", "grip", "--patterns", "1", "--quiet")
     assert call("learn", "odd.csv", "-o", "odd.yaml", *words)[0] == 0
-    assert sorted(ft.load("odd.yaml").classes) == sorted(names)
+    tree = ft.load("odd.yaml")
+    assert isinstance(tree, FuzzyTree)
+    assert sorted(tree.classes) == sorted(names)
     for path in ("odd.yaml", "odd.onnx"):
-        ft.save(ft.load("odd.yaml"), path)
+        ft.save(tree, path)
         out = call("run", path, "odd.csv", "--quiet")[1]
         answers = [line.split(",")[0] for line in out.splitlines()[1:]]
         assert answers == [name for name in names for _ in range(2)]

@@ -59,7 +59,9 @@ def test_a_tree_for_its_path_alone_keeps_its_cuts(call: Call) -> None:
     assert code == 0
     words = " ".join(out.split())
     assert "the flanks of term 'low' of 'force' only relative rules need them" in words
-    assert ft.run("path.yaml", "grasps.csv").classes == ["soft", "firm", "loose", None]
+    found = ft.run("path.yaml", "grasps.csv")
+    assert isinstance(found, ft.Answers)
+    assert found.classes == ["soft", "firm", "loose", None]
 
 
 def test_what_is_dropped_on_request_is_said(call: Call) -> None:

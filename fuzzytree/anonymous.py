@@ -1,0 +1,294 @@
+"""Models without what no answer depends on: names, units, notes, counts.
+
+Two models that are equal here give the same numbers and decide alike, whatever their
+variables and terms are called. A format that cannot hold a name, or has no place for
+a unit, still carries the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from msgspec.structs import replace
+
+from fuzzytree.contracts import Document
+from fuzzytree.rulebase import (
+    Band,
+    Clause,
+    Flank,
+    Part,
+    Rule,
+    RuleBase,
+    Semantics,
+    Shape,
+    Term,
+    Variable,
+)
+from fuzzytree.system import (
+    And,
+    Call,
+    Conclusion,
+    Condition,
+    Curve,
+    Expression,
+    Formula,
+    FuzzySystem,
+    Is,
+    Label,
+    Name,
+    Not,
+    Or,
+    RuleBlock,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+)
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets
+
+Names = Mapping[str, str]
+Labels = Mapping[str, Names]
+
+
+def anonymous(model: Document) -> Document:
+    """Return a model whose parts are called by their places: `v1`, `t1`, `c1`.
+
+    Units, notes, supports, training columns and the origin of terms are left out, and
+    ranges where no value is moved into them and no curve is looked at in them.
+
+    Args:
+        model: A tree, a rule base or a system.
+
+    Example:
+        >>> from fuzzytree.rulebase import RuleBase, Rule, Variable
+        >>> one = RuleBase("a", ("x",), (Variable("p"),), (Rule((), "x"),))
+        >>> two = RuleBase("b", ("y",), (Variable("q", unit="mm"),), (Rule((), "y"),))
+        >>> anonymous(one) == anonymous(two)
+        True
+    """
+    match model:
+        case FuzzySystem():
+            return _system(model)
+        case RuleBase():
+            return _rules(model)
+        case FuzzyTree():
+            return _tree(model)
+
+
+def _numbered(letter: str, names: Iterable[str]) -> Names:
+    return {name: f"{letter}{k}" for k, name in enumerate(names, 1)}
+
+
+def _rules(rules: RuleBase) -> RuleBase:
+    names = _numbered("v", (v.name for v in rules.variables))
+    terms = {v.name: _numbered("t", (t.name for t in v.terms)) for v in rules.variables}
+    classes = _numbered("c", rules.classes)
+    return RuleBase(
+        name="m",
+        classes=tuple(classes.values()),
+        variables=_variables(rules.variables, names, terms),
+        rules=tuple(
+            Rule(_clauses(rule.when, names, terms), classes[rule.then])
+            for rule in rules.rules
+        ),
+        semantics=_semantics(rules.semantics, classes),
+    )
+
+
+def _tree(tree: FuzzyTree) -> FuzzyTree:
+    names = _numbered("v", (v.name for v in tree.variables))
+    terms = {v.name: _numbered("t", (t.name for t in v.terms)) for v in tree.variables}
+    sets = {s.variable: _numbered("t", (t.name for t in s.terms)) for s in tree.sets}
+    classes = _numbered("c", tree.classes)
+
+    def branch(one: Branch, variable: str) -> Branch:
+        asked = tuple(terms[variable][name] for name in one.terms)
+        fitted = tuple(sets[variable][name] for name in one.sets) if sets else ()
+        return replace(one, terms=asked, sets=fitted)
+
+    return FuzzyTree(
+        name="m",
+        classes=tuple(classes.values()),
+        variables=_variables(tree.variables, names, terms),
+        nodes=tuple(
+            Node(
+                names[node.variable],
+                node.cuts,
+                node.owners,
+                tuple(branch(one, node.variable) for one in node.branches),
+            )
+            for node in tree.nodes
+        ),
+        leaves=tuple(Leaf(classes[leaf.label]) for leaf in tree.leaves),
+        sets=tuple(
+            Sets(names[one.variable], _terms(one.terms, sets[one.variable]))
+            for one in tree.sets
+        ),
+        semantics=_semantics(tree.semantics, classes),
+    )
+
+
+def _variables(
+    variables: tuple[Variable, ...], names: Names, terms: Labels
+) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(
+            names[one.name],
+            _terms(one.terms, terms[one.name]),
+            parts=_parts(one.parts, names),
+        )
+        for one in variables
+    )
+
+
+def _terms(terms: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
+    return tuple(Term(names[one.name], _shape(one.shape)) for one in terms)
+
+
+def _shape(shape: Shape) -> Shape:
+    if isinstance(shape, Band):
+        return replace(shape, left=_flank(shape.left), right=_flank(shape.right))
+    return shape
+
+
+def _flank(flank: Flank | None) -> Flank | None:
+    return None if flank is None else replace(flank, error=None)
+
+
+def _parts(parts: tuple[Part, ...], names: Names) -> tuple[Part, ...]:
+    return tuple(Part(names[one.input], one.weight, one.centre) for one in parts)
+
+
+def _clauses(
+    when: tuple[Clause, ...], names: Names, terms: Labels
+) -> tuple[Clause, ...]:
+    return tuple(
+        Clause(
+            names[one.variable],
+            tuple(terms[one.variable][name] for name in one.terms),
+            one.negated,
+        )
+        for one in when
+    )
+
+
+def _semantics(semantics: Semantics, classes: Names) -> Semantics:
+    uncovered, missing = semantics.uncovered, semantics.missing
+    return Semantics(
+        semantics.conjunction,
+        None if uncovered is None else classes[uncovered],
+        None if missing is None else classes[missing],
+    )
+
+
+def _system(system: FuzzySystem) -> FuzzySystem:
+    names = _numbered("v", (one.name for one in system.variables))
+    labels = {
+        one.name: _numbered("t", (label.name for label in one.labels))
+        for one in system.variables
+    }
+    return FuzzySystem(
+        name="m",
+        inputs=tuple(_input(one, names, labels) for one in system.inputs),
+        outputs=tuple(_output(one, names, labels) for one in system.outputs),
+        blocks=tuple(_block(one, names, labels) for one in system.blocks),
+    )
+
+
+def _input(one: SystemInput, names: Names, labels: Labels) -> SystemInput:
+    return SystemInput(
+        names[one.name],
+        _labels(one.labels, names, labels[one.name]),
+        low=one.low if one.clips else None,
+        high=one.high if one.clips else None,
+        clips=one.clips,
+        parts=_parts(one.parts, names),
+    )
+
+
+def _output(one: SystemOutput, names: Names, labels: Labels) -> SystemOutput:
+    is_free = one.defuzzifier.is_weighted and not one.clips
+    how = one.defuzzifier
+    if how.is_weighted:
+        how = type(how)(how.method)
+    return replace(
+        one,
+        name=names[one.name],
+        labels=_labels(one.labels, names, labels[one.name]),
+        low=None if is_free else one.low,
+        high=None if is_free else one.high,
+        defuzzifier=how,
+        unit="",
+    )
+
+
+def _labels(
+    labels: tuple[Label, ...], variables: Names, names: Names
+) -> tuple[Label, ...]:
+    return tuple(
+        replace(one, name=names[one.name], curve=_curve(one.curve, variables))
+        for one in labels
+    )
+
+
+def _curve(curve: Curve, names: Names) -> Curve:
+    if isinstance(curve, Formula):
+        return Formula(_expression(curve.expression, names))
+    return _shape(curve) if isinstance(curve, Band) else curve
+
+
+def _expression(expression: Expression, names: Names) -> Expression:
+    match expression:
+        case Name(name=name):
+            return Name(name if name == "x" else names.get(name, name))
+        case Call(function=function, arguments=arguments):
+            return Call(function, tuple(_expression(one, names) for one in arguments))
+        case _:
+            return expression
+
+
+def _block(block: RuleBlock, names: Names, labels: Labels) -> RuleBlock:
+    rules = tuple(
+        SystemRule(
+            None if rule.when is None else _condition(rule.when, names, labels),
+            tuple(_conclusion(one, names, labels) for one in rule.then),
+            rule.weight,
+        )
+        for rule in block.rules
+    )
+    kinds = [one for rule in block.rules for one in _kinds(rule.when)]
+    return replace(
+        block,
+        rules=rules,
+        conjunction=block.conjunction if And in kinds else None,
+        disjunction=block.disjunction if Or in kinds else None,
+        name="",
+    )
+
+
+def _kinds(condition: Condition | None) -> Iterable[type]:
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            yield type(condition)
+            for part in parts:
+                yield from _kinds(part)
+        case Not(part=part):
+            yield from _kinds(part)
+        case _:
+            return
+
+
+def _condition(condition: Condition, names: Names, labels: Labels) -> Condition:
+    match condition:
+        case Is(variable=variable, label=label, hedges=hedges):
+            known = labels[variable]
+            return Is(names[variable], None if label is None else known[label], hedges)
+        case And(parts=parts):
+            return And(tuple(_condition(one, names, labels) for one in parts))
+        case Or(parts=parts):
+            return Or(tuple(_condition(one, names, labels) for one in parts))
+        case Not(part=part):
+            return Not(_condition(part, names, labels))
+
+
+def _conclusion(one: Conclusion, names: Names, labels: Labels) -> Conclusion:
+    return Conclusion(names[one.output], labels[one.output][one.label], one.hedges)

@@ -1,0 +1,299 @@
+"""`fuzzytree convert`: a model from one format to another, with its losses."""
+
+from __future__ import annotations
+
+import hashlib
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from fuzzytree.cli.carriers import (
+    as_option,
+    conjunction_option,
+    terms_option,
+    wanted_format,
+)
+from fuzzytree.cli.talk import (
+    answer_bytes,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    say_rows,
+    standard_input,
+    wrong_options,
+)
+from fuzzytree.contracts import Carrier, Document, Format, Reading, Written
+from fuzzytree.errors import LossError
+from fuzzytree.files import LIMIT, write_atomically
+from fuzzytree.rulebase import Conjunction, Kind
+
+if TYPE_CHECKING:
+    from fuzzytree.converting import Proof
+    from fuzzytree.numerics.bounds import Certificate
+    from fuzzytree.options import Option
+
+
+@click.command("convert", short_help="Bring a model from one format to another.")
+@click.argument("source", metavar="IN")
+@click.argument("output", metavar="OUT")
+@click.option("--from", "read_as", metavar="FORMAT", help="If not IN's suffix says.")
+@click.option("--to", metavar="FORMAT", help="If not OUT's suffix says.")
+@as_option
+@terms_option
+@conjunction_option
+@click.option("--dialect", metavar="NAME", help="Of the format that is written.")
+@click.option(
+    "--tolerance",
+    metavar="NUMBER",
+    help="The largest error of a degree where a curve becomes points.",
+)
+@click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="An option of the writer; `fuzzytree formats --format NAME` lists them.",
+)
+@click.option(
+    "--allow-loss", is_flag=True, help="Read and write what is lost as near as can be."
+)
+@json_option
+@quiet_option
+def command(
+    source: str,
+    output: str,
+    read_as: str | None,
+    to: str | None,
+    carrier: Carrier | None,
+    kind: Kind | None,
+    conjunction: Conjunction | None,
+    dialect: str | None,
+    tolerance: str | None,
+    settings: Sequence[str],
+    allow_loss: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Bring the model of file IN to file OUT, whose suffixes name the formats.
+
+    `-` is standard input or output. What has no place in the model or in OUT is
+    listed, and nothing is written unless allowed: exit 1.
+    """
+    if output == "-" and to is None:
+        raise click.UsageError("`-` has no suffix; name the format with --to")
+    from fuzzytree.report.systems import document_text
+
+    given = [("dialect", dialect), ("tolerance", tolerance), *map(_pair, settings)]
+    form = wanted_format(output, to)
+    with wrong_options():
+        options = _options(form, given)
+    found, used = read_source(source, read_as)
+    head = f"{used}: {document_text(found.model)}"
+    say_rows(("read", source, head), quiet=quiet)
+    return carry(
+        found,
+        source,
+        used,
+        form,
+        output,
+        choice=Choice(carrier, kind, conjunction),
+        options=options,
+        allow_loss=allow_loss,
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+def _pair(text: str) -> tuple[str, str | None]:
+    name, mark, value = text.partition("=")
+    if not mark or not name.strip():
+        raise click.UsageError(f"--set {text}: must be NAME=VALUE")
+    return name.strip().replace("-", "_"), value.strip()
+
+
+def _options(
+    form: Format, given: Sequence[tuple[str, str | None]]
+) -> dict[str, Option]:
+    from fuzzytree.options import option_value
+
+    options: dict[str, Option] = {}
+    for name, text in given:
+        if text is None:
+            continue
+        if name in options:
+            raise ValueError(f"the option {name!r} is given twice")
+        options[name] = option_value(form, name, text)
+    return options
+
+
+def read_source(source: str, read_as: str | None) -> tuple[Reading, str]:
+    """Return what a file or standard input holds, and the name of its format."""
+    from fuzzytree import converting
+    from fuzzytree.errors import ReadError
+    from fuzzytree.exporters import find_format
+
+    if source != "-":
+        with wrong_options():
+            form = find_format(read_as) if read_as else converting.format_of(source)
+        return converting.read(source, format=form.name), form.name
+    if read_as is None:
+        raise click.UsageError("`-` has no suffix; name the format with --from")
+    with wrong_options():
+        form = find_format(read_as)
+    converting.refuse_unreadable(form, "standard input")
+    content = standard_input().read(LIMIT + 1)
+    if len(content) > LIMIT:
+        raise ReadError(f"standard input: is larger than {LIMIT} bytes")
+    return converting.read_content(content, form, name="standard input"), form.name
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """The form of a model that was asked for."""
+
+    carrier: Carrier | None = None
+    kind: Kind | None = None
+    conjunction: Conjunction | None = None
+
+
+def carry(
+    found: Reading,
+    source: str,
+    read_as: str,
+    form: Format,
+    output: str,
+    *,
+    choice: Choice,
+    options: Mapping[str, Option],
+    allow_loss: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Write what was read in another format, and tell what was done; 1 for a refusal.
+
+    Args:
+        found: What was read.
+        source: The file that it was read from.
+        read_as: The format of that file.
+        form: The format to write.
+        output: The file to write; `-` is standard output.
+        choice: The form of the model.
+        options: Of the writer.
+        allow_loss: Whether to write although something is lost.
+        as_json: Whether the facts are told as JSON.
+        quiet: Whether nothing is told but errors.
+    """
+    from fuzzytree.cli.carriers import carried
+    from fuzzytree.converting import carrier_of, loss_text, proved
+    from fuzzytree.report import systems
+
+    model = carried(
+        found.model,
+        form,
+        carrier=choice.carrier,
+        kind=choice.kind,
+        conjunction=choice.conjunction,
+    )
+    facts: dict[str, object] = {
+        "read": {
+            "file": source,
+            "format": read_as,
+            **systems.document_facts(found.model),
+            "losses": found.losses,
+            "remarks": found.remarks,
+        },
+        "format": form.name,
+        "carrier": carrier_of(model),
+    }
+    for remark in found.remarks:
+        say(f"remark   {remark}", quiet=quiet)
+    with wrong_options():
+        written, refusal = _written(model, form, options)
+    losses = (*found.losses, *written.losses)
+    if losses and not allow_loss:
+        _refuse(found, refusal)
+        if as_json and output != "-":
+            more = {"losses": written.losses, "remarks": written.remarks}
+            answer_json({**facts, "file": None, **more})
+        return 1
+    proof = proved(model, form, written, dtype=options.get("dtype"))
+    if output == "-":
+        answer_bytes(written.content)
+    else:
+        write_atomically(output, written.content)
+    for loss in losses:
+        say(f"lost     {loss_text(loss)}", quiet=quiet)
+    for remark in written.remarks:
+        say(f"remark   {remark}", quiet=quiet)
+    digest = hashlib.sha256(written.content).hexdigest()
+    size = len(written.content)
+    after = _next(source, output, form, has_loss=bool(found.losses))
+    say_rows(
+        ("wrote", output, f"{form.name}, {size} bytes, sha256 {digest}"),
+        _proof_row(proof),
+        *([("next", after, "")] if after else []),
+        quiet=quiet,
+    )
+    if as_json and output != "-":
+        answer_json(
+            {
+                **facts,
+                "file": output,
+                "bytes": size,
+                "sha256": digest,
+                "losses": written.losses,
+                "remarks": written.remarks,
+                "proof": {"verdict": proof.verdict, "sentence": proof.sentence},
+                "certificate": _certificate_facts(proof.certificate),
+                "next": after or None,
+            }
+        )
+    return 0
+
+
+def _written(
+    model: Document, form: Format, options: Mapping[str, Option]
+) -> tuple[Written, str]:
+    """Write a model; if something is lost, return also how the writer refuses that."""
+    from fuzzytree.converting import export
+
+    try:
+        return export(model, form.name, allow_loss=False, **options), ""
+    except LossError as error:
+        written = export(model, form.name, allow_loss=True, **options)
+        return written, str(error).replace("allow_loss=True", "--allow-loss")
+
+
+def _refuse(found: Reading, refusal: str) -> None:
+    """Say what would be lost, and that nothing is written."""
+    from fuzzytree.converting import loss_text
+
+    for loss in found.losses:
+        say(f"lost     {loss_text(loss)}")
+    if refusal:
+        say(refusal)
+    if "--allow-loss" not in refusal:
+        say("nothing is written; pass --allow-loss to write what is left")
+
+
+def _proof_row(proof: Proof) -> tuple[str, str, str]:
+    if proof.verdict == "certified" and proof.certificate:
+        return "bound", proof.certificate.dtype or "exact", proof.sentence
+    return "proved", proof.verdict, proof.sentence
+
+
+def _certificate_facts(found: Certificate | None) -> dict[str, object] | None:
+    if found is None:
+        return None
+    return {"sentence": found.sentence, **msgspec.structs.asdict(found)}
+
+
+def _next(source: str, output: str, form: Format, *, has_loss: bool) -> str:
+    """Return the command that one might run after this one."""
+    if "-" in (source, output) or (form.read is None and form.name != "onnx"):
+        return ""
+    words = ["fuzzytree", "check", source, output]
+    return shlex.join([*words, "--allow-loss"] if has_loss else words)

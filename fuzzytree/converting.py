@@ -1,0 +1,486 @@
+"""From a file to a model, and from a model to a file, with a proof of what arrived."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, cast, get_args
+
+import msgspec
+
+from fuzzytree.anonymous import anonymous
+from fuzzytree.contracts import (
+    Carrier,
+    Document,
+    Dtype,
+    Format,
+    Loss,
+    Model,
+    Reading,
+    Written,
+)
+from fuzzytree.errors import DisagreementError, LossError, ReadError
+from fuzzytree.exporters import find_format
+from fuzzytree.files import read_bounded
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.options import Option, check_names
+from fuzzytree.probing import probes
+from fuzzytree.reference import evaluate
+from fuzzytree.rulebase import Conjunction, Kind, RuleBase, fingerprint
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.numerics.bounds import Certificate
+
+_TRIED = 1000  # probes of what a loss does to decisions
+
+CALLED: dict[Carrier, str] = {
+    "tree": "tree",
+    "rules": "rule base",
+    "system": "fuzzy system",
+}
+"""What people call each carrier."""
+
+
+class Proof(msgspec.Struct, frozen=True):
+    """How a written file stands to the model that it was made of.
+
+    Attributes:
+        verdict: `equal`: read back, it is that model in every number and name.
+            `alike`: read back, it is that model but for names and notes, of which the
+            writer told.
+            `certified`: it computes, within the bound of the certificate.
+            `as listed`: it differs by the losses that were allowed.
+            `unproved`: the file is not read back.
+        sentence: The same for people.
+        certificate: What a number type can change, if the file computes.
+    """
+
+    verdict: Literal["equal", "alike", "certified", "as listed", "unproved"]
+    sentence: str
+    certificate: Certificate | None = None
+
+
+class Conversion(msgspec.Struct, frozen=True):
+    """A model that went from one file to another.
+
+    Attributes:
+        source: The file that was read, or the model's name.
+        read_as: The format that was read; empty for a model.
+        reading: What was read.
+        to: The format that was written.
+        model: What was written: the model that was read, or what it was turned into.
+        written: The file.
+        proof: How the file stands to the model.
+    """
+
+    source: str
+    read_as: str
+    reading: Reading
+    to: str
+    model: Document
+    written: Written
+    proof: Proof
+
+
+def carrier_of(model: Document) -> Carrier:
+    """Return which kind of model it is."""
+    match model:
+        case FuzzySystem():
+            return "system"
+        case RuleBase():
+            return "rules"
+        case FuzzyTree():
+            return "tree"
+
+
+def format_of(path: str | os.PathLike[str]) -> Format:
+    """Return the format that a file's suffix names.
+
+    Raises:
+        ReadError: If there is none.
+    """
+    suffix = Path(path).suffix
+    try:
+        return find_format(suffix or "no suffix")
+    except ValueError as error:
+        shown = f"the suffix {suffix!r}" if suffix else "no suffix"
+        known = str(error).rpartition("; ")[2]
+        raise ReadError(f"{os.fspath(path)}: has {shown}; {known}") from error
+
+
+def read(path: str | os.PathLike[str], *, format: str | None = None) -> Reading:
+    """Read a model from a file, with what the model cannot hold.
+
+    Args:
+        path: The file.
+        format: The name of its format; the one of its suffix unless given.
+
+    Raises:
+        ReadError: If the file cannot be read, or says something wrong; the message
+            lists all mistakes with their lines.
+        ValueError: If there is no such format.
+    """
+    form = find_format(format) if format else format_of(path)
+    refuse_unreadable(form, os.fspath(path))
+    return read_content(read_bounded(path), form, name=os.fspath(path))
+
+
+def refuse_unreadable(form: Format, name: str) -> None:
+    """Refuse a file in a format that only others read.
+
+    Raises:
+        ReadError: If the format has no reader.
+    """
+    if form.read is None:
+        raise ReadError(
+            f"{name}: a file in the format {form.name} is not read back as a model; "
+            "keep the YAML file beside it"
+        )
+
+
+def read_content(content: bytes, form: Format, *, name: str) -> Reading:
+    """Read a model from the content of a file.
+
+    Raises:
+        ReadError: As `read`.
+    """
+    refuse_unreadable(form, name)
+    if not content:
+        raise ReadError(f"{name}:1:1: the file is empty")
+    assert form.read is not None  # refused above; for type checkers
+    return form.read(content, name)
+
+
+def load(
+    path: str | os.PathLike[str], *, allow_loss: bool = False, format: str | None = None
+) -> Document:
+    """Read a model from a file: a tree, a rule base or a fuzzy system.
+
+    Args:
+        path: The file.
+        allow_loss: Whether to read what the model cannot hold as near as it can.
+        format: The name of its format; the one of its suffix unless given.
+
+    Raises:
+        ReadError: If the file cannot be read, or says something wrong; the message
+            lists all mistakes with their lines.
+        LossError: If the model cannot hold all that the file says, unless allowed;
+            the message lists all losses.
+        ValueError: If there is no such format.
+    """
+    found = read(path, format=format)
+    if found.losses and not allow_loss:
+        raise LossError(losses_text(found.losses, os.fspath(path)))
+    return found.model
+
+
+def deciding(model: Document, verb: str) -> Model:
+    """Return a model that decides for a class, as some verbs need.
+
+    Args:
+        model: Any model.
+        verb: What needs it.
+
+    Raises:
+        ReadError: If it is a fuzzy system, whose outputs are numbers.
+    """
+    if isinstance(model, FuzzySystem):
+        raise ReadError(
+            f"{model.name} is a fuzzy system, which decides for no class; "
+            f"{verb} needs a tree or a rule base"
+        )
+    return model
+
+
+def losses_text(losses: Sequence[Loss], name: str) -> str:
+    """Return a message that lists what a model cannot hold of a file."""
+    listed = "\n".join(f"  {loss_text(loss)}" for loss in losses)
+    return (
+        f"{name}: a model cannot hold all that the file says:\n{listed}\n"
+        "  pass allow_loss=True to read it as stated"
+    )
+
+
+def loss_text(loss: Loss) -> str:
+    """Return a loss as people read it, with its bound."""
+    bound = "" if loss.bound is None else f" (largest error {loss.bound:.2g})"
+    return f"{loss.where}: {loss.what}{bound}"
+
+
+def formed(
+    model: Document,
+    form: Format,
+    *,
+    carrier: Carrier | None = None,
+    kind: Kind | None = None,
+    conjunction: Conjunction | None = None,
+) -> Document:
+    """Return a model in the form that was asked for, or that a format carries.
+
+    Unless told otherwise a model stays what it is. Where the format does not carry
+    that, a tree becomes rules, rules become the system that decides alike, and a
+    system that decides as rules do becomes those rules.
+
+    Args:
+        model: A tree, a rule base or a system.
+        form: The format that it goes to.
+        carrier: What it shall be.
+        kind: The terms of rules made from a tree; relative unless given.
+        conjunction: The AND of rules made from a tree.
+
+    Raises:
+        LossError: If the format does not carry it in any form.
+        ValueError: If the model cannot be had in the form that was asked for.
+    """
+    asked_rules = kind is not None or conjunction is not None
+    if isinstance(model, FuzzyTree):
+        carries = carrier or ("rules" if asked_rules else _nearest("tree", form))
+        if carries == "tree":
+            return model
+        model = rules_from_tree(model, kind or "relative", conjunction=conjunction)
+        carrier = carrier or _nearest("rules", form)
+    elif isinstance(model, RuleBase):
+        _refuse_remaking(model, carrier, kind, conjunction)
+    if isinstance(model, RuleBase):
+        if (carrier or _nearest("rules", form)) != "system":
+            return model
+        from fuzzytree.casting import as_system
+
+        return as_system(model, scores="winner")
+    if carrier == "tree":
+        raise ValueError(
+            f"as tree: {model.name} is a fuzzy system, and no tree can be made of it"
+        )
+    if (carrier or _nearest("system", form)) == "system":
+        return model
+    from fuzzytree.casting import as_rules
+
+    found = as_rules(model, None)
+    if found is None:
+        raise LossError(
+            f"cannot write {model.name} as {form.name}: its outputs are numbers, and "
+            "rules decide for a class"
+        )
+    return found
+
+
+_FORMS: dict[Carrier, tuple[Carrier, ...]] = {
+    "tree": ("tree", "rules", "system"),
+    "rules": ("rules", "system"),
+    "system": ("system", "rules"),
+}
+"""What each kind of model can be turned into, the nearest first."""
+
+
+def _nearest(carrier: Carrier, form: Format) -> Carrier:
+    """Return the nearest kind of model that a format carries, or else the same."""
+    for one in _FORMS[carrier]:
+        if one in form.carries:
+            return one
+    return carrier
+
+
+def _refuse_remaking(
+    rules: RuleBase,
+    carrier: Carrier | None,
+    kind: Kind | None,
+    conjunction: Conjunction | None,
+) -> None:
+    if carrier == "tree":
+        raise ValueError(
+            f"as tree: {rules.name} is a rule base, and no tree can be made of it"
+        )
+    for option, wanted, found in (
+        ("terms", kind, rules.kind),
+        ("conjunction", conjunction, rules.semantics.conjunction),
+    ):
+        if wanted is not None and wanted != found:
+            raise ValueError(
+                f"{option} {wanted}: {rules.name} is a rule base with "
+                f"{found or 'other'}; other rules are made from the tree"
+            )
+
+
+def export(
+    model: Document, to: str = "yaml", *, allow_loss: bool = False, **options: Option
+) -> Written:
+    """Write a model in a format, as bytes.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system.
+        to: The name of a format, or a suffix such as `.onnx`.
+        allow_loss: Whether to write what the format cannot hold as near as it can.
+        options: The writer's own options, such as `dtype` for onnx.
+
+    Returns:
+        The content and what was lost.
+
+    Raises:
+        LossError: If something would be lost, unless allowed.
+        MissingExtraError: If a package is missing; the message names the extra.
+        ValueError: If there is no such format or option.
+    """
+    form = find_format(to)
+    carrier = carrier_of(model)
+    if carrier not in form.carries:
+        carried = " or ".join(form.carries)
+        raise LossError(
+            f"cannot write {model.name} as {form.name}: it carries {carried}, "
+            f"and this is a {CALLED[carrier]}"
+        )
+    check_names(form, options)
+    # Each writer checks its own options; the protocol knows the common one alone.
+    write = cast("Callable[..., Written]", form.write)
+    return write(model, allow_loss=allow_loss, **options)
+
+
+def proved(
+    model: Document, form: Format, written: Written, *, dtype: object = None
+) -> Proof:
+    """Read a file back, or derive what it can change, and tell how it stands.
+
+    Args:
+        model: What was written.
+        form: The format.
+        written: The file.
+        dtype: The number type that the writer was asked for, if any.
+
+    Raises:
+        DisagreementError: If the file is read back as another model, though the writer
+            and the reader told of nothing.
+    """
+    if form.dtype is not None:
+        return _certified(model, form, dtype)
+    if form.read is None:
+        return Proof("unproved", f"files in the format {form.name} are not read back")
+    again = form.read(written.content, form.name)
+    if fingerprint(again.model) == fingerprint(model):
+        what = CALLED[carrier_of(model)]
+        text = f"read back from the file, the {what} is equal in every number"
+        if form.name == "yaml" or not isinstance(model, FuzzySystem):
+            return Proof("equal", text, _exact(model, text))
+        return Proof("equal", text)
+    remarks = (*written.remarks, *again.remarks)
+    if remarks and any(_same(one, again.model) for one in _stand_ins(model)):
+        text = "read back from the file, it is equal but for names and notes"
+        return Proof("alike", text)
+    if written.losses or again.losses:
+        text = "read back from the file, it differs by what was lost"
+        return Proof("as listed", f"{text}{_decided(model, again.model)}")
+    raise DisagreementError(
+        f"{model.name} as {form.name} is read back as another model; nothing is written"
+    )
+
+
+def _decided(model: Document, other: Document) -> str:
+    """Return what a loss did to the decisions of rules, in words; empty for others.
+
+    Relative rules that became points decide alike everywhere, by the proof in
+    `fuzzytree.numerics.approximation`; here it is tried as well.
+    """
+    if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
+        return ""
+    if len(model.rules) != len(other.rules) or model.inputs != other.inputs:
+        return ""
+    rows = probes(model, limit=_TRIED)
+    changed = [r for r in rows if evaluate(model, r).rule != evaluate(other, r).rule]
+    if changed:
+        return f"; another rule wins in {len(changed)} of {len(rows)} probes"
+    proof = ", as it must for relative terms" if model.kind == "relative" else ""
+    return f"; the same rule wins in all of {len(rows)} probes{proof}"
+
+
+def _certified(model: Document, form: Format, dtype: object) -> Proof:
+    if isinstance(model, FuzzySystem):
+        return Proof("unproved", "the file computes; `fuzzytree check` compares it")
+    from fuzzytree.numerics.bounds import certify
+
+    asked = [name for name in get_args(Dtype) if name == dtype]
+    known = asked or [name for name in get_args(Dtype) if name == form.dtype]
+    certificate = certify(model, known[0], None)
+    return Proof("certified", certificate.sentence, certificate)
+
+
+def _exact(model: Document, origin: str) -> Certificate | None:
+    """Return the certificate of a file that holds a deciding model and changes none."""
+    if isinstance(model, FuzzySystem):
+        return None
+    from fuzzytree.numerics.bounds import Certificate
+
+    return Certificate(None, carrier_of(model), 0.0, origin)
+
+
+def _stand_ins(model: Document) -> Iterator[Document]:
+    """Yield what a file may hold in the place of a model, deciding alike."""
+    yield model
+    if isinstance(model, RuleBase):
+        from fuzzytree.casting import as_system
+
+        yield as_system(model, scores="winner")
+        yield as_system(model, scores="rule")
+        yield as_system(model, scores="class")
+
+
+def _same(one: Document, other: Document) -> bool:
+    return fingerprint(anonymous(one)) == fingerprint(anonymous(other))
+
+
+def convert(
+    source: str | os.PathLike[str] | Document | Reading,
+    to: str,
+    *,
+    format: str | None = None,
+    allow_loss: bool = False,
+    carrier: Carrier | None = None,
+    terms: Kind | None = None,
+    conjunction: Conjunction | None = None,
+    **options: Option,
+) -> Conversion:
+    """Bring a model from one format to another, and prove what arrived.
+
+    Args:
+        source: The path of a file, a model, or what was read.
+        to: The name of a format, or a suffix such as `.fll`.
+        format: Of the file; the one of its suffix unless given.
+        allow_loss: Whether to read and write what has no place as near as it can.
+        carrier: `tree`, `rules` or `system`; what the format carries unless given.
+        terms: Of rules made from a tree: `relative`, which equal it, or `raw`.
+        conjunction: Of rules made from a tree.
+        options: The writer's own.
+
+    Returns:
+        What was read, what was written, and how the file stands to the model.
+
+    Raises:
+        ReadError: As `read`.
+        LossError: If something would be lost, unless allowed.
+        DisagreementError: If the file is read back as another model without a word.
+        ValueError: If there is no such format, form or option.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> convert(random_tree(1), "yaml", carrier="rules").proof.verdict
+        'equal'
+    """
+    form = find_format(to)
+    name, read_as = "", ""
+    if isinstance(source, Reading):
+        found = source
+    elif isinstance(source, str | os.PathLike):
+        found = read(source, format=format)
+        name = os.fspath(source)
+        read_as = (find_format(format) if format else format_of(source)).name
+    else:
+        found = Reading(source)
+    name = name or found.model.name
+    if found.losses and not allow_loss:
+        raise LossError(losses_text(found.losses, name))
+    model = formed(
+        found.model, form, carrier=carrier, kind=terms, conjunction=conjunction
+    )
+    written = export(model, form.name, allow_loss=allow_loss, **options)
+    proof = proved(model, form, written, dtype=options.get("dtype"))
+    return Conversion(name, read_as, found, form.name, model, written, proof)
