@@ -138,11 +138,11 @@ def trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
 
 
 def _ramp(start: float, end: float) -> Curve:
+    if start == end:
+        return Points((start,), (0.0,))  # as fuzzylite
     if start < end:
-        return Trapezoid(start, end, end, None)
-    if start > end:
-        return Trapezoid(None, end, end, start)
-    return Points((start,), (0.0,))
+        return Points((start, end), (0.0, 1.0))
+    return Points((end, start), (1.0, 0.0))
 
 
 def _rising(start: float, end: float) -> Curve:
@@ -161,8 +161,8 @@ KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
     {
         "trimf": Kind("a b c", lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
         "trapmf": Kind("a b c d", lambda n: trapezoid(*n)),
-        "linzmf": Kind("a b", lambda n: Trapezoid(None, n[0], n[0], n[1])),
-        "linsmf": Kind("a b", lambda n: Trapezoid(n[0], n[1], n[1], None)),
+        "linzmf": Kind("a b", lambda n: _ramp(n[1], n[0])),
+        "linsmf": Kind("a b", lambda n: _ramp(*n)),
         "gaussmf": Kind("deviation mean", lambda n: Gaussian(n[1], abs(n[0]))),
         "gauss2mf": Kind(
             "deviation mean deviation mean",

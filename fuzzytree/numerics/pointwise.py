@@ -1,0 +1,192 @@
+"""Point lists joined value by value: the least, the greatest, the product, 1 minus.
+
+For formats in which a rule asks a variable only once: `x is low and x is not far` is
+one term there. Everything is computed with rational numbers and rounded once at the
+end; the bound covers that rounding, at every real value.
+"""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.errors import LossError
+from fuzzytree.numerics.curves import BELOW_ONE
+from fuzzytree.rulebase import MOST_POINTS, Points
+
+
+class _Knot(NamedTuple):
+    """A value, the degree at it, and the degree right above it."""
+
+    x: Fraction
+    at: Fraction
+    above: Fraction
+
+
+Lines = tuple[_Knot, ...]
+"""Knots in rising order, joined by lines; level before the first, behind the last."""
+
+
+def lines_of(points: Points) -> Lines:
+    """Return a point list as knots.
+
+    Example:
+        >>> len(lines_of(Points((0.0, 1.0, 1.0), (0.0, 1.0, 0.5))))
+        2
+    """
+    knots: list[_Knot] = []
+    for value, degree in zip(points.values, points.degrees, strict=True):
+        x, y = Fraction(value), Fraction(degree)
+        if knots and knots[-1].x == x:
+            knots[-1] = knots[-1]._replace(above=y)
+        else:
+            knots.append(_Knot(x, y, y))
+    return tuple(knots)
+
+
+def least(one: Lines, other: Lines) -> Lines:
+    """Return the smaller degree of two at each value, exactly."""
+    return _joined(one, other, min)
+
+
+def greatest(one: Lines, other: Lines) -> Lines:
+    """Return the larger degree of two at each value, exactly."""
+    return _joined(one, other, max)
+
+
+def negated(lines: Lines) -> Lines:
+    """Return 1 minus the degree at each value, exactly."""
+    return tuple(_Knot(k.x, 1 - k.at, 1 - k.above) for k in lines)
+
+
+def product(one: Lines, other: Lines, tolerance: float) -> tuple[Lines, float]:
+    """Return the product of two degrees at each value, and its largest error.
+
+    On a piece where the slopes are p and r, a line over a width h misses the product
+    by `|p r| h^2 / 4` at most; pieces are halved in number until that is below the
+    tolerance.
+    """
+    knots: list[_Knot] = []
+    worst = Fraction(0)
+    for before, here in itertools.pairwise([None, *_common(one, other)]):
+        assert here is not None  # only the first is
+        if before is not None:
+            rise = (here[1].at - before[1].above) * (here[2].at - before[2].above)
+            count = math.isqrt(int(abs(rise) / Fraction(4.0 * tolerance))) + 1
+            worst = max(worst, abs(rise) / (4 * count * count))
+            for step in range(1, count):
+                x = before[0] + (here[0] - before[0]) * Fraction(step, count)
+                y = _degree(one, x) * _degree(other, x)
+                knots.append(_Knot(x, y, y))
+        x, first, second = here
+        knots.append(_Knot(x, first.at * second.at, first.above * second.above))
+        if len(knots) > MOST_POINTS:
+            raise LossError(
+                f"the product of two curves needs more than {MOST_POINTS} points; "
+                "allow a larger error"
+            )
+    return tuple(knots), _up(worst)
+
+
+def rounded(lines: Lines) -> tuple[Points, float]:
+    """Return a point list, and the largest difference from the lines.
+
+    A degree that is below 1 stays below 1.
+
+    Raises:
+        LossError: If it would need more than 4096 points.
+    """
+    values: list[float] = []
+    degrees: list[float] = []
+    for knot in _needed(lines):
+        x = float(knot.x)
+        for y in (knot.at, knot.above) if knot.at != knot.above else (knot.at,):
+            if len(values) > 1 and values[-2] == x:
+                values.pop()  # three at one value; the last is what follows
+                degrees.pop()
+            values.append(x)
+            degrees.append(min(float(y), BELOW_ONE) if y < 1 else 1.0)
+    if len(values) > MOST_POINTS:
+        raise LossError(f"{len(values)} points are more than {MOST_POINTS}")
+    points = Points(tuple(values), tuple(degrees))
+    return points, _distance(lines, lines_of(points))
+
+
+def _needed(lines: Lines) -> Iterator[_Knot]:
+    """Yield the knots at which something changes."""
+    for place, knot in enumerate(lines):
+        if 0 < place < len(lines) - 1 and knot.at == knot.above:
+            before, after = lines[place - 1], lines[place + 1]
+            left = (knot.at - before.above) * (after.x - knot.x)
+            if left == (after.at - knot.above) * (knot.x - before.x):
+                continue
+        yield knot
+
+
+def _joined(
+    one: Lines, other: Lines, choose: Callable[[Fraction, Fraction], Fraction]
+) -> Lines:
+    knots: list[_Knot] = []
+    for before, here in itertools.pairwise([None, *_common(one, other)]):
+        assert here is not None  # only the first is
+        if before is not None:
+            start = before[1].above - before[2].above
+            end = here[1].at - here[2].at
+            if start * end < 0:
+                x = before[0] + (here[0] - before[0]) * start / (start - end)
+                y = _degree(one, x)
+                knots.append(_Knot(x, y, y))
+        x, first, second = here
+        knots.append(
+            _Knot(x, choose(first.at, second.at), choose(first.above, second.above))
+        )
+    return tuple(knots)
+
+
+def _common(one: Lines, other: Lines) -> list[tuple[Fraction, _Knot, _Knot]]:
+    """Return the values of all knots, and what each of the two has there."""
+    values = sorted({knot.x for knot in (*one, *other)})
+    return [(x, _knot(one, x), _knot(other, x)) for x in values]
+
+
+def _knot(lines: Lines, x: Fraction) -> _Knot:
+    place = bisect.bisect_left(lines, x, key=lambda knot: knot.x)
+    if place < len(lines) and lines[place].x == x:
+        return lines[place]
+    if place == 0:
+        y = lines[0].at
+    elif place == len(lines):
+        y = lines[-1].above
+    else:
+        low, high = lines[place - 1], lines[place]
+        y = low.above + (high.at - low.above) * (x - low.x) / (high.x - low.x)
+    return _Knot(x, y, y)
+
+
+def _degree(lines: Lines, x: Fraction) -> Fraction:
+    return _knot(lines, x).at
+
+
+def _distance(one: Lines, other: Lines) -> float:
+    """Return how far two can be apart, rounded up; a moved step counts in whole."""
+    worst = Fraction(0)
+    for _, first, second in _common(one, other):
+        worst = max(worst, abs(first.at - second.at), abs(first.above - second.above))
+    return _up(worst)
+
+
+def _up(value: Fraction) -> float:
+    near = float(value)
+    return near if Fraction(near) >= value else math.nextafter(near, math.inf)
+
+
+def folded(parts: Sequence[Lines], join: Callable[[Lines, Lines], Lines]) -> Lines:
+    """Return several joined from left to right."""
+    total = parts[0]
+    for part in parts[1:]:
+        total = join(total, part)
+    return total
