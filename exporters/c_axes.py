@@ -13,7 +13,7 @@ static int name_is_finite(name_real value)
 {
     union { name_real value; UINT bits; } look;
     look.value = value;
-    return HIGH << 1 < FULL;
+    return ~HIGH << 1 >> REST != 0;
 }
 """
 
@@ -95,11 +95,11 @@ def axes_code(
         yield fill(_NO_INPUTS, prefix)
         return
     if numbers.name == "double":
-        words = ("uint64_t", "(uint32_t)(look.bits >> 32)", "0xffe00000u")
+        words = ("uint64_t", "(uint32_t)(look.bits >> 32)", "21")
     else:
-        words = ("uint32_t", "look.bits", "0xff000000u")
+        words = ("uint32_t", "look.bits", "24")
     text = _FINITE
-    for mark, word in zip(("UINT", "HIGH", "FULL"), words, strict=True):
+    for mark, word in zip(("UINT", "HIGH", "REST"), words, strict=True):
         text = text.replace(mark, word)
     mixed = [variable for variable in variables if variable.parts]
     if not mixed:

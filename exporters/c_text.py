@@ -135,19 +135,28 @@ def whole_table(name: str, values: Sequence[int], about: str) -> Iterator[str]:
     yield f"/* {about} */\n"
     kind = integer_type(max(values))
     yield f"static const {kind} {name}[{len(values)}] = {{\n"
-    yield from _wrapped(f"{value}," for value in values)
+    yield from whole_lines(values)
     yield "};\n"
 
 
 def real_table(
-    name: str, values: Iterable[float], about: str, numbers: Numbers
+    name: str, values: Sequence[float], about: str, numbers: Numbers
 ) -> Iterator[str]:
-    """Yield a table of numbers, each with its decimal digits beside it."""
-    entries = [f"{numbers.text(v)}, /* {numbers.shown(v)} */" for v in values]
+    """Yield a table of numbers, with a comment before."""
     yield f"/* {about} */\n"
-    yield f"static const {numbers.name} {name}[{len(entries)}] = {{\n"
-    yield from _wrapped(entries)
+    yield f"static const {numbers.name} {name}[{len(values)}] = {{\n"
+    yield from real_lines(values, numbers)
     yield "};\n"
+
+
+def whole_lines(values: Iterable[int]) -> Iterator[str]:
+    """Yield lines of whole numbers."""
+    yield from _wrapped(f"{value}," for value in values)
+
+
+def real_lines(values: Iterable[float], numbers: Numbers) -> Iterator[str]:
+    """Yield lines of numbers, each with its decimal digits beside it."""
+    yield from _wrapped(f"{numbers.text(v)}, /* {numbers.shown(v)} */" for v in values)
 
 
 def _wrapped(entries: Iterable[str]) -> Iterator[str]:

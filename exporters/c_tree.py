@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from fuzzytree.exporters.c_text import (
     Numbers,
     fill,
+    integer_type,
     place_type,
-    real_table,
-    whole_table,
+    real_lines,
+    whole_lines,
 )
 from fuzzytree.tree import FuzzyTree, Node
 
@@ -75,13 +76,20 @@ name_answer name_decide(const name_real *x)
     PLACE_TYPE place = 0;
 TAKE_AXES
     do
-        place = name_next[2 * place + (value[name_line[place]] > name_cut[place])];
+        place = name_tree.next[
+            2 * place + (value[name_tree.line[place]] > name_tree.cut[place])];
     while (place < NAME_QUESTIONS);
-    answer.label = name_label[place - NAME_QUESTIONS];
+    answer.label = name_tree.label[place - NAME_QUESTIONS];
     answer.rule = (long)(place - NAME_QUESTIONS) + 1;
     answer.status = NAME_DECIDED;
     return answer;
 }
+"""
+
+_TABLES = """\
+/* Is the value at `line` above the cut? No and yes lead to the next two: a question, or
+ * NAME_QUESTIONS + leaf - 1. And the class of each leaf. */
+static const struct {
 """
 
 _ONE_LEAF = """
@@ -89,7 +97,7 @@ name_answer name_decide(const name_real *x)
 {
     name_answer answer = {NAME_WHEN_MISSING, 0, NAME_MISSING};
 TAKE_AXES
-    answer.label = name_label[0];
+    answer.label = LABEL;
     answer.rule = 1;
     answer.status = NAME_DECIDED;
     return answer;
@@ -114,22 +122,25 @@ def tree_code(
         axes: Statements that put the values of the variables into `value`, or return.
     """
     asked = questions_of(tree, line)
-    labels = [tree.classes.index(leaf.label) for leaf in tree.leaves]
-    yield from whole_table(f"{prefix}_label", labels, "The class of each leaf.")
+    numbered = {label: place for place, label in enumerate(tree.classes)}
+    labels = [numbered[leaf.label] for leaf in tree.leaves]
     if not asked:
         plain = axes.replace("    const name_real *value = x;\n", "")
-        yield fill(_ONE_LEAF.replace("TAKE_AXES\n", plain), prefix)
+        text = _ONE_LEAF.replace("LABEL", str(labels[0]))
+        yield fill(text.replace("TAKE_AXES\n", plain), prefix)
         return
     ends = [place for question in asked for place in (question.no, question.yes)]
-    cuts = numbers.nearest([question.cut for question in asked])
     lines = [question.line for question in asked]
+    cuts = numbers.nearest([question.cut for question in asked])
     yield fill(f"#define NAME_QUESTIONS {len(asked)}u\n\n", prefix)
-    yield from real_table(
-        f"{prefix}_cut", cuts, "Each question: is the value above this?", numbers
-    )
-    yield from whole_table(f"{prefix}_line", lines, "The value that it asks about.")
-    about = "Where no and yes lead: to a question, or NAME_QUESTIONS + leaf - 1."
-    yield from whole_table(f"{prefix}_next", ends, fill(about, prefix))
+    yield fill(_TABLES, prefix)
+    for name, values in (("line", lines), ("next", ends), ("label", labels)):
+        yield f"    {integer_type(max(values))} {name}[{len(values)}];\n"
+    yield f"    {numbers.name} cut[{len(cuts)}];\n"
+    yield fill("} name_tree = {\n", prefix)
+    for values in (lines, ends, labels):
+        yield from ("    {\n", *whole_lines(values), "    },\n")
+    yield from ("    {\n", *real_lines(cuts, numbers), "    }\n};\n")
     kind = place_type(2 * len(asked) + len(labels))
     walk = _WALK.replace("PLACE_TYPE", kind).replace("TAKE_AXES\n", axes)
     yield fill(walk, prefix)
