@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 
 import msgspec
 
-from fuzzytree.programs.operations import LOGICAL, NUMERIC, of_table, total
+from fuzzytree.programs.operations import (
+    LOGICAL,
+    NUMERIC,
+    maximum,
+    minimum,
+    of_table,
+    total,
+)
 from fuzzytree.programs.steps import Program, ResultKind, Step
 
 Found = float | bool | list[float] | list[bool]
@@ -64,6 +72,29 @@ def evaluate(program: Program, row: Mapping[str, float]) -> Numbers:
     return Numbers(program, tuple(values))
 
 
+def still_results(program: Program) -> tuple[Found | None, ...]:
+    """Return the results that no input enters, by step; None for the other steps.
+
+    Runners compute these once, here, and so with Python's own functions.
+
+    Example:
+        >>> from fuzzytree.programs.steps import Maker, Result
+        >>> make = Maker()
+        >>> grid = make("multiply", make.index(3), make.constant(0.5))
+        >>> scaled = make("total", make("multiply", make.input("x"), grid))
+        >>> program = make.program("p", ("x",), (Result("output", "y", scaled),))
+        >>> still_results(program)
+        ([0.0, 1.0, 2.0], 0.5, [0.0, 0.5, 1.0], None, None, None)
+    """
+    found: list[Found | None] = []
+    for step in program.steps:
+        given = [found[place] for place in step.arguments]
+        known = [value for value in given if value is not None]
+        is_moving = step.operation == "input" or len(known) < len(given)
+        found.append(None if is_moving else _result(step, known, {}))
+    return tuple(found)
+
+
 def _result(step: Step, given: list[Found], row: Mapping[str, float]) -> Found:
     match step.operation:
         case "constant":
@@ -72,7 +103,7 @@ def _result(step: Step, given: list[Found], row: Mapping[str, float]) -> Found:
             return float(row[step.name])
         case "index":
             return [float(place) for place in range(step.samples)]
-        case "total" | "running" | "highest" | "lowest":
+        case "total" | "running" | "last" | "highest" | "lowest":
             (samples,) = given
             if not isinstance(samples, list):  # a program cannot be made of such steps
                 raise TypeError(f"{step.operation} of a single number")
@@ -98,10 +129,12 @@ def _one(step: Step, given: list[Found]) -> float | bool:
 def _over_samples(operation: str, samples: list[float]) -> float | list[float]:
     if operation == "total":
         return total(samples)
+    if operation == "last":
+        return samples[-1]
     if operation == "highest":
-        return max(samples)
+        return functools.reduce(maximum, samples)
     if operation == "lowest":
-        return min(samples)
+        return functools.reduce(minimum, samples)
     sums: list[float] = []
     for value in samples:
         sums.append(sums[-1] + value if sums else value)

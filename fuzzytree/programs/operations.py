@@ -52,13 +52,13 @@ OPERATIONS: Mapping[str, Operation] = {
     "subtract": _numbers(2, "a - b"),
     "multiply": _numbers(2, "a b"),
     "divide": _numbers(2, "a / b"),
-    "minimum": _numbers(2, "a, unless b < a: then b"),
-    "maximum": _numbers(2, "a, unless b > a: then b"),
+    "minimum": _numbers(2, "the smaller of a and b; NaN if either is"),
+    "maximum": _numbers(2, "the larger of a and b; NaN if either is"),
     "negate": _numbers(1, "-a"),
     "absolute": _numbers(1, "|a|"),
     "floor": _numbers(1, "the largest whole number up to a"),
     "ceiling": _numbers(1, "the smallest whole number from a on"),
-    "round": _numbers(1, "the nearest whole number, halves away from 0"),
+    "round": _numbers(1, "the nearest whole number, of two equally near ones the even"),
     "square_root": _numbers(1, "the square root of a"),
     "exponential": _numbers(1, "e to the power a"),
     "logarithm": _numbers(1, "the natural logarithm of a"),
@@ -91,13 +91,14 @@ OPERATIONS: Mapping[str, Operation] = {
     "where": Operation(("truth", "number", "number"), "number", "b if a, else c"),
     "total": _numbers(1, "the sum over the samples, by halves"),
     "running": _numbers(1, "the sum of the samples up to each, in order"),
-    "highest": _numbers(1, "the largest of the samples"),
-    "lowest": _numbers(1, "the smallest of the samples"),
+    "last": _numbers(1, "the last of the samples"),
+    "highest": _numbers(1, "the largest of the samples; NaN if any is"),
+    "lowest": _numbers(1, "the smallest of the samples; NaN if any is"),
 }
 """Every operation by name. `total` pads the samples with zeros up to a power of two
 and adds the second half to the first until one number is left."""
 
-OVER_SAMPLES = frozenset(("total", "highest", "lowest"))
+OVER_SAMPLES = frozenset(("total", "last", "highest", "lowest"))
 """Operations that make one number of all samples."""
 
 INEXACT = frozenset(
@@ -153,18 +154,14 @@ def power(a: float, b: float) -> float:
         return -math.inf if is_negative else math.inf
 
 
-def rounded(a: float) -> float:
-    """Return the nearest whole number, halves away from 0.
+def minimum(a: float, b: float) -> float:
+    """Return the smaller of two numbers; NaN if either is."""
+    return a if a < b or a != a else b
 
-    Example:
-        >>> rounded(2.5), rounded(-0.5), rounded(0.49999999999999994)
-        (3.0, -1.0, 0.0)
-    """
-    size = abs(a)
-    whole = _floor(size)
-    if size - whole >= 0.5:
-        whole = whole + 1.0
-    return math.copysign(whole, a)
+
+def maximum(a: float, b: float) -> float:
+    """Return the larger of two numbers; NaN if either is."""
+    return a if a > b or a != a else b
 
 
 def picked(table: tuple[float, ...], place: float) -> float:
@@ -179,6 +176,10 @@ def _floor(a: float) -> float:
 
 def _ceiling(a: float) -> float:
     return float(math.ceil(a)) if math.isfinite(a) else a
+
+
+def _round(a: float) -> float:
+    return float(round(a)) if math.isfinite(a) else a
 
 
 def _quiet(function: Callable[[float], float]) -> Callable[[float], float]:
@@ -227,13 +228,13 @@ NUMERIC: Mapping[str, Callable[..., float]] = {
     "subtract": operator.sub,
     "multiply": operator.mul,
     "divide": divide,
-    "minimum": min,  # keeps the first, unless the second is less
-    "maximum": max,
+    "minimum": minimum,
+    "maximum": maximum,
     "negate": operator.neg,
     "absolute": abs,
     "floor": _floor,
     "ceiling": _ceiling,
-    "round": rounded,
+    "round": _round,
     "square_root": _quiet(math.sqrt),
     "exponential": _quiet(math.exp),
     "logarithm": _logarithm(math.log, 0.0),

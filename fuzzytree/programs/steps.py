@@ -134,7 +134,8 @@ class Program(Value, frozen=True):
 class Maker:
     """Collects steps; a step that stands there already is not added again.
 
-    Steps on constants alone are computed at once. `x * 1`, `x / 1` and `x - 0` are x.
+    Steps on constants alone are computed at once. `x * 1`, `x / 1`, `x - 0` and the
+    smaller of x and x are x.
     """
 
     def __init__(self) -> None:
@@ -173,8 +174,10 @@ class Maker:
             return arguments[0]
         if operation == "multiply" and _is_neutral(operation, given[::-1]):
             return arguments[1]
-        if operation == "where" and arguments[1] == arguments[2]:
-            return arguments[1]
+        if operation in ("minimum", "maximum", "where"):
+            *_, one, two = arguments
+            if one == two:
+                return one
         samples = 0
         if operation not in OVER_SAMPLES:
             samples = max((step.samples for step in given), default=0)
@@ -184,6 +187,10 @@ class Maker:
         """Return the number of a constant, None if the step is none."""
         step = self._steps[place]
         return step.number if step.operation == "constant" else None
+
+    def samples(self, place: int) -> int:
+        """Return how many samples a step has results for."""
+        return self._steps[place].samples
 
     def chain(self, operation: str, places: Sequence[int]) -> int:
         """Return an operation carried along from left to right."""

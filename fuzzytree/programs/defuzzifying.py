@@ -1,0 +1,99 @@
+"""From the degrees of an output's curve at its samples to a number, as steps."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from fuzzytree.programs.formulas import as_number
+from fuzzytree.programs.steps import Maker
+from fuzzytree.system import SystemOutput
+
+
+def samples_of(make: Maker, output: SystemOutput) -> int:
+    """Return the values at which an output's range is looked at."""
+    low, high = output.low or 0.0, output.high or 0.0
+    count = output.defuzzifier.samples
+    index, start = make.index(count), make.constant(low)
+    if output.defuzzifier.grid == "middle":
+        step = make.constant((high - low) / count)
+        middle = make("add", index, make.constant(0.5))
+        return make("add", start, make("multiply", middle, step))
+    step = make.constant((high - low) / (count - 1))
+    value = make("add", start, make("multiply", index, step))
+    is_last = make("equal", index, make.constant(float(count - 1)))
+    return make("where", is_last, make.constant(high), value)
+
+
+def sample_values(output: SystemOutput) -> list[float]:
+    """Return the same values as numbers."""
+    low, high = output.low or 0.0, output.high or 0.0
+    count = output.defuzzifier.samples
+    if output.defuzzifier.grid == "middle":
+        step = (high - low) / count
+        return [low + (k + 0.5) * step for k in range(count)]
+    step = (high - low) / (count - 1)
+    return [*(low + k * step for k in range(count - 1)), high]
+
+
+def defuzzified(make: Maker, output: SystemOutput, xs: int, degrees: int) -> int:
+    """Return an output's number; NaN if the curve is 0 everywhere."""
+    method = output.defuzzifier.method
+    if method in ("centroid", "bisector"):
+        areas = _areas(make, output, degrees)
+        if method == "bisector":
+            return _bisector(make, xs, areas)
+        moments = make("total", make("multiply", xs, areas))
+        return make("divide", moments, make("total", areas))
+    highest = make("highest", degrees)
+    chosen = make("equal", degrees, highest)
+    if method == "mean of maximum":
+        found = _mean(make, xs, chosen)
+    else:
+        found = _end(make, output, xs, chosen, is_first=method.startswith("smallest"))
+    is_any = make("less", make.constant(0.0), highest)
+    return make("where", is_any, found, make.constant(math.nan))
+
+
+def _areas(make: Maker, output: SystemOutput, degrees: int) -> int:
+    """Return how much each sample counts: its degree, half of it at `half ends`."""
+    if output.defuzzifier.grid != "half ends":
+        return degrees
+    count = output.defuzzifier.samples
+    index, last = make.index(count), make.constant(float(count - 1))
+    is_end = make("equal", index, make.constant(0.0))
+    is_end = make("or", is_end, make("equal", index, last))
+    share = make("where", is_end, make.constant(0.5), make.constant(1.0))
+    return make("multiply", share, degrees)
+
+
+def _bisector(make: Maker, xs: int, areas: int) -> int:
+    """Return the mean of the samples that part the area most evenly.
+
+    Where a share is NaN so is the lowest miss, which no miss equals: 0 / 0 then.
+    """
+    sums = make("running", areas)
+    share = make("divide", sums, make("last", sums))
+    misses = make("absolute", make("subtract", share, make.constant(0.5)))
+    return _mean(make, xs, make("equal", misses, make("lowest", misses)))
+
+
+def _mean(make: Maker, xs: int, chosen: int) -> int:
+    kept = make("where", chosen, xs, make.constant(0.0))
+    return make("divide", make("total", kept), make("total", as_number(make, chosen)))
+
+
+def _end(
+    make: Maker, output: SystemOutput, xs: int, chosen: int, *, is_first: bool
+) -> int:
+    """Return the first or the last of the chosen samples."""
+    outside = make.constant(math.inf if is_first else -math.inf)
+    find = "lowest" if is_first else "highest"
+    numbers = sample_values(output)
+    if all(one <= two for one, two in itertools.pairwise(numbers)):
+        return make(find, make("where", chosen, xs, outside))
+    # A range of a few neighbouring doubles: its samples need not rise.
+    index = make.index(output.defuzzifier.samples)
+    return make.table(
+        "pick", make(find, make("where", chosen, index, outside)), numbers
+    )
