@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.casting.facts import as_rules, facts_of
+from fuzzytree.casting.points import pointed
 from fuzzytree.casting.scores import (
     Always,
     Scores,
@@ -22,5 +23,6 @@ __all__ = [
     "cast_remarks",
     "facts_of",
     "flattened",
+    "pointed",
     "winner",
 ]
