@@ -364,7 +364,7 @@ def proved(
             return Proof("equal", text, _exact(model, text))
         return Proof("equal", text)
     remarks = (*written.remarks, *again.remarks)
-    if remarks and any(_same(one, again.model) for one in _stand_ins(model)):
+    if remarks and any(_same(one, again.model) for one in stand_ins(model)):
         text = "read back from the file, it is equal but for names and notes"
         return Proof("alike", text)
     if written.losses or again.losses:
@@ -413,7 +413,7 @@ def _exact(model: Document, origin: str) -> Certificate | None:
     return Certificate(None, carrier_of(model), 0.0, origin)
 
 
-def _stand_ins(model: Document) -> Iterator[Document]:
+def stand_ins(model: Document) -> Iterator[Document]:
     """Yield what a file may hold in the place of a model, deciding alike."""
     yield model
     if isinstance(model, RuleBase):

@@ -3,30 +3,54 @@
 `random_tree` makes valid trees of any size from a seed; `probes` (from
 `fuzzytree.probing`) the rows that matter for a model, `probe_values` as an array.
 `random_system` makes fuzzy systems with numeric outputs, `random_rows` rows for them.
+`check_exporter` tries everything that a format must do, in one call:
+
+    def test_the_turtle_format_keeps_its_promises() -> None:
+        check_exporter(turtle.FORMAT)
 """
 
 from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from msgspec.structs import replace
 
+from fuzzytree.conformance import failures
+from fuzzytree.contracts import Document, Format
+from fuzzytree.errors import DisagreementError
+from fuzzytree.exporters import find_format
+from fuzzytree.lowering import rules_from_tree
 from fuzzytree.probing import SPECIAL, landmarks, probe_values, probes
 from fuzzytree.random_systems import random_rows, random_system
 from fuzzytree.rulebase import (
     LR,
     Band,
+    Clause,
     Flank,
     Part,
     Points,
+    Rule,
     RuleBase,
     Semantics,
     Shape,
     Side,
     Term,
     Variable,
+)
+from fuzzytree.samples import samples
+from fuzzytree.system import (
+    Conclusion,
+    Defuzzifier,
+    FuzzySystem,
+    Is,
+    Label,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
 )
 from fuzzytree.tree import (
     Branch,
@@ -40,6 +64,8 @@ from fuzzytree.tree import (
 
 __all__ = [
     "SPECIAL",
+    "check_exporter",
+    "exporter_models",
     "probe_values",
     "probes",
     "random_rows",
@@ -47,6 +73,134 @@ __all__ = [
     "random_tree",
     "with_points",
 ]
+
+
+def check_exporter(form: Format | str, *, seed: int = 0) -> None:
+    """Try whatever a format must do, and tell everything that it does wrong.
+
+    It writes some eighty models of the kinds that the format says it carries: with
+    every feature, odd names and extreme numbers. Each must be written twice as the same
+    bytes, or be refused by a LossError that lists what would be lost. What is written
+    without a loss must be read back as an equal model, if the format reads. Damaged and
+    hostile files must end in a ReadError.
+
+    Args:
+        form: The format, or the name of one that is installed.
+        seed: Of the random models and the damaged files.
+
+    Raises:
+        DisagreementError: It lists every failure, a sentence each.
+        ValueError: If there is no format of the name.
+
+    Example:
+        >>> check_exporter("yaml")
+    """
+    form = find_format(form) if isinstance(form, str) else form
+    found = failures(form, exporter_models(seed), seed=seed)
+    if found:
+        listed = "\n".join(f"  {text}" for text in found)
+        raise DisagreementError(f"{form.name} fails in {len(found)} points:\n{listed}")
+
+
+def exporter_models(seed: int = 0) -> Iterator[tuple[str, Document]]:
+    """Yield the models that `check_exporter` tries, each with a title.
+
+    Args:
+        seed: Of the random ones.
+    """
+    yield from samples().items()
+    for number in range(seed, seed + 3):
+        tree = random_tree(number, leaves=5)
+        yield f"random_tree({number})", tree
+        for kind in ("relative", "raw"):
+            rules = rules_from_tree(tree, kind)
+            yield f"{kind} rules of random_tree({number})", rules
+        points = with_points(rules_from_tree(tree, conjunction="product"), number)
+        yield f"with_points of random_tree({number})", points
+    for number in range(seed, seed + 12):
+        yield f"random_system({number})", random_system(number)
+    for start in range(0, len(ODD_NAMES), 4):
+        names = ODD_NAMES[start : start + 4]
+        yield f"rules named {names}", _named_rules(names)
+        yield f"a system named {names}", _named_system(names)
+    yield "rules with extreme numbers", _extreme_rules()
+    yield "a system with extreme numbers", _extreme_system()
+
+
+ODD_NAMES = (
+    *("petal length", "is", "IF", "and", "not", "then", "x", "class", "END_RULE"),
+    *("rule", "1st", "3.5", "-1", "null", "größe", "温度", "😀", "  blanks  "),
+    *("A", "a", "a_b", "a b", "a'b", 'a"b', "a\\b", "a;b", "a:b", "a,b", "a#b"),
+    *("a//b", "*/", "(* b *)", "a\nb", "a\tb", "]]>", "<a&b>", "{a}", "%s", "--"),
+    *("\u00e9", "e\u0301", "x" * 300, "$a", "a.b"),
+)
+"""Names that one format or another cannot hold as they are."""
+
+
+def _named_rules(names: Sequence[str]) -> RuleBase:
+    """Return rules whose classes, variables and terms have these names."""
+    ramp = Points((0.0, 1.0), (0.0, 1.0))
+    terms = tuple(Term(name, ramp) for name in names)
+    return RuleBase(
+        names[0],
+        tuple(names),
+        tuple(Variable(name, terms, unit=name) for name in names),
+        tuple(
+            Rule(tuple(Clause(one, (other,)) for one in names), other)
+            for other in names
+        ),
+    )
+
+
+def _named_system(names: Sequence[str]) -> FuzzySystem:
+    """Return a system whose inputs and terms have these names."""
+    ramp = Points((0.0, 1.0), (0.0, 1.0))
+    curves = tuple(Label(name, ramp) for name in names)
+    numbers = tuple(Label(name, Singleton(k)) for k, name in enumerate(names, 1))
+    output = SystemOutput(
+        f"{names[0]} 2", numbers, 0.0, 9.0, Defuzzifier("weighted average")
+    )
+    rules = tuple(
+        SystemRule(Is(one, other), (Conclusion(output.name, other),), name=one)
+        for one, other in zip(names, names[::-1], strict=True)
+    )
+    inputs = tuple(SystemInput(name, curves, 0.0, 1.0, unit=name) for name in names)
+    return FuzzySystem(names[0], inputs, (output,), (RuleBlock(rules, name=names[0]),))
+
+
+_EXTREMES = (-1e308, -1.5, -5e-324, -0.0, 5e-324, 1e-310, 0.1, 1e308)
+
+
+def _extreme_rules() -> RuleBase:
+    """Return rules over points at the ends of the doubles, and between the smallest."""
+    degrees = (0.0, 1.0, 5e-324, 0.5, 1.0 - 2.0**-53, 0.1, 1.0, 0.0)
+    terms = (
+        Term("wide", Points(_EXTREMES, degrees)),
+        Term("all", Points((0.0,), (1.0,))),
+    )
+    mix = Variable("mix", terms, parts=(Part("a", 5e-324), Part("b", -1e300, 1e308)))
+    inputs = (Variable("a", terms, low=-1e308, high=1e308), Variable("b", terms))
+    rules = (
+        Rule((Clause("a", ("wide",)), Clause("mix", ("all",))), "one", 2**53),
+        Rule((Clause("b", ("wide", "all"), negated=True),), "two", 0),
+        Rule((), "one"),
+    )
+    return RuleBase("extreme", ("one", "two"), (*inputs, mix), rules)
+
+
+def _extreme_system() -> FuzzySystem:
+    """Return a system of extreme numbers."""
+    degrees = (0.0, 1.0, 5e-324, 0.5, 1.0 - 2.0**-53, 0.1, 1.0, 0.0)
+    label = Label("wide", Points(_EXTREMES, degrees), height=5e-324)
+    numbers = tuple(Label(f"n{k}", Singleton(x)) for k, x in enumerate(_EXTREMES))
+    how = Defuzzifier("weighted average")
+    output = SystemOutput("y", numbers, -1e308, 1e308, how, default=-0.0)
+    rules = tuple(
+        SystemRule(Is("a", "wide"), (Conclusion("y", one.name),), weight)
+        for one, weight in zip(numbers, degrees, strict=True)
+    )
+    inputs = (SystemInput("a", (label,), -1e308, 1e308),)
+    return FuzzySystem("extreme", inputs, (output,), (RuleBlock(rules),))
 
 
 def random_tree(
