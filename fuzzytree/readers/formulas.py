@@ -18,10 +18,12 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
+from fuzzytree.readers.layout import LONGEST_NAME
 from fuzzytree.rulebase import name_choice
 from fuzzytree.system import FUNCTIONS, MOST_LEVELS, Call, Expression, Name, Number
 
 MOST_CHARACTERS: Final = 20_000
+_LONGEST: Final = 2 * LONGEST_NAME + 2  # a name of quotes, in quotes
 
 _BINARY: Mapping[str, tuple[int, int]] = MappingProxyType(
     {
@@ -283,6 +285,9 @@ def _tokens(text: str) -> Iterator[_Token]:
             if text[place] == "'":
                 what = "the quote that opens here is not closed"
             raise FormulaError(place + 1, what)
+        if found.end() - place > _LONGEST and found.lastgroup != "blank":
+            sentence = f"a word of {found.end() - place:,} characters"
+            raise FormulaError(place + 1, sentence)
         if found.lastgroup != "blank":
             yield _Token(found.lastgroup or "", found.group(), place + 1)
         place = found.end()

@@ -101,6 +101,9 @@ def words(text: str, line: int, column: int, signs: str = "") -> Iterator[Word]:
         column: The column of its first character.
         signs: Characters that need no blank beside them.
 
+    Returns:
+        The words; one that is longer than any name ends in dots.
+
     Example:
         >>> [word.text for word in words("if (a is b)", 1, 1, "()")]
         ['if', '(', 'a', 'is', 'b', ')']
@@ -108,7 +111,10 @@ def words(text: str, line: int, column: int, signs: str = "") -> Iterator[Word]:
     marked = re.escape(signs)
     pattern = rf"[{marked}]|[^\s{marked}]+" if signs else r"\S+"
     for found in re.finditer(pattern, text):
-        yield Word(found.group(), line, column + found.start())
+        word = found.group()
+        if len(word) > LONGEST_WORD:
+            word = f"{word[:LONGEST_WORD]}..."
+        yield Word(word, line, column + found.start())
 
 
 def number_of(text: str) -> float | None:

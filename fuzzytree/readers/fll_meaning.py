@@ -1,0 +1,207 @@
+"""What an FLL file means where it is not the plain sum of its lines.
+
+What is disabled is taken out, monotone terms are told from others in weighted outputs,
+and remarks say where fuzzylite 6 and pyfuzzylite 8 mean other things by one file.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+
+from msgspec.structs import replace
+
+from fuzzytree.contracts import Loss
+from fuzzytree.readers.fll_terms import as_degree
+from fuzzytree.readers.fll_variables import Known, ReadBlock
+from fuzzytree.readers.fll_words import Entry, Notes
+from fuzzytree.system import (
+    And,
+    Call,
+    Condition,
+    Expression,
+    Formula,
+    Is,
+    Label,
+    Linear,
+    Not,
+    Or,
+    Singleton,
+    SystemOutput,
+    SystemRule,
+    names_in,
+)
+
+
+def without_disabled(
+    variables: Sequence[Known], blocks: Sequence[ReadBlock], notes: Notes
+) -> tuple[list[Known], list[ReadBlock]]:
+    """Return variables and blocks without what is disabled; remarks tell it.
+
+    What is asked of a disabled variable has degree 0, whatever the hedges. A disabled
+    input stays a column, for formulas may name it.
+    """
+    for block in blocks:
+        if not block.is_enabled:
+            line = block.section.head.line
+            notes.remarks.append(f"line {line}: a disabled block is left out")
+    kept_blocks = [one for one in blocks if one.is_enabled]
+    off = [one.name for one in variables if not one.is_enabled]
+    kept = [one for one in variables if one.is_enabled or not one.is_output]
+    for name in off:
+        text = f"{name!r} is disabled: nothing concludes it, and it is nothing"
+        notes.remarks.append(text)
+    outputs = [one.name for one in kept if one.is_output]
+    if not off or not outputs:
+        return kept, kept_blocks
+    never = Is(outputs[0], None, ("not", "any"))
+    return kept, [_without(one, off, never, notes) for one in kept_blocks]
+
+
+def _without(
+    read: ReadBlock, off: Collection[str], never: Condition, notes: Notes
+) -> ReadBlock:
+    """Return a block whose rules do not know the disabled variables."""
+    rules: list[SystemRule] = []
+    lines: list[Entry] = []
+    for rule, line in zip(read.block.rules, read.lines, strict=True):
+        then = tuple(one for one in rule.then if one.output not in off)
+        when = None if rule.when is None else _asked(rule.when, off, never)
+        if then:
+            rules.append(replace(rule, when=when, then=then))
+            lines.append(line)
+        elif read.block.activation.method not in ("general", "threshold"):
+            what = "it concludes only what is disabled, and is not counted any more"
+            notes.losses.append(Loss(f"the rule in line {line.line}", what))
+    block = replace(read.block, rules=tuple(rules))
+    return replace(read, block=block, lines=tuple(lines))
+
+
+def _asked(condition: Condition, off: Collection[str], never: Condition) -> Condition:
+    match condition:
+        case Is(variable=variable):
+            return never if variable in off else condition
+        case And(parts=parts):
+            return And(tuple(_asked(part, off, never) for part in parts))
+        case Or(parts=parts):
+            return Or(tuple(_asked(part, off, never) for part in parts))
+        case Not(part=part):
+            return Not(_asked(part, off, never))
+
+
+def as_meant(output: Known, notes: Notes) -> SystemOutput:
+    """Return an output whose weighted terms are numbers where the file says so.
+
+    Fuzzylite calls it the type: `TakagiSugeno` takes the degree of every term at the
+    activation, `Tsukamoto` asks a monotone term where it has that degree, `Automatic`
+    goes by the terms.
+    """
+    variable = output.variable
+    assert isinstance(variable, SystemOutput)  # who calls it sees to that
+    if not variable.defuzzifier.is_weighted:
+        return variable
+    has_numbers = any(term.is_number for term in output.terms)
+    has_monotone = any(term.is_monotone for term in output.terms)
+    if output.kind == "Automatic" and has_numbers and has_monotone:
+        what = (
+            "numbers and monotone terms are mixed, which fuzzylite 6 takes by the "
+            "first that is activated and pyfuzzylite refuses; each is taken by its kind"
+        )
+        notes.losses.append(Loss(f"output {output.name!r}", what))
+    is_sugeno = output.kind == "TakagiSugeno"
+    labels = tuple(
+        as_degree(term.label) if is_sugeno or not term.is_monotone else term.label
+        for term in output.terms
+    )
+    return replace(variable, labels=labels)
+
+
+def tell_differences(
+    variables: Sequence[Known], blocks: Sequence[ReadBlock], notes: Notes
+) -> None:
+    """Note where the two engines mean other things by these lines."""
+    notes.remarks.extend(_joined_twice(variables, blocks))
+    notes.remarks.extend(_inverse_remarks(variables))
+    notes.remarks.extend(_formula_remarks(variables))
+
+
+def _joined_twice(
+    variables: Sequence[Known], blocks: Sequence[ReadBlock]
+) -> Iterator[str]:
+    """Yield where several rules conclude one term of a weighted output."""
+    counts = Counter(
+        (one.output, one.label)
+        for read in blocks
+        for rule in read.block.rules
+        for one in rule.then
+    )
+    for known in variables:
+        output = known.variable
+        if not isinstance(output, SystemOutput) or not output.defuzzifier.is_weighted:
+            continue
+        twice = [one for one in output.labels if counts[known.name, one.name] > 1]
+        names = ", ".join(repr(one.name) for one in twice[:3])
+        if twice and output.aggregation is not None:
+            yield (
+                f"output {known.name!r}: rules that conclude the same term ({names}) "
+                "are joined by the aggregation, as in pyfuzzylite; fuzzylite 6 adds "
+                "each"
+            )
+        elif any(_depends_on_degree(one) for one in twice):
+            yield (
+                f"output {known.name!r}: rules that conclude the same term ({names}) "
+                "are weighted one by one, as in fuzzylite 6; pyfuzzylite adds their "
+                "degrees first"
+            )
+
+
+def _inverse_remarks(variables: Sequence[Known]) -> Iterator[str]:
+    """Yield which outputs ask where a term has a degree that fuzzylite 6 misses."""
+    for known in variables:
+        output = known.variable
+        if not isinstance(output, SystemOutput) or not output.defuzzifier.is_weighted:
+            continue
+        kinds = {term.kind for term in known.terms if term.is_monotone}
+        if known.kind != "TakagiSugeno" and kinds - {"Ramp"}:
+            yield (
+                f"output {known.name!r}: where a term has a degree is what pyfuzzylite "
+                "says; fuzzylite 6 differs for falling Concave terms, and near 0 and 1 "
+                "for others"
+            )
+
+
+def _depends_on_degree(label: Label) -> bool:
+    """Return whether a label's number depends on its degree of activation."""
+    match label.curve:
+        case Singleton() | Linear():
+            return False
+        case Formula(expression=expression):
+            return "x" in names_in(expression)
+        case _:
+            return True
+
+
+def _formula_remarks(variables: Sequence[Known]) -> Iterator[str]:
+    told = {
+        "%": "'%' has the sign of its second number, as in pyfuzzylite; fuzzylite 6 "
+        "takes the first one's",
+        "round": "'round' takes a half to the even neighbour, as in pyfuzzylite; "
+        "fuzzylite 6 takes it away from 0",
+    }
+    used = {
+        function
+        for known in variables
+        for term in known.terms
+        if isinstance(term.label.curve, Formula)
+        for function in _functions_of(term.label.curve.expression)
+    }
+    for function, text in told.items():
+        if function in used:
+            yield f"formulas: {text}"
+
+
+def _functions_of(expression: Expression) -> Iterator[str]:
+    if isinstance(expression, Call):
+        yield expression.function
+        for argument in expression.arguments:
+            yield from _functions_of(argument)
