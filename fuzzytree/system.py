@@ -606,35 +606,49 @@ def names_in(expression: Expression) -> Iterator[str]:
 def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     if not system.name:
         yield ("name",), "a system needs a name"
-    names = [one.name for one in system.variables]
-    yield from name_mistakes(("inputs",), "variable", names)
+    yield from name_mistakes(("name",), "name", [system.name])
     if not system.outputs:
         yield ("outputs",), "a system needs at least one output"
+    yield from _variable_name_mistakes(system)
     known: dict[str, bool] = {}
+    nameable = dict.fromkeys(one.name for one in system.inputs)
+    count = len(system.columns)
     for position, one in enumerate(system.inputs):
         path: Path = ("inputs", position)
         yield from range_mistakes(path, one.name, one.low, one.high)
         yield from part_mistakes(path, one.name, one.parts, known)
-        yield from _label_mistakes(path, one, system, [i.name for i in system.inputs])
+        yield from _label_mistakes(path, one, count, nameable)
         if one.clips and one.low is None and one.high is None:
             yield path, f"input {one.name!r} is clipped to a range that it lacks"
         known[one.name] = bool(one.parts)
-    names = [one.name for one in system.inputs]
     for position, output in enumerate(system.outputs):
         path = ("outputs", position)
         yield from range_mistakes(path, output.name, output.low, output.high)
-        yield from _label_mistakes(path, output, system, names)
-        names.append(output.name)
+        yield from _label_mistakes(path, output, count, nameable)
+        nameable[output.name] = None
         yield from _defuzzifier_mistakes(path, output)
-    for position, block in enumerate(system.blocks):
-        yield from _block_mistakes(("blocks", position), block, system)
+    yield from _rule_mistakes(system)
+
+
+def _variable_name_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
+    """Yield what is wrong with the names of variables; no two of them are equal."""
+    places: list[Path] = [
+        *(("inputs", position) for position in range(len(system.inputs))),
+        *(("outputs", position) for position in range(len(system.outputs))),
+    ]
+    names = [one.name for one in system.variables]
+    for path, text in name_mistakes((), "variable", names):
+        yield places[int(path[-1])], text
+    for place, name in zip(places, names, strict=True):
+        if not name:
+            yield (*place, "name"), "a variable needs a name"
 
 
 def _label_mistakes(
     path: Path,
     variable: SystemInput | SystemOutput,
-    system: FuzzySystem,
-    nameable: list[str],
+    columns: int,
+    nameable: Mapping[str, None],
 ) -> Iterator[Mistake]:
     """Yield what is wrong with terms, whose formulas may use some names."""
     labels = variable.labels
@@ -645,24 +659,28 @@ def _label_mistakes(
     )
     for index, label in enumerate(labels):
         place = (*path, "labels", index)
+        if not label.name:
+            yield place, f"a term of {variable.name!r} has no name"
         where = f"term {label.name!r} of {variable.name!r}"
         if not 0.0 < label.height <= 1.0:
             yield place, f"{where}: the height must lie in (0, 1], not {label.height!r}"
-        if isinstance(label.curve, Linear):
-            given, needed = len(label.curve.weights), len(system.columns)
-            if given != needed:
-                yield place, f"{where}: {given} weights for {needed} inputs"
-            if not is_weighted:
-                text = "only a weighted average or sum takes a linear term"
-                yield place, f"{where}: {text}"
         texts = [*curve_mistakes(label.curve)]
-        if isinstance(label.curve, Formula) and not texts:
-            texts += _name_mistakes(label.curve.expression, nameable)
+        match label.curve:
+            case Linear(weights=weights):
+                if len(weights) != columns:
+                    texts.append(f"{len(weights)} weights for {columns} inputs")
+                if not is_weighted:
+                    text = "only a weighted average or sum takes a linear term"
+                    texts.append(text)
+            case Formula(expression=expression) if not texts:
+                texts += _name_mistakes(expression, nameable)
+            case _:
+                pass
         for text in texts:
             yield place, f"{where}: {text}"
 
 
-def _name_mistakes(expression: Expression, names: list[str]) -> Iterator[str]:
+def _name_mistakes(expression: Expression, names: Mapping[str, None]) -> Iterator[str]:
     for name in dict.fromkeys(names_in(expression)):
         if name == "x" and name in names:
             yield "'x' is a variable, and in a formula it is the value itself"
@@ -783,68 +801,89 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
         )
 
 
-def _emptiness(condition: Condition | None) -> bool:
-    """Return whether a condition joins nothing anywhere."""
-    if isinstance(condition, And | Or) and not condition.parts:
-        return True
-    return any(map(_emptiness, _parts(condition)))
+Terms = Mapping[str, Mapping[str, None]]
 
 
-def _block_mistakes(
-    path: Path, block: RuleBlock, system: FuzzySystem
-) -> Iterator[Mistake]:
-    how = block.activation
-    if how.count < 1:
-        yield (*path, "activation"), f"at least 1 rule is activated, not {how.count}"
-    if not 0.0 <= how.threshold <= 1.0:
-        text = f"the threshold must lie in [0, 1], not {how.threshold!r}"
-        yield (*path, "activation"), text
-    terms = {one.name: [label.name for label in one.labels] for one in system.variables}
+def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
+    terms: Terms = {
+        one.name: dict.fromkeys(label.name for label in one.labels)
+        for one in system.variables
+    }
     outputs = {one.name: one for one in system.outputs}
-    for index, rule in enumerate(block.rules):
-        place = (*path, "rules", index)
-        where = f"rule {index + 1}"
-        if not 0.0 <= rule.weight <= 1.0:
-            text = f"{where}: the weight must lie in [0, 1], not {rule.weight!r}"
-            yield place, text
-        if _levels(rule.when) > MOST_LEVELS:
-            yield place, f"{where}: nested deeper than {MOST_LEVELS} levels"
-            continue
-        if _emptiness(rule.when):
-            yield place, f"{where} joins no conditions at all"
-        for asked in questions(rule.when):
-            if asked.label is None and asked.variable in terms:
-                if not asked.hedges or asked.hedges[-1] != "any":
-                    yield place, f"{where}: {asked.variable!r} is asked without a term"
-                continue
-            yield from _reference_mistakes(
-                place, where, asked.variable, asked.label or "", terms
-            )
-        if not rule.then:
-            yield place, f"{where} concludes nothing"
-        for one in rule.then:
-            known = {name: terms[name] for name in outputs}
-            yield from _reference_mistakes(place, where, one.output, one.label, known)
-            output = outputs.get(one.output)
-            is_curve = output is not None and not output.defuzzifier.is_weighted
-            if is_curve and block.implication is None:
-                text = f"{where}: {one.output!r} needs an implication in its block"
-                yield place, text
-        for kind, norm in ((And, block.conjunction), (Or, block.disjunction)):
-            if norm is None and _uses(rule.when, kind):
-                word = "conjunction" if kind is And else "disjunction"
-                yield place, f"{where} needs a {word}, and its block has none"
+    concludable: Terms = {name: terms[name] for name in outputs}
+    for position, block in enumerate(system.blocks):
+        path: Path = ("blocks", position)
+        yield from _activation_mistakes((*path, "activation"), block.activation)
+        of_block = f" of block {position + 1}" if len(system.blocks) > 1 else ""
+        for index, rule in enumerate(block.rules):
+            where = f"rule {index + 1}{of_block}"
+            texts = [
+                *_condition_mistakes(rule.when, block, terms),
+                *_conclusion_mistakes(rule.then, block, outputs, concludable),
+            ]
+            if not 0.0 <= rule.weight <= 1.0:
+                texts.append(f"the weight must lie in [0, 1], not {rule.weight!r}")
+            for text in texts:
+                yield (*path, "rules", index), f"{where}: {text}"
+
+
+def _activation_mistakes(path: Path, how: Activation) -> Iterator[Mistake]:
+    if how.count < 1:
+        yield path, f"at least 1 rule is activated, not {how.count}"
+    if not 0.0 <= how.threshold <= 1.0:
+        yield path, f"the threshold must lie in [0, 1], not {how.threshold!r}"
+
+
+def _condition_mistakes(
+    condition: Condition | None, block: RuleBlock, terms: Terms
+) -> Iterator[str]:
+    if _levels(condition) > MOST_LEVELS:
+        yield f"nested deeper than {MOST_LEVELS} levels"
+        return
+    if _is_empty(condition):
+        yield "it joins no conditions at all"
+    for asked in questions(condition):
+        if asked.label is not None or asked.variable not in terms:
+            yield from _reference_mistakes(asked.variable, asked.label, terms)
+        elif not asked.hedges or asked.hedges[-1] != "any":
+            yield f"{asked.variable!r} is asked without a term"
+    if block.conjunction is None and _uses(condition, And):
+        yield "it needs a conjunction, and its block has none"
+    if block.disjunction is None and _uses(condition, Or):
+        yield "it needs a disjunction, and its block has none"
+
+
+def _conclusion_mistakes(
+    then: tuple[Conclusion, ...],
+    block: RuleBlock,
+    outputs: Mapping[str, SystemOutput],
+    terms: Terms,
+) -> Iterator[str]:
+    if not then:
+        yield "it concludes nothing"
+    for one in then:
+        yield from _reference_mistakes(one.output, one.label, terms)
+        output = outputs.get(one.output)
+        is_curve = output is not None and not output.defuzzifier.is_weighted
+        if is_curve and block.implication is None:
+            yield f"{one.output!r} needs an implication in its block"
 
 
 def _reference_mistakes(
-    place: Path, where: str, variable: str, label: str, terms: dict[str, list[str]]
-) -> Iterator[Mistake]:
+    variable: str, label: str | None, terms: Terms
+) -> Iterator[str]:
     if variable not in terms:
-        choice = name_choice(variable, terms)
-        yield place, f"{where}: no variable {variable!r}; {choice}"
-    elif label not in terms[variable]:
+        yield f"no variable {variable!r}; {name_choice(variable, terms)}"
+    elif label is not None and label not in terms[variable]:
         choice = name_choice(label, terms[variable])
-        yield place, f"{where}: {variable!r} has no term {label!r}; {choice}"
+        yield f"{variable!r} has no term {label!r}; {choice}"
+
+
+def _is_empty(condition: Condition | None) -> bool:
+    """Return whether a condition joins nothing anywhere."""
+    if isinstance(condition, And | Or) and not condition.parts:
+        return True
+    return any(map(_is_empty, _parts(condition)))
 
 
 def _levels(condition: Condition | None) -> int:
