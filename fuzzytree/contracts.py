@@ -133,13 +133,49 @@ Run = Callable[["FloatArray"], Outcome]
 """Answers to values of shape (inputs, rows), in the order of the model's inputs."""
 
 
+class SystemOutcome(msgspec.Struct, frozen=True):
+    """The numbers that a runtime gives for a fuzzy system and many rows.
+
+    Attributes:
+        outputs: Shape (outputs, rows), in the order of the system; NaN without number.
+        status: A `fuzzytree.reference.Status` for each row: decided, uncovered (a
+            default or NaN answers an output) or missing.
+        activations: Shape (rules, rows), of the rules of all blocks; None where they
+            were not asked for. NaN in rows with missing values.
+    """
+
+    outputs: FloatArray
+    status: IntArray
+    activations: FloatArray | None = None
+
+    def part(self, rows: slice | IntArray) -> SystemOutcome:
+        """Return the answers to some of the rows."""
+        degrees = None if self.activations is None else self.activations[:, rows]
+        return SystemOutcome(self.outputs[:, rows], self.status[rows], degrees)
+
+
+SystemRun = Callable[["FloatArray"], SystemOutcome]
+"""Numbers for values of shape (columns, rows), in the order of the system's columns."""
+
+
+class SystemLoader(Protocol):
+    """Prepares a fuzzy system for many rows."""
+
+    def __call__(
+        self, system: FuzzySystem, /, *, activations: bool = False
+    ) -> SystemRun:
+        """Return what runs it, or raise LossError if it is outside its means."""
+        ...
+
+
 class Runtime(msgspec.Struct, frozen=True):
     """Something that can execute a model.
 
     Attributes:
         name: As in reports, such as `onnxruntime float32`.
         runs: Which models it can execute.
-        load: Prepare a model; raises LossError if the model is outside its means.
+        load: Prepare a tree or rules; raises LossError if it is outside its means.
+        load_system: Prepare a fuzzy system; None if it runs none.
         dtype: The number type of degrees and strengths.
         bound: The largest difference of a strength that is allowed against the
             reference, for a model, and where it comes from; None demands equal bits
@@ -153,6 +189,7 @@ class Runtime(msgspec.Struct, frozen=True):
     name: str
     runs: tuple[Carrier, ...]
     load: Callable[[Model], Run]
+    load_system: SystemLoader | None = None
     dtype: Dtype = "float64"
     bound: Callable[[Model], tuple[float, str]] | None = None
     cannot: tuple[str, ...] = ()

@@ -11,6 +11,7 @@ from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.best_first import search
 from fuzzytree.runtimes.native_rules import fire
 from fuzzytree.runtimes.native_tree import follow
+from fuzzytree.runtimes.systems import run_system
 
 
 def load(model: Model, dtype: Dtype = "float64") -> Run:
@@ -50,7 +51,7 @@ def load_best_first(model: Model) -> Run:
 _FLOAT32 = "numbers beyond float32, and different numbers that become one in it"
 
 RUNTIMES = (
-    Runtime("native", ("tree", "rules"), load),
+    Runtime("native", ("tree", "rules", "system"), load, load_system=run_system),
     Runtime(
         "native mixed", ("tree", "rules"), partial(load, dtype="mixed"), dtype="mixed"
     ),

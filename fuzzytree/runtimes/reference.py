@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from fuzzytree.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.reference import Answer, descend, evaluate
 from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes.systems import infer_rows
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -39,4 +40,12 @@ def load(model: Model) -> Run:
     return run
 
 
-RUNTIMES = (Runtime("reference", ("tree", "rules"), load, is_slow=True),)
+RUNTIMES = (
+    Runtime(
+        "reference",
+        ("tree", "rules", "system"),
+        load,
+        load_system=infer_rows,
+        is_slow=True,
+    ),
+)
