@@ -15,9 +15,8 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import get_args
 
-from fuzzytree.anonymous import anonymous
 from fuzzytree.contracts import Carrier, Document, Format, Loss, Reading, Written
-from fuzzytree.converting import carrier_of, stand_ins
+from fuzzytree.converting import carrier_of, likeness
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
 from fuzzytree.rulebase import fingerprint
 
@@ -116,9 +115,7 @@ def _written_failures(
 ) -> Iterator[str]:
     """Yield what is wrong with what a writer returned."""
     how = " with allow_loss=True" if allow_loss else ""
-    made: object = written  # a writer of others can return anything
-    content: object = getattr(made, "content", None)
-    if not isinstance(made, Written) or not isinstance(content, bytes):
+    if not _is_written(written):
         yield f"writing{how} returns no Written with bytes"
         return
     again, error = _tried(form, model, allow_loss=allow_loss)
@@ -133,6 +130,15 @@ def _written_failures(
             yield f"the bound of a loss{how} is {loss.bound!r}: {loss.where}"
     if any(not remark.strip() for remark in written.remarks):
         yield f"a remark{how} is empty"
+
+
+def _is_written(found: object) -> bool:
+    """Return whether a writer, which may be of others, returned what it must."""
+    return isinstance(found, Written) and type(found.content) is bytes
+
+
+def _is_reading(found: object) -> bool:
+    return isinstance(found, Reading)
 
 
 def _refusal_failures(
@@ -180,17 +186,14 @@ def _read_back_failures(
         return
     if again.losses:
         yield f"reading what it writes loses {_listed(again.losses)}"
-    if fingerprint(again.model) == fingerprint(model):
-        return
-    if not any(_same(one, again.model) for one in stand_ins(model)):
-        what = f"{carrier_of(model)} {model.name!r}"
-        yield f"read back, {what} is another model, and no loss was told"
-    elif not written.remarks and not again.remarks:
-        yield "read back, names or notes differ, and no remark was made"
-
-
-def _same(one: Document, other: Document) -> bool:
-    return fingerprint(anonymous(one)) == fingerprint(anonymous(other))
+    match likeness(model, written, again):
+        case "other":
+            what = f"{carrier_of(model)} {model.name!r}"
+            yield f"read back, {what} is another model, and no loss was told"
+        case "renamed":
+            yield "read back, names or notes differ, and no remark was made"
+        case _:
+            pass
 
 
 def _read(form: Format, content: bytes) -> tuple[Reading | None, Exception | None]:
@@ -214,12 +217,11 @@ def _reader_failures(
         begin = time.perf_counter()
         found, error = _read(form, content)
         spent = time.perf_counter() - begin
-        made: object = found  # a reader of others can return anything
         if spent > _PATIENCE_S:
             yield f"reading {title} takes {spent:.0f} s"
         if found is None:
             yield from _error_failures(title, error)
-        elif not isinstance(made, Reading):
+        elif not _is_reading(found):
             yield f"reading {title} returns no Reading"
     for content in good[:3]:
         yield from _line_end_failures(form, content)

@@ -23,6 +23,7 @@ from fuzzytree.contracts import (
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import find_format
 from fuzzytree.files import read_bounded
+from fuzzytree.losses import loss_text
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.options import Option, check_names
 from fuzzytree.probing import probes
@@ -204,12 +205,6 @@ def losses_text(losses: Sequence[Loss], name: str) -> str:
     )
 
 
-def loss_text(loss: Loss) -> str:
-    """Return a loss as people read it, with its bound."""
-    bound = "" if loss.bound is None else f" (largest error {loss.bound:.2g})"
-    return f"{loss.where}: {loss.what}{bound}"
-
-
 def formed(
     model: Document,
     form: Format,
@@ -357,22 +352,44 @@ def proved(
     if form.read is None:
         return Proof("unproved", f"files in the format {form.name} are not read back")
     again = form.read(written.content, form.name)
-    if fingerprint(again.model) == fingerprint(model):
-        what = CALLED[carrier_of(model)]
-        text = f"read back from the file, the {what} is equal in every number"
-        if form.name == "yaml" or not isinstance(model, FuzzySystem):
+    match likeness(model, written, again):
+        case "equal":
+            what = CALLED[carrier_of(model)]
+            text = f"read back from the file, the {what} is equal in every number"
             return Proof("equal", text, _exact(model, text))
-        return Proof("equal", text)
-    remarks = (*written.remarks, *again.remarks)
-    if remarks and any(_same(one, again.model) for one in stand_ins(model)):
-        text = "read back from the file, it is equal but for names and notes"
-        return Proof("alike", text)
-    if written.losses or again.losses:
-        text = "read back from the file, it differs by what was lost"
-        return Proof("as listed", f"{text}{_decided(model, again.model)}")
-    raise DisagreementError(
-        f"{model.name} as {form.name} is read back as another model; nothing is written"
-    )
+        case "alike":
+            text = "read back from the file, it is equal but for names and notes"
+            return Proof("alike", text)
+        case "other" if written.losses or again.losses:
+            text = "read back from the file, it differs by what was lost"
+            return Proof("as listed", f"{text}{_decided(model, again.model)}")
+        case _:
+            raise DisagreementError(
+                f"{model.name} as {form.name} is read back as another model; "
+                "nothing is written"
+            )
+
+
+Likeness = Literal["equal", "alike", "renamed", "other"]
+
+
+def likeness(model: Document, written: Written, again: Reading) -> Likeness:
+    """Return how what was read back stands to what was written.
+
+    Args:
+        model: What was written.
+        written: The file.
+        again: What it was read as.
+
+    Returns:
+        `equal` in every number and name; `alike` but for names, notes and units, of
+        which remarks were made; `renamed`, the same without a remark; or `other`.
+    """
+    if fingerprint(again.model) == fingerprint(model):
+        return "equal"
+    if not any(_same(one, again.model) for one in _stand_ins(model)):
+        return "other"
+    return "alike" if written.remarks or again.remarks else "renamed"
 
 
 def _decided(model: Document, other: Document) -> str:
@@ -413,7 +430,7 @@ def _exact(model: Document, origin: str) -> Certificate | None:
     return Certificate(None, carrier_of(model), 0.0, origin)
 
 
-def stand_ins(model: Document) -> Iterator[Document]:
+def _stand_ins(model: Document) -> Iterator[Document]:
     """Yield what a file may hold in the place of a model, deciding alike."""
     yield model
     if isinstance(model, RuleBase):

@@ -187,7 +187,8 @@ def carry(
         quiet: Whether nothing is told but errors.
     """
     from fuzzytree.cli.carriers import carried
-    from fuzzytree.converting import carrier_of, loss_text, proved
+    from fuzzytree.converting import carrier_of, proved
+    from fuzzytree.losses import loss_text
     from fuzzytree.report import systems
 
     model = carried(
@@ -269,7 +270,7 @@ def _written(
 
 def _refuse(found: Reading, refusal: str) -> None:
     """Say what would be lost, and that nothing is written."""
-    from fuzzytree.converting import loss_text
+    from fuzzytree.losses import loss_text
 
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")

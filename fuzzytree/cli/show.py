@@ -47,7 +47,7 @@ def command(model: str, as_json: bool, quiet: bool) -> None:
 
 def _tell(found: Reading, *, quiet: bool) -> None:
     """Say on stderr what is not shown."""
-    from fuzzytree.converting import loss_text
+    from fuzzytree.losses import loss_text
 
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")

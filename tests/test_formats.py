@@ -1,0 +1,138 @@
+"""What each format can carry is found by trying, and the page shows what was found.
+
+`python tests/test_formats.py` rewrites the table of `docs/formats.md`.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.abilities import MEANINGS, abilities
+from fuzzytree.contracts import Document, Loss, Written
+from fuzzytree.converting import carrier_of, formed
+from fuzzytree.errors import LossError
+from fuzzytree.exporters import TABLE, all_formats, find_format
+from fuzzytree.report.formats import SIGNS, ability_table
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.samples import samples
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "formats.md"
+MARKED = re.compile(r"(<!-- abilities -->\n\n).*?(<!-- end -->\n)", re.DOTALL)
+YAML = find_format("yaml")
+
+
+def _page() -> str:
+    made = ability_table({one.name: abilities(one) for one in all_formats()})
+    text = PAGE.read_text("utf-8")
+    return MARKED.sub(lambda found: f"{found[1]}{made}\n{found[2]}", text)
+
+
+def test_the_page_shows_what_was_found() -> None:
+    shown = PAGE.read_text("utf-8")
+    assert shown == _page(), "python tests/test_formats.py rewrites the page"
+
+
+def test_trying_every_format_takes_a_moment() -> None:
+    begin = time.perf_counter()
+    for form in all_formats():
+        abilities(form)
+    assert time.perf_counter() - begin < 10.0  # 3 s on a quiet machine
+
+
+def test_there_is_a_sample_of_every_kind_of_model() -> None:
+    kinds = {type(model) for model in samples().values()}
+    assert kinds == {FuzzyTree, RuleBase, FuzzySystem}
+
+
+def test_every_outcome_has_a_sign_and_a_meaning() -> None:
+    assert list(SIGNS) == list(MEANINGS)
+    assert len(set(SIGNS.values())) == len(SIGNS)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_a_format_carries_what_it_says(name: str) -> None:
+    form = find_format(name)
+    found = {one.sample: one.outcome for one in abilities(form)}
+    for sample, model in samples().items():
+        kind = {FuzzyTree: "tree", RuleBase: "rules", FuzzySystem: "system"}[
+            type(model)
+        ]
+        if kind in form.carries:
+            assert found[sample] != "no"
+
+
+def test_yaml_carries_trees_and_rules_as_they_are() -> None:
+    for one in abilities(YAML):
+        model = samples()[one.sample]
+        if not isinstance(model, FuzzySystem):
+            assert one.outcome == "equal"
+
+
+def _outcome(sample: str, *, bound: float | None, read: bool = True) -> str:
+    """Return what is found of a format that has one loss."""
+
+    def write(model: Document, /, *, allow_loss: bool = False) -> Written:
+        written = YAML.write(model)
+        return replace(written, losses=(Loss("all", "is less", bound),))
+
+    form = replace(YAML, write=write, read=YAML.read if read else None)
+    return {one.sample: one.outcome for one in abilities(form)}[sample]
+
+
+def test_a_loss_with_a_bound_is_told_from_one_without() -> None:
+    assert _outcome("tree", bound=1e-3) == "points"
+    assert _outcome("tree", bound=None) == "lossy"
+
+
+def test_a_refusal_is_told_with_its_reason() -> None:
+    def write(model: Document, /, *, allow_loss: bool = False) -> Written:
+        raise LossError("turtles only")
+
+    found = abilities(replace(YAML, write=write))[0]
+    assert (found.outcome, found.reasons) == ("refused", ("turtles only",))
+
+
+def test_what_is_read_back_as_another_model_is_lossy() -> None:
+    def write(model: Document, /, *, allow_loss: bool = False) -> Written:
+        assert isinstance(model, FuzzyTree)
+        return YAML.write(replace(model, leaves=model.leaves[::-1]))
+
+    models = {"tree": samples()["tree"]}
+    found = abilities(replace(YAML, write=write), models)[0]
+    assert (found.outcome, found.reasons) == (
+        "lossy",
+        ("it is read back as another model",),
+    )
+
+
+def test_a_tree_goes_as_rules_and_rules_as_a_system() -> None:
+    tree = samples()["tree"]
+    rules = formed(tree, replace(YAML, carries=("rules",)))
+    assert isinstance(rules, RuleBase)
+    system = formed(tree, replace(YAML, carries=("system",)))
+    assert isinstance(system, FuzzySystem)
+    again = formed(system, replace(YAML, carries=("rules",)))
+    assert isinstance(again, RuleBase)
+    assert len(again.rules) == len(rules.rules)
+
+
+def test_a_system_whose_outputs_are_numbers_is_no_rule_base() -> None:
+    with pytest.raises(LossError) as caught:
+        formed(samples()["Mamdani, centroid"], replace(YAML, carries=("rules",)))
+    assert str(caught.value) == (
+        "cannot write fan as yaml: its outputs are numbers, "
+        "and rules decide for a class"
+    )
+
+
+if __name__ == "__main__":
+    PAGE.write_text(_page(), "utf-8")
+    sys.exit()
