@@ -1,0 +1,452 @@
+"""PMML 4.4: a tree or rule base that any engine of the Data Mining Group's format runs.
+
+**Rules.** Each term, each combination and each rule's strength is a derived field. The
+number of the first strongest rule is one too: the least k whose strength equals the
+largest. A tree model of one level then says its class; the node's number is the rule's.
+So the decision is that of the rule base, ties included. Degrees are arithmetic in the
+reference's order (`curves="exact"`), or PMML's own lists of points, `NormContinuous`.
+
+**Trees** are tree models with the same cuts.
+
+A row with a value that is missing or not finite has a branch of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Literal, NamedTuple
+
+from fuzzytree.casting import pointed
+from fuzzytree.contracts import Format, Loss, Model, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.pmml_shapes import Functions, norm_continuous
+from fuzzytree.exporters.pmml_xml import (
+    Element,
+    apply,
+    constant,
+    derived,
+    element,
+    joined,
+    legal,
+    legal_names,
+    ref,
+    text_of,
+)
+from fuzzytree.naming import unlike
+from fuzzytree.rulebase import (
+    Clause,
+    Points,
+    RuleBase,
+    Variable,
+    fingerprint,
+    sentence,
+)
+from fuzzytree.tree import FuzzyTree, Node, intervals
+
+_LARGEST = 1.7976931348623157e308
+_MISSING, _UNCOVERED = -1.0, 0.0  # numbers in the place of a rule's
+
+
+def write(
+    model: Model,
+    /,
+    *,
+    allow_loss: bool = False,
+    curves: Literal["exact", "points"] = "exact",
+    tolerance: float = 1e-3,
+) -> Written:
+    """Return a tree or a rule base as a PMML file, in UTF-8.
+
+    Args:
+        model: A tree or a rule base.
+        allow_loss: Whether curves may become points, if they are written as such.
+        curves: `exact`: degrees are arithmetic, with the reference's bits. `points`:
+            every term is a `NormContinuous`.
+        tolerance: The largest error of a degree for `points`.
+
+    Raises:
+        LossError: If curves would become points and `allow_loss` is False.
+        ValueError: If `curves` is neither of the two.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> written = write(random_tree(0))
+        >>> print(written.content.decode().splitlines()[1])
+        <PMML version="4.4" xmlns="http://www.dmg.org/PMML-4_4">
+    """
+    if curves not in ("exact", "points"):
+        raise ValueError(f"curves are exact or points, not {curves!r}")
+    losses: tuple[Loss, ...] = ()
+    if isinstance(model, RuleBase) and curves == "points":
+        model, losses = pointed(model, tolerance)
+        if losses and not allow_loss:
+            listed = "\n  ".join(
+                f"{loss.where}: {loss.what} (largest error {loss.bound:.1e})"
+                for loss in losses
+            )
+            raise LossError(
+                f"cannot write {model.name} as pmml with curves as points:\n  {listed}"
+            )
+    names = _Names.of(model)
+    if isinstance(model, RuleBase):
+        functions, fields, body = _rules(model, names, is_exact=curves == "exact")
+    else:
+        functions = []
+        fields, body = _tree(model, names)
+    dictionary = element(
+        "TransformationDictionary",
+        *functions,
+        *_axes(model.variables, names),
+        *fields,
+    )
+    root = element(
+        "PMML",
+        _header(model),
+        element("DataDictionary", *_data_fields(model, names)),
+        dictionary,
+        body,
+        version="4.4",
+        xmlns="http://www.dmg.org/PMML-4_4",
+    )
+    text = f'<?xml version="1.0" encoding="UTF-8"?>\n{text_of(root)}\n'
+    return Written(text.encode("utf-8"), losses, tuple(_remarks(names)))
+
+
+class _Names(NamedTuple):
+    """What things are called in the file.
+
+    Attributes:
+        field: The field of each variable.
+        label: The text of each class.
+        target: The field of the class.
+        taken: Names of fields.
+    """
+
+    field: dict[str, str]
+    label: dict[str, str]
+    target: str
+    taken: set[str]
+
+    @staticmethod
+    def of(model: Model) -> _Names:
+        field = legal_names(variable.name for variable in model.variables)
+        taken = set(field.values())
+        target = unlike("class", taken)
+        return _Names(field, legal_names(model.classes), target, taken | {target})
+
+    def new(self, name: str) -> str:
+        """Return a name for one more field."""
+        found = unlike(legal(name), self.taken)
+        self.taken.add(found)
+        return found
+
+
+def _remarks(names: _Names) -> Iterator[str]:
+    for kind, changed in (("variable", names.field), ("class", names.label)):
+        for name, plain in changed.items():
+            if name != plain:
+                yield f"{kind} {name!r} is called {plain!r}: XML has no such characters"
+
+
+def _header(model: Model) -> Element:
+    kind = "rule base" if isinstance(model, RuleBase) else "tree"
+    facts = {
+        "fingerprint": fingerprint(model),
+        "uncovered": _answer(model.semantics.uncovered),
+        "missing": _answer(model.semantics.missing),
+        "and": model.semantics.conjunction,
+    }
+    return element(
+        "Header",
+        *(_extension(name, text) for name, text in facts.items()),
+        element("Application", name="fuzzytree"),
+        description=legal(f"A fuzzy {kind}, named {model.name}."),
+    )
+
+
+def _answer(label: str | None) -> str:
+    return "no class" if label is None else f"class {label}"
+
+
+def _extension(name: str, value: str) -> Element:
+    return element("Extension", extender="fuzzytree", name=name, value=legal(value))
+
+
+def _data_fields(model: Model, names: _Names) -> Iterator[Element]:
+    for variable in model.variables:
+        if variable.parts:
+            continue
+        known = {
+            "unit": variable.unit,
+            "low": "" if variable.low is None else repr(float(variable.low)),
+            "high": "" if variable.high is None else repr(float(variable.high)),
+        }
+        yield element(
+            "DataField",
+            *(_extension(name, text) for name, text in known.items() if text),
+            name=names.field[variable.name],
+            optype="continuous",
+            dataType="double",
+        )
+    yield element(
+        "DataField",
+        *(element("Value", value=names.label[name]) for name in model.classes),
+        name=names.target,
+        optype="categorical",
+        dataType="string",
+    )
+
+
+def _axes(variables: Sequence[Variable], names: _Names) -> Iterator[Element]:
+    """Yield the field of each combination, summed in the reference's order."""
+    for variable in variables:
+        if not variable.parts:
+            continue
+        summands = [
+            apply(
+                "*",
+                constant(part.weight),
+                apply("-", ref(names.field[part.input]), constant(part.centre)),
+            )
+            for part in variable.parts
+        ]
+        total = summands[0]
+        for one in summands[1:]:
+            total = apply("+", total, one)
+        yield derived(names.field[variable.name], total)
+
+
+def _usable(variables: Sequence[Variable], names: _Names) -> Element:
+    """Return 1 where every value is there and finite, and 0 elsewhere."""
+    parts: list[Element] = []
+    for variable in variables:
+        x = ref(names.field[variable.name])
+        is_finite = apply("lessOrEqual", apply("abs", x), constant(_LARGEST))
+        finite = apply("if", is_finite, constant(1.0), constant(0.0))
+        parts.append(apply("if", apply("isMissing", x), constant(0.0), finite))
+    return joined("min", parts) if parts else constant(1.0)
+
+
+def _schema(model: Model, names: _Names) -> Element:
+    fields = [
+        element("MiningField", name=names.field[name], invalidValueTreatment="asIs")
+        for name in model.inputs
+    ]
+    target = element("MiningField", name=names.target, usageType="target")
+    return element("MiningSchema", *fields, target)
+
+
+def _model(
+    model: Model, names: _Names, outputs: Iterable[Element], nodes: Iterable[Element]
+) -> Element:
+    """Return a tree model whose answer is null where no node of the root fits."""
+    predicted = element(
+        "OutputField",
+        name=names.new("answer"),
+        optype="categorical",
+        dataType="string",
+        feature="predictedValue",
+    )
+    number = element(
+        "OutputField",
+        name=names.new("rule"),
+        optype="categorical",
+        dataType="string",
+        feature="entityId",
+    )
+    return element(
+        "TreeModel",
+        _schema(model, names),
+        element("Output", predicted, number, *outputs),
+        element("Node", element("True"), *nodes, id="0"),
+        modelName=legal(model.name),
+        functionName="classification",
+        missingValueStrategy="nullPrediction",
+        noTrueChildStrategy="returnNullPrediction",
+        splitCharacteristic="multiSplit",
+    )
+
+
+def _rules(
+    rules: RuleBase, names: _Names, *, is_exact: bool
+) -> tuple[list[Element], list[Element], Element]:
+    """Return the functions, the derived fields and the model of a rule base."""
+    functions = Functions()
+    terms: dict[tuple[str, str], str] = {}
+    fields: list[Element] = []
+    for variable in rules.variables:
+        for term in variable.terms:
+            name = names.new(f"{variable.name} is {term.name}")
+            terms[variable.name, term.name] = name
+            field = names.field[variable.name]
+            degree = (
+                norm_continuous(term.shape, field)
+                if isinstance(term.shape, Points) and not is_exact
+                else functions.degree(term.shape, field)
+            )
+            fields.append(derived(name, degree))
+    strengths = [names.new(f"strength {k}") for k in range(1, len(rules.rules) + 1)]
+    how = "product" if rules.semantics.conjunction == "product" else "min"
+    clauses: dict[int, Element] = {}
+    for strength, rule in zip(strengths, rules.rules, strict=True):
+        for clause in rule.when:
+            if id(clause) not in clauses:
+                clauses[id(clause)] = _clause(clause, terms)
+        parts = [clauses[id(clause)] for clause in rule.when]
+        whole = joined(how, parts) if parts else constant(1.0)
+        fields.append(derived(strength, whole))
+    usable, best = names.new("usable"), names.new("best")
+    fields.append(derived(usable, _usable(rules.variables, names)))
+    fields.append(derived(best, joined("max", list(map(ref, strengths)))))
+    winner = names.new("winner")
+    fields.append(derived(winner, _winner(strengths, usable, best)))
+    outputs = _outputs(rules, strengths, usable, names)
+    nodes = _rule_nodes(rules, winner, names)
+    body = _model(rules, names, outputs, nodes)
+    return list(functions.defined.values()), fields, body
+
+
+def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> Element:
+    asked = [ref(terms[clause.variable, term]) for term in clause.terms]
+    whole = joined("max", asked)
+    return apply("-", constant(1.0), whole) if clause.negated else whole
+
+
+def _winner(strengths: Sequence[str], usable: str, best: str) -> Element:
+    """Return the number of the first strongest rule."""
+    none = float(len(strengths) + 1)
+    candidates = [
+        apply("if", apply("equal", ref(name), ref(best)), constant(k), constant(none))
+        for k, name in enumerate(strengths, 1)
+    ]
+    fired = apply("greaterThan", ref(best), constant(0.0))
+    found = apply("if", fired, joined("min", candidates), constant(_UNCOVERED))
+    is_usable = apply("equal", ref(usable), constant(1.0))
+    return apply("if", is_usable, found, constant(_MISSING))
+
+
+def _outputs(
+    rules: RuleBase, strengths: Sequence[str], usable: str, names: _Names
+) -> Iterator[Element]:
+    """Yield the strength of each rule, and of each class's strongest."""
+    is_usable = apply("equal", ref(usable), constant(1.0))
+
+    def output(name: str, value: Element) -> Element:
+        return element(
+            "OutputField",
+            apply("if", is_usable, value),
+            name=names.new(name),
+            optype="continuous",
+            dataType="double",
+            feature="transformedValue",
+        )
+
+    for k, strength in enumerate(strengths, 1):
+        yield output(f"strength of rule {k}", ref(strength))
+    own: dict[str, list[Element]] = {name: [] for name in rules.classes}
+    for strength, rule in zip(strengths, rules.rules, strict=True):
+        own[rule.then].append(ref(strength))
+    for name, parts in own.items():
+        value = joined("max", parts) if parts else constant(0.0)
+        yield output(f"strength of class {name}", value)
+
+
+def _rule_nodes(rules: RuleBase, winner: str, names: _Names) -> Iterator[Element]:
+    def node(number: float, label: str, id_: str, count: int | None = None) -> Element:
+        return element(
+            "Node",
+            _predicate(winner, "equal", number),
+            id=id_,
+            score=names.label[label],
+            recordCount=None if count is None else str(count),
+        )
+
+    for k, rule in enumerate(rules.rules, 1):
+        found = node(float(k), rule.then, str(k), rule.support)
+        text = _extension("rule", sentence(rule))
+        yield found._replace(children=(text, *found.children))
+    if rules.semantics.uncovered is not None:
+        yield node(_UNCOVERED, rules.semantics.uncovered, "uncovered")
+    if rules.semantics.missing is not None:
+        yield node(_MISSING, rules.semantics.missing, "missing")
+
+
+def _predicate(field: str, operator: str, value: float) -> Element:
+    return element(
+        "SimplePredicate", field=field, operator=operator, value=repr(float(value))
+    )
+
+
+def _tree(tree: FuzzyTree, names: _Names) -> tuple[list[Element], Element]:
+    """Return the derived fields and the model of a tree."""
+    usable = names.new("usable")
+    fields = [derived(usable, _usable(tree.variables, names))]
+    is_usable = _predicate(usable, "equal", 1.0)
+    made: dict[int, Element] = {}  # by number; a node's children have higher ones
+    for number in range(len(tree.nodes), 0, -1):
+        node = tree.nodes[number - 1]
+        children: list[Element] = []
+        for owner, branch in enumerate(node.branches):
+            predicate = _owned(node, owner, names.field[node.variable])
+            if branch.node is not None:
+                children.append(_with_predicate(made.pop(branch.node), predicate))
+            else:
+                children.append(_leaf(tree, branch.leaf or 0, predicate, names))
+        made[number] = element("Node", *children, id=f"node {number}")
+    root = (
+        _with_predicate(made[1], is_usable)
+        if tree.nodes
+        else _leaf(tree, 1, is_usable, names)
+    )
+    nodes = [root]
+    if tree.semantics.missing is not None:
+        label = names.label[tree.semantics.missing]
+        is_missing = _predicate(usable, "equal", 0.0)
+        nodes.append(element("Node", is_missing, id="missing", score=label))
+    return fields, _model(tree, names, (), nodes)
+
+
+def _with_predicate(node: Element, predicate: Element) -> Element:
+    return node._replace(children=(predicate, *node.children))
+
+
+def _leaf(tree: FuzzyTree, number: int, predicate: Element, names: _Names) -> Element:
+    leaf = tree.leaves[number - 1]
+    return element(
+        "Node",
+        predicate,
+        id=str(number),
+        score=names.label[leaf.label],
+        recordCount=None if leaf.support is None else str(leaf.support),
+    )
+
+
+def _owned(node: Node, owner: int, field: str) -> Element:
+    """Return whether a value lies in one of the intervals that a branch owns."""
+    parts: list[Element] = []
+    for one, (low, high) in zip(node.owners, intervals(node), strict=True):
+        if one != owner:
+            continue
+        ends: list[Element] = []
+        if low is not None:
+            ends.append(_predicate(field, "greaterThan", low))
+        if high is not None:
+            ends.append(_predicate(field, "lessOrEqual", high))
+        parts.append(_compound("and", ends))
+    return _compound("or", parts)
+
+
+def _compound(operator: str, parts: list[Element]) -> Element:
+    if len(parts) == 1:
+        return parts[0]
+    return element("CompoundPredicate", *parts, booleanOperator=operator)
+
+
+FORMAT = Format(
+    name="pmml",
+    suffixes=(".pmml",),
+    carries=("tree", "rules"),
+    write=write,
+    cannot=("a pmml file runs, but is not read back as a tree or rule base",),
+    dtype="float64",
+)

@@ -1,0 +1,198 @@
+"""Degrees as expressions of PMML: the reference's operations, in its order.
+
+Functions that several terms need are defined once in the file. So a degree has the
+reference's bits in every engine that computes in doubles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fuzzytree.exporters.pmml_xml import Element, apply, constant, element, ref
+from fuzzytree.reference import BELOW_ONE
+from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side
+
+
+class Functions:
+    """The functions that a file needs, as they are asked for.
+
+    Attributes:
+        defined: Each function's definition, by name; what another one needs stands
+            before it.
+    """
+
+    def __init__(self) -> None:
+        self.defined: dict[str, Element] = {}
+
+    def degree(self, shape: Shape, field: str) -> Element:
+        """Return the degree of a field's value."""
+        x = ref(field)
+        match shape:
+            case Band(low=low, high=high, left=left, right=right):
+                found = constant(1.0)
+                if high is not None:
+                    beyond = self._flank(right, x)
+                    found = apply("if", _above(x, high), beyond, found)
+                if low is not None:
+                    below = self._flank(left, x)
+                    found = apply("if", _up_to(x, low), below, found)
+                return found
+            case LR(mean=mean, left=left, right=right):
+                below = self._side(left, apply("-", constant(mean), x))
+                above = self._side(right, apply("-", x, constant(mean)))
+                return apply("min", below, above)
+            case Points():
+                return self._points(shape, x)
+
+    def _define(self, name: str, parameters: Sequence[str], body: Element) -> str:
+        if name not in self.defined:
+            fields = [
+                element(
+                    "ParameterField", name=one, optype="continuous", dataType="double"
+                )
+                for one in parameters
+            ]
+            self.defined[name] = element(
+                "DefineFunction",
+                *fields,
+                body,
+                name=name,
+                optype="continuous",
+                dataType="double",
+            )
+        return name
+
+    def _clipped(self, value: Element, high: Element) -> Element:
+        held = apply("max", ref("value"), constant(0.0))
+        body = apply("min", held, ref("high"))
+        return apply(self._define("clip", ("value", "high"), body), value, high)
+
+    def _flank(self, flank: Flank | None, x: Element) -> Element:
+        if flank is None:
+            return constant(0.0)
+        names = _names(len(flank.curve))
+        top = apply("*", _horner(names, ref("q")), ref("q"))
+        held = apply("min", apply("max", top, constant(0.0)), constant(BELOW_ONE))
+        curve = self._define(f"flank{len(names)}", ("q", *names), held)
+        run = constant(flank.start - flank.end)
+        q = apply("/", apply("-", x, constant(flank.end)), run)
+        return apply(
+            curve, self._clipped(q, constant(1.0)), *map(constant, flank.curve)
+        )
+
+    def _side(self, side: Side, distance: Element) -> Element:
+        names = _names(len(side.curve))
+        count = len(names)
+        given = tuple(map(ref, names))
+        v = apply("-", apply("*", constant(2.0), ref("t")), constant(1.0))
+        horner = self._define(f"horner{count}", ("v", *names), _horner(names, ref("v")))
+        fall = apply("*", ref("t"), apply(horner, v, *given))
+        kept = self._clipped(apply("-", constant(1.0), fall), constant(1.0))
+        body = self._define(f"body{count}", ("t", *names), kept)
+        square = self._define("square", ("w",), apply("*", ref("w"), ref("w")))
+        left = apply("/", apply("-", ref("reach"), ref("u")), ref("length"))
+        w = self._clipped(left, constant(1.0))
+        whole = apply(
+            "*",
+            apply(body, apply("min", ref("u"), constant(1.0)), *given),
+            apply(square, apply(square, w)),
+        )
+        parameters = ("u", "reach", "length", *names)
+        lr = self._define(f"side{count}", parameters, whole)
+        u = apply("/", distance, constant(side.spread))
+        return apply(
+            lr,
+            self._clipped(u, constant(side.reach)),
+            constant(side.reach),
+            constant(side.reach - 1.0),
+            *map(constant, side.curve),
+        )
+
+    def _points(self, points: Points, x: Element) -> Element:
+        """Return nested questions that halve the points, down to a line or a degree."""
+        values, degrees = points.values, points.degrees
+        count = len(values)
+
+        def within(first: int, last: int) -> Element:
+            # Of places 0 (up to the first point), 1, ..., count (behind the last one).
+            if first == last:
+                return self._line(points, first, x)
+            middle = (first + last) // 2
+            return apply(
+                "if",
+                _up_to(x, values[middle]),
+                within(first, middle),
+                within(middle + 1, last),
+            )
+
+        return within(0, count) if count > 1 else constant(degrees[0])
+
+    def _line(self, points: Points, after: int, x: Element) -> Element:
+        values, degrees = points.values, points.degrees
+        if after in (0, len(values)):
+            return constant(degrees[after and -1])
+        anchor, other = values[after], values[after - 1]
+        near, far = degrees[after], degrees[after - 1]
+        if near == far or anchor == other:
+            return constant(near)  # behind a step nothing lies between
+        if far == 0.0:
+            anchor, other, near, far = other, anchor, far, near
+        share = apply("/", apply("-", ref("x"), ref("anchor")), ref("run"))
+        line = apply("+", ref("near"), apply("*", share, ref("rise")))
+        held = apply("min", apply("max", line, ref("low")), ref("high"))
+        names = ("x", "anchor", "run", "near", "rise", "low", "high")
+        numbers = (
+            anchor,
+            other - anchor,
+            near,
+            far - near,
+            min(near, far),
+            max(near, far),
+        )
+        name = self._define("line", names, held)
+        return apply(name, x, *map(constant, numbers))
+
+
+def norm_continuous(points: Points, field: str) -> Element:
+    """Return points as PMML's own lists, one for each stretch between steps.
+
+    An engine rounds in its own order: a stretch whose degrees are below 1 is held at
+    the highest of them, so that no rounding makes it 1.
+    """
+    runs: list[list[tuple[float, float]]] = [[]]
+    for point in zip(points.values, points.degrees, strict=True):
+        if runs[-1] and runs[-1][-1][0] == point[0]:
+            runs.append([])
+        runs[-1].append(point)
+    found = _run(runs[-1], field)
+    for run in reversed(runs[:-1]):
+        found = apply("if", _up_to(ref(field), run[-1][0]), _run(run, field), found)
+    return found
+
+
+def _run(run: list[tuple[float, float]], field: str) -> Element:
+    if len({degree for _, degree in run}) == 1:
+        return constant(run[0][1])
+    norms = [element("LinearNorm", orig=repr(x), norm=repr(d)) for x, d in run]
+    found = element("NormContinuous", *norms, field=field, outliers="asExtremeValues")
+    highest = max(degree for _, degree in run)
+    return found if highest == 1.0 else apply("min", found, constant(highest))
+
+
+def _names(count: int) -> tuple[str, ...]:
+    return tuple(f"c{k}" for k in range(count))
+
+
+def _horner(names: Sequence[str], x: Element) -> Element:
+    total = ref(names[-1])
+    for name in reversed(names[:-1]):
+        total = apply("+", apply("*", total, x), ref(name))
+    return total
+
+
+def _up_to(x: Element, value: float) -> Element:
+    return apply("lessOrEqual", x, constant(value))
+
+
+def _above(x: Element, value: float) -> Element:
+    return apply("greaterThan", x, constant(value))
