@@ -1,7 +1,8 @@
-"""ONNX: a tree or a rule base as a graph that any ONNX runtime executes.
+"""ONNX: a tree, rules or a fuzzy system as a graph that any ONNX runtime executes.
 
 A tree gives the graph that follows its path, a rule base the graph that fires all its
-rules. See `docs/onnx.md` for the graphs, their cost and the versions that run them.
+rules, and a fuzzy system that of all its operations. See `docs/onnx.md` for the graphs,
+their cost and the versions that run them.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 from fuzzytree.contracts import Dtype, Format, Loss, Model, Written
 from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.rulebase import fingerprint
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 FORMAT_VERSION = "1"
 """Of the meaning of inputs, outputs and metadata."""
 
-Output = Literal["label", "rule", "strengths", "status"]
+Output = Literal["label", "rule", "strengths", "status", "outputs", "activations"]
 Signature = Literal["needed", "all"]
 
 OPSETS = range(12, 27)
@@ -49,8 +51,12 @@ is for Python 3.11, and `TreeEnsemble` came with 1.21."""
 _MOST_ROWS_TO_VERIFY = 24
 
 
+_OF_MODELS: tuple[Output, ...] = ("label", "rule", "strengths", "status")
+_OF_SYSTEMS: tuple[Output, ...] = ("outputs", "status", "activations")
+
+
 def write(
-    model: Model,
+    model: Model | FuzzySystem,
     /,
     *,
     allow_loss: bool = False,
@@ -58,29 +64,33 @@ def write(
     opset: int = 17,
     ir: int = 8,
     signature: Signature = "needed",
-    outputs: Sequence[Output] = ("label", "rule"),
+    outputs: Sequence[Output] | None = None,
     readable: bool = False,
     plain: bool = False,
     verify: bool = True,
 ) -> Written:
-    """Write a tree as the graph of its path, a rule base as the graph of its rules.
+    """Write a tree as the graph of its path, rules and systems as that of their rules.
 
     The input is `inputs`, of shape (rows, columns), double (float32 for `float32`).
     The outputs, each with one entry per row: `label`, the class or "" for none;
     `rule`, the number of the winning rule or leaf from 1, or 0; `status`, a
     `fuzzytree.reference.Status`; `strengths`, of shape (rows, rules), NaN where a
-    value is missing. The same model and options give the same bytes.
+    value is missing. Of a fuzzy system: `outputs`, of shape (rows, outputs), NaN
+    without a number; `status`; `activations`, of shape (rows, rules). The same model
+    and options give the same bytes.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         allow_loss: Whether to write what float32 cannot hold as near as it can.
         dtype: The number type; `mixed` compares and divides in double and does the
             rest in float32. A tree has comparisons only: `mixed` is `float64` for it.
+            A fuzzy system is always `float64`.
         opset: The version of the operators, 12 to 26.
         ir: The version of the file, 4 to 13.
         signature: `needed` for the model's inputs as columns, `all` for all columns
             of the training table, of which the others are ignored.
-        outputs: Which outputs, in this order.
+        outputs: Which outputs, in this order: unless given, `label` and `rule`, of a
+            system `outputs` and `status`.
         readable: Whether degrees and the winner are functions of the domain
             `fuzzytree`, for people who look into the file (rules only).
         plain: Whether a tree does without the operators of ai.onnx.ml.
@@ -90,8 +100,9 @@ def write(
         The file and what was lost.
 
     Raises:
-        LossError: If float32 cannot hold a number of the model, unless allowed; or if
-            the installed onnxruntime does not load the file.
+        LossError: If float32 cannot hold a number of the model, unless allowed; if a
+            system needs a function that onnxruntime lacks in double; or if the
+            installed onnxruntime does not load the file.
         DisagreementError: If the file, run in onnxruntime, gives another answer.
         MissingExtraError: If onnx is not installed, or onnxruntime to verify with.
         ValueError: If an option is not one of those above.
@@ -102,11 +113,19 @@ def write(
         >>> written.losses
         ()
     """
+    outputs = _usual_outputs(model) if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
     _check_variants(model, opset, ir, readable=readable, plain=plain)
     _require("onnx", "writing onnx needs")
     if verify:
         _require("onnxruntime", "verifying a written onnx file needs")
+    if isinstance(model, FuzzySystem):
+        from fuzzytree.exporters.onnx_system import write_system
+
+        facts = {"format": FORMAT_VERSION, "version": version()}
+        return write_system(
+            model, opset=opset, ir=ir, outputs=outputs, facts=facts, verify=verify
+        )
     from fuzzytree.exporters.onnx_numbers import NUMBERS
     from fuzzytree.numerics.narrowing import losses
 
@@ -133,22 +152,30 @@ def write(
     return Written(content, lost)
 
 
-def _is_tree(model: Model) -> bool:
+def _usual_outputs(model: Model | FuzzySystem) -> Sequence[Output]:
+    if isinstance(model, FuzzySystem):
+        return ("outputs", "status")
+    return ("label", "rule")
+
+
+def _is_tree(model: Model | FuzzySystem) -> bool:
     return isinstance(model, FuzzyTree)
 
 
 def _check_options(
-    model: Model,
+    model: Model | FuzzySystem,
     dtype: Dtype,
     opset: int,
     ir: int,
     signature: Signature,
     outputs: Sequence[Output],
 ) -> None:
+    is_system = isinstance(model, FuzzySystem)
+    known = _OF_SYSTEMS if is_system else _OF_MODELS
     for name, value, choices in (
-        ("dtype", dtype, get_args(Dtype)),
-        ("signature", signature, get_args(Signature)),
-        *(("outputs", output, get_args(Output)) for output in outputs),
+        ("dtype", dtype, ("float64",) if is_system else get_args(Dtype)),
+        ("signature", signature, ("needed",) if is_system else get_args(Signature)),
+        *(("outputs", output, known) for output in outputs),
     ):
         if value not in choices:
             raise ValueError(f"{name}: there is {', '.join(choices)}, not {value!r}")
@@ -162,7 +189,7 @@ def _check_options(
         raise ValueError(_range_text("opset", OPSETS, opset))
     if ir not in IRS:
         raise ValueError(_range_text("ir", IRS, ir))
-    if signature == "all" and not model.columns:
+    if signature == "all" and not (isinstance(model, FuzzySystem) or model.columns):
         raise ValueError(
             f"{model.name!r} does not know the columns of its training table, "
             "so its signature can only be 'needed'"
@@ -170,8 +197,10 @@ def _check_options(
 
 
 def _check_variants(
-    model: Model, opset: int, ir: int, *, readable: bool, plain: bool
+    model: Model | FuzzySystem, opset: int, ir: int, *, readable: bool, plain: bool
 ) -> None:
+    if readable and isinstance(model, FuzzySystem):
+        raise ValueError("readable is for rules: a system's graph has no functions")
     if plain and not _is_tree(model):
         raise ValueError("plain is for trees: rules never need ai.onnx.ml")
     if readable and _is_tree(model):
@@ -358,10 +387,12 @@ def version() -> str:
 FORMAT = Format(
     name="onnx",
     suffixes=(".onnx",),
-    carries=("tree", "rules"),
+    carries=("tree", "rules", "system"),
     write=write,
     cannot=(
-        "an onnx file runs, but is not read back as a tree or rule base",
+        "an onnx file runs, but is not read back as a tree, rule base or system",
+        "tan, asin, acos, atan, sinh, cosh, log10, log1p and the like of a system's "
+        "formulas: onnxruntime has them in float32 only",
         "a tree's terms and fitted sets are left out: its path needs the cuts alone",
     ),
     extra="onnx",

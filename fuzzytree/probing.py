@@ -28,6 +28,21 @@ from fuzzytree.rulebase import (
     Variable,
     shapes_of,
 )
+from fuzzytree.system import (
+    Bell,
+    Binary,
+    Cosine,
+    Curve,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Linear,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Spike,
+    TwoGaussians,
+)
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -93,6 +108,104 @@ def probe_values(
     made = probes(model, limit=limit, seed=seed)
     table = np.array([[row[n] for row in made] for n in model.inputs], np.float64)
     return table.reshape(len(model.inputs), len(made))
+
+
+def system_probes(
+    system: FuzzySystem, *, limit: int = 2_000, seed: int = 0
+) -> list[Row]:
+    """Return rows that put each input of a system on the landmarks of its curves.
+
+    Landmarks are the numbers by which a curve is given, the middles between them, and
+    the ends of the input's range, each with its neighbouring doubles.
+
+    Args:
+        system: The system.
+        limit: The most rows to return. Above it, landmarks are drawn from the seed;
+            random rows, and one in five of all rows with a special value, keep their
+            place.
+        seed: The same system, limit and seed give the same rows.
+
+    Returns:
+        A value for each column in each row.
+
+    Example:
+        >>> from fuzzytree.testing import random_system
+        >>> len(system_probes(random_system(1), limit=50))
+        50
+    """
+    chance = random.Random(seed)
+    points = _system_points(system)
+    ranges = {name: _hull(values) for name, values in points.items()}
+
+    def draw() -> Row:
+        return {name: chance.uniform(*ends) for name, ends in ranges.items()}
+
+    special = [(name, value) for name in points for value in SPECIAL]
+    chance.shuffle(special)
+    random_rows = max(limit // 5, 1)
+    tail = [draw() for _ in range(random_rows)]
+    tail += [{**draw(), name: value} for name, value in special[: limit // 5]]
+    near = [
+        (name, value)
+        for name, values in points.items()
+        for point in dict.fromkeys(values)
+        for value in neighbours(point)
+    ]
+    room = max(limit - len(tail), 0)
+    if len(near) > room:
+        near = chance.sample(near, room)
+    rows = [{**draw(), name: value} for name, value in near]
+    while len(rows) < room:
+        rows.append({n: chance.choice(points[n]) for n in points} if points else {})
+    return [*rows, *tail][:limit]
+
+
+def _system_points(system: FuzzySystem) -> dict[str, list[float]]:
+    """Return the landmarks of each column; of combinations, those of their parts."""
+    points: dict[str, list[float]] = {name: [] for name in system.columns}
+    for one in system.inputs:
+        ends = [end for end in (one.low, one.high) if end is not None]
+        own = [value for label in one.labels for value in numbers_of(label.curve)]
+        inner = [a + 0.5 * (b - a) for a, b in itertools.pairwise(sorted(set(own)))]
+        if not one.parts:
+            points[one.name] += [*ends, *own, *filter(math.isfinite, inner)]
+        for part in one.parts:
+            points[part.input].append(part.centre)
+    return {name: values or [0.0, 1.0] for name, values in points.items()}
+
+
+def numbers_of(curve: Curve) -> list[float]:
+    """Return the values at which a system's curve may change its formula.
+
+    Example:
+        >>> from fuzzytree.system import Gaussian, Trapezoid
+        >>> numbers_of(Trapezoid(None, 1.0, 2.0, 4.0)), numbers_of(Gaussian(5.0, 2.0))
+        ([1.0, 2.0, 4.0], [5.0, 3.0, 7.0])
+    """
+    match curve:
+        case Band() | LR() | Points():
+            return [*landmarks(curve)]
+        case Linear() | Formula():
+            return []
+        case (
+            SigmoidDifference(first=first, second=second)
+            | SigmoidProduct(first=first, second=second)
+        ):
+            return [*numbers_of(first), *numbers_of(second)]
+        case Bell(center=middle, width=width) | Gaussian(mean=middle, deviation=width):
+            found = [middle, middle - width, middle + width]
+        case Cosine(center=middle, width=width) | Spike(center=middle, width=width):
+            found = [middle, middle - width / 2.0, middle + width / 2.0]
+        case Sigmoid(inflection=middle):
+            found = [middle]
+        case TwoGaussians(left=left, right=right):
+            found = [left, right]
+        case Binary(start=start):
+            found = [start]
+        case _:
+            fields = [getattr(curve, name) for name in curve.__struct_fields__]
+            found = [value for value in fields if value is not None]
+    return [value for value in found if math.isfinite(value)]
 
 
 def landmarks(shape: Shape) -> tuple[float, ...]:

@@ -13,10 +13,20 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fuzzytree.contracts import Carrier, Dtype, Model, Outcome, Run, Runtime
+from fuzzytree.contracts import (
+    Carrier,
+    Dtype,
+    Model,
+    Outcome,
+    Run,
+    Runtime,
+    SystemOutcome,
+    SystemRun,
+)
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
 from fuzzytree.rulebase import Semantics
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -36,7 +46,7 @@ _CACHE_BYTES = 2**18
 Labels = tuple[str | None, ...]
 
 
-class Facts(msgspec.Struct, frozen=True):
+class Facts(msgspec.Struct, frozen=True, kw_only=True):
     """What an ONNX file of ours says about itself.
 
     Attributes:
@@ -53,6 +63,8 @@ class Facts(msgspec.Struct, frozen=True):
         rules: The number of rules or leaves.
         outputs: Of the graph, in its order.
         semantics: What an answer depends on beside rules or tree.
+        names: Of the numbers in the output `outputs` of a fuzzy system.
+        chunk: How many rows are best run together; 0 if unknown.
     """
 
     name: str
@@ -68,23 +80,29 @@ class Facts(msgspec.Struct, frozen=True):
     rules: int
     outputs: tuple[Output, ...]
     semantics: Semantics
+    names: tuple[str, ...] = ()
+    chunk: int = 0
 
 
-class OnnxModel(Facts, frozen=True):
+class OnnxModel(Facts, frozen=True, kw_only=True):
     """An ONNX file, ready to run: what it says about itself, and its answers.
 
     Attributes:
         run: Answers to values of shape (inputs, rows), in the order of `inputs`.
             A file without the output `status` does not tell ties, nor an overflow
-            from an uncovered row.
+            from an uncovered row. A fuzzy system has `run_system` instead, and this
+            raises ValueError.
         labels: The file's own labels for the same values, None for "no class"; None
             in place of the function if the file has no output `label`.
         content: The file.
+        run_system: The numbers of a fuzzy system; None for trees and rules. A file
+            without the output `status` does not tell a default from a number.
     """
 
     run: Run
     labels: Callable[[FloatArray], Labels] | None
     content: bytes
+    run_system: SystemRun | None = None
 
 
 def open_onnx(content: bytes, name: str) -> OnnxModel:
@@ -130,11 +148,15 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
         text = f"{name}: onnxruntime does not load it: {first_line(error)}"
         raise ReadError(text) from error
     has_labels = "label" in facts.outputs
+    is_system = facts.carrier == "system"
     return OnnxModel(
         **msgspec.structs.asdict(facts),
-        run=functools.partial(_run, session, facts),
+        run=functools.partial(_refuse if is_system else _run, session, facts),
         labels=functools.partial(_labels, session, facts) if has_labels else None,
         content=content,
+        run_system=functools.partial(_run_system, session, facts)
+        if is_system
+        else None,
     )
 
 
@@ -265,6 +287,58 @@ def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:
     return outcome
 
 
+def _refuse(session: Session, facts: Facts, values: FloatArray) -> Outcome:
+    raise ValueError(f"{facts.name} is a fuzzy system: call run_system")
+
+
+def _run_system(session: Session, facts: Facts, values: FloatArray) -> SystemOutcome:
+    import numpy as np
+
+    from fuzzytree.runtimes.rows import checked
+
+    values = checked(values, facts.inputs)
+    count = values.shape[1]
+    has_activations = "activations" in facts.outputs
+    outcome = SystemOutcome(
+        outputs=np.empty((len(facts.names), count)),
+        status=np.empty(count, np.int64),
+        activations=np.empty((facts.rules, count)) if has_activations else None,
+    )
+    for start, found in _chunks(session, facts, values, facts.outputs):
+        part = slice(start, start + len(found["outputs"]))
+        outcome.outputs[:, part] = found["outputs"].T
+        if outcome.activations is not None:
+            outcome.activations[:, part] = found["activations"].T
+        if "status" in found:
+            outcome.status[part] = found["status"]
+    if "status" not in facts.outputs:
+        is_none = np.isnan(outcome.outputs).any(axis=0)
+        is_missing = ~np.isfinite(values).all(axis=0)
+        outcome.status[:] = np.where(is_missing, 3, np.where(is_none, 2, 0))
+    return outcome
+
+
+def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
+    """Write a fuzzy system as ONNX, in memory, and return what runs it.
+
+    Args:
+        system: The system.
+        activations: Whether the degree of activation of each rule is wanted.
+
+    Raises:
+        LossError: If the graph cannot hold the system.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+    """
+    _require_packages("running")
+    from fuzzytree.exporters.onnx_session import open_session
+
+    outputs: tuple[Output, ...] = ("outputs", "status", "activations")
+    outputs = outputs if activations else outputs[:2]
+    content = write(system, outputs=outputs, verify=False).content
+    facts = _facts(_parsed(content, system.name), system.name)
+    return functools.partial(_run_system, open_session(content), facts)
+
+
 def _labels(session: Session, facts: Facts, values: FloatArray) -> Labels:
     from fuzzytree.runtimes.rows import checked
 
@@ -304,6 +378,8 @@ def _rows_at_once(facts: Facts) -> int:
     """Return how many rows are answered together, so that they stay in the cache."""
     if facts.carrier == "tree":
         return 2**16
+    if facts.carrier == "system":
+        return min(max(facts.chunk, 1), 2**16)
     degree = 8 if facts.dtype == "float64" else 4
     return max(128, min(2**13, _CACHE_BYTES // (degree * facts.rules)))
 
@@ -324,9 +400,11 @@ def _is_answer(facts: Facts, found: Outputs, rows: int) -> bool:
     """Say whether outputs have the shapes and numbers that answers have."""
     import numpy as np
 
-    strengths = found.get("strengths")
-    if strengths is not None and strengths.shape != (rows, facts.rules):
-        return False
+    widths = {"strengths": facts.rules, "activations": facts.rules}
+    widths["outputs"] = len(facts.names)
+    for name, width in widths.items():
+        if name in found and found[name].shape != (rows, width):
+            return False
     for name, last in (("rule", facts.rules), ("status", 3)):
         if name not in found:
             continue
@@ -370,13 +448,16 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
             f"{name}: the file has format {version!r}, and this fuzzytree "
             f"reads format {FORMAT_VERSION!r}; a newer one may help"
         )
-    records = ("columns", "inputs", "units", "classes", "rules", "outputs", "semantics")
+    records = {"columns", "inputs", "units", "classes", "rules", "outputs", "semantics"}
+    records |= {"names", "chunk"}
     try:
         known = {k: json.loads(v) if k in records else v for k, v in texts.items()}
         facts = msgspec.convert(known, Facts)
     except (json.JSONDecodeError, msgspec.ValidationError) as error:
         raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
-    is_possible = 1 <= facts.rules <= proto.ByteSize()
+    least = 0 if facts.carrier == "system" else 1
+    is_possible = least <= facts.rules <= proto.ByteSize()
+    is_possible &= (facts.carrier == "system") == bool(facts.names)
     if not set(facts.inputs) <= set(facts.columns) or not is_possible:
         raise ReadError(f"{name}: the file's metadata contradicts itself")
     return facts
@@ -414,10 +495,13 @@ def _check_signature(proto: onnx.ModelProto, facts: Facts, name: str) -> None:
         raise ReadError(
             f"{name}: the graph's inputs and outputs are not those of its metadata"
         )
-    if "rule" not in outputs:
+    needed, wanted = "rule", "label and rule"
+    if facts.carrier == "system":
+        needed, wanted = "outputs", "outputs and status"
+    if needed not in outputs:
         raise ReadError(
-            f"{name}: the file has no output 'rule', so it cannot be run here; "
-            "write it with the outputs label and rule"
+            f"{name}: the file has no output {needed!r}, so it cannot be run here; "
+            f"write it with the outputs {wanted}"
         )
 
 
@@ -430,6 +514,7 @@ def _runtime(
     plain: bool = False,
 ) -> Runtime:
     return Runtime(
+        load_system=load_system if "system" in runs else None,
         name=f"onnxruntime {name}",
         runs=runs,
         load=functools.partial(load, dtype=dtype, readable=readable, plain=plain),
@@ -446,7 +531,7 @@ _SINGLE = (
 )
 
 RUNTIMES = (
-    _runtime("float64", ("tree", "rules"), "float64"),
+    _runtime("float64", ("tree", "rules", "system"), "float64"),
     _runtime("mixed", ("tree", "rules"), "mixed"),
     _runtime("float32", ("tree", "rules"), "float32", *_SINGLE),
     _runtime("readable", ("rules",), "float64", readable=True),

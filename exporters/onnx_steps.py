@@ -1,0 +1,215 @@
+"""The steps of a program as nodes of a graph: one step, one to four plain operators.
+
+One number for each row is a block of shape (rows,), samples are one of shape
+(samples, rows). What no input enters is a constant, computed here with the numbers of
+Python's own library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.exporters.onnx_graph import Sheet
+from fuzzytree.programs.evaluate import Found, still_results
+from fuzzytree.programs.steps import Program, Step
+
+_NODES: Mapping[str, str] = {
+    "add": "Add",
+    "subtract": "Sub",
+    "multiply": "Mul",
+    "divide": "Div",
+    "minimum": "Min",
+    "maximum": "Max",
+    "negate": "Neg",
+    "absolute": "Abs",
+    "floor": "Floor",
+    "ceiling": "Ceil",
+    "round": "Round",
+    "square_root": "Sqrt",
+    "exponential": "Exp",
+    "logarithm": "Log",
+    "sine": "Sin",
+    "cosine": "Cos",
+    "hyperbolic_tangent": "Tanh",
+    "power": "Pow",
+    "less": "Less",
+    "at_most": "LessOrEqual",
+    "equal": "Equal",
+    "and": "And",
+    "or": "Or",
+    "not": "Not",
+    "where": "Where",
+}
+"""Operations that are one operator, in double in onnxruntime too."""
+
+_WORDS: Mapping[str, str] = {
+    "tangent": "tan",
+    "arc_sine": "asin",
+    "arc_cosine": "acos",
+    "arc_tangent": "atan",
+    "arc_tangent_2": "atan2",
+    "hyperbolic_sine": "sinh",
+    "hyperbolic_cosine": "cosh",
+    "area_sine": "asinh",
+    "area_cosine": "acosh",
+    "area_tangent": "atanh",
+    "logarithm_10": "log10",
+    "logarithm_1p": "log1p",
+}
+"""Operations that no operator computes in double, by the names of C."""
+
+
+def missing_functions(program: Program) -> tuple[str, ...]:
+    """Return the functions of a program that no operator computes in double.
+
+    Example:
+        >>> from fuzzytree.programs.steps import Maker, Result
+        >>> make = Maker()
+        >>> angle = Result("output", "y", make("arc_tangent", make.input("x")))
+        >>> missing_functions(make.program("angle", ("x",), (angle,)))
+        ('atan',)
+    """
+    still = still_results(program)
+    pairs = zip(program.steps, still, strict=True)
+    used = [
+        _WORDS[s.operation] for s, r in pairs if r is None and s.operation in _WORDS
+    ]
+    return tuple(dict.fromkeys(used))
+
+
+def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[str]:
+    """Add the steps of a program to a sheet and return the names of its results.
+
+    Args:
+        sheet: Where the nodes go; `inputs` is its input, of shape (rows, columns).
+        program: The program; `missing_functions` must be empty.
+        columns: What the columns of the input are, in order.
+
+    Returns:
+        A block of shape (rows,) for each result.
+    """
+    source = sheet.node("Transpose", "inputs", perm=[1, 0])
+    names: list[str] = []
+    for step, still in zip(program.steps, still_results(program), strict=True):
+        given = [names[place] for place in step.arguments]
+        if still is not None:
+            names.append(_constant(sheet, still))
+        elif step.operation == "input":
+            place = _whole(sheet, columns.index(step.name))
+            names.append(sheet.node("Gather", source, place))
+        else:
+            names.append(_node(sheet, step, given, program))
+    results = [names[result.step] for result in program.results]
+    is_still = [still_results(program)[r.step] is not None for r in program.results]
+    return [
+        _spread(sheet, source, name) if still else name
+        for name, still in zip(results, is_still, strict=True)
+    ]
+
+
+def _constant(sheet: Sheet, found: Found) -> str:
+    kind: npt.DTypeLike = np.float64
+    first = found[0] if isinstance(found, list) else found
+    if isinstance(first, bool):
+        kind = np.bool_
+    value = np.array(found, kind)
+    if isinstance(found, list):
+        value = value.reshape(-1, 1)
+    return sheet.constant(value, "number")
+
+
+def _spread(sheet: Sheet, source: str, name: str) -> str:
+    """Return a constant once for each row."""
+    shape = sheet.take(sheet.node("Shape", source), [1])
+    return sheet.node("Expand", name, shape)
+
+
+def _number(sheet: Sheet, value: float) -> str:
+    return sheet.constant(np.array(value), "number")
+
+
+def _whole(sheet: Sheet, value: int) -> str:
+    return sheet.constant(np.array(value, np.int64), "whole")
+
+
+def _node(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> str:
+    if step.operation in _NODES:
+        return sheet.node(_NODES[step.operation], *given)
+    match step.operation:
+        case "is_finite":
+            size = sheet.node("Abs", *given)
+            return sheet.node("Less", size, _number(sheet, np.inf))
+        case "remainder":
+            return sheet.node("Mod", *given, fmod=1)
+        case "below":
+            return _below(sheet, step, given[0])
+        case "pick":
+            return _pick(sheet, step, given[0])
+        case "running":
+            return sheet.node("CumSum", *given, _whole(sheet, 0))
+        case "total":
+            count = program.steps[step.arguments[0]].samples
+            return _total(sheet, given[0], count)
+        case "last":
+            count = program.steps[step.arguments[0]].samples
+            return sheet.node("Gather", given[0], _whole(sheet, count - 1))
+        case "highest":
+            return _reduced(sheet, "ReduceMax", given[0])
+        case "lowest":
+            return _reduced(sheet, "ReduceMin", given[0])
+        case _:
+            raise ValueError(f"no operator computes {step.operation} in double")
+
+
+def _below(sheet: Sheet, step: Step, value: str) -> str:
+    """Count the numbers of a table below a value, one row of truths for each."""
+    ranks = [-1] + [1] * (2 if step.samples else 1)
+    table = sheet.constant(np.array(step.table).reshape(ranks), "table")
+    is_below = sheet.node("Less", table, value)
+    kind = int(np_to_onnx(np.float64))
+    return sheet.total(sheet.node("Cast", is_below, to=kind), axis=0, keepdims=0)
+
+
+def _pick(sheet: Sheet, step: Step, value: str) -> str:
+    """Take the entry at a place; places outside, and NaN, take the first."""
+    inside = sheet.node("LessOrEqual", _number(sheet, 0.0), value)
+    last = float(len(step.table) - 1)
+    inside = sheet.node(
+        "And", inside, sheet.node("LessOrEqual", value, _number(sheet, last))
+    )
+    place = sheet.node("Where", inside, value, _number(sheet, 0.0))
+    place = sheet.node("Cast", place, to=int(np_to_onnx(np.int64)))
+    return sheet.node("Gather", sheet.constant(np.array(step.table), "table"), place)
+
+
+def _total(sheet: Sheet, samples: str, count: int) -> str:
+    """Add the second half of the samples to the first until one is left."""
+    size = 1 << (count - 1).bit_length()
+    if size > count:
+        pads = sheet.numbers([0, 0, size - count, 0], "pads")
+        samples = sheet.node("Pad", samples, pads)
+    zero, axis = sheet.numbers([0], "start"), sheet.numbers([0], "axes")
+    while size > 1:
+        half, whole = sheet.numbers([size // 2], "end"), sheet.numbers([size], "end")
+        first = sheet.node("Slice", samples, zero, half, axis)
+        second = sheet.node("Slice", samples, half, whole, axis)
+        samples = sheet.node("Add", first, second)
+        size //= 2
+    return sheet.node("Reshape", samples, sheet.numbers([-1], "flat"))
+
+
+def _reduced(sheet: Sheet, operator: str, samples: str) -> str:
+    if sheet.opset >= 18:
+        axes = sheet.numbers([0], "axes")
+        return sheet.node(operator, samples, axes, keepdims=0)
+    return sheet.node(operator, samples, axes=[0], keepdims=0)
+
+
+def np_to_onnx(kind: npt.DTypeLike) -> int:
+    """Return the number by which ONNX knows a type of numpy."""
+    from onnx import helper
+
+    return int(helper.np_dtype_to_tensor_dtype(np.dtype(kind)))

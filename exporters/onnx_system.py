@@ -1,0 +1,249 @@
+"""ONNX: a fuzzy system as a graph of plain operators, in double.
+
+The graph is the system's program, step by step (`fuzzytree.programs`), so it gives the
+numbers of the inference, up to the last digits of `exp`, `pow`, `sin` and the like.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from fuzzytree.contracts import Written
+from fuzzytree.errors import DisagreementError, LossError
+from fuzzytree.programs.systems import from_system
+from fuzzytree.rulebase import fingerprint
+from fuzzytree.system import FuzzySystem
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+    import onnx
+
+    from fuzzytree.exporters.onnx import Output
+    from fuzzytree.exporters.onnx_graph import Sheet
+    from fuzzytree.programs.steps import Program
+
+_MOST_ROWS_TO_VERIFY = 24
+_MOST_STEPS_TO_VERIFY = 300_000
+
+
+def write_system(
+    system: FuzzySystem,
+    /,
+    *,
+    opset: int,
+    ir: int,
+    outputs: Sequence[Output],
+    facts: dict[str, str],
+    verify: bool,
+) -> Written:
+    """Write a fuzzy system; `fuzzytree.exporters.onnx.write` documents the options.
+
+    Args:
+        system: The system.
+        opset: The version of the operators.
+        ir: The version of the file.
+        outputs: Which outputs, in this order.
+        facts: What every file of ours says about itself.
+        verify: Whether to load the file in onnxruntime and to compare its answers.
+
+    Raises:
+        LossError: If it needs a function that onnxruntime lacks in double, or if the
+            installed onnxruntime does not load the file.
+        DisagreementError: If the file, run in onnxruntime, gives another answer.
+    """
+    from fuzzytree.exporters.onnx_steps import missing_functions
+
+    program = from_system(system, activations="activations" in outputs)
+    missing = missing_functions(program)
+    if missing:
+        raise LossError(
+            f"cannot write {system.name} as onnx: a formula needs {', '.join(missing)},"
+            " which onnxruntime computes in float32 only"
+        )
+    made = _model_proto(system, program, opset, ir, outputs, facts)
+    content: bytes = made.SerializeToString(deterministic=True)
+    if verify:
+        _prove(content, system, outputs)
+    return Written(content)
+
+
+def _model_proto(
+    system: FuzzySystem,
+    program: Program,
+    opset: int,
+    ir: int,
+    outputs: Sequence[Output],
+    facts: dict[str, str],
+) -> onnx.ModelProto:
+    from onnx import TensorProto, helper
+
+    from fuzzytree.exporters.onnx_graph import Sheet
+
+    sheet = Sheet(opset)
+    _fill(sheet, system, program, outputs)
+    kinds: dict[Output, tuple[int, list[str | int]]] = {
+        "outputs": (TensorProto.DOUBLE, ["rows", len(system.outputs)]),
+        "status": (TensorProto.INT64, ["rows"]),
+        "activations": (TensorProto.DOUBLE, ["rows", len(system.rules)]),
+    }
+    width: list[str | int] = ["rows", len(system.columns)]
+    graph = helper.make_graph(
+        sheet.nodes,
+        "system",
+        [helper.make_tensor_value_info("inputs", TensorProto.DOUBLE, width)],
+        [helper.make_tensor_value_info(name, *kinds[name]) for name in outputs],
+        sheet.tensors,
+    )
+    made = helper.make_model(
+        graph,
+        opset_imports=[helper.make_opsetid("", opset)],
+        ir_version=ir,
+        producer_name="fuzzytree",
+        producer_version=facts["version"],
+        doc_string=_in_words(system),
+    )
+    for key, value in (facts | _facts(system, outputs)).items():
+        made.metadata_props.add(key=f"fuzzytree.{key}", value=value)
+    return made
+
+
+def _fill(
+    sheet: Sheet, system: FuzzySystem, program: Program, outputs: Sequence[Output]
+) -> None:
+    from fuzzytree.exporters.onnx_steps import add_steps, np_to_onnx
+
+    names = add_steps(sheet, program, system.columns)
+    count, rules = len(system.outputs), len(system.rules)
+    if "outputs" in outputs:
+        _columns(sheet, names[:count], "outputs")
+    if "activations" in outputs:
+        _columns(sheet, names[count : count + rules], "activations")
+    if "status" in outputs:
+        sheet.node("Cast", names[-1], named="status", to=np_to_onnx("int64"))
+
+
+def _columns(sheet: Sheet, names: Sequence[str], named: str) -> None:
+    """Put blocks of shape (rows,) side by side."""
+    if len(names) == 1:
+        sheet.node("Reshape", names[0], sheet.numbers([-1, 1], "shape"), named=named)
+        return
+    line = sheet.numbers([0], "axes")
+    if sheet.opset >= 13:
+        lines = [sheet.node("Unsqueeze", name, line) for name in names]
+    else:
+        lines = [sheet.node("Unsqueeze", name, axes=[0]) for name in names]
+    block = sheet.node("Concat", *lines, axis=0)
+    sheet.node("Transpose", block, perm=[1, 0], named=named)
+
+
+def _facts(system: FuzzySystem, outputs: Sequence[Output]) -> dict[str, str]:
+    """Return the metadata: plain words where possible, JSON for lists."""
+    units = {one.name: one.unit for one in system.inputs}
+    texts = {
+        "name": system.name,
+        "carrier": "system",
+        "kind": "system",
+        "dtype": "float64",
+        "fingerprint": fingerprint(system),
+    }
+    records: dict[str, object] = {
+        "columns": list(system.columns),
+        "inputs": list(system.columns),
+        "units": [units[name] for name in system.columns],
+        "classes": [],
+        "rules": len(system.rules),
+        "outputs": list(outputs),
+        "semantics": {},
+        "names": [one.name for one in system.outputs],
+        "chunk": _rows_at_once(system),
+    }
+    return texts | {
+        key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
+    }
+
+
+def _rows_at_once(system: FuzzySystem) -> int:
+    """Return how many rows are best run together, so that they stay in the cache."""
+    samples = [
+        one.defuzzifier.samples
+        for one in system.outputs
+        if not one.defuzzifier.is_weighted
+    ]
+    return max(2**12 // max(samples, default=1), 16)
+
+
+def _in_words(system: FuzzySystem) -> str:
+    numbers = ", ".join(repr(one.name) for one in system.outputs)
+    return (
+        f"The fuzzy system {system.name!r} with {len(system.rules)} rules: it computes "
+        f"{numbers}. Missing and infinite values give NaN. Numbers: float64."
+    )
+
+
+def _prove(content: bytes, system: FuzzySystem, outputs: Sequence[Output]) -> None:
+    """Load a file, run it and hold its answers against the inference."""
+    import numpy as np
+    import onnxruntime
+
+    from fuzzytree.exporters.onnx_session import (
+        RUNTIME_ERRORS,
+        first_line,
+        open_session,
+    )
+    from fuzzytree.probing import system_probes
+
+    program = from_system(system, activations=True)
+    limit = max(1, min(_MOST_ROWS_TO_VERIFY, _MOST_STEPS_TO_VERIFY // program.size))
+    rows = system_probes(system, limit=limit)
+    table = np.array([[row[name] for name in system.columns] for row in rows])
+    table = table.reshape(len(rows), len(system.columns))
+    try:
+        found = open_session(content)(outputs, table)
+    except RUNTIME_ERRORS as error:
+        raise LossError(
+            f"cannot write {system.name} as onnx: onnxruntime "
+            f"{onnxruntime.__version__} does not run it: {first_line(error)}"
+        ) from error
+    for text in _differences(system, program, rows, table, found):
+        raise DisagreementError(text)
+
+
+def _differences(
+    system: FuzzySystem,
+    program: Program,
+    rows: Sequence[Mapping[str, float]],
+    table: npt.NDArray[np.float64],
+    found: Mapping[str, npt.NDArray[np.generic]],
+) -> Iterator[str]:
+    """Yield where a file's numbers are further from the inference's than they may."""
+    import numpy as np
+
+    from fuzzytree.inference import infer
+    from fuzzytree.programs.bounds import error_bounds
+
+    right = [infer(system, row) for row in rows]
+    expected = {
+        "outputs": np.array([one.outputs for one in right], np.float64),
+        "activations": np.array([one.activations for one in right], np.float64),
+        "status": np.array([[one.status] for one in right], np.float64),
+    }
+    bounds = error_bounds(program, table.T).T
+    first, last = len(system.outputs), len(system.outputs) + len(system.rules)
+    allowed = {
+        "outputs": bounds[:, :first],
+        "activations": bounds[:, first:last],
+        "status": bounds[:, last:],
+    }
+    for name, array in found.items():
+        given = array.astype(np.float64).reshape(expected[name].shape)
+        one = expected[name]
+        is_same = (given == one) | (np.isnan(given) & np.isnan(one))
+        is_near = is_same | (np.abs(given - one) <= allowed[name])
+        for row, place in np.argwhere(~(is_near | np.isinf(allowed[name]))).tolist():
+            yield (
+                f"the onnx file of {system.name} gives other {name} than the model "
+                f"where {dict(rows[row])}: {given[row, place]}, not {one[row, place]}"
+            )
