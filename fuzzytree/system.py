@@ -786,6 +786,8 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
     if output.clips and output.low is None and output.high is None:
         yield path, f"output {output.name!r} is clipped to a range that it lacks"
     if how.is_weighted:
+        if not 1 <= how.samples <= MOST_SAMPLES:
+            yield path, f"output {output.name!r}: {how.samples} samples"
         return
     if output.low is None or output.high is None or output.low >= output.high:
         yield path, f"output {output.name!r} needs a range for its {how.method}"

@@ -19,9 +19,14 @@ import msgspec
 from msgspec import inspect
 
 from fuzzytree.readers.layout import Record, RuleBaseFile, TreeFile
+from fuzzytree.readers.system_layout import SystemFile
 
 FILES: Final[Mapping[str, type[Record]]] = MappingProxyType(
-    {"rulebase.schema.json": RuleBaseFile, "tree.schema.json": TreeFile}
+    {
+        "rulebase.schema.json": RuleBaseFile,
+        "tree.schema.json": TreeFile,
+        "system.schema.json": SystemFile,
+    }
 )
 """Each file's name and the record that it describes."""
 

@@ -10,13 +10,13 @@ import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import pytest
 import yaml
 
-from fuzzytree.contracts import Model
+from fuzzytree.contracts import Document
 from fuzzytree.exporters.yaml import write
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.report import schemas as results
 from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.schemas.generation import FILES, generate, write_all
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "tests" / "example-files"
@@ -31,14 +31,17 @@ BEYOND_A_SCHEMA = {
 
 
 def validator(kind: str) -> Any:
-    name = {"rule base": "rulebase.schema.json", "tree": "tree.schema.json"}[kind]
+    name = f"{kind.replace(' ', '')}.schema.json"
     schema = json.loads((ROOT / "schemas" / name).read_text("utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
     return jsonschema.Draft202012Validator(schema)
 
 
-def models() -> list[Model]:
-    found: list[Model] = []
+def models() -> list[Document]:
+    found: list[Document] = [
+        random_system(seed, formulas="wild", has_odd_names=seed > 9)
+        for seed in range(20)
+    ]
     for seed in range(6):
         tree = random_tree(seed, leaves=1 + 3 * seed)
         found += [tree, rules_from_tree(tree), rules_from_tree(tree, "raw")]
@@ -73,13 +76,19 @@ def test_schemas_are_written_to_a_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "model", models(), ids=lambda m: f"{type(m).__name__} {m.name}"
 )
-def test_every_written_file_fits_its_schema(model: Model) -> None:
+def test_every_written_file_fits_its_schema(model: Document) -> None:
     data = yaml.safe_load(write(model).content)
     validator(data["kind"]).validate(data)
 
 
 @pytest.mark.parametrize(
-    "path", sorted((EXAMPLES / "positive").glob("iris-*")), ids=lambda path: path.stem
+    "path",
+    sorted(
+        path
+        for pattern in ("iris-*", "system-*")
+        for path in (EXAMPLES / "positive").glob(pattern)
+    ),
+    ids=lambda path: path.stem,
 )
 def test_an_example_to_accept_fits_its_schema(path: Path) -> None:
     data = yaml.safe_load(path.read_bytes())
@@ -97,7 +106,8 @@ def test_an_example_to_accept_fits_its_schema(path: Path) -> None:
 )
 def test_a_schema_refuses_what_the_reader_refuses_for_its_form(path: Path) -> None:
     data = yaml.safe_load(path.read_bytes())
-    kind = "tree" if path.stem.startswith("tree") else "rule base"
+    kind = path.stem.split("-")[0]
+    kind = kind if kind in ("tree", "system") else "rule base"
     assert not validator(kind).is_valid(data)
 
 

@@ -31,10 +31,11 @@ def variable(one: layout.VariableOfModel) -> Variable:
 
 
 def _term(one: layout.TermOfVariable) -> Term:
-    return Term(one.name, _shape(one))
+    return Term(one.name, shape(one))
 
 
-def _shape(one: layout.TermOfVariable) -> Shape:
+def shape(one: layout.TermOfVariable) -> Shape:
+    """Return the shape of a term."""
     if one.points is not None:
         pairs = zip(*one.points, strict=True)
         return Points(*map(tuple, pairs))

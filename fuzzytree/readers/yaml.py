@@ -1,15 +1,15 @@
-"""YAML to a rule base or a tree; see `docs/yaml-format.md` for the file."""
+"""YAML to a rule base, a tree or a system; see `docs/yaml-format.md` for the file."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Final, TypeVar
 
-from fuzzytree.contracts import Model, Reading
+from fuzzytree.contracts import Document, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers import layout, values
-from fuzzytree.readers.binding import Entries, bind, entries, not_a_list, record
+from fuzzytree.readers.binding import Entries, entries, record
 from fuzzytree.readers.layout import RuleBaseFile, TreeFile
 from fuzzytree.readers.nodes import (
     Found,
@@ -20,6 +20,7 @@ from fuzzytree.readers.nodes import (
     compose,
     report,
 )
+from fuzzytree.readers.places import located, record_at, records_at, value_of
 from fuzzytree.readers.references import (
     clauses_of_nodes,
     clauses_of_rules,
@@ -31,6 +32,7 @@ from fuzzytree.readers.references import (
 )
 from fuzzytree.readers.rules import read_rules
 from fuzzytree.readers.sentences import Vocabulary, vocabulary_of, words
+from fuzzytree.readers.systems import read_system
 from fuzzytree.rulebase import (
     Band,
     Mistake,
@@ -43,22 +45,11 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.tree import FuzzyTree
 
-_KEYS: Final = {
-    # What a field of the model is called in the file, where the words differ.
-    "when": ("if",),
-    "parts": ("sum of",),
-    "low": ("range",),
-    "high": ("range",),
-    "label": ("class",),
-    "variable": ("ask", "variable"),
-    "terms": ("is", "is not", "terms"),
-    "owners": ("interval owners",),
-}
-R = TypeVar("R", bound=layout.Record)
+R = TypeVar("R")
 
 
-def read(content: bytes, name: str) -> Model:
-    """Return the rule base or tree of a YAML file.
+def read(content: bytes, name: str) -> Document:
+    """Return the rule base, tree or system of a YAML file.
 
     Args:
         content: The file.
@@ -105,15 +96,8 @@ class _UnreadableError(Exception):
         super().__init__()
 
 
-def _value_of(node: Node, key: str) -> Node | None:
-    for one, value in node.pairs if isinstance(node, MappingNode) else ():
-        if isinstance(one, Scalar) and one.text == key:
-            return value
-    return None
-
-
 def _check_format(root: MappingNode) -> None:
-    node = _value_of(root, "format")
+    node = value_of(root, "format")
     if node is None:
         text = "no 'format: fuzzytree/1' says what this file is"
         raise _UnreadableError((root.line, root.column, text))
@@ -130,19 +114,19 @@ def _check_format(root: MappingNode) -> None:
 
 
 def _kind(root: MappingNode) -> str:
-    node = _value_of(root, "kind")
+    node = value_of(root, "kind")
     if isinstance(node, Scalar) and node.text in _READERS:
         return node.text
     place = node or root
-    text = "'kind' must be 'rule base' or 'tree'"
+    text = "'kind' must be 'rule base', 'tree' or 'system'"
     raise _UnreadableError((place.line, place.column, text))
 
 
 def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
     kept = entries(root, RuleBaseFile, found)
     head = record(kept, layout.RuleBaseHead, found)
-    semantics = _one(kept, "semantics", layout.RuleSemantics, found)
-    bound = _many(kept, "rules", layout.RuleOfModel, found)
+    semantics = record_at(kept, "semantics", layout.RuleSemantics, found)
+    bound = records_at(kept, "rules", layout.RuleOfModel, found)
     known = _variables(kept, found)
     if head is None or bound is None or known is None:
         return None
@@ -150,14 +134,14 @@ def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
     vocabulary = vocabulary_of(variables)
     mistakes: list[Mistake] = []
     rules = read_rules(bound, head.classes[0], vocabulary, mistakes)
-    found += _located(root, mistakes)
+    found += located(root, mistakes)
     unknown = [
         *unknown_inputs(variables, head.columns),
         *unknown_classes(rules, head.classes),
         *unknown_terms(clauses_of_rules(rules), vocabulary),
     ]
     if is_flood(unknown, _names_declared(head, vocabulary)):
-        found += _located(root, unknown)
+        found += located(root, unknown)
         return None
     return _built(
         lambda: RuleBase(
@@ -176,13 +160,13 @@ def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
 def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
     kept = entries(root, TreeFile, found)
     head = record(kept, layout.TreeHead, found)
-    semantics = _one(kept, "semantics", layout.TreeSemantics, found)
-    questions = _many(kept, "nodes", layout.Question, found)
-    ends = _many(kept, "leaves", layout.End, found)
-    groups = _many(kept, "sets", layout.FittedSets, found)
+    semantics = record_at(kept, "semantics", layout.TreeSemantics, found)
+    questions = records_at(kept, "nodes", layout.Question, found)
+    ends = records_at(kept, "leaves", layout.End, found)
+    groups = records_at(kept, "sets", layout.FittedSets, found)
     known = _variables(kept, found)
     if questions is not None and ends is not None:
-        found += _located(root, [*_number_mistakes(questions, ends)])
+        found += located(root, [*_number_mistakes(questions, ends)])
     if head is None or known is None:
         return None
     variables, broken = known
@@ -197,7 +181,7 @@ def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
     ]
     unknown = [*unknown_inputs(variables, head.columns), *astray]
     if is_flood(unknown, _names_declared(head, vocabulary, patterns)):
-        found += _located(root, unknown)
+        found += located(root, unknown)
         return None
     meant = values.semantics(semantics)
     if nodes is None or leaves is None or fitted is None or broken:
@@ -205,7 +189,7 @@ def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
             *naming_mistakes(head.name, head.classes, meant),
             *variable_mistakes(variables, head.columns),
         ]
-        found += _located(root, [*mistakes, *astray], broken)
+        found += located(root, [*mistakes, *astray], broken)
         return None
     return _built(
         lambda: FuzzyTree(
@@ -226,13 +210,13 @@ M = TypeVar("M", RuleBase, FuzzyTree)
 
 
 def _built(
-    build: Callable[[], M], root: Node, found: list[Found], broken: set[int]
+    build: Callable[[], M], root: Node, found: list[Found], broken: set[Path]
 ) -> M | None:
     """Return the model, or None after adding what is wrong with it."""
     try:
         return build()
     except InvalidModelError as error:
-        found += _located(root, error.mistakes, broken)
+        found += located(root, error.mistakes, broken)
         return None
 
 
@@ -241,27 +225,11 @@ def _names_declared(head: layout.Head, *vocabularies: Vocabulary) -> int:
     return len(head.classes) + len(head.columns) + of_variables
 
 
-_READERS: Final[Mapping[str, Callable[[MappingNode, list[Found]], Model | None]]] = {
+_READERS: Final[Mapping[str, Callable[[MappingNode, list[Found]], Document | None]]] = {
     "rule base": _rule_base,
     "tree": _tree,
+    "system": read_system,
 }
-
-
-def _one(kept: Entries, key: str, kind: type[R], found: list[Found]) -> R | None:
-    return bind(kept[key], kind, found) if key in kept else None
-
-
-def _many(
-    kept: Entries, key: str, kind: type[R], found: list[Found]
-) -> list[R | None] | None:
-    """Return the items of a list, None for a broken one; None if it is no list."""
-    node = kept.get(key)
-    if node is None:
-        return None if key in ("rules", "leaves") else []
-    if not isinstance(node, ListNode):
-        not_a_list(node, key, found)
-        return None
-    return [bind(item, kind, found) for item in node.items]
 
 
 def _whole(items: list[R | None] | None) -> list[R] | None:
@@ -272,17 +240,17 @@ def _whole(items: list[R | None] | None) -> list[R] | None:
 
 def _variables(
     kept: Entries, found: list[Found]
-) -> tuple[tuple[Variable, ...], set[int]] | None:
+) -> tuple[tuple[Variable, ...], set[Path]] | None:
     """Return the variables and which are broken; None if names cannot be known.
 
     In the place of a broken variable stands one of its name and its terms' names, so
     that what speaks of it can be checked.
     """
-    bound = _many(kept, "variables", layout.VariableOfModel, found)
+    bound = records_at(kept, "variables", layout.VariableOfModel, found)
     if bound is None:
         return None
     variables: list[Variable] = []
-    broken: set[int] = set()
+    broken: set[Path] = set()
     for position, one in enumerate(bound):
         if one is not None:
             variables.append(values.variable(one))
@@ -290,7 +258,7 @@ def _variables(
         names = _names(kept["variables"], position)
         if names is None:
             return None
-        broken.add(position)
+        broken.add(("variables", position))
         terms = tuple(Term(name, Band()) for name in names[1:])
         variables.append(Variable(names[0], terms))
     return tuple(variables), broken
@@ -299,10 +267,10 @@ def _variables(
 def _names(variables: Node, position: int) -> list[str] | None:
     """Return the name of a variable and of its terms, as far as they can be read."""
     node = variables.items[position] if isinstance(variables, ListNode) else variables
-    name = _value_of(node, "name")
-    terms = _value_of(node, "terms")
+    name = value_of(node, "name")
+    terms = value_of(node, "terms")
     items = terms.items if isinstance(terms, ListNode) else ()
-    named = [name, *(_value_of(term, "name") for term in items)]
+    named = [name, *(value_of(term, "name") for term in items)]
     texts = [one.text for one in named if isinstance(one, Scalar)]
     return texts if len(texts) == len(named) else None
 
@@ -319,33 +287,3 @@ def _number_mistakes(
         if leaf is not None and leaf.leaf != place:
             text = f"this is leaf {place} of the list, not leaf {leaf.leaf}"
             yield ("leaves", place - 1, "leaf"), text
-
-
-def _located(
-    root: Node, mistakes: Iterable[Mistake], broken: Iterable[int] = ()
-) -> Iterator[Found]:
-    """Yield mistakes with their places, but not those in broken variables."""
-    left_out = {("variables", position) for position in broken}
-    for path, text in mistakes:
-        if path[:2] not in left_out:
-            node = _find(root, path)
-            yield node.line, node.column, text
-
-
-def _find(node: Node, path: Path) -> Node:
-    """Return the deepest node on a path of the model that is in the file."""
-    for step in path:
-        inner = _child(node, step)
-        if inner is None:
-            break
-        node = inner
-    return node
-
-
-def _child(node: Node, step: str | int) -> Node | None:
-    if isinstance(step, int):
-        items = node.items if isinstance(node, ListNode) else ()
-        return items[step] if step < len(items) else None
-    keys = (*_KEYS.get(step, ()), step)
-    found = (_value_of(node, key) for key in keys)
-    return next((one for one in found if one is not None), None)
