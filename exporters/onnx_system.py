@@ -172,7 +172,7 @@ def _rows_at_once(system: FuzzySystem) -> int:
         for one in system.outputs
         if not one.defuzzifier.is_weighted
     ]
-    return max(2**12 // max(samples, default=1), 16)
+    return max(2**17 // max(samples, default=8), 64)
 
 
 def _in_words(system: FuzzySystem) -> str:

@@ -69,10 +69,6 @@ _UFUNCS: Mapping[str, Function] = {
 }
 
 
-def _where(a: Values, b: Values, c: Values) -> Values:
-    return np.where(a, b, c)
-
-
 def _total(samples: Values, *, out: Values) -> Values:
     """Add the second half of the samples to the first until one is left."""
     size = 1 << (len(samples) - 1).bit_length()
@@ -165,8 +161,8 @@ class Plan:
     Attributes:
         still: What no input enters, by step; None for the other steps.
         inputs: The step and the place among the inputs of each input.
-        calls: Function, place of the result, places of the arguments, and whether the
-            function makes a result of its own.
+        calls: Function, place of the result, places of the arguments. A function of
+            three makes a result of its own, the others write into a buffer.
         shelves: The buffers.
         results: The step of each result.
         rows: How many rows go through together.
@@ -174,7 +170,7 @@ class Plan:
 
     still: tuple[Values | None, ...]
     inputs: tuple[tuple[int, int], ...]
-    calls: tuple[tuple[Function, int, tuple[int, ...], bool], ...]
+    calls: tuple[tuple[Function, int, tuple[int, ...]], ...]
     shelves: tuple[_Shelf, ...]
     results: tuple[int, ...]
     rows: int
@@ -184,17 +180,17 @@ def plan_program(program: Program) -> Plan:
     """Return what running a program needs, computed once."""
     still = _still_values(program)
     moving = [place for place, value in enumerate(still) if value is None]
-    calls: list[tuple[Function, int, tuple[int, ...], bool]] = []
+    calls: list[tuple[Function, int, tuple[int, ...]]] = []
     inputs: list[tuple[int, int]] = []
     for place in moving:
         step = program.steps[place]
         if step.operation == "input":
             inputs.append((place, program.inputs.index(step.name)))
         elif step.operation == "where":
-            calls.append((_where, place, step.arguments, True))
+            calls.append((np.where, place, step.arguments))
         else:
-            calls.append((_function(step), place, step.arguments, False))
-    shelves = _shelves(program, [place for _, place, _, made in calls if not made])
+            calls.append((_function(step), place, step.arguments))
+    shelves = _shelves(program, [place for _, place, given in calls if len(given) < 3])
     size = sum(shelf.count * max(shelf.samples, 1) for shelf in shelves)
     widest = max((program.steps[place].samples for place in moving), default=0)
     rows = _WORKING_SET // max(size, 2 * widest, 1)
@@ -244,12 +240,15 @@ def _run_chunk(plan: Plan, values: FloatArray, out: FloatArray) -> None:
         buffers = [np.empty(shape, shelf.dtype) for _ in range(shelf.count)]
         for place, buffer in shelf.places:
             known[place] = buffers[buffer]
-    for function, place, arguments, makes_its_own in plan.calls:
-        given = [known[argument] for argument in arguments]
-        if makes_its_own:
-            known[place] = function(*given)
+    for function, place, arguments in plan.calls:  # unpacked: for one row it matters
+        if len(arguments) == 2:
+            one, two = arguments
+            function(known[one], known[two], out=known[place])
+        elif len(arguments) == 1:
+            function(known[arguments[0]], out=known[place])
         else:
-            function(*given, out=known[place])
+            condition, one, two = arguments
+            known[place] = function(known[condition], known[one], known[two])
     for line, place in enumerate(plan.results):
         out[line] = known[place]
 
