@@ -156,7 +156,7 @@ def _named_system(names: Sequence[str]) -> FuzzySystem:
     """Return a system whose inputs and terms have these names."""
     ramp = Points((0.0, 1.0), (0.0, 1.0))
     curves = tuple(Label(name, ramp) for name in names)
-    numbers = tuple(Label(name, Singleton(k)) for k, name in enumerate(names, 1))
+    numbers = tuple(Label(name, Singleton(float(k))) for k, name in enumerate(names, 1))
     output = SystemOutput(
         f"{names[0]} 2", numbers, 0.0, 9.0, Defuzzifier("weighted average")
     )

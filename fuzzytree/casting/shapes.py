@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from fuzzytree.rulebase import LR, Band, Points, Shape
 from fuzzytree.system import Binary, Curve, Singleton, Trapezoid
@@ -40,6 +41,25 @@ def shape_of(curve: Curve) -> Shape | None:
             return _joined(_rise(start, start) if is_above else _fall(start, start), [])
         case _:
             return None
+
+
+def stepped(values: Iterable[float]) -> tuple[float, ...]:
+    """Return the values of points; of two neighbouring doubles the first comes twice.
+
+    No double lies between such two, so a step at the first has the same degrees. A
+    value that comes twice already stays.
+
+    Example:
+        >>> import math
+        >>> stepped((0.0, 1.0, math.nextafter(1.0, 2.0), 2.0))
+        (0.0, 1.0, 1.0, 2.0)
+    """
+    found: list[float] = []
+    for value in values:
+        is_second = len(found) > 1 and found[-1] == found[-2]
+        is_next = bool(found) and value == math.nextafter(found[-1], math.inf)
+        found.append(found[-1] if is_next and not is_second else value)
+    return tuple(found)
 
 
 def _rise(start: float, end: float) -> _Points:

@@ -12,7 +12,7 @@ from typing import Final
 from fuzzytree.casting import as_rules
 from fuzzytree.contracts import Document, Reading
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.readers.fll_meaning import as_meant, tell_differences, without_disabled
+from fuzzytree.readers.fll_meaning import as_meant, differences, without_disabled
 from fuzzytree.readers.fll_variables import (
     Known,
     ReadBlock,
@@ -77,13 +77,12 @@ def _system(sections: Sequence[Section], stem: str, notes: Notes) -> FuzzySystem
         return None
     variables, blocks = without_disabled(variables, blocks, notes)
     _tell_descriptions(sections, notes)
-    tell_differences(variables, blocks, notes)
     outputs = [one for one in variables if one.is_output]
     inputs = [one for one in variables if not one.is_output]
     engine = next((one for one in sections if one.kind == "Engine"), None)
     described = None if engine is None else engine.one_of("description")
     try:
-        return FuzzySystem(
+        system = FuzzySystem(
             (engine.head.value if engine else "") or stem or "system",
             tuple(
                 one.variable for one in inputs if isinstance(one.variable, SystemInput)
@@ -97,6 +96,8 @@ def _system(sections: Sequence[Section], stem: str, notes: Notes) -> FuzzySystem
             place = _place_of(path, inputs, outputs, blocks)
             notes.found.append((*place, sentence))
         return None
+    notes.remarks.extend(differences(system))
+    return system
 
 
 def _tell_descriptions(sections: Sequence[Section], notes: Notes) -> None:

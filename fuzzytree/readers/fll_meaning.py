@@ -8,24 +8,32 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
+from types import MappingProxyType
 
 from msgspec.structs import replace
 
 from fuzzytree.contracts import Loss
+from fuzzytree.inference import value_at
 from fuzzytree.readers.fll_terms import as_degree
 from fuzzytree.readers.fll_variables import Known, ReadBlock
 from fuzzytree.readers.fll_words import Entry, Notes
+from fuzzytree.rulebase import Points
 from fuzzytree.system import (
     And,
+    Arc,
     Call,
+    Concave,
     Condition,
+    Curve,
     Expression,
     Formula,
+    FuzzySystem,
     Is,
     Label,
     Linear,
     Not,
     Or,
+    SemiEllipse,
     Singleton,
     SystemOutput,
     SystemRule,
@@ -116,58 +124,45 @@ def as_meant(output: Known, notes: Notes) -> SystemOutput:
     return replace(variable, labels=labels)
 
 
-def tell_differences(
-    variables: Sequence[Known], blocks: Sequence[ReadBlock], notes: Notes
-) -> None:
-    """Note where the two engines mean other things by these lines."""
-    notes.remarks.extend(_joined_twice(variables, blocks))
-    notes.remarks.extend(_inverse_remarks(variables))
-    notes.remarks.extend(_formula_remarks(variables))
-
-
-def _joined_twice(
-    variables: Sequence[Known], blocks: Sequence[ReadBlock]
-) -> Iterator[str]:
-    """Yield where several rules conclude one term of a weighted output."""
+def differences(system: FuzzySystem) -> Iterator[str]:
+    """Yield where fuzzylite 6 and pyfuzzylite 8 mean other things by a file."""
     counts = Counter(
-        (one.output, one.label)
-        for read in blocks
-        for rule in read.block.rules
-        for one in rule.then
+        (one.output, one.label) for rule in system.rules for one in rule.then
     )
-    for known in variables:
-        output = known.variable
-        if not isinstance(output, SystemOutput) or not output.defuzzifier.is_weighted:
-            continue
-        twice = [one for one in output.labels if counts[known.name, one.name] > 1]
-        names = ", ".join(repr(one.name) for one in twice[:3])
-        if twice and output.aggregation is not None:
-            yield (
-                f"output {known.name!r}: rules that conclude the same term ({names}) "
-                "are joined by the aggregation, as in pyfuzzylite; fuzzylite 6 adds "
-                "each"
-            )
-        elif any(_depends_on_degree(one) for one in twice):
-            yield (
-                f"output {known.name!r}: rules that conclude the same term ({names}) "
-                "are weighted one by one, as in fuzzylite 6; pyfuzzylite adds their "
-                "degrees first"
-            )
+    for output in system.outputs:
+        if output.defuzzifier.is_weighted:
+            concluded = [
+                label for label in output.labels if counts[output.name, label.name]
+            ]
+            twice = [one for one in concluded if counts[output.name, one.name] > 1]
+            yield from _joined_twice(output, twice)
+            yield from _inverse_remarks(output, concluded)
+    hedges = {
+        hedge for rule in system.rules for one in rule.then for hedge in one.hedges
+    }
+    if hedges & {"any", "not"}:
+        yield (
+            "a rule of degree 0 concludes nothing, as in fuzzylite 6; in pyfuzzylite "
+            "'any' and 'not' in a conclusion make 1 of 0"
+        )
+    curves = [label.curve for one in system.variables for label in one.labels]
+    yield from _curve_remarks(curves)
 
 
-def _inverse_remarks(variables: Sequence[Known]) -> Iterator[str]:
-    """Yield which outputs ask where a term has a degree that fuzzylite 6 misses."""
-    for known in variables:
-        output = known.variable
-        if not isinstance(output, SystemOutput) or not output.defuzzifier.is_weighted:
-            continue
-        kinds = {term.kind for term in known.terms if term.is_monotone}
-        if known.kind != "TakagiSugeno" and kinds - {"Ramp"}:
-            yield (
-                f"output {known.name!r}: where a term has a degree is what pyfuzzylite "
-                "says; fuzzylite 6 differs for falling Concave terms, and near 0 and 1 "
-                "for others"
-            )
+def _joined_twice(output: SystemOutput, twice: Sequence[Label]) -> Iterator[str]:
+    """Yield what happens to labels that several rules conclude."""
+    names = ", ".join(repr(one.name) for one in twice[:3])
+    same = f"output {output.name!r}: rules that conclude the same term ({names})"
+    if twice and output.aggregation is not None:
+        yield (
+            f"{same} are joined by the aggregation, as in pyfuzzylite; fuzzylite 6 "
+            "adds each"
+        )
+    elif any(_depends_on_degree(one) for one in twice):
+        yield (
+            f"{same} are weighted one by one, as in fuzzylite 6; pyfuzzylite adds "
+            "their degrees first"
+        )
 
 
 def _depends_on_degree(label: Label) -> bool:
@@ -181,23 +176,46 @@ def _depends_on_degree(label: Label) -> bool:
             return True
 
 
-def _formula_remarks(variables: Sequence[Known]) -> Iterator[str]:
-    told = {
+def _inverse_remarks(output: SystemOutput, concluded: Sequence[Label]) -> Iterator[str]:
+    """Yield whether fuzzylite 6 finds other values at which a term has a degree."""
+    curves = [one.curve for one in concluded if not isinstance(one.curve, Points)]
+    if any(value_at(one, 0.5) is not None for one in curves):
+        yield (
+            f"output {output.name!r}: where a term has a degree is what pyfuzzylite "
+            "says; fuzzylite 6 differs for falling Concave terms, and near 0 and 1 for "
+            "others"
+        )
+
+
+_TOLD = MappingProxyType(
+    {
         "%": "'%' has the sign of its second number, as in pyfuzzylite; fuzzylite 6 "
         "takes the first one's",
+        "min": "pyfuzzylite fails at 'min' in an output's curve",
+        "max": "pyfuzzylite fails at 'max' in an output's curve",
         "round": "'round' takes a half to the even neighbour, as in pyfuzzylite; "
         "fuzzylite 6 takes it away from 0",
     }
+)
+
+
+def _curve_remarks(curves: Sequence[Curve]) -> Iterator[str]:
     used = {
         function
-        for known in variables
-        for term in known.terms
-        if isinstance(term.label.curve, Formula)
-        for function in _functions_of(term.label.curve.expression)
+        for curve in curves
+        if isinstance(curve, Formula)
+        for function in _functions_of(curve.expression)
     }
-    for function, text in told.items():
+    for function, text in _TOLD.items():
         if function in used:
             yield f"formulas: {text}"
+    if any(isinstance(one, Concave) and one.inflection == one.end for one in curves):
+        yield (
+            "a Concave term that ends at its inflection is 1 above it, as in "
+            "fuzzylite 6; in pyfuzzylite it is 0 there"
+        )
+    if any(isinstance(one, Arc | SemiEllipse) for one in curves):
+        yield "fuzzylite 6 does not know Arc and SemiEllipse; pyfuzzylite does"
 
 
 def _functions_of(expression: Expression) -> Iterator[str]:

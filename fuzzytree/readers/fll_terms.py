@@ -9,6 +9,7 @@ from typing import Final
 
 import msgspec
 
+from fuzzytree.casting.shapes import stepped
 from fuzzytree.errors import ReadError
 from fuzzytree.readers.formulas import FormulaError, parse
 from fuzzytree.readers.lines import Word, number_of
@@ -118,7 +119,7 @@ def read_term(
                 height = numbers.pop()
             if not numbers:
                 raise _error(kind, "Discrete takes pairs of a value and a degree")
-            curve = Points(tuple(numbers[::2]), tuple(numbers[1::2]))
+            curve = Points(stepped(numbers[::2]), tuple(numbers[1::2]))
         case known if known in _CLASSES:
             count, make = _CLASSES[known]
             wanted = f"{count} numbers, or {count + 1} with the height"

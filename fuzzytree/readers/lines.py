@@ -13,10 +13,11 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
+from fuzzytree.readers.layout import LONGEST_NAME
 from fuzzytree.readers.nodes import Found, report
 
 MOST_BYTES: Final = 4 * 2**20
-LONGEST_WORD: Final = 256
+LONGEST_WORD: Final = LONGEST_NAME
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1f\x7f]")

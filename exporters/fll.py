@@ -1,0 +1,330 @@
+"""FLL: rule bases and systems for fuzzylite 6 and pyfuzzylite 8.
+
+`docs/fll.md` describes the file and says where the two engines differ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from fuzzytree.casting import (
+    Scores,
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    flattened,
+    pointed,
+)
+from fuzzytree.contracts import Format, Loss, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.fll_rules import has_not, hedge_losses, rule_text, speakable
+from fuzzytree.exporters.fll_terms import (
+    KNOWN,
+    degree_text,
+    number_text,
+    weighted_type,
+)
+from fuzzytree.naming import Names
+from fuzzytree.readers.fll import FACTS, read
+from fuzzytree.readers.fll_meaning import differences
+from fuzzytree.readers.fll_rules import RULE_WORDS
+from fuzzytree.readers.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
+from fuzzytree.readers.lines import LONGEST_WORD
+from fuzzytree.rulebase import LR, Band, RuleBase
+from fuzzytree.system import (
+    FUNCTIONS,
+    Activation,
+    Defuzzifier,
+    FuzzySystem,
+    Label,
+    RuleBlock,
+    SystemInput,
+    SystemOutput,
+)
+
+_RESERVED: Final = (*RULE_WORDS, *FUNCTIONS, "fabs", "pow", "pi", "inf", "nan", "x")
+_NO_OUTPUT: Final = SystemOutput("y", (), None, None, Defuzzifier("weighted sum"))
+_TITLE: Final = "Written by fuzzytree."
+
+
+def write(
+    model: RuleBase | FuzzySystem,
+    /,
+    *,
+    allow_loss: bool = False,
+    scores: Scores = "winner",
+    tolerance: float = 1e-6,
+) -> Written:
+    """Return a rule base or a system as an FLL file, in UTF-8.
+
+    Args:
+        model: The model.
+        allow_loss: Whether to write what FLL cannot hold as near as it can.
+        scores: What the outputs say of a rule base: the number of the class that wins
+            (`winner`), or a score for each rule (`rule`) or class (`class`); see
+            `fuzzytree.casting.scores`.
+        tolerance: The largest error of a degree where points stand for a curve.
+
+    Raises:
+        LossError: If something would be lost, unless allowed; and always if rules or
+            terms have no place in FLL.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
+        >>> text = write(rules, allow_loss=True).content.decode()
+        >>> "activation: Highest 1" in text
+        True
+    """
+    losses: list[Loss] = []
+    remarks: list[str] = []
+    facts = ""
+    if isinstance(model, RuleBase):
+        rules, lost = pointed(model, tolerance)
+        system = as_system(rules, scores)
+        losses += [*cast_losses(model, scores), *lost]
+        remarks += cast_remarks(model, scores)
+        if model.kind != "relative":
+            remarks.append("fuzzylite 6 takes a strength below 1e-6 for 0")
+        facts = FACTS + facts_of(rules, scores)
+    else:
+        system, lost = pointed(model, tolerance, allowed=KNOWN)
+        losses += lost
+        system, lost = _with_pointed_numbers(system, tolerance)
+        losses += lost
+    system, lost = flattened(system)
+    losses += [*lost, *_losses(system)]
+    if any(has_not(rule.when) for rule in system.rules):
+        remarks.append("NOT is written as the hedge 'not', with the same numbers")
+    system = replace(system, blocks=_speakable(system))
+    if losses and not allow_loss:
+        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
+        head = f"cannot write {model.name} as fll without loss:"
+        hint = "pass allow_loss=True to write it so"
+        raise LossError(f"{head}\n{listed}\n  {hint}")
+    names = _naming(system)
+    comments = [f"# {one}" for one in (_TITLE, facts) if one]
+    text = "\n".join([*comments, *_text(system, names)]) + "\n"
+    remarks += [*_remarks(system, names), *differences(system)]
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks))
+
+
+class _Names(msgspec.Struct, frozen=True):
+    """The names in a file: of variables, and of the labels of each."""
+
+    variables: Names
+    labels: Mapping[str, Names]
+
+    def speak(self, variable: str, label: str | None) -> tuple[str, str]:
+        """Return the words for a variable and one of its labels."""
+        term = "" if label is None else self.labels[variable][label]
+        return self.variables[variable], term
+
+    def changed(self) -> dict[str, str]:
+        """Return the names that are others in the file."""
+        found = dict(self.variables.changed)
+        for names in self.labels.values():
+            found.update(names.changed)
+        return found
+
+
+def _naming(system: FuzzySystem) -> _Names:
+    return _Names(
+        _accepted([one.name for one in system.variables]),
+        {
+            one.name: _accepted([label.name for label in one.labels])
+            for one in system.variables
+        },
+    )
+
+
+def _accepted(names: Sequence[str]) -> Names:
+    return Names.of(names, reserved=_RESERVED, longest=LONGEST_WORD)
+
+
+def _with_pointed_numbers(
+    system: FuzzySystem, tolerance: float
+) -> tuple[FuzzySystem, tuple[Loss, ...]]:
+    """Return a system whose weighted outputs have points for bands and LR sets."""
+    outputs: list[SystemOutput] = []
+    losses: list[Loss] = []
+    for output in system.outputs:
+        shapes = tuple(one for one in output.labels if isinstance(one.curve, Band | LR))
+        if shapes:
+            carrier = (SystemInput("of it", shapes),)
+            found, lost = pointed(
+                FuzzySystem(system.name, carrier, (_NO_OUTPUT,), ()), tolerance
+            )
+            known = {one.name: one for one in found.inputs[0].labels}
+            labels = tuple(known.get(one.name, one) for one in output.labels)
+            output = replace(output, labels=labels)
+            losses += [
+                replace(one, where=one.where.replace("'of it'", repr(output.name)))
+                for one in lost
+            ]
+        outputs.append(output)
+    return replace(system, outputs=tuple(outputs)), tuple(losses)
+
+
+def _losses(system: FuzzySystem) -> Iterator[Loss]:
+    """Yield what an answer depends on and FLL cannot say."""
+    for output in system.outputs:
+        how = output.defuzzifier
+        if not how.is_weighted and how.grid != "middle":
+            yield Loss(
+                f"output {output.name!r}",
+                f"its curve is looked at in the middle of {how.samples} pieces of the "
+                f"range, and not at {how.samples} values with the ends",
+            )
+    yield from hedge_losses(system.rules)
+
+
+def _speakable(system: FuzzySystem) -> tuple[RuleBlock, ...]:
+    """Return blocks that FLL has words for.
+
+    Raises:
+        LossError: With every rule and term that has no place in FLL.
+    """
+    reasons: list[str] = []
+    blocks: list[RuleBlock] = []
+    for block in system.blocks:
+        try:
+            blocks.append(speakable(block))
+        except LossError as error:
+            reasons.append(f"  {error}")
+    for variable in system.variables:
+        for label in variable.labels:
+            if _term_text(variable, label, {}) is None:
+                where = f"term {label.name!r} of {variable.name!r}"
+                kind = type(label.curve).__name__
+                reasons.append(f"  {where}: FLL has no {kind} there")
+    if reasons:
+        listed = "\n".join(reasons)
+        raise LossError(f"cannot write {system.name} as fll:\n{listed}")
+    return tuple(blocks)
+
+
+def _term_text(
+    variable: SystemInput | SystemOutput, label: Label, names: Mapping[str, str]
+) -> str | None:
+    if isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted:
+        return number_text(label, weighted_type(variable), names)
+    return degree_text(label, names)
+
+
+def _text(system: FuzzySystem, names: _Names) -> Iterator[str]:
+    """Yield the lines of a file."""
+    yield f"Engine: {_line(system.name)}".rstrip()
+    if system.note:
+        yield f"  description: {_line(system.note)}".rstrip()
+    for one in system.inputs:
+        yield f"InputVariable: {names.variables[one.name]}"
+        yield from _common(one)
+        yield from _terms(one, names)
+    for output in system.outputs:
+        yield f"OutputVariable: {names.variables[output.name]}"
+        yield from _common(output)
+        yield f"  aggregation: {_S_WORDS[output.aggregation]}"
+        yield f"  defuzzifier: {_defuzzifier(output)}"
+        default = math.nan if output.default is None else output.default
+        yield f"  default: {float(default)!r}"
+        yield "  lock-previous: false"
+        yield from _terms(output, names)
+    always = f"{names.variables[system.variables[0].name]} is any"
+    for block in system.blocks:
+        yield f"RuleBlock: {_line(block.name)}".rstrip()
+        yield "  enabled: true"
+        yield f"  conjunction: {_T_WORDS[block.conjunction]}"
+        yield f"  disjunction: {_S_WORDS[block.disjunction]}"
+        yield f"  implication: {_T_WORDS[block.implication]}"
+        yield f"  activation: {_activation(block.activation)}"
+        for rule in block.rules:
+            yield f"  rule: {rule_text(rule, names.speak, always)}"
+
+
+def _common(variable: SystemInput | SystemOutput) -> Iterator[str]:
+    low = -math.inf if variable.low is None else variable.low
+    high = math.inf if variable.high is None else variable.high
+    yield "  enabled: true"
+    yield f"  range: {float(low)!r} {float(high)!r}"
+    yield f"  lock-range: {str(variable.clips).lower()}"
+
+
+def _terms(variable: SystemInput | SystemOutput, names: _Names) -> Iterator[str]:
+    for label in variable.labels:
+        name = names.labels[variable.name][label.name]
+        yield f"  term: {name} {_term_text(variable, label, names.variables.accepted)}"
+
+
+def _defuzzifier(output: SystemOutput) -> str:
+    how = output.defuzzifier
+    rest = weighted_type(output) if how.is_weighted else str(how.samples)
+    return f"{_METHOD_WORDS[how.method]} {rest}"
+
+
+def _activation(activation: Activation) -> str:
+    word = _ACTIVATION_WORDS[activation.method]
+    match activation.method:
+        case "general" | "proportional":
+            return word
+        case "first" | "last":
+            return f"{word} {activation.count} {float(activation.threshold)!r}"
+        case "highest" | "lowest":
+            return f"{word} {activation.count}"
+        case "threshold":
+            return f"{word} {activation.relation} {float(activation.threshold)!r}"
+
+
+_T_WORDS = MappingProxyType({None: "none", **{v: k for k, v in T_NORMS.items()}})
+_S_WORDS = MappingProxyType({None: "none", **{v: k for k, v in S_NORMS.items()}})
+_METHOD_WORDS = MappingProxyType({v: k for k, v in METHODS.items()})
+_ACTIVATION_WORDS = MappingProxyType({v: k for k, v in ACTIVATIONS.items()})
+
+
+def _line(text: str) -> str:
+    """Return a text for people without what would end a line or begin a comment."""
+    kept = "".join(" " if not one.isprintable() else one for one in text)
+    return " ".join(kept.replace("#", "no.").split())
+
+
+def _remarks(system: FuzzySystem, names: _Names) -> Iterator[str]:
+    """Yield what else has no place in the file or has another form there."""
+    pairs = [f"{name!r} is {found}" for name, found in names.changed().items()]
+    if pairs:
+        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
+        yield f"names were changed: {shown}"
+    texts = [system.name, system.note, *(block.name for block in system.blocks)]
+    if any(_line(text) != text for text in texts):
+        yield "names of the system and of blocks, and its note, became single lines"
+    units = [one.name for one in system.variables if one.unit]
+    if units:
+        yield f"units have no place: of {', '.join(map(repr, units[:5]))}" + (
+            ", ..." if len(units) > 5 else ""
+        )
+    if any(rule.name for rule in system.rules):
+        yield "names of rules have no place"
+
+
+FORMAT = Format(
+    name="fll",
+    suffixes=(".fll",),
+    carries=("rules", "system"),
+    write=write,
+    read=read,
+    cannot=(
+        "a combination of columns; it becomes an input, to be given as its sum",
+        "polynomial flanks and LR sets; they become points",
+        "the hedges cubed, plus, minus and cube root",
+        "curves that are looked at at the ends of a range too",
+        "a NOT of several conditions, for other norms than minimum and maximum",
+    ),
+    dtype="float64",
+)
