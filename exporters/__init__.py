@@ -22,6 +22,8 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "python": (".py",),
         "sql": (".sql",),
         "c": (".c",),
+        "fll": (".fll",),
+        "pmml": (".pmml",),
     }
 )
 """Each format's name and its suffixes, the usual one first.
