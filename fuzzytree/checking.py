@@ -36,7 +36,12 @@ from fuzzytree.numerics.oracle import decide
 from fuzzytree.pruning import proof_faults, pruned
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import Kind, RuleBase, fingerprint
-from fuzzytree.runtimes import chosen_runtimes, find_runtime, is_installed
+from fuzzytree.runtimes import (
+    chosen_runtimes,
+    find_runtime,
+    is_installed,
+    needed_by,
+)
 from fuzzytree.tree import FuzzyTree, Use
 
 if TYPE_CHECKING:
@@ -176,7 +181,7 @@ def _runtimes(
             continue
         title = f"{runtime.name}: {carrier.title}"
         if not is_installed(runtime):
-            yield f"{runtime.name} is not installed (extra {runtime.extra!r})"
+            yield f"{runtime.name} is not installed ({needed_by(runtime)})"
             continue
         try:
             run = runtime.load(carrier.model)

@@ -183,6 +183,7 @@ class Runtime(msgspec.Struct, frozen=True):
         cannot: What it cannot do, a sentence each.
         extra: The optional packages it needs, if any.
         modules: The modules that must be importable.
+        programs: The programs of which one must be installed.
         is_slow: Whether rows cost so much that a check gives it only a share of them.
     """
 
@@ -195,4 +196,5 @@ class Runtime(msgspec.Struct, frozen=True):
     cannot: tuple[str, ...] = ()
     extra: str | None = None
     modules: tuple[str, ...] = ()
+    programs: tuple[str, ...] = ()
     is_slow: bool = False

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from fuzzytree.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.errors import LossError
 from fuzzytree.lowering import forms
-from fuzzytree.runtimes import is_installed
+from fuzzytree.runtimes import is_installed, needed_by
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def made_ready(
     if kind not in runtime.runs:
         return None
     if not is_installed(runtime):
-        skipped.append(f"{runtime.name} is not installed (extra {runtime.extra!r})")
+        skipped.append(f"{runtime.name} is not installed ({needed_by(runtime)})")
         return None
     title = f"{runtime.name}: {carrier}"
     try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import shutil
 from collections.abc import Sequence
 
 from fuzzytree.contracts import Runtime
@@ -18,6 +19,7 @@ TABLE = (
     "fuzzytree.runtimes.native",
     "fuzzytree.runtimes.onnxruntime",
     "fuzzytree.runtimes.python",
+    "fuzzytree.runtimes.c",
     "fuzzytree.runtimes.skfuzzy",
 )
 """The modules that hold `RUNTIMES`; the reference comes first."""
@@ -52,8 +54,21 @@ def chosen_runtimes(names: Sequence[str] | None) -> tuple[Runtime, ...]:
 
 
 def is_installed(runtime: Runtime) -> bool:
-    """Return whether every module that a runtime needs can be imported."""
-    return all(importlib.util.find_spec(name) for name in runtime.modules)
+    """Return whether the modules and one of the programs it needs are there."""
+    has_program = not runtime.programs or any(map(shutil.which, runtime.programs))
+    return has_program and all(map(importlib.util.find_spec, runtime.modules))
+
+
+def needed_by(runtime: Runtime) -> str:
+    """Return what a runtime that is not installed needs, for a message.
+
+    Example:
+        >>> needed_by(find_runtime("c"))
+        'one of the programs gcc, cc, clang'
+    """
+    if runtime.programs:
+        return f"one of the programs {', '.join(runtime.programs)}"
+    return f"extra {runtime.extra!r}"
 
 
 def _runtimes_of(module: str) -> tuple[Runtime, ...]:

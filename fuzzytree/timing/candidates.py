@@ -15,7 +15,7 @@ from fuzzytree.contracts import Dtype, Model, Outcome, Runtime
 from fuzzytree.exporters.python import write as write_python
 from fuzzytree.lowering import forms
 from fuzzytree.rulebase import RuleBase
-from fuzzytree.runtimes import all_runtimes, is_installed
+from fuzzytree.runtimes import all_runtimes, is_installed, needed_by
 from fuzzytree.runtimes.onnxruntime import Prepared, prepare
 from fuzzytree.timing.records import (
     Bound,
@@ -103,7 +103,7 @@ def own(
     asked = questions(model)
     for runtime in all_runtimes():
         if not is_installed(runtime):
-            why = f"not installed (extra {runtime.extra!r})"
+            why = f"not installed ({needed_by(runtime)})"
             omitted.append(Omission(runtime.name, why))
             continue
         for question, form in asked.items():

@@ -1,0 +1,173 @@
+"""Generated C as a runtime: what `fuzzytree.exporters.c` writes, compiled and loaded.
+
+The file is compiled in a folder of its own, which is gone when the library is loaded.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from fuzzytree.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
+from fuzzytree.exporters.c import write
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes.rows import checked
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray
+
+    Decide = Callable[..., None]
+
+Dtype = Literal["float64", "float32"]
+
+COMPILERS = ("gcc", "cc", "clang")
+"""The programs of which one is needed; the first that is found compiles."""
+
+_OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-x", "c", "-")
+_LONGEST_WAIT = 600.0  # seconds
+
+_LOOP = """
+#include <stddef.h>
+
+/* Answer many rows: x holds one line of `rows` values for each input. The strengths of
+ * a row go to `fired`; where that is null, the winner alone is looked for. */
+extern void model_decide_many(const model_real *x, size_t rows, int64_t *rule,
+    int64_t *status, model_real *fired, double *strengths)
+{
+    model_real row[MODEL_INPUTS + 1];
+    size_t place, line;
+    for (place = 0; place < rows; place++) {
+        model_answer found;
+        for (line = 0; line < MODEL_INPUTS; line++)
+            row[line] = x[line * rows + place];
+        FIND
+        rule[place] = found.rule;
+        status[place] = found.status;
+    }
+}
+"""
+
+_DECIDE = "(void)fired, (void)strengths, found = model_decide(row);"
+
+_EITHER = """\
+found = fired ? model_strengths(row, fired) : model_decide(row);
+        for (line = 0; fired && line < MODEL_RULES; line++)
+            strengths[line * rows + place] = (double)fired[line];
+"""
+
+
+def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) -> Run:
+    """Return a function that answers rows by compiled C.
+
+    Args:
+        model: A tree or a rule base.
+        dtype: The type of all numbers.
+        has_strengths: Whether all rules of a rule base are fired, or the winner alone
+            is looked for.
+
+    Raises:
+        LossError: If float32 cannot hold a number of the model.
+        MissingExtraError: If no compiler is installed.
+        FuzzyTreeError: If the compiler fails.
+    """
+    try:
+        content = write(model, dtype=dtype, name="model").content
+    except LossError as error:
+        text = str(error).replace("cannot write", "cannot run", 1)
+        raise LossError(text.partition("\n  pass allow_loss")[0]) from error
+    is_rules = isinstance(model, RuleBase)
+    decide = _compiled(content, is_rules)
+    count = len(model.rules) if isinstance(model, RuleBase) and has_strengths else 0
+    real = np.dtype(dtype)
+
+    def run(values: FloatArray) -> Outcome:
+        array = checked(values, model.inputs)
+        with np.errstate(over="ignore"):  # what float32 cannot hold is missing
+            given = np.ascontiguousarray(array, real)
+        rows = array.shape[1]
+        rule, status = np.empty((2, rows), np.int64)
+        fired = np.empty(count, real) if count else None
+        strengths = np.empty((count, rows), np.float64) if count else None
+        filled = map(_at, (rule, status, fired, strengths))
+        decide(_at(given), rows, *filled)
+        return Outcome(rule, status, strengths)
+
+    return run
+
+
+def load_best_first(model: Model) -> Run:
+    """Return a function that looks for the winner of a rule base alone.
+
+    Raises:
+        LossError: If the model is no rule base.
+    """
+    if not isinstance(model, RuleBase):
+        raise LossError(
+            f"cannot run {model.name} as c best-first: it searches rule bases, and "
+            "this is a tree\n  pass rules_from_tree(tree)"
+        )
+    return load(model, has_strengths=False)
+
+
+def _at(array: npt.NDArray[np.generic] | None) -> int | None:
+    return None if array is None else array.ctypes.data
+
+
+@lru_cache(maxsize=64)
+def _compiled(content: bytes, is_rules: bool) -> Decide:
+    """Return the function that answers many rows."""
+    loop = _LOOP.replace("FIND", _EITHER if is_rules else _DECIDE)
+    compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
+    if compiler is None:
+        raise MissingExtraError(f"the runtime 'c' needs one of {', '.join(COMPILERS)}")
+    with tempfile.TemporaryDirectory(prefix="fuzzytree-") as folder:
+        path = Path(folder, "model.so")
+        done = subprocess.run(
+            [compiler, *_OPTIONS, "-o", str(path)],
+            input=content + loop.encode("ascii"),
+            capture_output=True,
+            check=False,
+            timeout=_LONGEST_WAIT,
+        )
+        if done.returncode:
+            said = done.stderr.decode("utf-8", "replace").strip()[:1000]
+            raise FuzzyTreeError(f"{compiler} cannot compile the model: {said}")
+        found = ctypes.CDLL(str(path)).model_decide_many
+    pointer = ctypes.c_void_p
+    found.argtypes = [pointer, ctypes.c_size_t, *[pointer] * 4]
+    found.restype = None
+    decide: Decide = found
+    return decide
+
+
+_FLOAT32 = "numbers beyond float32, and different numbers that become one in it"
+
+RUNTIMES = (
+    Runtime("c", ("tree", "rules"), load, programs=COMPILERS),
+    Runtime(
+        "c best-first",
+        ("rules",),
+        load_best_first,
+        cannot=("strengths of rules",),
+        programs=COMPILERS,
+    ),
+    Runtime(
+        "c float32",
+        ("tree", "rules"),
+        partial(load, dtype="float32"),
+        dtype="float32",
+        cannot=(_FLOAT32,),
+        programs=COMPILERS,
+    ),
+)
