@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fuzzytree.estimator import FuzzyTreeClassifier
     from fuzzytree.lowering import rules_from_tree
     from fuzzytree.outputs import Outputs
+    from fuzzytree.readers.sklearn import from_sklearn
     from fuzzytree.rulebase import RuleBase
     from fuzzytree.system import FuzzySystem
     from fuzzytree.tree import FuzzyTree
@@ -50,6 +51,7 @@ __all__ = [
     "check",
     "convert",
     "export",
+    "from_sklearn",
     "learn",
     "load",
     "read",
@@ -73,6 +75,7 @@ _HOMES = {
     "check": "fuzzytree.verbs",
     "convert": "fuzzytree.verbs",
     "export": "fuzzytree.verbs",
+    "from_sklearn": "fuzzytree.readers.sklearn",
     "learn": "fuzzytree.verbs",
     "load": "fuzzytree.verbs",
     "read": "fuzzytree.verbs",
