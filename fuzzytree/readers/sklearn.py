@@ -11,7 +11,7 @@ The library itself is not imported: what is read are the arrays of a fitted tree
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ def from_sklearn(
     columns: Sequence[str] | None = None,
     classes: Sequence[str] | None = None,
     soft: float | Mapping[str, float] | None = None,
-    spreads: Sequence[float] | None = None,
+    spreads: Iterable[float] | None = None,
     name: str = "scikit-learn tree",
     missing: str | None = None,
 ) -> FuzzyTree:
@@ -195,7 +195,7 @@ def _widths(
     asked: Mapping[str, int],
     named: _Names,
     soft: float | Mapping[str, float] | None,
-    spreads: Sequence[float] | None,
+    spreads: Iterable[float] | None,
 ) -> dict[str, float | None]:
     """Return how wide the flanks on each column are."""
     if soft is None:
@@ -214,13 +214,11 @@ def _widths(
             "soft is a number of spreads: give spreads=X.std(axis=0) too, or a width "
             "for each column"
         )
-    elif len(spreads) != len(named.columns):
-        raise ValueError(f"{len(spreads)} spreads for {len(named.columns)} columns")
     else:
-        widths = {
-            column: float(soft) * float(spreads[place])
-            for column, place in asked.items()
-        }
+        listed = [float(spread) for spread in spreads]  # a pandas series has an index
+        if len(listed) != len(named.columns):
+            raise ValueError(f"{len(listed)} spreads for {len(named.columns)} columns")
+        widths = {column: soft * listed[place] for column, place in asked.items()}
     for column, width in widths.items():
         if not (math.isfinite(width) and width > 0.0):
             raise ValueError(

@@ -160,7 +160,9 @@ def test_names_of_the_table_are_kept() -> None:
     pandas = pytest.importorskip("pandas")
     table = pandas.DataFrame({"grip force": [0.0, 1.0], "unused": [0.0, 0.0]})
     tree = trees.DecisionTreeClassifier().fit(table, ["soft", "firm"])
-    ours = from_sklearn(tree, classes=["fest", "weich"], name="grip")
+    named: dict[str, Any] = {"classes": ["fest", "weich"], "name": "grip"}
+    ours = from_sklearn(tree, **named)
+    assert from_sklearn(tree, soft=1.0, spreads=table.std(), **named) != ours
     assert ours.columns == ("grip force", "unused")
     assert ours.inputs == ("grip force",)
     assert ours.classes == ("fest", "weich")
