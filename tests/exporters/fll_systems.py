@@ -1,0 +1,93 @@
+"""Random systems that FLL can hold without a loss."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from fuzzytree.rulebase import LR, Band
+from fuzzytree.system import (
+    And,
+    Condition,
+    Defuzzifier,
+    FuzzySystem,
+    Hedge,
+    Is,
+    Label,
+    Linear,
+    Not,
+    Or,
+    RuleBlock,
+    Trapezoid,
+)
+from fuzzytree.testing import random_system
+
+_KNOWN: tuple[Hedge, ...] = ("any", "not", "very", "somewhat", "extremely", "seldom")
+
+
+def plain_system(seed: int) -> FuzzySystem:
+    """Return `random_system(seed)` without what FLL lacks.
+
+    Combinations become columns, unknown hedges and NOTs of several conditions go,
+    curves are looked at in the middle of pieces, and bands and LR sets are trapezoids.
+    """
+    system = random_system(seed, has_odd_names=seed % 2 == 0)
+    columns = len(system.inputs)
+    return replace(
+        system,
+        inputs=tuple(
+            replace(one, parts=(), labels=tuple(_label(x, columns) for x in one.labels))
+            for one in system.inputs
+        ),
+        outputs=tuple(
+            replace(
+                one,
+                labels=tuple(_label(x, columns) for x in one.labels),
+                defuzzifier=Defuzzifier(
+                    one.defuzzifier.method, one.defuzzifier.samples
+                ),
+            )
+            for one in system.outputs
+        ),
+        blocks=tuple(map(_block, system.blocks)),
+    )
+
+
+def _label(label: Label, columns: int) -> Label:
+    match label.curve:
+        case Band() | LR():
+            return replace(label, curve=Trapezoid(-1.0, -0.5, 0.25, 2.0))
+        case Linear(weights=weights):
+            wide = (*weights, *(0.5,) * (columns - len(weights)))
+            return replace(label, curve=replace(label.curve, weights=wide))
+        case _:
+            return label
+
+
+def _block(block: RuleBlock) -> RuleBlock:
+    rules = tuple(
+        replace(
+            rule,
+            when=None if rule.when is None else _said(rule.when),
+            then=tuple(replace(one, hedges=_known(one.hedges)) for one in rule.then),
+        )
+        for rule in block.rules
+    )
+    return replace(block, rules=rules)
+
+
+def _known(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
+    return tuple(hedge for hedge in hedges if hedge in _KNOWN)
+
+
+def _said(condition: Condition) -> Condition:
+    match condition:
+        case Is(hedges=hedges):
+            return replace(condition, hedges=_known(hedges))
+        case Not(part=Is() as part):
+            return Not(_said(part))
+        case Not(part=part):
+            return _said(part)
+        case And(parts=parts):
+            return And(tuple(map(_said, parts)))
+        case Or(parts=parts):
+            return Or(tuple(map(_said, parts)))

@@ -1,0 +1,388 @@
+"""FLL files as they are written."""
+
+from __future__ import annotations
+
+import math
+from typing import get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from fuzzytree.anonymous import anonymous
+from fuzzytree.casting import Scores, as_system, pointed
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.fll import write
+from fuzzytree.inference import infer
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.readers.fll import FACTS, read
+from fuzzytree.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
+from fuzzytree.system import (
+    Activation,
+    And,
+    Arc,
+    Call,
+    Concave,
+    Conclusion,
+    Condition,
+    Curve,
+    Defuzzifier,
+    Formula,
+    FuzzySystem,
+    Is,
+    Label,
+    Linear,
+    Name,
+    Not,
+    Number,
+    Or,
+    RuleBlock,
+    SCurve,
+    Sigmoid,
+    Singleton,
+    SNorm,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+    Trapezoid,
+)
+from fuzzytree.testing import random_rows, random_tree
+from tests.exporters.fll_systems import plain_system
+
+TANK = FuzzySystem(
+    "tank",
+    (
+        SystemInput(
+            "water level",
+            (
+                Label("low", Trapezoid(None, 0.0, 1.0, 2.5)),
+                Label("high", Arc(0.1, 3.0)),
+            ),
+            0.0,
+            3.0,
+            clips=True,
+            unit="m",
+        ),
+        SystemInput("is", (Label("big", Sigmoid(1e-7, 2.0), 0.5),)),
+    ),
+    (
+        SystemOutput(
+            "valve",
+            (Label("shut", Trapezoid(0.0, 0.0, 0.2, 0.2)),),
+            0.0,
+            1.0,
+            Defuzzifier("bisector", 50),
+            "maximum",
+            0.5,
+        ),
+        SystemOutput(
+            "rate",
+            (
+                Label("none", Singleton(0.0)),
+                Label("some", Linear((0.5, 1.0 / 3.0), -1.0)),
+                Label(
+                    "most",
+                    Formula(Call("negate", (Call("+", (Name("x"), Number(2.0))),))),
+                ),
+            ),
+            None,
+            None,
+            Defuzzifier("weighted sum"),
+        ),
+    ),
+    (
+        RuleBlock(
+            (
+                SystemRule(
+                    And(
+                        (
+                            Or((Is("water level", "low"), Is("is", "big", ("very",)))),
+                            Not(Is("water level", "high")),
+                        )
+                    ),
+                    (Conclusion("valve", "shut"), Conclusion("rate", "some", ("not",))),
+                    0.1 + 0.2,
+                ),
+                SystemRule(None, (Conclusion("rate", "none"),)),
+            ),
+            "minimum",
+            "algebraic sum",
+            "product",
+            Activation("first", 2, 0.25),
+            "all",
+        ),
+    ),
+    "A tank.\nSee #3.",
+)
+
+WRITTEN = """\
+# Written by fuzzytree.
+Engine: tank
+  description: A tank. See no.3.
+InputVariable: water_level
+  enabled: true
+  range: 0.0 3.0
+  lock-range: true
+  term: low Trapezoid -inf 0.0 1.0 2.5
+  term: high Arc 0.1 3.0
+InputVariable: is_
+  enabled: true
+  range: -inf inf
+  lock-range: false
+  term: big Sigmoid 1e-07 2.0 0.5
+OutputVariable: valve
+  enabled: true
+  range: 0.0 1.0
+  lock-range: false
+  aggregation: Maximum
+  defuzzifier: Bisector 50
+  default: 0.5
+  lock-previous: false
+  term: shut Rectangle 0.0 0.2
+OutputVariable: rate
+  enabled: true
+  range: -inf inf
+  lock-range: false
+  aggregation: none
+  defuzzifier: WeightedSum TakagiSugeno
+  default: nan
+  lock-previous: false
+  term: none Constant 0.0
+  term: some Linear 0.5 0.3333333333333333 -1.0
+  term: most Function ~(x + 2.0)
+RuleBlock: all
+  enabled: true
+  conjunction: Minimum
+  disjunction: AlgebraicSum
+  implication: AlgebraicProduct
+  activation: First 2 0.25
+  rule: if (water_level is low or is_ is very big) and water_level is not high then \
+valve is shut and rate is not some with 0.30000000000000004
+  rule: if water_level is any then rate is none
+"""
+
+
+def test_a_system_is_written_word_by_word() -> None:
+    written = write(TANK)
+    assert written.content.decode() == WRITTEN
+    assert written.losses == ()
+    assert written.remarks == (
+        "NOT is written as the hedge 'not', with the same numbers",
+        "names were changed: 'water level' is water_level, 'is' is is_",
+        "names of the system and of blocks, and its note, became single lines",
+        "units have no place: of 'water level'",
+        "a rule of degree 0 concludes nothing, as in fuzzylite 6; in pyfuzzylite 'any' "
+        "and 'not' in a conclusion make 1 of 0",
+        "fuzzylite 6 does not know Arc and SemiEllipse; pyfuzzylite does",
+    )
+
+
+def test_a_system_that_is_read_is_written_as_the_same_bytes() -> None:
+    model = read(WRITTEN.encode(), "tank.fll").model
+    assert isinstance(model, FuzzySystem)
+    again = write(model)
+    assert again.content == write(TANK).content
+
+
+@pytest.mark.parametrize("scores", get_args(Scores))
+@given(seed=st.integers(0, 10**6), kind=st.sampled_from(["relative", "raw"]))
+@settings(max_examples=15, deadline=None)
+def test_reading_written_rules_gives_the_equal_rules(
+    scores: Scores, seed: int, kind: str
+) -> None:
+    tree = random_tree(seed, leaves=4, combinations=0.5)
+    made = rules_from_tree(tree, "raw" if kind == "raw" else "relative")
+    rules, _ = pointed(replace(made, kind=None), 1e-3)
+    written = write(rules, scores=scores, allow_loss=True)
+    assert read(written.content, "r.fll").model == rules
+
+
+@pytest.mark.parametrize("scores", get_args(Scores))
+def test_without_its_comment_a_file_of_rules_is_their_system(scores: Scores) -> None:
+    rules, _ = pointed(rules_from_tree(random_tree(3, combinations=0.0)), 1e-3)
+    written = write(rules, scores=scores)
+    lines = written.content.decode().splitlines()
+    bare = "\n".join(line for line in lines if FACTS not in line)
+    model = read(bare.encode(), "r.fll").model
+    assert isinstance(model, FuzzySystem)
+    assert anonymous(model) == anonymous(as_system(rules, scores))
+
+
+def test_the_file_of_a_changed_comment_is_the_system_that_it_says() -> None:
+    rules, _ = pointed(rules_from_tree(random_tree(3, combinations=0.0)), 1e-3)
+    text = write(rules).content.decode()
+    changed = text.replace("activation: Highest 1", "activation: General")
+    assert isinstance(read(text.encode(), "r.fll").model, RuleBase)
+    assert isinstance(read(changed.encode(), "r.fll").model, FuzzySystem)
+
+
+def test_what_is_lost_is_listed_and_refused() -> None:
+    flank = Flank(0.0, -1.0, (0.5, 0.5))
+    system = replace(
+        TANK,
+        inputs=(
+            SystemInput("a", (Label("low", Band(0.0, 1.0, flank, None)),)),
+            SystemInput("b", parts=(Part("a", 2.0, 0.5),)),
+        ),
+        outputs=(
+            SystemOutput(
+                "y",
+                (Label("t", Trapezoid(0.0, 1.0, 1.0, 2.0)),),
+                0.0,
+                2.0,
+                Defuzzifier("centroid", 101, "ends"),
+                "maximum",
+            ),
+        ),
+        blocks=(
+            RuleBlock(
+                (SystemRule(Is("a", "low", ("cubed",)), (Conclusion("y", "t"),)),),
+                implication="minimum",
+            ),
+        ),
+    )
+    with pytest.raises(LossError) as error:
+        write(system, tolerance=0.01)
+    head, curve, *rest = str(error.value).splitlines()
+    assert head == "cannot write tank as fll without loss:"
+    assert curve.startswith("  term 'low' of 'a': it becomes ")
+    assert rest == [
+        "  combination 'b': it is an input, to be given as 2.0 * ('a' - 0.5)",
+        "  output 'y': its curve is looked at in the middle of 101 pieces of the "
+        "range, and not at 101 values with the ends",
+        "  rule 1: FLL has no 'cubed': left out",
+        "  pass allow_loss=True to write it so",
+    ]
+    written = write(system, tolerance=0.01, allow_loss=True)
+    assert len(written.losses) == 4
+    bound = written.losses[0].bound
+    assert bound is not None
+    assert 0.0 < bound <= 0.01
+
+
+NEVER: list[tuple[Condition, TNorm, SNorm]] = [
+    (Not(And((Is("is", "big"), Is("is", "big")))), "product", "maximum"),
+    (
+        And((Not(Or((Is("is", "big"), Is("is", "big")))), Is("is", "big"))),
+        "product",
+        "maximum",
+    ),
+    (
+        Or((Not(And((Is("is", "big"), Is("is", "big")))), Is("is", "big"))),
+        "minimum",
+        "sum",
+    ),
+]
+
+
+@pytest.mark.parametrize(("when", "conjunction", "disjunction"), NEVER)
+def test_a_not_that_has_no_words_is_refused_for_good(
+    when: Condition, conjunction: TNorm, disjunction: SNorm
+) -> None:
+    rule = SystemRule(when, (Conclusion("rate", "none"),))
+    block = RuleBlock((rule,), conjunction, disjunction)
+    with pytest.raises(LossError, match="rule 1 has a NOT of several conditions"):
+        write(replace(TANK, blocks=(block,)), allow_loss=True)
+
+
+def test_a_not_of_several_conditions_is_said_of_each_under_minimum_and_maximum() -> (
+    None
+):
+    low, big, high = (
+        Is("water level", "low"),
+        Is("is", "big"),
+        Is("water level", "high"),
+    )
+    when = Not(Or((And((low, big)), Not(Not(And((high, Is("is", None, ("any",)))))))))
+    rule = SystemRule(when, (Conclusion("rate", "none"),))
+    system = replace(TANK, blocks=(RuleBlock((rule,), implication="minimum"),))
+    model = read(write(system).content, "t.fll").model
+    assert isinstance(model, FuzzySystem)
+    for level in (0.05, 0.4, 1.3, 2.0, 2.9):
+        for x in (-2.0, 0.3, 0.9):
+            ours = infer(system, {"water level": level, "is": x})
+            theirs = infer(model, {"water_level": level, "is_": x})
+            assert theirs.activations == ours.activations
+
+
+STEPS = Points((0.0, 1.0, 1.0, 2.0, 2.0), (0.0, 0.5, 1.0, 1.0, 0.0))
+
+
+def test_the_second_point_of_a_step_stands_one_double_higher() -> None:
+    rule = SystemRule(Is("water level", "low"), (Conclusion("rate", "none"),))
+    system = replace(
+        TANK,
+        inputs=(SystemInput("water level", (Label("low", STEPS),)), TANK.inputs[1]),
+        blocks=(RuleBlock((rule,)),),
+    )
+    text = write(system).content.decode()
+    points = "0.0 0.0 1.0 0.5 1.0000000000000002 1.0 2.0 1.0 2.0000000000000004 0.0"
+    assert f"term: low Discrete {points}\n" in text
+    model = read(text.encode(), "s.fll").model
+    assert isinstance(model, FuzzySystem)
+    assert model.inputs[0].labels[0].curve == STEPS
+
+
+MIXED: list[Curve] = [
+    Points((1.0, 3.0), (0.0, 1.0)),
+    Points((1.0, 3.0), (1.0, 0.0)),
+    Sigmoid(1.0, -2.0),
+    SCurve(1.0, 3.0),
+    SCurve(3.0, 1.0),
+    Concave(1.0, 2.0),
+    Concave(2.0, 1.0),
+    Arc(1.0, 3.0),
+    Arc(3.0, 1.0),
+]
+
+
+@pytest.mark.parametrize("curve", MIXED)
+@pytest.mark.parametrize("height", [1.0, 0.75])
+@pytest.mark.parametrize("is_mixed", [False, True])
+def test_where_a_term_has_a_degree_is_kept_among_numbers_too(
+    curve: Curve, height: float, is_mixed: bool
+) -> None:
+    labels = (Label("t", curve, height), Label("n", Singleton(1.0)))
+    output = replace(TANK.outputs[1], labels=labels if is_mixed else labels[:1])
+    ramp = Label("up", Points((0.0, 4.0), (0.0, 1.0)))
+    rule = SystemRule(Is("a", "up"), (Conclusion("rate", "t"),))
+    system = FuzzySystem(
+        "s", (SystemInput("a", (ramp,)),), (output,), (RuleBlock((rule,)),)
+    )
+    written = write(system)
+    kind = "TakagiSugeno" if is_mixed else "Tsukamoto"
+    assert f"WeightedSum {kind}\n" in written.content.decode()
+    model = read(written.content, "s.fll").model
+    assert isinstance(model, FuzzySystem)
+    for value in (0.5, 1.0, 2.0, 2.5):
+        (ours,) = infer(system, {"a": value}).outputs
+        (theirs,) = infer(model, {"a": value}).outputs
+        assert math.isfinite(ours)
+        assert theirs == pytest.approx(ours, rel=1e-14)
+
+
+def test_bands_and_lr_sets_as_numbers_become_points_of_their_own() -> None:
+    shape = LR(0.5, Side(0.25, (1.0,)), Side(0.25, (1.0,)))
+    output = replace(TANK.outputs[1], labels=(Label("t", shape),))
+    rule = SystemRule(Is("is", "big"), (Conclusion("rate", "t"),))
+    system = replace(TANK, outputs=(output,), blocks=(RuleBlock((rule,)),))
+    written = write(system, allow_loss=True)
+    assert [loss.where for loss in written.losses] == ["term 't' of 'rate'"]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_random_system_without_losses_answers_alike_when_it_is_read(
+    seed: int,
+) -> None:
+    system = plain_system(seed)
+    written = write(system)
+    assert written.losses == ()
+    model = read(written.content, "r.fll").model
+    assert isinstance(model, FuzzySystem)
+    for row in random_rows(system, seed, 5):
+        given = dict(zip(model.columns, row.values(), strict=True))
+        ours, theirs = infer(system, row), infer(model, given)
+        assert theirs.activations == ours.activations
+        assert theirs.outputs == pytest.approx(ours.outputs, rel=1e-11, nan_ok=True)
