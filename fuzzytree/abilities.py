@@ -8,8 +8,9 @@ from typing import Literal
 import msgspec
 
 from fuzzytree.contracts import Document, Format
-from fuzzytree.converting import carrier_of, formed, likeness
+from fuzzytree.converting import carrier_of, formed
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
+from fuzzytree.likeness import likeness
 from fuzzytree.samples import samples
 
 Outcome = Literal["equal", "alike", "written", "points", "lossy", "refused", "no"]

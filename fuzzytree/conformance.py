@@ -16,8 +16,9 @@ from collections.abc import Iterable, Iterator
 from typing import get_args
 
 from fuzzytree.contracts import Carrier, Document, Format, Loss, Reading, Written
-from fuzzytree.converting import carrier_of, likeness
+from fuzzytree.converting import carrier_of
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
+from fuzzytree.likeness import likeness
 from fuzzytree.rulebase import fingerprint
 
 _PATIENCE_S = 10.0  # for one hostile input

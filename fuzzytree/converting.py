@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import msgspec
 
-from fuzzytree.anonymous import anonymous
 from fuzzytree.contracts import (
     Carrier,
     Document,
@@ -23,12 +22,13 @@ from fuzzytree.contracts import (
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import find_format
 from fuzzytree.files import read_bounded
+from fuzzytree.likeness import likeness
 from fuzzytree.losses import loss_text
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.options import Option, check_names
 from fuzzytree.probing import probes
 from fuzzytree.reference import evaluate
-from fuzzytree.rulebase import Conjunction, Kind, RuleBase, fingerprint
+from fuzzytree.rulebase import Conjunction, Kind, RuleBase
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
@@ -358,7 +358,10 @@ def proved(
             text = f"read back from the file, the {what} is equal in every number"
             return Proof("equal", text, _exact(model, text))
         case "alike":
-            text = "read back from the file, it is equal but for names and notes"
+            text = (
+                "read back from the file, it is equal but for names and notes, "
+                "or lines that became points"
+            )
             return Proof("alike", text)
         case "other" if written.losses or again.losses:
             text = "read back from the file, it differs by what was lost"
@@ -368,28 +371,6 @@ def proved(
                 f"{model.name} as {form.name} is read back as another model; "
                 "nothing is written"
             )
-
-
-Likeness = Literal["equal", "alike", "renamed", "other"]
-
-
-def likeness(model: Document, written: Written, again: Reading) -> Likeness:
-    """Return how what was read back stands to what was written.
-
-    Args:
-        model: What was written.
-        written: The file.
-        again: What it was read as.
-
-    Returns:
-        `equal` in every number and name; `alike` but for names, notes and units, of
-        which remarks were made; `renamed`, the same without a remark; or `other`.
-    """
-    if fingerprint(again.model) == fingerprint(model):
-        return "equal"
-    if not any(_same(one, again.model) for one in _stand_ins(model)):
-        return "other"
-    return "alike" if written.remarks or again.remarks else "renamed"
 
 
 def _decided(model: Document, other: Document) -> str:
@@ -428,21 +409,6 @@ def _exact(model: Document, origin: str) -> Certificate | None:
     from fuzzytree.numerics.bounds import Certificate
 
     return Certificate(None, carrier_of(model), 0.0, origin)
-
-
-def _stand_ins(model: Document) -> Iterator[Document]:
-    """Yield what a file may hold in the place of a model, deciding alike."""
-    yield model
-    if isinstance(model, RuleBase):
-        from fuzzytree.casting import as_system
-
-        yield as_system(model, scores="winner")
-        yield as_system(model, scores="rule")
-        yield as_system(model, scores="class")
-
-
-def _same(one: Document, other: Document) -> bool:
-    return fingerprint(anonymous(one)) == fingerprint(anonymous(other))
 
 
 def convert(

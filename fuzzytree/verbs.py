@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, Literal, TypeVar, get_args, overload
+from typing import TYPE_CHECKING, Literal, get_args
 
-import msgspec
 import numpy as np
 
 from fuzzytree.agreement import Agreement
-from fuzzytree.answers import Answers, answers_of, joined
-from fuzzytree.contracts import Document, Dtype, Model, Run, Written
+from fuzzytree.answering import Answering, Carried, answering, opened, run
+from fuzzytree.contracts import Document, Dtype, Model, Written
 from fuzzytree.converting import (
     Conversion,
     convert,
@@ -21,17 +20,13 @@ from fuzzytree.converting import (
     load,
     read,
 )
-from fuzzytree.errors import LossError, MissingExtraError, ReadError, TableError
+from fuzzytree.errors import TableError
 from fuzzytree.exporters import all_formats
-from fuzzytree.files import read_bounded, write_atomically
-from fuzzytree.inference import infer
+from fuzzytree.files import write_atomically
 from fuzzytree.options import Option
-from fuzzytree.outputs import Outputs, joined_outputs
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.runtimes import chosen_runtimes, find_runtime, is_installed
-from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tables import Batch, Table, batches, read_table
+from fuzzytree.runtimes import chosen_runtimes
+from fuzzytree.runtimes.onnxruntime import OnnxModel
+from fuzzytree.tables import Table, batches, read_table
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -64,12 +59,7 @@ __all__ = [
     "stability",
 ]
 
-Carried = Document | OnnxModel | bytes | str | os.PathLike[str]
-"""A model, an ONNX file opened or as bytes, or the path of a file of either."""
-
 Progress = Callable[[str, float], None]
-
-_BLOCK = 1 << 16  # rows answered at a time
 
 
 def learn(
@@ -207,29 +197,6 @@ def _name_of(table: object) -> str:
     return "tree"
 
 
-def opened(source: Carried, *, allow_loss: bool = False) -> Document | OnnxModel:
-    """Return a model as it is, and whatever a file or bytes hold ready to run.
-
-    Args:
-        source: A model, an ONNX file opened or as bytes, or the path of a file.
-        allow_loss: As in `load`.
-
-    Raises:
-        ReadError: If the file cannot be read, or is not ours.
-        LossError: As `load`.
-        MissingExtraError: If it is an ONNX file and onnxruntime is not installed.
-    """
-    match source:
-        case bytes():
-            return open_onnx(source, "the bytes")
-        case str() | os.PathLike():
-            if Path(source).suffix.lower() == ".onnx":
-                return open_onnx(read_bounded(source), os.fspath(source))
-            return load(source, allow_loss=allow_loss)
-        case _:
-            return source
-
-
 def save(
     model: Document,
     path: str | os.PathLike[str],
@@ -257,249 +224,6 @@ def save(
     )
     write_atomically(path, written.content)
     return written
-
-
-@overload
-def run(
-    model: FuzzySystem,
-    table: object,
-    *,
-    runtime: str | None = None,
-    columns: Sequence[str] | None = None,
-    with_strengths: bool = True,
-    allow_loss: bool = False,
-) -> Outputs: ...
-
-
-@overload
-def run(
-    model: Model | OnnxModel | bytes,
-    table: object,
-    *,
-    runtime: str | None = None,
-    columns: Sequence[str] | None = None,
-    with_strengths: bool = True,
-    allow_loss: bool = False,
-) -> Answers: ...
-
-
-@overload
-def run(
-    model: Carried,
-    table: object,
-    *,
-    runtime: str | None = None,
-    columns: Sequence[str] | None = None,
-    with_strengths: bool = True,
-    allow_loss: bool = False,
-) -> Answers | Outputs: ...
-
-
-def run(
-    model: Carried,
-    table: object,
-    *,
-    runtime: str | None = None,
-    columns: Sequence[str] | None = None,
-    with_strengths: bool = True,
-    allow_loss: bool = False,
-) -> Answers | Outputs:
-    """Answer the rows of a table: classes, or the numbers of a fuzzy system.
-
-    Args:
-        model: The model; see `Carried`.
-        table: A path, a pandas, polars or arrow table, or an array of shape
-            (rows, columns). Columns are found by name.
-        runtime: What executes the model: `native` unless given; an ONNX file is
-            always executed by onnxruntime.
-        columns: The names of an array's columns; unless given those of the table
-            that the model was learnt from.
-        with_strengths: Whether to keep the strengths of the rules, 8 bytes for each
-            rule and row.
-        allow_loss: As in `load`.
-
-    Raises:
-        TableError: If a column is absent or holds text.
-        MissingExtraError: If the runtime is not installed.
-        LossError: If the runtime cannot carry the model, or as `load`.
-        ValueError: If there is no such runtime.
-    """
-    found = opened(model, allow_loss=allow_loss)
-    if isinstance(found, FuzzySystem):
-        numbers = answering(found, runtime, with_strengths=with_strengths)
-        return numbers.join([one for _, one in numbers(table, columns=columns)])
-    classes = answering(found, runtime, with_strengths=with_strengths)
-    return classes.join([one for _, one in classes(table, columns=columns)])
-
-
-Found = TypeVar("Found", Answers, Outputs)
-
-
-class Answering(msgspec.Struct, Generic[Found], frozen=True):
-    """A model made ready, which answers tables piece by piece.
-
-    Attributes:
-        inputs: The columns that it needs, in order.
-        trained: The columns of the table that it was learnt from, if any.
-        answer: Answers to values of shape (inputs, rows).
-        join: Makes one of the answers to several pieces.
-    """
-
-    inputs: tuple[str, ...]
-    trained: tuple[str, ...]
-    answer: Callable[[FloatArray], Found]
-    join: Callable[[Sequence[Found]], Found]
-
-    def __call__(
-        self,
-        table: object,
-        *,
-        columns: Sequence[str] | None = None,
-        delimiter: str | None = None,
-        name: str | None = None,
-        with_others: bool = False,
-    ) -> Iterator[tuple[Batch, Found]]:
-        """Yield the rows of a table in batches, with the answers to them.
-
-        The arguments are those of `fuzzytree.tables.batches`.
-
-        Raises:
-            TableError: If a column is absent or holds text.
-        """
-        for batch in batches(
-            table,
-            self.inputs,
-            trained=self.trained,
-            columns=columns,
-            delimiter=delimiter,
-            name=name,
-            with_others=with_others,
-        ):
-            rows = batch.values.shape[1]
-            starts = range(0, max(rows, 1), _BLOCK)
-            found = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
-            yield batch, self.join(found)
-
-
-@overload
-def answering(
-    model: FuzzySystem, runtime: str | None = None, *, with_strengths: bool = True
-) -> Answering[Outputs]: ...
-
-
-@overload
-def answering(
-    model: Model | OnnxModel, runtime: str | None = None, *, with_strengths: bool = True
-) -> Answering[Answers]: ...
-
-
-@overload
-def answering(
-    model: Document | OnnxModel,
-    runtime: str | None = None,
-    *,
-    with_strengths: bool = True,
-) -> Answering[Answers] | Answering[Outputs]: ...
-
-
-def answering(
-    model: Document | OnnxModel,
-    runtime: str | None = None,
-    *,
-    with_strengths: bool = True,
-) -> Answering[Answers] | Answering[Outputs]:
-    """Make a model ready to answer.
-
-    Raises:
-        MissingExtraError: If the runtime is not installed.
-        LossError: If the runtime cannot carry the model.
-        ValueError: If there is no such runtime, or another one for an ONNX file.
-    """
-    if isinstance(model, OnnxModel):
-        return _answering_onnx(model, runtime, with_strengths=with_strengths)
-    if isinstance(model, FuzzySystem):
-        return _answering_system(model, runtime, with_strengths=with_strengths)
-    execute = _loaded(model, runtime or "native")
-    if isinstance(model, RuleBase):
-        ends = [rule.then for rule in model.rules]
-    else:
-        ends = [leaf.label for leaf in model.leaves]
-
-    def answer(values: FloatArray) -> Answers:
-        return answers_of(
-            execute(np.ascontiguousarray(values)),
-            choices=model.classes,
-            ends=ends,
-            semantics=model.semantics,
-            with_strengths=with_strengths,
-        )
-
-    return Answering(model.inputs, model.columns, answer, joined)
-
-
-def _answering_system(
-    system: FuzzySystem, runtime: str | None, *, with_strengths: bool
-) -> Answering[Outputs]:
-    del runtime
-    names = tuple(one.name for one in system.outputs)
-
-    def answer(values: FloatArray) -> Outputs:
-        found = [
-            infer(system, dict(zip(system.columns, row, strict=True)))
-            for row in values.T.tolist()
-        ]
-        numbers = np.array([one.outputs for one in found], np.float64)
-        degrees = np.array([one.activations for one in found], np.float64)
-        return Outputs(
-            names,
-            numbers.reshape(len(found), len(names)).T,
-            np.array([one.status for one in found], np.int64),
-            degrees.reshape(len(found), -1).T if with_strengths else None,
-        )
-
-    return Answering(system.columns, (), answer, joined_outputs)
-
-
-def _answering_onnx(
-    model: OnnxModel, runtime: str | None, *, with_strengths: bool
-) -> Answering[Answers]:
-    if runtime is not None:
-        raise ValueError(
-            f"runtime {runtime!r}: an ONNX file runs in onnxruntime; "
-            "other runtimes need the YAML file"
-        )
-    label = model.labels
-    if label is None:
-        raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
-    position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
-
-    def answer(values: FloatArray) -> Answers:
-        outcome = model.run(values)
-        return Answers(
-            model.classes,
-            np.array([position.get(name, -1) for name in label(values)], np.int64),
-            outcome.rule,
-            outcome.status,
-            strengths=outcome.strengths if with_strengths else None,
-        )
-
-    return Answering(model.inputs, model.columns, answer, joined)
-
-
-def _loaded(model: Model, name: str) -> Run:
-    runtime = find_runtime(name)
-    carrier = "rules" if isinstance(model, RuleBase) else "tree"
-    if carrier not in runtime.runs:
-        raise LossError(
-            f"cannot run {model.name} in {name}: it runs "
-            f"{' or '.join(runtime.runs)}, not a {carrier}"
-        )
-    if not is_installed(runtime):
-        raise MissingExtraError(
-            f"the runtime {name!r} needs the extra {runtime.extra!r}: "
-            f"pip install 'fuzzytree-toolkit[{runtime.extra}]'"
-        )
-    return runtime.load(model)
 
 
 def rows_of(

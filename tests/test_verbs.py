@@ -13,7 +13,7 @@ import pyarrow as pa
 import pytest
 
 import fuzzytree as ft
-from fuzzytree import verbs
+from fuzzytree import answering
 from fuzzytree.errors import LossError, ReadError, TableError
 from fuzzytree.exporters import TABLE
 from fuzzytree.learning import Settings
@@ -116,7 +116,7 @@ def test_every_carrier_of_a_tree_answers_alike(
 
 def test_many_rows_are_answered_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     expected = ft.run(ft.rules_from_tree(TREE), ROWS).to_csv("rule")
-    monkeypatch.setattr(verbs, "_BLOCK", 7)
+    monkeypatch.setattr(answering, "_BLOCK", 7)
     assert ft.run(ft.rules_from_tree(TREE), ROWS).to_csv("rule") == expected
 
 

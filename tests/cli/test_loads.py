@@ -35,7 +35,7 @@ LEARN = (
         (("export", "grip.yaml", "-o", "other.py", "--quiet"), ""),
         (LEARN, ""),
         (("check", "grip.yaml", "--runtime", "native", *WIDE), ""),
-        (("formats",), ""),
+        (("formats",), "onnx onnxruntime"),
         (("needs", "grip.yaml", "--quiet"), "onnx"),
         (("export", "grip.yaml", "-o", "other.onnx", "--quiet"), "onnx onnxruntime"),
         (("run", "grip.onnx", "grasps.csv", "--quiet"), "onnx onnxruntime"),
