@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 from fuzzytree.contracts import Model
 from fuzzytree.exporters.onnx import write
 from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
+from fuzzytree.system import FuzzySystem
 
 if TYPE_CHECKING:
     import onnx
 
 
-def graph_difference(content: bytes, model: Model) -> str | None:
+def graph_difference(content: bytes, model: Model | FuzzySystem) -> str | None:
     """Return how a file's graph differs from a fresh one; None if they are equal.
 
     The fresh graph is written with the options that the file itself states. Metadata
@@ -36,13 +37,14 @@ def graph_difference(content: bytes, model: Model) -> str | None:
     facts = {p.key.removeprefix("fuzzytree."): p.value for p in found.metadata_props}
     versions = {entry.domain: entry.version for entry in found.opset_import}
     columns = json.loads(facts["columns"])
+    needed = model.columns if isinstance(model, FuzzySystem) else model.inputs
     fresh = write(
         model,
         allow_loss=True,
         dtype=facts["dtype"],
         opset=versions.get("", 0),
         ir=found.ir_version,
-        signature="needed" if columns == list(model.inputs) else "all",
+        signature="needed" if columns == list(needed) else "all",
         outputs=json.loads(facts["outputs"]),
         readable=DOMAIN in versions,
         plain=facts["carrier"] == "tree" and TREES not in versions,

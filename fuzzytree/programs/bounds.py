@@ -24,6 +24,8 @@ Pair = tuple[Array, Array]
 
 ORIGIN = "units in the last place of exp, pow and the like, carried through the steps"
 
+_WORKING_SET = 1 << 21  # numbers of which values and bounds are kept together
+
 PAIR_ULPS: Mapping[str, float] = {
     "exponential": 4.0,
     "logarithm": 4.0,
@@ -85,22 +87,31 @@ def error_bounds(
         >>> error_bounds(make.program("p", ("x",), results), np.ones((1, 1))).tolist()
         [[0.0], [1.7763568394002505e-15]]
     """
-    found: list[Pair] = []
     rows = values.shape[1]
+    some = max(_WORKING_SET // max(program.size, 1), 1)
+    found = np.empty((len(program.results), rows))
     with np.errstate(all="ignore"):
-        for step, still in zip(program.steps, still_results(program), strict=True):
-            given = [found[place] for place in step.arguments]
-            if still is not None:  # computed once, by the same functions
-                value = np.array(still)
-                value = value.reshape(-1, 1) if isinstance(still, list) else value
-                found.append((value, np.zeros(value.shape, value.dtype)))
-            elif step.operation == "input":
-                line = values[program.inputs.index(step.name)]
-                found.append((line, np.zeros(rows)))
-            else:
-                found.append(_pair(step, given))
-    bounds = [np.broadcast_to(found[one.step][1], rows) for one in program.results]
-    return np.array(bounds, np.float64).reshape(len(bounds), rows)
+        for start in range(0, rows, some):
+            part = slice(start, start + some)
+            for line, bound in enumerate(_bounds(program, values[:, part])):
+                found[line, part] = bound
+    return found
+
+
+def _bounds(program: Program, values: npt.NDArray[np.float64]) -> list[Array]:
+    found: list[Pair] = []
+    for step, still in zip(program.steps, still_results(program), strict=True):
+        given = [found[place] for place in step.arguments]
+        if still is not None:  # computed once, by the same functions
+            value = np.array(still)
+            value = value.reshape(-1, 1) if isinstance(still, list) else value
+            found.append((value, np.zeros(value.shape, value.dtype)))
+        elif step.operation == "input":
+            line = values[program.inputs.index(step.name)]
+            found.append((line, np.zeros(line.shape)))
+        else:
+            found.append(_pair(step, given))
+    return [found[one.step][1] for one in program.results]
 
 
 def _pair(step: Step, given: Sequence[Pair]) -> Pair:

@@ -1,0 +1,424 @@
+"""Do all carriers of a fuzzy system give its numbers?
+
+The inference is the meaning; the native runtime is held against it, every other runtime
+against the native one, and shipped files against both. Bits are compared first. Where
+they differ, two runners may be as far apart as the functions of their libraries make
+them (`fuzzytree.programs.bounds`), and no further.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.agreement import Agreement, Basis, Comparison, Count
+from fuzzytree.checking import first_difference
+from fuzzytree.comparing import Rows
+from fuzzytree.contracts import Runtime, SystemOutcome, SystemRun
+from fuzzytree.errors import FuzzyTreeError, LossError
+from fuzzytree.probing import system_probes
+from fuzzytree.programs.bounds import ORIGIN, error_bounds
+from fuzzytree.programs.systems import from_system
+from fuzzytree.reference import Status
+from fuzzytree.rulebase import fingerprint
+from fuzzytree.runtimes import chosen_runtimes, is_installed
+from fuzzytree.runtimes.systems import infer_rows, run_system
+from fuzzytree.system import FuzzySystem
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.programs.steps import Program
+    from fuzzytree.runtimes.onnxruntime import OnnxModel
+
+_SLOW_STEPS = 2_000_000  # operations that a slow runtime is asked for
+_TOLD = 5  # differing rows told for each comparison
+
+Finding = Comparison | str
+"""A comparison, or a sentence about what was skipped."""
+
+
+class _Subject(msgspec.Struct, frozen=True):
+    """What is checked, and on which rows.
+
+    Attributes:
+        system: The system.
+        program: Its program, with activations.
+        rows: The rows.
+        native: The native runtime's numbers for all of them.
+    """
+
+    system: FuzzySystem
+    program: Program
+    rows: Rows
+    native: SystemOutcome
+
+
+def check_system(
+    system: FuzzySystem,
+    *others: FuzzySystem | OnnxModel,
+    data: FloatArray | None = None,
+    names: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    limit: int = 2_000,
+) -> Agreement:
+    """Hold every carrier of a fuzzy system against the system itself.
+
+    Args:
+        system: The system.
+        others: Carriers that were shipped with it: systems read from files, opened
+            ONNX files.
+        data: Rows of one's own, shape (columns, rows), in the order of
+            `system.columns`.
+        names: What to call each of the others; `file 1`, `file 2` unless given.
+        runtimes: The names of the runtimes to run; all that are installed if None.
+        limit: The most probes.
+
+    Returns:
+        What was compared, on what, and with which result. A row `flips` where its
+        status differs.
+
+    Raises:
+        ValueError: If `data` is not of shape (columns, rows), or a runtime is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_system
+        >>> check_system(random_system(2), runtimes=["native"], limit=50).ok
+        True
+    """
+    rows = _rows(system, data, limit)
+    chosen = chosen_runtimes(runtimes)
+    native = run_system(system, activations=True)(rows.values)
+    program = from_system(system, activations=True)
+    subject = _Subject(system, program, rows, native)
+    findings = [*_inference(subject)]
+    for runtime in chosen:
+        findings += _runtime(subject, runtime)
+    for number, other in enumerate(others):
+        title = names[number] if number < len(names) else f"file {number + 1}"
+        findings += _shipped(title, other, subject)
+    return Agreement(
+        system.name,
+        fingerprint(system),
+        tuple(one for one in findings if isinstance(one, Comparison)),
+        (_count("system", native),),
+        tuple(dict.fromkeys(one for one in findings if isinstance(one, str))),
+        None,
+        rows.probes,
+    )
+
+
+def _rows(system: FuzzySystem, data: FloatArray | None, limit: int) -> Rows:
+    names = system.columns
+    probes = system_probes(system, limit=limit)
+    table = np.array([[row[name] for row in probes] for name in names], np.float64)
+    values = table.reshape(len(names), len(probes))
+    if data is not None:
+        if data.ndim != 2 or data.shape[0] != len(names):
+            raise ValueError(
+                f"data must have shape ({len(names)}, rows), not {data.shape}"
+            )
+        values = np.concatenate([values, data], axis=1)
+    values = np.ascontiguousarray(values)
+    return Rows(names, values, np.arange(values.shape[1]), len(probes))
+
+
+def _inference(subject: _Subject) -> Iterator[Finding]:
+    """Hold the native runtime against the meaning, on a share of the rows."""
+    share = _share(subject)
+    some = subject.rows.part(share)
+    right = infer_rows(subject.system, activations=True)(some.values)
+    found = subject.native.part(share)
+    yield _compared("native", "the inference", found, right, subject, some)
+
+
+def _share(subject: _Subject) -> slice:
+    """Return which rows a slow runtime gets, so that it ends in seconds."""
+    step = len(subject.rows.numbers) * subject.program.size // _SLOW_STEPS
+    return slice(None, None, max(step, 1))
+
+
+def _runtime(subject: _Subject, runtime: Runtime) -> Iterator[Finding]:
+    if "system" not in runtime.runs or runtime.load_system is None:
+        return
+    if not is_installed(runtime):
+        yield f"{runtime.name} is not installed (extra {runtime.extra!r})"
+        return
+    try:
+        run = runtime.load_system(subject.system, activations=True)
+    except LossError as error:
+        yield f"{runtime.name}: {error}"
+        return
+    share = _share(subject) if runtime.is_slow else slice(None)
+    some = subject.rows.part(share)
+    if runtime.name not in ("native", "reference"):
+        found, right = run(some.values), subject.native.part(share)
+        yield _compared(runtime.name, "native", found, right, subject, some)
+    yield _calls(runtime.name, run, some, subject)
+
+
+class _Gaps(msgspec.Struct, frozen=True):
+    """Where two tables of numbers differ.
+
+    Attributes:
+        apart: The rows in which a bit differs.
+        gap: The differences in these rows, of shape (numbers, rows).
+        allowed: How large they may be.
+    """
+
+    apart: IntArray
+    gap: FloatArray
+    allowed: FloatArray
+
+    @property
+    def wrong(self) -> list[int]:
+        """The places among `apart` where more differs than may, worst first."""
+        found = np.flatnonzero((self.gap > self.allowed).any(axis=0)).tolist()
+        return sorted(found, key=lambda place: -float(self.gap[:, place].max()))
+
+
+def _gaps(one: FloatArray, two: FloatArray, subject: _Subject, rows: Rows) -> _Gaps:
+    is_same = (one == two) | (np.isnan(one) & np.isnan(two))
+    apart = np.flatnonzero(~is_same.all(axis=0))
+    allowed = error_bounds(subject.program, rows.values[:, apart])
+    if len(one) < len(allowed):  # without activations
+        allowed = allowed[[*range(len(one) - 1), len(allowed) - 1]]
+    with np.errstate(invalid="ignore"):
+        gap = np.abs(one[:, apart] - two[:, apart])
+    gap = np.where(is_same[:, apart], 0.0, np.where(np.isnan(gap), np.inf, gap))
+    return _Gaps(apart, gap, allowed)
+
+
+def _faults(
+    one: FloatArray, two: FloatArray, subject: _Subject, rows: Rows
+) -> Iterator[str]:
+    """Yield what is wrong in each row, worst first."""
+    gaps = _gaps(one, two, subject, rows)
+    for place in gaps.wrong:
+        row = int(gaps.apart[place])
+        yield _fault(
+            subject, one[:, row], two[:, row], gaps.allowed[:, place], row, rows
+        )
+
+
+def _compared(
+    carrier: str,
+    against: str,
+    found: SystemOutcome,
+    right: SystemOutcome,
+    subject: _Subject,
+    rows: Rows,
+) -> Comparison:
+    """Compare bits, then what the bounds of the rows that differ allow."""
+    one, two = _table(found, right), _table(right, found)
+    gaps = _gaps(one, two, subject, rows)
+    is_open = np.isinf(gaps.allowed)
+    faults = list(itertools.islice(_faults(one, two, subject, rows), _TOLD))
+    return Comparison(
+        carrier,
+        against,
+        "rows",
+        len(rows.numbers),
+        "DISAGREES" if faults else "agrees",
+        differing=len(gaps.wrong),
+        largest_difference=_largest(np.where(is_open, 0.0, gaps.gap)),
+        allowed=_largest(np.where(is_open, 0.0, gaps.allowed)),
+        origin=_origin(gaps, len(rows.numbers)),
+        flips=int((found.status != right.status).sum()),
+        detail=tuple(faults),
+    )
+
+
+def _table(outcome: SystemOutcome, other: SystemOutcome) -> FloatArray:
+    """Return all numbers that two outcomes have, a line each, the status last."""
+    lines = [outcome.outputs]
+    if outcome.activations is not None and other.activations is not None:
+        lines.append(outcome.activations)
+    return np.vstack([*lines, outcome.status.astype(np.float64)])
+
+
+def _largest(numbers: FloatArray) -> float:
+    return float(numbers.max(initial=0.0))
+
+
+def _origin(gaps: _Gaps, rows: int) -> str:
+    if not len(gaps.apart):
+        return "equal bits"
+    text = f"{ORIGIN}; equal bits in {rows - len(gaps.apart)} rows"
+    is_open = np.isinf(gaps.allowed) & (gaps.gap > 0.0)
+    unbounded = int(is_open.any(axis=0).sum())
+    return text + (f", no bound in {unbounded}" if unbounded else "")
+
+
+def _names(system: FuzzySystem) -> list[str]:
+    return [
+        *(f"output {one.name!r}" for one in system.outputs),
+        *(f"rule {number}" for number in range(1, len(system.rules) + 1)),
+        "status",
+    ]
+
+
+def _fault(
+    subject: _Subject,
+    one: FloatArray,
+    two: FloatArray,
+    allowed: FloatArray,
+    row: int,
+    rows: Rows,
+) -> str:
+    """Say which number of a row is wrong first, and the values that lead to it."""
+    names = _names(subject.system)
+    names = [*names[: len(one) - 1], names[-1]]
+    with np.errstate(invalid="ignore"):
+        is_right = (np.abs(one - two) <= allowed) | (one == two)
+    first = int(np.argmin(is_right | (np.isnan(one) & np.isnan(two))))
+    bound = float(allowed[first])
+    values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
+    where = ", ".join(f"{column} {value!r}" for column, value in values)
+    numbers = f"{float(one[first])!r} where {float(two[first])!r} is right"
+    more = "" if bound == 0.0 else f", which may differ by {bound:.2g}"
+    return f"{rows.name(row)}: {where}: {names[first]} {numbers}{more}"
+
+
+def _calls(title: str, run: SystemRun, rows: Rows, subject: _Subject) -> Comparison:
+    """Call a runtime in the ways that break: no row, one, other order, wrong width.
+
+    A library may compute a function of one number otherwise than of many, so that the
+    answers to a row may be apart as far as those of two runners.
+    """
+    width, total = rows.values.shape
+    some = slice(None, None, max(total // 24, 1))
+    sample = np.ascontiguousarray(rows.values[:, some])
+    whole = run(sample)
+    singles = [run(sample[:, row : row + 1]) for row in range(sample.shape[1])]
+    alone = np.hstack([_table(one, whole) for one in singles])
+    faults = [
+        f"a row answered alone differs from the same row in a batch, {text}"
+        for text in _faults(alone, _table(whole, whole), subject, rows.part(some))
+    ]
+    turned = _table(run(np.asfortranarray(sample)), whole)
+    if any(_faults(turned, _table(whole, whole), subject, rows.part(some))):
+        faults.append("another memory order changes the answers")
+    empty = run(np.empty((width, 0)))
+    if empty.outputs.shape[1:] != (0,) or empty.status.shape != (0,):
+        faults.append("no rows do not give empty answers")
+    try:
+        run(np.zeros((width + 1, 3)))
+        faults.append(f"{width + 1} inputs are accepted where {width} are right")
+    except (ValueError, FuzzyTreeError):
+        pass
+    return _counted("calls", title, "itself", sample.shape[1] + 3, faults)
+
+
+def _shipped(
+    title: str, other: FuzzySystem | OnnxModel, subject: _Subject
+) -> Iterator[Finding]:
+    """Compare a file that was shipped beside a system: content, then answers."""
+    if isinstance(other, FuzzySystem):
+        yield from _shipped_system(title, other, subject)
+        return
+    system = subject.system
+    outputs = tuple(one.name for one in system.outputs)
+    if (
+        other.run_system is None
+        or other.inputs != system.columns
+        or other.names != outputs
+    ):
+        fault = (
+            f"it computes {', '.join(other.names) or 'a class'} from "
+            f"{', '.join(other.inputs)}, which are not the system's"
+        )
+        yield _counted("file", title, "the system's facts", 1, (fault,))
+        return
+    stated, right_print = other.fingerprint, fingerprint(system)
+    fault = f"it states fingerprint {stated[:12]}..., {right_print[:12]}... is right"
+    faults = () if stated == right_print else (fault,)
+    yield _counted("file", title, "the system's fingerprint", 1, faults)
+    yield from _graph(title, other, system)
+    rows = subject.rows
+    try:
+        found = other.run_system(rows.values)
+    except LossError as error:  # the file loads, but onnxruntime cannot run it
+        yield _counted("rows", title, "native", len(rows.numbers), (str(error),))
+        return
+    right = subject.native
+    if "status" not in other.outputs:
+        found, right = (_without_status(one) for one in (found, right))
+    yield _compared(title, "native", found, right, subject, rows)
+
+
+def _without_status(outcome: SystemOutcome) -> SystemOutcome:
+    """Return an outcome that tells missing rows alone."""
+    is_missing = outcome.status == Status.MISSING
+    return msgspec.structs.replace(
+        outcome, status=np.where(is_missing, Status.MISSING, Status.DECIDED)
+    )
+
+
+def _graph(title: str, other: OnnxModel, system: FuzzySystem) -> Iterator[Finding]:
+    """Compare the graph with the one that would be written now: a proof if equal."""
+    from fuzzytree.exporters.onnx import version
+    from fuzzytree.exporters.onnx_compare import graph_difference
+
+    try:
+        fault = graph_difference(other.content, system)
+    except (ValueError, LossError) as error:  # it states what is not written now
+        fault = str(error)
+    if fault is None or other.version == version():
+        faults = () if fault is None else (fault,)
+        yield _counted("file", title, "a freshly written graph", 1, faults)
+    else:
+        yield f"{title}: another version, {other.version}, wrote it, so only rows tell"
+
+
+def _shipped_system(
+    title: str, other: FuzzySystem, subject: _Subject
+) -> Iterator[Finding]:
+    """Compare content; where it differs, only rows tell. Names are taken in order."""
+    system = subject.system
+    fault = first_difference(system, other)
+    if fault is None:
+        yield _counted("file", title, "the system", 1, ())
+        return
+    yield Comparison(
+        title, "the system", "file", 1, "differs by design", 1, detail=(fault,)
+    )
+    counts = [(len(one.columns), len(one.outputs)) for one in (system, other)]
+    if counts[0] != counts[1]:
+        fault = (
+            f"it computes {counts[1][1]} outputs from {counts[1][0]} inputs, and the "
+            f"system {counts[0][1]} from {counts[0][0]}"
+        )
+        yield _counted("file", title, "the system's inputs and outputs", 1, (fault,))
+        return
+    is_alike = len(other.rules) == len(system.rules)
+    found = run_system(other, activations=is_alike)(subject.rows.values)
+    yield _compared(title, "native", found, subject.native, subject, subject.rows)
+
+
+def _counted(
+    basis: Basis, carrier: str, against: str, rows: int, faults: Sequence[str]
+) -> Comparison:
+    return Comparison(
+        carrier,
+        against,
+        basis,
+        rows,
+        "DISAGREES" if faults else "agrees",
+        differing=len(faults),
+        detail=tuple(faults[:_TOLD]),
+    )
+
+
+def _count(carrier: str, outcome: SystemOutcome) -> Count:
+    status = outcome.status
+    return Count(
+        carrier,
+        int(status.size),
+        0,
+        int((status == Status.UNCOVERED).sum()),
+        int((status == Status.MISSING).sum()),
+    )
