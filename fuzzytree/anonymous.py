@@ -11,12 +11,14 @@ from collections.abc import Iterable, Mapping
 
 from msgspec.structs import replace
 
+from fuzzytree.casting.shapes import shape_of, stepped
 from fuzzytree.contracts import Document
 from fuzzytree.rulebase import (
     Band,
     Clause,
     Flank,
     Part,
+    Points,
     Rule,
     RuleBase,
     Semantics,
@@ -53,7 +55,9 @@ def anonymous(model: Document) -> Document:
     """Return a model whose parts are called by their places: `v1`, `t1`, `c1`.
 
     Units, notes, supports, training columns and the origin of terms are left out, and
-    ranges where no value is moved into them and no curve is looked at in them.
+    ranges where no value is moved into them and no curve is looked at in them. Curves
+    with the same degrees at every double are alike, and so are conditions that min or
+    max joins in another order; norms that no rule uses are left out.
 
     Args:
         model: A tree, a rule base or a system.
@@ -147,6 +151,8 @@ def _terms(terms: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
 def _shape(shape: Shape) -> Shape:
     if isinstance(shape, Band):
         return replace(shape, left=_flank(shape.left), right=_flank(shape.right))
+    if isinstance(shape, Points):
+        return Points(stepped(shape.values), shape.degrees)
     return shape
 
 
@@ -190,14 +196,14 @@ def _system(system: FuzzySystem) -> FuzzySystem:
         name="m",
         inputs=tuple(_input(one, names, labels) for one in system.inputs),
         outputs=tuple(_output(one, names, labels) for one in system.outputs),
-        blocks=tuple(_block(one, names, labels) for one in system.blocks),
+        blocks=tuple(_block(one, system, names, labels) for one in system.blocks),
     )
 
 
 def _input(one: SystemInput, names: Names, labels: Labels) -> SystemInput:
     return SystemInput(
         names[one.name],
-        _labels(one.labels, names, labels[one.name]),
+        _labels(one.labels, names, labels[one.name], are_numbers=False),
         low=one.low if one.clips else None,
         high=one.high if one.clips else None,
         clips=one.clips,
@@ -213,7 +219,9 @@ def _output(one: SystemOutput, names: Names, labels: Labels) -> SystemOutput:
     return replace(
         one,
         name=names[one.name],
-        labels=_labels(one.labels, names, labels[one.name]),
+        labels=_labels(
+            one.labels, names, labels[one.name], are_numbers=how.is_weighted
+        ),
         low=None if is_free else one.low,
         high=None if is_free else one.high,
         defuzzifier=how,
@@ -222,18 +230,23 @@ def _output(one: SystemOutput, names: Names, labels: Labels) -> SystemOutput:
 
 
 def _labels(
-    labels: tuple[Label, ...], variables: Names, names: Names
+    labels: tuple[Label, ...], variables: Names, names: Names, *, are_numbers: bool
 ) -> tuple[Label, ...]:
     return tuple(
-        replace(one, name=names[one.name], curve=_curve(one.curve, variables))
+        replace(
+            one,
+            name=names[one.name],
+            curve=_curve(one.curve, variables, is_number=are_numbers),
+        )
         for one in labels
     )
 
 
-def _curve(curve: Curve, names: Names) -> Curve:
+def _curve(curve: Curve, names: Names, *, is_number: bool) -> Curve:
     if isinstance(curve, Formula):
         return Formula(_expression(curve.expression, names))
-    return _shape(curve) if isinstance(curve, Band) else curve
+    shape = None if is_number else shape_of(curve)
+    return curve if shape is None else _shape(shape)
 
 
 def _expression(expression: Expression, names: Names) -> Expression:
@@ -246,23 +259,60 @@ def _expression(expression: Expression, names: Names) -> Expression:
             return expression
 
 
-def _block(block: RuleBlock, names: Names, labels: Labels) -> RuleBlock:
+def _block(
+    block: RuleBlock, system: FuzzySystem, names: Names, labels: Labels
+) -> RuleBlock:
     rules = tuple(
         SystemRule(
-            None if rule.when is None else _condition(rule.when, names, labels),
+            None
+            if rule.when is None
+            else _ordered(_condition(rule.when, names, labels), block),
             tuple(_conclusion(one, names, labels) for one in rule.then),
             rule.weight,
         )
         for rule in block.rules
     )
-    kinds = [one for rule in block.rules for one in _kinds(rule.when)]
+    kinds = [one for rule in rules for one in _kinds(rule.when)]
+    looked_at = {o.name for o in system.outputs if not o.defuzzifier.is_weighted}
+    concluded = {one.output for rule in block.rules for one in rule.then}
     return replace(
         block,
         rules=rules,
         conjunction=block.conjunction if And in kinds else None,
         disjunction=block.disjunction if Or in kinds else None,
+        implication=block.implication if looked_at & concluded else None,
         name="",
     )
+
+
+def _ordered(condition: Condition, block: RuleBlock) -> Condition:
+    """Return a condition whose parts stand in order where it changes no bit.
+
+    An AND within an AND is one AND under min, and so is an OR within an OR under max.
+    """
+    match condition:
+        case Not(part=part):
+            return Not(_ordered(part, block))
+        case And(parts=parts) | Or(parts=parts):
+            kind = type(condition)
+            is_free = (
+                block.conjunction == "minimum"
+                if kind is And
+                else block.disjunction == "maximum"
+            )
+            found = [_ordered(part, block) for part in parts]
+            if is_free:
+                found = sorted(
+                    (
+                        inner
+                        for part in found
+                        for inner in (part.parts if isinstance(part, kind) else (part,))
+                    ),
+                    key=repr,
+                )
+            return found[0] if len(found) == 1 else kind(tuple(found))
+        case _:
+            return condition
 
 
 def _kinds(condition: Condition | None) -> Iterable[type]:
@@ -286,6 +336,9 @@ def _condition(condition: Condition, names: Names, labels: Labels) -> Condition:
             return And(tuple(_condition(one, names, labels) for one in parts))
         case Or(parts=parts):
             return Or(tuple(_condition(one, names, labels) for one in parts))
+        case Not(part=Is() as part):
+            negated = replace(part, hedges=("not", *part.hedges))
+            return _condition(negated, names, labels)
         case Not(part=part):
             return Not(_condition(part, names, labels))
 

@@ -414,6 +414,8 @@ class _Flat:
                 found.append(flat)
         if len(parts) == 1:
             return self.condition(parts[0])
+        if norm in ("minimum", "maximum"):
+            found.sort(key=repr)  # in any order they give the same bits
         self.used.add(f"{word} {norm}")
         return (word, *found)
 

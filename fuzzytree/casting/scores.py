@@ -50,6 +50,7 @@ from fuzzytree.system import (
     FuzzySystem,
     Is,
     Label,
+    Linear,
     Not,
     Or,
     RuleBlock,
@@ -215,8 +216,26 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
     )
     if not losses:
         return system, ()
-    inputs = tuple(replace(one, parts=()) for one in system.inputs)
-    return replace(system, inputs=inputs), losses
+    return replace(
+        system,
+        inputs=tuple(replace(one, parts=()) for one in system.inputs),
+        outputs=tuple(
+            replace(
+                one,
+                labels=tuple(_widened(label, system.inputs) for label in one.labels),
+            )
+            for one in system.outputs
+        ),
+    ), losses
+
+
+def _widened(label: Label, inputs: tuple[SystemInput, ...]) -> Label:
+    """Return a conclusion that gives combinations, which are columns now, no weight."""
+    if not isinstance(label.curve, Linear):
+        return label
+    left = iter(label.curve.weights)
+    weights = tuple(0.0 if one.parts else next(left) for one in inputs)
+    return replace(label, curve=replace(label.curve, weights=weights))
 
 
 def _note(rules: RuleBase, scores: Scores) -> str:

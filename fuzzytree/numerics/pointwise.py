@@ -10,7 +10,7 @@ from __future__ import annotations
 import bisect
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -61,6 +61,12 @@ def greatest(one: Lines, other: Lines) -> Lines:
 def negated(lines: Lines) -> Lines:
     """Return 1 minus the degree at each value, exactly."""
     return tuple(_Knot(k.x, 1 - k.at, 1 - k.above) for k in lines)
+
+
+def scaled(lines: Lines, height: float) -> Lines:
+    """Return the degree times a height at each value, exactly."""
+    by = Fraction(height)
+    return tuple(_Knot(k.x, k.at * by, k.above * by) for k in lines)
 
 
 def product(one: Lines, other: Lines, tolerance: float) -> tuple[Lines, float]:
@@ -182,11 +188,3 @@ def _distance(one: Lines, other: Lines) -> float:
 def _up(value: Fraction) -> float:
     near = float(value)
     return near if Fraction(near) >= value else math.nextafter(near, math.inf)
-
-
-def folded(parts: Sequence[Lines], join: Callable[[Lines, Lines], Lines]) -> Lines:
-    """Return several joined from left to right."""
-    total = parts[0]
-    for part in parts[1:]:
-        total = join(total, part)
-    return total

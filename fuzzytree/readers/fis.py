@@ -56,7 +56,7 @@ _SYSTEM_KEYS: Final = (
 _VARIABLE_KEYS: Final = ("Name", "Range", "NumMFs", "MF1")
 _PRIVATE_KEYS: Final = frozenset({"Enabled", "Default", "LockPrevious", "LockRange"})
 _TERM = re.compile(r"MF([0-9]{1,6})")
-_DEFAULTS: Final = {
+DEFAULTS: Final = {
     "matlab": Defuzzifier("centroid", 101, "ends"),
     "octave": Defuzzifier("centroid", 101, "half ends"),
     "fuzzylite": Defuzzifier("centroid", 100, "middle"),
@@ -246,7 +246,7 @@ def _methods(section: Section, name: str, dialect: Dialect, notes: Notes) -> _Me
         method = "weighted average" if is_sugeno else "centroid"
         if "DefuzzMethod" not in entries:
             notes.remarks.append(f"the file has no DefuzzMethod; read as {method}")
-    how = msgspec.structs.replace(_DEFAULTS[dialect], method=method)
+    how = msgspec.structs.replace(DEFAULTS[dialect], method=method)
     if how.is_weighted:
         how = Defuzzifier(how.method)
     else:

@@ -123,11 +123,15 @@ class Kind(msgspec.Struct, frozen=True):
 def trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
     """Return a trapezoid; two corners beyond `FAR` leave a side open.
 
+    A side to the next double is a step: no value lies on it.
+
     Example:
         >>> trapezoid(-2e300, -1e300, 3.0, 5.0).a is None
         True
     """
     is_left, is_right = b <= -FAR, c >= FAR
+    a = b if a == math.nextafter(b, -math.inf) else a
+    d = c if d == math.nextafter(c, math.inf) else d
     if is_left and is_right:
         return Trapezoid(None, 0.0, 0.0, None)
     if is_left:
@@ -159,7 +163,7 @@ def _falling(start: float, end: float) -> Curve:
 
 KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
     {
-        "trimf": Kind("a b c", lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
+        "trimf": Kind("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
         "trapmf": Kind("a b c d", lambda n: trapezoid(*n)),
         "linzmf": Kind("a b", lambda n: _ramp(n[1], n[0])),
         "linsmf": Kind("a b", lambda n: _ramp(*n)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -88,27 +87,15 @@ def answers(
         timeout=600,
         check=False,
     )
-    lines = [[*map(float, line.split())] for line in done.stdout.splitlines() if line]
+    found_lines = done.stdout.splitlines()
+    numbers = [[*map(float, line.split())] for line in found_lines if line]
     found: dict[str, Answers] = {}
     place = 0
     for name, (_, rows) in files.items():
-        if place >= len(lines):
+        if place >= len(numbers):
             raise AssertionError(f"Octave stopped at {name}: {done.stderr[-2000:]}")
-        rules, inputs, _ = lines[place]
-        numbers = tuple(map(tuple, lines[place + 1 : place + 1 + len(rows)]))
-        found[name] = Answers(int(rules), int(inputs), numbers)
+        rules, inputs, _ = numbers[place]
+        answered = tuple(map(tuple, numbers[place + 1 : place + 1 + len(rows)]))
+        found[name] = Answers(int(rules), int(inputs), answered)
         place += 1 + len(rows)
     return found
-
-
-def largest_difference(
-    ours: Sequence[Sequence[float]], theirs: Sequence[Sequence[float]]
-) -> float:
-    """Return the largest difference of numbers, infinite where one side has none."""
-    worst = 0.0
-    for one, other in zip(ours, theirs, strict=True):
-        for a, b in zip(one, other, strict=True):
-            if math.isnan(a) and math.isnan(b):
-                continue
-            worst = max(worst, abs(a - b) if not math.isnan(a - b) else math.inf)
-    return worst

@@ -1,0 +1,429 @@
+"""FIS: rule bases and systems for MATLAB, Octave's fuzzy-logic-toolkit and fuzzylite.
+
+`docs/fis.md` describes the file. A rule asks every input at most once and all of them
+by `and` or all by `or`: what a model asks otherwise becomes terms of its own
+(`fuzzytree.exporters.fis_rules`), or the file is not written.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final, Literal
+
+from msgspec.structs import replace
+
+from fuzzytree.casting import (
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    flattened,
+    pointed,
+)
+from fuzzytree.contracts import Format, Loss, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
+from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
+from fuzzytree.naming import Names
+from fuzzytree.readers.fis import DEFAULTS, DIALECT, FACTS, reading
+from fuzzytree.readers.fis_words import (
+    DIALECTS,
+    METHODS,
+    PRIVATE,
+    SNORMS,
+    TNORMS,
+    Dialect,
+)
+from fuzzytree.rulebase import Points, RuleBase
+from fuzzytree.system import (
+    Activation,
+    FuzzySystem,
+    Label,
+    Linear,
+    RuleBlock,
+    Singleton,
+    SNorm,
+    SystemInput,
+    SystemOutput,
+    TNorm,
+)
+
+_RESERVED: Final = (
+    *("and", "or", "if", "then", "is", "with", "not", "any", "very", "somewhat"),
+    *("extremely", "seldom", "nan", "inf", "min", "max", "sin", "cos", "exp", "log"),
+)
+_MATLAB_NORMS: Final = frozenset({"min", "prod", "max", "probor", "sum"})
+_FUZZYLITE_NORMS: Final = frozenset(
+    {"nilpotent_minimum", "nilpotent_maximum", "normalized_sum"}
+)
+_TITLE: Final = "Written by fuzzytree."
+
+
+def write(
+    model: RuleBase | FuzzySystem,
+    /,
+    *,
+    allow_loss: bool = False,
+    dialect: Dialect = "octave",
+    tolerance: float = 1e-6,
+    curves: Literal["any", "standard"] = "any",
+) -> Written:
+    """Return a rule base or a system as a FIS file.
+
+    Args:
+        model: The model. Of a rule base each rule has a score, see
+            `fuzzytree.casting.scores`.
+        allow_loss: Whether to write what FIS cannot hold as near as it can.
+        dialect: For whom the file is: `matlab`, `octave` or `fuzzylite`.
+        tolerance: The largest error of a degree where points stand for a curve.
+        curves: `standard` counts lists of points, `discretemf`, as a loss: MATLAB and
+            Octave need a small function for them, which `docs/fis.md` shows.
+
+    Raises:
+        LossError: If something would be lost, unless allowed; and always if the rules
+            have no place in FIS.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
+        >>> text = write(rules, allow_loss=True).content.decode()
+        >>> "AndMethod='min'" in text
+        True
+    """
+    if dialect not in DIALECTS:
+        raise ValueError(f"no dialect {dialect!r}; there is {', '.join(DIALECTS)}")
+    losses: list[Loss] = []
+    remarks: list[str] = []
+    comments = [_TITLE, f"{DIALECT}{dialect}"]
+    if isinstance(model, RuleBase):
+        rules, lost = pointed(model, tolerance)
+        system = as_system(rules, always="term")
+        losses += [*cast_losses(model), *lost]
+        remarks += cast_remarks(model)
+        comments.append(FACTS + facts_of(rules, always="term"))
+    else:
+        system = model
+    system, lost = flattened(system)
+    losses += lost
+    system, lost = with_known_curves(_scaled(system, losses), dialect, tolerance)
+    losses += [*lost, *_losses(system, dialect)]
+    terms = Terms(system, dialect, tolerance)
+    lines = _lines(system, terms)
+    losses += terms.losses
+    if curves == "standard":
+        losses += _private_losses(terms, dialect)
+    if losses and not allow_loss:
+        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
+        raise LossError(f"cannot write {model.name} as fis without loss:\n{listed}")
+    names = _Naming(system, terms)
+    remarks += names.remarks
+    text = _text(system, (terms, lines), (comments, names), dialect, remarks)
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks))
+
+
+class _Naming:
+    """The names of variables and terms in a file."""
+
+    def __init__(self, system: FuzzySystem, terms: Terms) -> None:
+        variables = [one.name for one in system.variables]
+        self.variables = Names.of(variables, reserved=_RESERVED)
+        self.labels = {
+            name: Names.of([one.name for one in labels], reserved=_RESERVED)
+            for name, labels in _all_labels(system, terms).items()
+        }
+        self.system = Names.of([system.name])[system.name]
+        changed = {
+            **Names.of([system.name]).changed,
+            **self.variables.changed,
+            **{
+                k: v for names in self.labels.values() for k, v in names.changed.items()
+            },
+        }
+        pairs = [f"{name!r} is {found}" for name, found in changed.items()]
+        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
+        self.remarks = [f"names were changed: {shown}"] if pairs else []
+
+
+def _all_labels(system: FuzzySystem, terms: Terms) -> dict[str, Sequence[Label]]:
+    return {**terms.labels, **{one.name: one.labels for one in system.outputs}}
+
+
+def _scaled(system: FuzzySystem, losses: list[Loss]) -> FuzzySystem:
+    """Return a system whose terms all have the height 1."""
+    weighted = {o.name for o in system.outputs if o.defuzzifier.is_weighted}
+
+    def changed(variable: str, label: Label) -> Label:
+        curve = label.curve
+        if isinstance(curve, Singleton | Linear) and variable in weighted:
+            return replace(label, height=1.0)  # it is a number and no degree
+        if label.height == 1.0:
+            return label
+        if isinstance(curve, Points):
+            degrees = tuple(label.height * degree for degree in curve.degrees)
+            losses.append(
+                Loss(
+                    f"term {label.name!r} of {variable!r}",
+                    f"its height {label.height!r} is in its points, which are rounded",
+                    2.0**-52,
+                )
+            )
+            return Label(label.name, Points(curve.values, degrees))
+        raise LossError(
+            f"term {label.name!r} of {variable!r} has the height {label.height!r}, "
+            "and FIS knows none"
+        )
+
+    if all(one.height == 1.0 for v in system.variables for one in v.labels):
+        return system
+    system, lost = pointed(system, 1e-6)
+    losses.extend(lost)
+    return replace(
+        system,
+        inputs=tuple(
+            replace(v, labels=tuple(changed(v.name, one) for one in v.labels))
+            for v in system.inputs
+        ),
+        outputs=tuple(
+            replace(v, labels=tuple(changed(v.name, one) for one in v.labels))
+            for v in system.outputs
+        ),
+    )
+
+
+def _lines(system: FuzzySystem, terms: Terms) -> list[Line]:
+    """Return all rules.
+
+    Raises:
+        LossError: With every rule that has no place in FIS.
+    """
+    lines: list[Line] = []
+    reasons: list[str] = []
+    for number, rule in enumerate(system.rules, 1):
+        try:
+            lines += lines_of(rule, terms)
+        except LossError as error:
+            reasons.append(f"  rule {number}: {error}")
+    for output in system.outputs:
+        for label in output.labels:
+            if _term(output, label, terms.dialect) is None:
+                reasons.append(
+                    f"  term {label.name!r} of {output.name!r}: {terms.dialect} has no "
+                    "such conclusion"
+                )
+    if reasons:
+        listed = "\n".join(reasons)
+        raise LossError(f"cannot write {system.name} as fis:\n{listed}")
+    return lines
+
+
+def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
+    """Yield what the one set of methods of a file cannot say of a system."""
+    first = system.outputs[0]
+    for output in system.outputs:
+        where = f"output {output.name!r}"
+        how = output.defuzzifier
+        if how.method != first.defuzzifier.method:
+            what = f"{how.method} becomes {first.defuzzifier.method}, as of the first"
+            yield Loss(where, what)
+        usual = DEFAULTS[dialect]
+        if not how.is_weighted and (how.samples, how.grid) != (
+            usual.samples,
+            usual.grid,
+        ):
+            yield Loss(
+                where,
+                f"its curve is looked at in {how.samples} values ({how.grid}), and FIS "
+                f"does not say so; {dialect} takes {usual.samples} ({usual.grid})",
+            )
+        if output.aggregation != first.aggregation:
+            yield Loss(where, f"joined by {first.aggregation}, as of the first output")
+        elif how.is_weighted and output.aggregation and dialect != "octave":
+            what = f"{output.aggregation} becomes a sum: {dialect} knows no other here"
+            yield Loss(where, what)
+        if output.default is not None and dialect != "fuzzylite":
+            yield Loss(
+                where, f"FIS has no default, {output.default!r}, where no rule fires"
+            )
+    for variable in system.variables:
+        if variable.clips and dialect != "fuzzylite":
+            what = "values are not moved into the range"
+            yield Loss(f"variable {variable.name!r}", what)
+    yield from _block_losses(system, dialect)
+
+
+def _block_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
+    for number, block in enumerate(system.blocks, 1):
+        where = f"block {number} of rules"
+        first = system.blocks[0]
+        if block.activation != Activation():
+            what = f"all rules are activated, not by {block.activation.method}"
+            yield Loss(where, what)
+        norms = (block.conjunction, block.disjunction, block.implication)
+        if norms != (first.conjunction, first.disjunction, first.implication):
+            yield Loss(where, "the file has one set of norms, those of the first block")
+    for key, word in _methods(system, dialect).items():
+        is_known = (
+            word in _MATLAB_NORMS or word not in {**TNORMS, **SNORMS}
+            if dialect == "matlab"
+            else dialect == "fuzzylite" or word not in _FUZZYLITE_NORMS
+        )
+        if not is_known:
+            yield Loss(key, f"{dialect} knows no {word!r}, and cannot run the file")
+
+
+def _methods(system: FuzzySystem, dialect: Dialect) -> dict[str, str]:
+    """Return the methods of a file by their keys."""
+    block = system.blocks[0] if system.blocks else RuleBlock(())
+    output = system.outputs[0]
+    is_weighted = output.defuzzifier.is_weighted
+    aggregation = output.aggregation or ("sum" if is_weighted else "maximum")
+    methods = {meant: word for word, meant in METHODS.items()}
+    return {
+        "AndMethod": _t_norm(block.conjunction or "minimum"),
+        "OrMethod": _s_norm(block.disjunction or "maximum", dialect),
+        "ImpMethod": _t_norm(
+            block.implication or ("product" if is_weighted else "minimum")
+        ),
+        "AggMethod": _s_norm(aggregation, dialect),
+        "DefuzzMethod": methods[output.defuzzifier.method],
+    }
+
+
+def _t_norm(norm: TNorm) -> str:
+    return next(word for word, meant in TNORMS.items() if meant == norm)
+
+
+def _s_norm(norm: SNorm, dialect: Dialect) -> str:
+    words = [word for word, meant in SNORMS.items() if meant == norm]
+    return words[-1] if dialect == "octave" else words[0]
+
+
+def _private_losses(terms: Terms, dialect: Dialect) -> Iterator[Loss]:
+    for name, labels in terms.labels.items():
+        for label in labels:
+            found = term_of(label.curve, dialect)
+            if found is not None and found[0] in PRIVATE:
+                yield Loss(
+                    f"term {label.name!r} of {name!r}",
+                    f"it is a {found[0]}, which MATLAB and Octave do not have",
+                )
+
+
+def _term(
+    output: SystemOutput, label: Label, dialect: Dialect
+) -> tuple[str, str] | None:
+    find = number_of if output.defuzzifier.is_weighted else term_of
+    return find(label.curve, dialect)
+
+
+def _text(
+    system: FuzzySystem,
+    rules: tuple[Terms, list[Line]],
+    said: tuple[list[str], _Naming],
+    dialect: Dialect,
+    remarks: list[str],
+) -> str:
+    terms, lines = rules
+    comments, names = said
+    is_weighted = system.outputs[0].defuzzifier.is_weighted
+    head = {
+        "Name": f"'{names.system}'",
+        "Type": "'sugeno'" if is_weighted else "'mamdani'",
+        "Version": "2.0",
+        "NumInputs": str(len(system.inputs)),
+        "NumOutputs": str(len(system.outputs)),
+        "NumRules": str(len(lines)),
+        **{key: f"'{word}'" for key, word in _methods(system, dialect).items()},
+    }
+    blocks = [[f"# {comment}" for comment in comments], _section("System", head)]
+    for number, one in enumerate(system.inputs, 1):
+        found = [term_of(label.curve, dialect) for label in terms.labels[one.name]]
+        blocks.append(
+            _variable(f"Input{number}", one, (terms.labels[one.name], found), names)
+        )
+    for number, output in enumerate(system.outputs, 1):
+        found = [_term(output, label, dialect) for label in output.labels]
+        block = _variable(f"Output{number}", output, (output.labels, found), names)
+        if dialect == "fuzzylite" and output.default is not None:
+            block.insert(3, f"Default={output.default!r}")
+        blocks.append(block)
+    rows = [_rule(line, system) for line in lines]
+    blocks.append(["[Rules]", *rows])
+    if any(one.low is None or one.high is None for one in system.inputs):
+        remarks.append(
+            "the range of an input is unknown; that of its terms' corners stands there"
+        )
+    if dialect == "octave":
+        remarks.append(
+            "Octave refuses rows with a value outside the Range of its input"
+        )
+    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def _section(title: str, entries: Mapping[str, str]) -> list[str]:
+    return [f"[{title}]", *(f"{key}={value}" for key, value in entries.items())]
+
+
+def _variable(
+    title: str,
+    one: SystemInput | SystemOutput,
+    about: tuple[Sequence[Label], Sequence[tuple[str, str] | None]],
+    names: _Naming,
+) -> list[str]:
+    labels, found = about
+    low, high = _range(one, found)
+    entries = {
+        "Name": f"'{names.variables[one.name]}'",
+        "Range": f"[{low!r} {high!r}]",
+        "NumMFs": str(len(labels)),
+    }
+    for number, (label, term) in enumerate(zip(labels, found, strict=True), 1):
+        assert term is not None  # `_lines` and `with_known_curves` have seen to it
+        name = names.labels[one.name][label.name]
+        entries[f"MF{number}"] = f"'{name}':'{term[0]}',[{term[1]}]"
+    lines = _section(title, entries)
+    if one.clips:
+        lines.insert(3, "LockRange=1")
+    return lines
+
+
+def _range(
+    one: SystemInput | SystemOutput, terms: Iterable[tuple[str, str] | None]
+) -> tuple[float, float]:
+    """Return a range, guessed from the terms' numbers where it is unknown."""
+    numbers: list[float] = []
+    for kind, text in (term for term in terms if term is not None):
+        if kind == "function" or kind == "linear":
+            continue
+        found = [*map(float, text.split())]
+        numbers += found[::2] if kind == "discretemf" else found
+    near = [number for number in numbers if abs(number) < 1e290]
+    low = one.low if one.low is not None else min(near, default=0.0)
+    high = one.high if one.high is not None else max(near, default=1.0)
+    if low >= high:
+        low, high = min(low, high) - 1.0, max(low, high) + 1.0
+    return (low, high) if math.isfinite(high - low) else (-1e300, 1e300)
+
+
+def _rule(line: Line, system: FuzzySystem) -> str:
+    asked = " ".join(line.asked.get(one.name, "0") for one in system.inputs)
+    concluded = " ".join(line.concluded.get(one.name, "0") for one in system.outputs)
+    connection = 2 if line.is_or else 1
+    return f"{asked}, {concluded} ({line.weight!r}) : {connection}"
+
+
+FORMAT = Format(
+    name="fis",
+    suffixes=(".fis",),
+    carries=("rules", "system"),
+    write=write,
+    read=reading,
+    cannot=(
+        "a rule that mixes and and or over several inputs, or asks an output",
+        "several blocks of rules, defuzzifiers or aggregations",
+        "combinations of inputs: each becomes an input",
+        "an answer where no rule fires",
+    ),
+)

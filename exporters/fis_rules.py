@@ -1,0 +1,298 @@
+"""Conditions as FIS says them: a number for each input, all joined by and or by or.
+
+What asks an input more than once becomes one term of that input: the least or the
+greatest of the degrees at each value, which is exact but for rounding, or their
+product within a tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+import msgspec
+
+from fuzzytree.casting.shapes import shape_of
+from fuzzytree.contracts import Loss
+from fuzzytree.errors import LossError
+from fuzzytree.naming import unlike
+from fuzzytree.numerics import pointwise
+from fuzzytree.numerics.pointwise import Lines
+from fuzzytree.readers.fis_words import CONCLUDING_HEDGES, HEDGES, Dialect
+from fuzzytree.rulebase import Points
+from fuzzytree.system import (
+    And,
+    Condition,
+    FuzzySystem,
+    Hedge,
+    Is,
+    Label,
+    Not,
+    Or,
+    SystemOutput,
+    SystemRule,
+    questions,
+)
+
+EVERYWHERE: Final = Points((0.0,), (1.0,))
+
+
+class Line(msgspec.Struct, frozen=True):
+    """A rule: the codes of its inputs and outputs by name, and how it is joined."""
+
+    asked: Mapping[str, str]
+    concluded: Mapping[str, str]
+    weight: float
+    is_or: bool = False
+
+
+class Terms:
+    """The terms of all inputs; terms that a rule needs are added."""
+
+    def __init__(self, system: FuzzySystem, dialect: Dialect, tolerance: float) -> None:
+        self.system, self.tolerance = system, tolerance
+        self.dialect: Dialect = dialect
+        self.inputs = {one.name: one for one in system.inputs}
+        self.labels = {one.name: [*one.labels] for one in system.inputs}
+        self.losses: list[Loss] = []
+        self._made: dict[Condition, tuple[str, str]] = {}
+
+    def place(self, variable: str, label: str) -> int:
+        """Return the number of a term, from 1."""
+        names = [one.name for one in self.labels[variable]]
+        return names.index(label) + 1
+
+    def everywhere(self) -> dict[str, str]:
+        """Return a question that always holds."""
+        if not self.inputs:
+            raise LossError("it asks nothing, and there is no input that it could ask")
+        first = next(iter(self.inputs))
+        if self.dialect == "fuzzylite":
+            return {first: "0.99"}
+        return {first: str(self._added(first, "always", EVERYWHERE))}
+
+    def _added(self, variable: str, name: str, curve: Points) -> int:
+        labels = self.labels[variable]
+        for number, label in enumerate(labels, 1):
+            if label.curve == curve and label.height == 1.0:
+                return number
+        labels.append(Label(unlike(name, [one.name for one in labels]), curve))
+        return len(labels)
+
+    def code(self, asked: Is) -> str | None:
+        """Return the number of a question with its hedges; None if it has none."""
+        hedges = _merged(asked.hedges)
+        is_negated = hedges[:1] == ("not",)
+        hundredths = _hundredths(HEDGES[self.dialect], hedges[is_negated:])
+        if hundredths is None:
+            return None
+        place = 0 if asked.label is None else self.place(asked.variable, asked.label)
+        return _code(place, hundredths, is_negated=is_negated)
+
+    def joined(self, parts: Sequence[Condition], *, is_or: bool) -> str:
+        """Return the number of a term for several questions of one input."""
+        whole = Or(tuple(parts)) if is_or else And(tuple(parts))
+        if whole in self._made:
+            return str(self.place(*self._made[whole]))
+        variable = next(questions(whole)).variable
+        try:
+            lines, bound = self._lines(whole)
+            points, rounding = pointwise.rounded(lines)
+        except LossError as error:
+            raise LossError(
+                f"{variable!r} is asked several things, and {error}"
+            ) from error
+        number = self._added(variable, _words(whole)[:60], points)
+        label = self.labels[variable][number - 1].name
+        self._made[whole] = (variable, label)
+        what = f"the rules ask it together; the term {label!r} stands for that"
+        self.losses.append(
+            Loss(f"{_words(whole)} of {variable!r}"[:200], what, bound + rounding)
+        )
+        return str(number)
+
+    def _lines(self, condition: Condition) -> tuple[Lines, float]:
+        """Return the degree of a condition on one input as lines, and their error."""
+        match condition:
+            case Is():
+                return self._asked(condition), 0.0
+            case Not(part=part):
+                lines, bound = self._lines(part)
+                return pointwise.negated(lines), bound
+            case And(parts=parts) | Or(parts=parts):
+                found = [self._lines(part) for part in parts]
+                total, bound = found[0]
+                join = self._join(is_or=isinstance(condition, Or))
+                for lines, error in found[1:]:
+                    total, more = join(total, lines)
+                    # Errors of a product add; least and greatest pass one on.
+                    bound = bound + error + more
+                return total, bound
+
+    def _asked(self, asked: Is) -> Lines:
+        hedges = _merged(asked.hedges)
+        if hedges == ("any",):
+            return pointwise.lines_of(EVERYWHERE)
+        if asked.label is None or hedges not in ((), ("not",)):
+            raise LossError(f"{asked.variable!r} is asked several things with hedges")
+        label = self.labels[asked.variable][self.place(asked.variable, asked.label) - 1]
+        shape = shape_of(label.curve)
+        if not isinstance(shape, Points):
+            text = f"the term {asked.label!r} of {asked.variable!r}"
+            raise LossError(f"{text} is asked with others and is no list of points")
+        lines = pointwise.scaled(pointwise.lines_of(shape), label.height)
+        return pointwise.negated(lines) if hedges else lines
+
+    def _join(self, *, is_or: bool) -> Callable[[Lines, Lines], tuple[Lines, float]]:
+        block = self.system.blocks[0]
+        norm = block.disjunction if is_or else block.conjunction
+        match norm:
+            case "minimum":
+                return lambda one, other: (pointwise.least(one, other), 0.0)
+            case "maximum":
+                return lambda one, other: (pointwise.greatest(one, other), 0.0)
+            case "product":
+                return lambda one, other: pointwise.product(one, other, self.tolerance)
+            case _:
+                raise LossError(f"one input is asked several things, joined by {norm}")
+
+
+def lines_of(rule: SystemRule, terms: Terms) -> list[Line]:
+    """Return a rule as lines; more than one where it concludes an output twice.
+
+    Raises:
+        LossError: If it has no place in FIS.
+    """
+    is_or = isinstance(rule.when, Or)
+    asked = _asked(rule.when, terms)
+    found: list[dict[str, str]] = []
+    for name, code in _conclusions(rule, terms):
+        if not found or name in found[-1]:
+            found.append({})
+        found[-1][name] = code
+    return [Line(asked, concluded, rule.weight, is_or) for concluded in found]
+
+
+def _asked(condition: Condition | None, terms: Terms) -> dict[str, str]:
+    if condition is None:
+        return {} if terms.dialect == "matlab" else terms.everywhere()
+    is_or = isinstance(condition, Or)
+    groups: dict[str, list[Condition]] = {}
+    parts = _flat(condition, terms)
+    if terms.dialect != "fuzzylite":
+        plain = [part for part in parts if not _always_holds(part)]
+        if not plain or (is_or and len(plain) < len(parts)):
+            return _asked(None, terms)
+        parts = plain
+    for part in parts:
+        names = {asked.variable for asked in questions(part)}
+        if len(names) > 1:
+            raise LossError("it mixes and, or and not over several inputs")
+        (name,) = names
+        if name not in terms.inputs:
+            raise LossError(f"it asks the output {name!r}")
+        groups.setdefault(name, []).append(part)
+    asked: dict[str, str] = {}
+    for name, parts in groups.items():
+        code = None
+        if len(parts) == 1 and isinstance(parts[0], Is):
+            code = terms.code(parts[0])
+            if code is None:
+                hedges = " ".join(parts[0].hedges)
+                raise LossError(f"{terms.dialect} has no way to say {hedges!r}")
+        asked[name] = code or terms.joined(parts, is_or=is_or)
+    return {name: code for name, code in asked.items() if code != "0"}
+
+
+def _always_holds(part: Condition) -> bool:
+    return isinstance(part, Is) and part.hedges == ("any",)
+
+
+def _flat(condition: Condition, terms: Terms) -> list[Condition]:
+    """Return what is joined; an and within an and joins its own parts."""
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            block = terms.system.blocks[0]
+            is_or = isinstance(condition, Or)
+            norm = block.disjunction if is_or else block.conjunction
+            found: list[Condition] = []
+            for place, part in enumerate(parts):
+                is_open = place == 0 or norm in ("minimum", "maximum")
+                if isinstance(part, type(condition)) and is_open:
+                    found += _flat(part, terms)
+                else:
+                    found.append(_simple(part))
+            return found
+        case _:
+            return [_simple(condition)]
+
+
+def _simple(condition: Condition) -> Condition:
+    match condition:
+        case Not(part=Is(variable=variable, label=label, hedges=hedges)):
+            return Is(variable, label, ("not", *hedges))
+        case And(parts=(part,)) | Or(parts=(part,)):
+            return _simple(part)
+        case _:
+            return condition
+
+
+def _conclusions(rule: SystemRule, terms: Terms) -> list[tuple[str, str]]:
+    """Return the outputs that a rule concludes, and their codes."""
+    outputs: Mapping[str, SystemOutput] = {
+        one.name: one for one in terms.system.outputs
+    }
+    table = HEDGES[terms.dialect]
+    if terms.dialect == "octave":
+        table = CONCLUDING_HEDGES
+    so_far: tuple[Hedge, ...] = ()
+    found: list[tuple[str, str]] = []
+    for one in rule.then:
+        output = outputs[one.output]
+        place = [label.name for label in output.labels].index(one.label) + 1
+        # Hedges act on the conclusions behind them too; in Octave on each alone.
+        so_far = (*one.hedges, *so_far)
+        is_shared = terms.dialect == "fuzzylite"
+        hedges = _merged(one.hedges if is_shared else so_far)
+        is_negated = hedges[:1] == ("not",)
+        hundredths = _hundredths(table, hedges[is_negated:])
+        is_plain = not is_negated and not hedges
+        if hundredths is None or not (
+            is_plain or is_shared or output.defuzzifier.is_weighted
+        ):
+            text = " ".join(hedges)
+            raise LossError(f"{terms.dialect} cannot conclude {text!r} {one.label!r}")
+        found.append((one.output, _code(place, hundredths, is_negated=is_negated)))
+    return found
+
+
+def _code(place: int, hundredths: int, *, is_negated: bool) -> str:
+    sign = "-" if is_negated else ""
+    return f"{sign}{place}.{hundredths:02d}" if hundredths else f"{sign}{place}"
+
+
+def _merged(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
+    """Return hedges with `very very` as one, and nothing before the last `any`."""
+    if "any" in hedges:
+        rest = hedges[: hedges.index("any")]
+        return (*_merged(rest), "any")
+    return ("very very",) if hedges == ("very", "very") else hedges
+
+
+def _hundredths(
+    table: Mapping[int, tuple[Hedge, ...]], hedges: tuple[Hedge, ...]
+) -> int | None:
+    known = {hedge: code for code, hedge in reversed([*table.items()])}
+    return known.get(hedges)
+
+
+def _words(condition: Condition) -> str:
+    match condition:
+        case Is(label=label, hedges=hedges):
+            return " ".join((*hedges, label or ""))
+        case Not(part=part):
+            return f"not {_words(part)}"
+        case And(parts=parts):
+            return " and ".join(map(_words, parts))
+        case Or(parts=parts):
+            return " or ".join(map(_words, parts))

@@ -1,0 +1,212 @@
+"""Curves as the words and numbers of FIS files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from fuzzytree.casting import pointed
+from fuzzytree.casting.shapes import shape_of
+from fuzzytree.contracts import Loss
+from fuzzytree.readers.fis_words import FAR, Dialect, curve_of
+from fuzzytree.readers.formulas import fuzzylite_text_of
+from fuzzytree.rulebase import Points
+from fuzzytree.system import (
+    Bell,
+    Binary,
+    Concave,
+    Cosine,
+    Curve,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Linear,
+    PiCurve,
+    SCurve,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Spike,
+    Trapezoid,
+    TwoGaussians,
+)
+
+Term = tuple[str, str]
+"""A kind such as `trimf`, and its numbers as text."""
+
+_SHARED: Final[tuple[type, ...]] = (
+    Trapezoid,
+    Singleton,
+    Binary,
+    Gaussian,
+    TwoGaussians,
+    Bell,
+    Sigmoid,
+    SigmoidProduct,
+    SCurve,
+    PiCurve,
+)
+_KNOWN: Final[Mapping[Dialect, tuple[type, ...]]] = MappingProxyType(
+    {
+        "octave": _SHARED,
+        "matlab": (*_SHARED, SigmoidDifference),
+        "fuzzylite": (*_SHARED, SigmoidDifference, Cosine, Spike, Concave, Formula),
+    }
+)
+
+
+def with_known_curves(
+    system: FuzzySystem, dialect: Dialect, tolerance: float
+) -> tuple[FuzzySystem, tuple[Loss, ...]]:
+    """Return a system whose curves a dialect knows, and how far points are off.
+
+    Raises:
+        LossError: If a curve cannot become points within the tolerance.
+    """
+    unknown = {
+        type(label.curve)
+        for variable in system.variables
+        for label in variable.labels
+        if term_of(label.curve, dialect) is None
+    }
+    allowed = tuple(one for one in _KNOWN[dialect] if one not in unknown)
+    return pointed(system, tolerance, allowed=allowed)
+
+
+def term_of(curve: Curve, dialect: Dialect) -> Term | None:
+    """Return a curve as a file says it; None if the dialect cannot.
+
+    Example:
+        >>> term_of(Trapezoid(0.0, 1.0, 1.0, 2.5), "octave")
+        ('trimf', '0.0 1.0 2.5')
+        >>> term_of(Points((1.0, 2.0), (1.0, 0.0)), "matlab")
+        ('trapmf', '-2e+300 -1e+300 1.0 2.0')
+        >>> term_of(Cosine(0.0, 1.0), "octave") is None
+        True
+    """
+    match curve:
+        case Points(values=values, degrees=degrees):
+            pairs = zip(values, degrees, strict=True)
+            exact = _corners_of(curve)
+            if exact is not None:
+                return _trapezoid(exact)
+            return "discretemf", _text(number for pair in pairs for number in pair)
+        case Trapezoid() | Singleton() | Binary():
+            found = _corners(curve)
+            return None if found is None else _trapezoid(found)
+        case Formula(expression=expression):
+            is_known = dialect == "fuzzylite"
+            return ("function", fuzzylite_text_of(expression)) if is_known else None
+        case _:
+            return _formed(curve, dialect)
+
+
+def number_of(curve: Curve, dialect: Dialect) -> Term | None:
+    """Return what a weighted output's term says; None if the dialect cannot."""
+    match curve:
+        case Singleton(value=value):
+            return "constant", repr(float(value))
+        case Linear(weights=weights, offset=offset):
+            return "linear", _text((*weights, offset))
+        case Points(values=(first, last), degrees=(0.0, 1.0)) if dialect == "fuzzylite":
+            return "rampmf", _text((first, last))
+        case Points(values=(first, last), degrees=(1.0, 0.0)) if dialect == "fuzzylite":
+            return "rampmf", _text((last, first))
+        case _:
+            return term_of(curve, dialect) if dialect == "fuzzylite" else None
+
+
+def _formed(curve: Curve, dialect: Dialect) -> Term | None:
+    match curve:
+        case Gaussian(mean=mean, deviation=deviation):
+            return "gaussmf", _text((deviation, mean))
+        case TwoGaussians(left=a, left_deviation=s, right=b, right_deviation=t):
+            return "gauss2mf", _text((s, a, t, b))
+        case Bell(center=center, width=width, slope=slope):
+            if dialect == "octave" and slope != int(slope):
+                return None
+            return "gbellmf", _text((width, slope, center))
+        case Sigmoid(inflection=c, slope=a):
+            return "sigmf", _text((a, c))
+        case SigmoidDifference(first=first, second=second) if dialect != "octave":
+            numbers = first.slope, first.inflection, second.slope, second.inflection
+            return "dsigmf", _text(numbers)
+        case SigmoidProduct(first=first, second=second):
+            numbers = first.slope, first.inflection, second.slope, second.inflection
+            return "psigmf", _text(numbers)
+        case SCurve(start=start, end=end) if start != end:
+            kind = "smf" if start < end else "zmf"
+            return kind, _text((min(start, end), max(start, end)))
+        case PiCurve(a=a, b=b, c=c, d=d) if a < b and c < d:
+            return "pimf", _text((a, b, c, d))
+        case Cosine(center=center, width=width) if dialect == "fuzzylite":
+            return "cosinemf", _text((center, width))
+        case Spike(center=center, width=width) if dialect == "fuzzylite":
+            return "spikemf", _text((center, width))
+        case Concave(inflection=inflection, end=end) if dialect == "fuzzylite":
+            return "concavemf", _text((inflection, end))
+        case _:
+            return None
+
+
+_Corners = tuple[float, float, float, float]
+
+
+def _corners(curve: Trapezoid | Singleton | Binary) -> _Corners | None:
+    """Return four corners that rise, with the same degrees at every double.
+
+    A side that is a step ends at the next double. An open side is stretched far beyond
+    all values: exact from -1e300 to 1e300.
+    """
+    match curve:
+        case Singleton(value=value):
+            return _corners(Trapezoid(value, value, value, value))
+        case Binary(start=start, is_above=True):
+            return _corners(Trapezoid(start, start, start, None))
+        case Binary(start=start):
+            return _corners(Trapezoid(None, start, start, start))
+        case Trapezoid(a=a, b=b, c=c, d=d):
+            inner = [corner for corner in (a, b, c, d) if corner is not None]
+            if max(map(abs, inner)) >= FAR / 2:
+                return None
+            left = (-2 * FAR, -FAR) if a is None else (a, b)
+            right = (FAR, 2 * FAR) if d is None else (c, d)
+            if left[0] == left[1]:
+                left = (math.nextafter(b, -math.inf), b)
+            if right[0] == right[1]:
+                right = (c, math.nextafter(c, math.inf))
+            return (*left, *right)
+
+
+def _corners_of(points: Points) -> _Corners | None:
+    """Return corners that are read back as these very points, if there are any."""
+    degrees, values = points.degrees, points.values
+    if 1.0 not in degrees or max(map(abs, values)) >= FAR / 2:
+        return None
+    first = degrees.index(1.0)
+    last = len(degrees) - 1 - degrees[::-1].index(1.0)
+    left, right = (-2 * FAR, -FAR), (FAR, 2 * FAR)
+    if first > 0:
+        a, b = values[first - 1], values[first]
+        left = (a, b if a < b else math.nextafter(b, math.inf))
+    if last < len(degrees) - 1:
+        c, d = values[last], values[last + 1]
+        right = (c, d if c < d else math.nextafter(c, math.inf))
+    if left[1] > right[0]:
+        return None
+    corners = (*left, *right)
+    found = curve_of("trapmf", corners)
+    is_same = not isinstance(found, str) and shape_of(found) == points
+    return corners if is_same else None
+
+
+def _trapezoid(corners: _Corners) -> Term:
+    a, b, c, d = corners
+    return ("trimf", _text((a, b, d))) if b == c else ("trapmf", _text(corners))
+
+
+def _text(numbers: Iterable[float]) -> str:
+    return " ".join(repr(float(number)) for number in numbers)

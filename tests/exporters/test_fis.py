@@ -1,0 +1,433 @@
+"""FIS: what is written is read back alike, and what cannot be written is told."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Sequence
+from typing import get_args
+
+import pytest
+
+from fuzzytree.anonymous import anonymous
+from fuzzytree.casting import as_system, flattened, pointed
+from fuzzytree.contracts import Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters import find_format
+from fuzzytree.exporters.fis import write
+from fuzzytree.exporters.fis_terms import term_of
+from fuzzytree.inference import infer
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.readers.fis import DEFAULTS, reading
+from fuzzytree.readers.fis_words import CONCLUDING_HEDGES, DIALECTS, HEDGES, Dialect
+from fuzzytree.reference import evaluate
+from fuzzytree.rulebase import Points, RuleBase
+from fuzzytree.system import (
+    And,
+    Bell,
+    Binary,
+    Conclusion,
+    Condition,
+    Curve,
+    Defuzzifier,
+    FuzzySystem,
+    Gaussian,
+    Hedge,
+    Is,
+    Label,
+    Linear,
+    Not,
+    Or,
+    PiCurve,
+    RuleBlock,
+    SCurve,
+    Sigmoid,
+    SigmoidProduct,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+    Trapezoid,
+    TwoGaussians,
+)
+from fuzzytree.testing import probes, random_tree
+
+
+def random_curve(chance: random.Random) -> Curve:
+    a, b, c, d = sorted(chance.uniform(-5.0, 5.0) for _ in range(4))
+    curves: Sequence[Curve] = (
+        Trapezoid(a, b, c, d),
+        Trapezoid(a, b, b, d),
+        Trapezoid(b, b, c, c),
+        Trapezoid(None, b, b, c),
+        Trapezoid(a, b, b, None),
+        Trapezoid(a, b, c, c),
+        Points((a, b, b, d), (0.0, 0.25, 1.0, 0.5)),
+        Points((a, b), (0.0, 1.0)),
+        Points((a, b, c), (1.0, 0.0, 0.5)),
+        Gaussian(a, d - a),
+        TwoGaussians(a, 1.5, c, 0.25),
+        Bell(b, 1.25, 2.0),
+        Sigmoid(c, -2.5),
+        SigmoidProduct(Sigmoid(a, 2.0), Sigmoid(d, -3.0)),
+        SCurve(a, b),
+        SCurve(d, c),
+        PiCurve(a, b, c, d),
+        Singleton(c),
+        Binary(b),
+        Binary(b, is_above=False),
+    )
+    return chance.choice(curves)
+
+
+def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
+    """Return a system that FIS can hold."""
+    chance = random.Random(seed)
+    is_weighted = chance.random() < 0.5
+    inputs = tuple(
+        SystemInput(
+            f"x{k}",
+            tuple(Label(f"t{n}", random_curve(chance)) for n in range(3)),
+            -5.0,
+            5.0,
+        )
+        for k in range(3)
+    )
+    how = Defuzzifier("weighted average") if is_weighted else DEFAULTS[dialect]
+    numbers: tuple[Curve, ...] = (
+        Singleton(0.1),
+        Linear((1.0, -2.0, 0.3), 1e-9),
+        Singleton(1e-300),
+    )
+    outputs = tuple(
+        SystemOutput(
+            f"y{k}",
+            tuple(
+                Label(f"t{n}", numbers[n] if is_weighted else random_curve(chance))
+                for n in range(3)
+            ),
+            -5.0,
+            5.0,
+            how,
+            None if is_weighted else "maximum",
+        )
+        for k in range(2)
+    )
+    rules = tuple(_random_rule(chance, dialect, is_weighted) for _ in range(6))
+    norms: tuple[TNorm, TNorm] = ("minimum", "product")
+    implication = None if is_weighted else chance.choice(norms)
+    block = RuleBlock(rules, chance.choice(norms), "maximum", implication)
+    return FuzzySystem("s", inputs, outputs, (block,))
+
+
+def _random_rule(
+    chance: random.Random, dialect: Dialect, is_weighted: bool
+) -> SystemRule:
+    def hedges(known: Sequence[tuple[Hedge, ...]]) -> tuple[Hedge, ...]:
+        first: Sequence[tuple[Hedge, ...]] = ((), ("not",))
+        return (*chance.choice(first), *chance.choice(known))
+
+    asked = [*HEDGES[dialect].values()]
+    parts = [
+        Is(f"x{k}", f"t{chance.randrange(3)}", hedges(asked))
+        for k in range(3)
+        if chance.random() < 0.7
+    ] or [Is("x0", "t0")]
+    kind = chance.choice((And, Or))
+    when: Condition = kind(tuple(parts)) if len(parts) > 1 else parts[0]
+    concluded: Sequence[tuple[Hedge, ...]] = [()]
+    if dialect == "octave" and is_weighted:
+        concluded = [*CONCLUDING_HEDGES.values()]
+    if dialect == "fuzzylite":
+        concluded = [one for one in asked if one != ("any",)]
+    then = (
+        Conclusion(
+            f"y{chance.randrange(2)}",
+            f"t{chance.randrange(3)}",
+            chance.choice(concluded),
+        ),
+    )
+    return SystemRule(when, then, chance.choice((1.0, 0.3)))
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("seed", range(25))
+def test_a_system_is_read_back_alike(seed: int, dialect: Dialect) -> None:
+    system = random_fis(seed, dialect)
+    written = write(system, dialect=dialect)
+    assert written.losses == ()
+    found = reading(written.content, "s.fis")
+    assert found.losses == ()
+    assert anonymous(found.model) == anonymous(system)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("kind", ["relative", "raw"])
+def test_rules_of_points_are_read_back_equal_where_no_input_is_asked_twice(
+    seed: int, kind: str
+) -> None:
+    tree = random_tree(seed, leaves=3, combinations=0.0)
+    rules, _ = pointed(rules_from_tree(tree, kind), 1e-3)  # type: ignore[arg-type]
+    written = write(rules, allow_loss=True)
+    if not written.losses:
+        assert reading(written.content, "r.fis").model == rules
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", ["relative", "raw"])
+def test_scores_read_back_are_within_the_bounds_of_the_losses(
+    seed: int, kind: str
+) -> None:
+    rules = rules_from_tree(random_tree(seed, combinations=0.0), kind)  # type: ignore[arg-type]
+    written = write(rules, allow_loss=True, tolerance=1e-4)
+    bounds = [loss.bound for loss in written.losses if loss.bound is not None]
+    again = reading(written.content, "r.fis").model
+    system = as_system(again) if isinstance(again, RuleBase) else again
+    assert isinstance(system, FuzzySystem)
+    for row in probes(rules, limit=60):
+        if not all(map(math.isfinite, row.values())):
+            continue
+        renamed = {
+            new: row[old]
+            for new, old in zip(
+                system.columns, (v.name for v in rules.variables), strict=True
+            )
+        }
+        expected = evaluate(rules, row)
+        scores = infer(system, renamed).outputs
+        for score, strength in zip(scores, expected.strengths, strict=True):
+            meant = strength / (1.0 + strength)
+            assert abs(score - meant) <= 2.0 * max(bounds, default=0.0) + 1e-15
+        if kind == "relative":
+            assert scores.index(max(scores)) + 1 == expected.rule
+
+
+def test_every_line_of_a_small_file() -> None:
+    low = Label("low", Trapezoid(0.0, 1.0, 1.0, 2.5))
+    system = FuzzySystem(
+        "tip %1",
+        (SystemInput("food", (low,), 0.0, 10.0),),
+        (
+            SystemOutput(
+                "tip",
+                (Label("small", Singleton(0.1)),),
+                0.0,
+                30.0,
+                Defuzzifier("weighted average"),
+            ),
+        ),
+        (
+            RuleBlock(
+                (SystemRule(Is("food", "low", ("not", "very")), (_small(),), 0.5),)
+            ),
+        ),
+    )
+    written = write(system)
+    assert written.content.decode().splitlines() == [
+        "# Written by fuzzytree.",
+        "# dialect: octave",
+        "",
+        "[System]",
+        "Name='tip_1'",
+        "Type='sugeno'",
+        "Version=2.0",
+        "NumInputs=1",
+        "NumOutputs=1",
+        "NumRules=1",
+        "AndMethod='min'",
+        "OrMethod='max'",
+        "ImpMethod='prod'",
+        "AggMethod='sum'",
+        "DefuzzMethod='wtaver'",
+        "",
+        "[Input1]",
+        "Name='food'",
+        "Range=[0.0 10.0]",
+        "NumMFs=1",
+        "MF1='low':'trimf',[0.0 1.0 2.5]",
+        "",
+        "[Output1]",
+        "Name='tip'",
+        "Range=[0.0 30.0]",
+        "NumMFs=1",
+        "MF1='small':'constant',[0.1]",
+        "",
+        "[Rules]",
+        "-1.20, 1 (0.5) : 1",
+    ]
+    assert written.remarks == (
+        "names were changed: 'tip %1' is tip_1",
+        "Octave refuses rows with a value outside the Range of its input",
+    )
+
+
+def _small() -> Conclusion:
+    return Conclusion("tip", "small")
+
+
+def _sugeno(*rules: SystemRule, block: RuleBlock | None = None) -> FuzzySystem:
+    labels = (
+        Label("low", Trapezoid(None, 1.0, 1.0, 2.0)),
+        Label("high", Trapezoid(1.0, 2.0, 2.0, None)),
+    )
+    output = SystemOutput(
+        "tip", (Label("small", Singleton(1.0)),), None, None, _AVERAGE, None
+    )
+    inputs = SystemInput("a", labels, 0.0, 3.0), SystemInput("b", labels, 0.0, 3.0)
+    return FuzzySystem("s", inputs, (output,), (block or RuleBlock(rules),))
+
+
+_AVERAGE = Defuzzifier("weighted average")
+
+
+def rows(written: Written) -> list[str]:
+    _, _, text = written.content.decode().partition("[Rules]\n")
+    return text.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("when", "line"),
+    [
+        (Is("b", "high"), "0 2, 1 (1.0) : 1"),
+        (Not(Is("b", "high")), "0 -2, 1 (1.0) : 1"),
+        (Or((Is("b", "low"), Is("a", "high"))), "2 1, 1 (1.0) : 2"),
+        (And((And((Is("a", "low"), Is("b", "low"))),)), "1 1, 1 (1.0) : 1"),
+        (And((Is("a", None, ("any",)), Is("b", "low"))), "0 1, 1 (1.0) : 1"),
+    ],
+)
+def test_a_condition_is_a_number_for_each_input(when: Condition, line: str) -> None:
+    assert rows(write(_sugeno(SystemRule(when, (_small(),))))) == [line]
+
+
+def test_a_rule_without_a_condition_asks_a_term_that_always_holds() -> None:
+    system = _sugeno(SystemRule(None, (_small(),)))
+    written = write(system)
+    assert "MF3='always':'trapmf',[-2e+300 -1e+300 1e+300 2e+300]" in (
+        written.content.decode()
+    )
+    assert rows(written) == ["3 0, 1 (1.0) : 1"]
+    assert rows(write(system, dialect="matlab")) == ["0 0, 1 (1.0) : 1"]
+    assert rows(write(system, dialect="fuzzylite")) == ["0.99 0, 1 (1.0) : 1"]
+
+
+def test_an_input_that_is_asked_twice_becomes_a_term_with_a_bound() -> None:
+    both = And((Is("a", "low"), Is("b", "low"), Is("a", "high")))
+    system = _sugeno(SystemRule(both, (_small(),)))
+    with pytest.raises(LossError, match="low and high of 'a': the rules ask it"):
+        write(system)
+    written = write(system, allow_loss=True)
+    assert rows(written) == ["3 1, 1 (1.0) : 1"]
+    assert [(loss.where, loss.bound) for loss in written.losses] == [
+        ("low and high of 'a'", 0.0)
+    ]
+    again = reading(written.content, "s.fis").model
+    assert isinstance(again, FuzzySystem)
+    assert again.inputs[0].labels[2].curve == Points((1.0, 1.5, 2.0), (0.0, 0.5, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("rule", "reason"),
+    [
+        (
+            SystemRule(
+                Or((And((Is("a", "low"), Is("b", "low"))), Is("a", "high"))),
+                (_small(),),
+            ),
+            "rule 1: it mixes and, or and not over several inputs",
+        ),
+        (
+            SystemRule(Is("tip", "small"), (_small(),)),
+            "rule 1: it asks the output 'tip'",
+        ),
+        (
+            SystemRule(Is("a", "low", ("seldom",)), (_small(),)),
+            "rule 1: octave has no way to say 'seldom'",
+        ),
+    ],
+)
+def test_a_rule_without_a_place_in_fis_is_refused(
+    rule: SystemRule, reason: str
+) -> None:
+    with pytest.raises(LossError) as caught:
+        write(_sugeno(rule), allow_loss=True)
+    assert str(caught.value) == f"cannot write s as fis:\n  {reason}"
+
+
+def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
+    one = SystemOutput(
+        "y", (Label("t", Gaussian(0.0, 1.0)),), 0.0, 1.0,
+        Defuzzifier("centroid", 200, "middle"), "maximum", default=0.25, clips=True,
+    )  # fmt: skip
+    rule = SystemRule(Is("x", "t"), (Conclusion("y", "t"),))
+    system = FuzzySystem(
+        "s",
+        (SystemInput("x", (Label("t", Gaussian(0.0, 1.0)),), 0.0, 1.0),),
+        (one,),
+        (
+            RuleBlock((rule,), "minimum", "maximum", "minimum"),
+            RuleBlock((rule,), "product", "maximum", "minimum"),
+        ),
+    )
+    with pytest.raises(LossError) as caught:
+        write(system)
+    assert str(caught.value).splitlines() == [
+        "cannot write s as fis without loss:",
+        "  output 'y': its curve is looked at in 200 values (middle), and FIS does not "
+        "say so; octave takes 101 (half ends)",
+        "  output 'y': FIS has no default, 0.25, where no rule fires",
+        "  variable 'y': values are not moved into the range",
+        "  block 2 of rules: the file has one set of norms, those of the first block",
+    ]
+
+
+def test_combinations_become_inputs_and_linear_conclusions_give_them_no_weight() -> (
+    None
+):
+    rules = rules_from_tree(random_tree(4, combinations=1.0))
+    with pytest.raises(LossError, match="combination 'mix 1': it is an input"):
+        write(rules)
+    flat, _ = flattened(as_system(rules))
+    written = write(rules, allow_loss=True)
+    again = reading(written.content, "r.fis").model
+    if isinstance(again, FuzzySystem):
+        assert len(again.columns) == len(flat.columns)
+
+
+def test_points_are_a_loss_where_standard_curves_are_asked_for() -> None:
+    curve = Points((0.0, 1.0, 2.0), (0.0, 0.5, 1.0))
+    system = FuzzySystem(
+        "s",
+        (SystemInput("x", (Label("t", curve),), 0.0, 2.0),),
+        (SystemOutput("y", (Label("t", Singleton(1.0)),), 0.0, 1.0, _AVERAGE),),
+        (RuleBlock((SystemRule(Is("x", "t"), (Conclusion("y", "t"),)),)),),
+    )
+    assert write(system).losses == ()
+    with pytest.raises(LossError, match="it is a discretemf, which MATLAB and Octave"):
+        write(system, curves="standard")
+
+
+@pytest.mark.parametrize(
+    "curve", [Trapezoid(0.5, 0.5, 1.0, 1.0), Binary(2.0), Singleton(0.0)]
+)
+def test_steps_have_corners_that_rise_for_octave(curve: Curve) -> None:
+    term = term_of(curve, "octave")
+    assert term is not None
+    corners = [*map(float, term[1].split())]
+    assert corners[0] < corners[1] <= corners[-2] < corners[-1]
+
+
+def test_the_same_model_gives_the_same_bytes() -> None:
+    rules = rules_from_tree(random_tree(3))
+    one, other = write(rules, allow_loss=True), write(rules, allow_loss=True)
+    assert one == other
+
+
+def test_fis_is_in_the_table_of_formats() -> None:
+    assert find_format(".fis").read is not None
+    assert get_args(Dialect) == DIALECTS
+
+
+def test_a_dialect_that_is_none_is_refused() -> None:
+    with pytest.raises(ValueError, match="no dialect 'scilab'; there is matlab"):
+        write(rules_from_tree(random_tree(0)), dialect="scilab")  # type: ignore[arg-type]
