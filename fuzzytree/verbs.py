@@ -11,6 +11,7 @@ import numpy as np
 
 from fuzzytree.agreement import Agreement
 from fuzzytree.answering import Answering, Carried, answering, opened, run
+from fuzzytree.casting import as_rules, as_system
 from fuzzytree.contracts import Document, Dtype, Model, Written
 from fuzzytree.converting import (
     Conversion,
@@ -20,12 +21,14 @@ from fuzzytree.converting import (
     load,
     read,
 )
-from fuzzytree.errors import TableError
+from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import write_atomically
 from fuzzytree.options import Option
+from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import chosen_runtimes
 from fuzzytree.runtimes.onnxruntime import OnnxModel
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tables import Table, batches, read_table
 from fuzzytree.tree import FuzzyTree
 
@@ -228,7 +231,7 @@ def save(
 
 def rows_of(
     data: object,
-    model: Model,
+    model: Document,
     *,
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
@@ -246,11 +249,12 @@ def rows_of(
     """
     if data is None:
         return None
+    is_system = isinstance(model, FuzzySystem)
     found = [
         *batches(
             data,
-            model.inputs,
-            trained=model.columns,
+            model.columns if isinstance(model, FuzzySystem) else model.inputs,
+            trained=() if is_system else model.columns,
             columns=columns,
             delimiter=delimiter,
         )
@@ -262,19 +266,20 @@ def rows_of(
 
 
 def check(
-    model: Model | str | os.PathLike[str],
+    model: Document | str | os.PathLike[str],
     *others: Carried,
     data: object = None,
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
-    limit: int = 20_000,
+    limit: int | None = None,
+    allow_loss: bool = False,
 ) -> Agreement:
     """Compare a model with everything that is made of it, in every runtime.
 
     Args:
-        model: A tree or a rule base, or the path of one.
+        model: A tree, a rule base or a fuzzy system, or the path of one.
         others: What was shipped beside it: models, ONNX files opened or as bytes, or
             paths.
         data: A table with rows of one's own, beside the probes.
@@ -282,10 +287,12 @@ def check(
         delimiter: Of a CSV file, if its first line does not tell.
         names: What to call each of the others; its path unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
-        limit: The most probes.
+        limit: The most probes; 20,000 unless given, and 2,000 for a system.
+        allow_loss: As in `load`, for every file.
 
     Raises:
-        ReadError: If a file cannot be read.
+        ReadError: If a file cannot be read, or holds another kind of model.
+        LossError: As `load`.
         TableError: If a column is absent or holds text, or the table has no row.
         ValueError: If a runtime is unknown.
 
@@ -294,21 +301,64 @@ def check(
         >>> check(random_tree(1), runtimes=["native"], limit=100).ok
         True
     """
-    from fuzzytree import checking
-
-    first = _model_of(model, "check")
+    first = _loaded(model, allow_loss=allow_loss)
     titles = [
         names[k] if k < len(names) else _title(other, k)
         for k, other in enumerate(others)
     ]
+    rest = [opened(other, allow_loss=allow_loss) for other in others]
+    values = rows_of(data, first, columns=columns, delimiter=delimiter)
+    if isinstance(first, FuzzySystem):
+        from fuzzytree.checking_systems import check_system
+
+        return check_system(
+            first,
+            *(_as_system(one, title) for one, title in zip(rest, titles, strict=True)),
+            data=values,
+            names=titles,
+            runtimes=runtimes,
+            limit=limit or 2_000,
+        )
+    from fuzzytree import checking
+
     return checking.check(
         first,
-        *(_deciding(other) for other in others),
-        data=rows_of(data, first, columns=columns, delimiter=delimiter),
+        *(_as_deciding(one, title) for one, title in zip(rest, titles, strict=True)),
+        data=values,
         names=titles,
         runtimes=runtimes,
-        limit=limit,
+        limit=limit or 20_000,
     )
+
+
+def _as_system(model: Document | OnnxModel, title: str) -> FuzzySystem | OnnxModel:
+    """Return what is compared with a system: a rule base as the number of its class.
+
+    Raises:
+        ReadError: If it is a tree.
+    """
+    if isinstance(model, FuzzyTree):
+        raise ReadError(f"{title}: is a tree, and is not compared with a fuzzy system")
+    if isinstance(model, RuleBase):
+        return as_system(model, "winner")
+    return model
+
+
+def _as_deciding(model: Document | OnnxModel, title: str) -> Model | OnnxModel:
+    """Return what is compared with a tree or rules: rules that a system stands for.
+
+    Raises:
+        ReadError: If it is a system whose outputs are numbers.
+    """
+    if not isinstance(model, FuzzySystem):
+        return model
+    found = as_rules(model, None)
+    if found is None:
+        raise ReadError(
+            f"{title}: is a fuzzy system whose outputs are numbers, and is not "
+            "compared with rules or a tree"
+        )
+    return found
 
 
 def certify(
@@ -410,13 +460,15 @@ def bench(
 
 
 def _model_of(model: Document | str | os.PathLike[str], verb: str) -> Model:
-    found = load(model) if isinstance(model, str | os.PathLike) else model
-    return deciding(found, verb)
+    return deciding(_loaded(model), verb)
 
 
-def _deciding(source: Carried) -> Model | OnnxModel:
-    found = opened(source)
-    return found if isinstance(found, OnnxModel) else deciding(found, "check")
+def _loaded(
+    model: Document | str | os.PathLike[str], *, allow_loss: bool = False
+) -> Document:
+    if isinstance(model, str | os.PathLike):
+        return load(model, allow_loss=allow_loss)
+    return model
 
 
 def _data_name(data: object) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import click
 
 from fuzzytree.cli.talk import (
+    allow_loss_option,
     answer,
     data_option,
     delimiter_option,
@@ -27,12 +28,11 @@ from fuzzytree.cli.talk import (
 @click.option(
     "--limit",
     type=click.IntRange(min=1),
-    default=20_000,
-    show_default=True,
-    help="The most probes.",
+    help="The most probes; 20000 if none, and 2000 for a fuzzy system.",
 )
 @click.option("--rows", "is_full", is_flag=True, help="Tell rows that may differ, too.")
 @delimiter_option
+@allow_loss_option
 @json_option
 @quiet_option
 def command(
@@ -40,16 +40,17 @@ def command(
     files: Sequence[str],
     data: str | None,
     runtimes: Sequence[str],
-    limit: int,
+    limit: int | None,
     is_full: bool,
     delimiter: str | None,
+    allow_loss: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compare MODEL, a YAML file, with FILES made of it, in every runtime.
+    """Compare MODEL, any file that can be read, with FILES made of it.
 
-    The tree, its rules, each runtime and each file answer the same rows. Exit 1 if
-    two of them disagree.
+    The tree, its rules, each runtime and each file answer the same rows; so do a fuzzy
+    system, each runtime and each file. Exit 1 if two of them disagree.
     """
     from fuzzytree import verbs
     from fuzzytree.report import text
@@ -62,6 +63,7 @@ def command(
             delimiter=delimiter,
             runtimes=runtimes or None,
             limit=limit,
+            allow_loss=allow_loss,
         )
     if as_json:
         answer(found.to_json())
