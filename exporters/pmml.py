@@ -43,7 +43,6 @@ from fuzzytree.rulebase import (
 )
 from fuzzytree.tree import FuzzyTree, Node, intervals
 
-_LARGEST = 1.7976931348623157e308
 _MISSING, _UNCOVERED = -1.0, 0.0  # numbers in the place of a rule's
 
 
@@ -88,15 +87,17 @@ def write(
                 f"cannot write {model.name} as pmml with curves as points:\n  {listed}"
             )
     names = _Names.of(model)
+    functions = Functions()
+    axes = [*_axes(model.variables, names, functions)]
     if isinstance(model, RuleBase):
-        functions, fields, body = _rules(model, names, is_exact=curves == "exact")
+        is_exact = curves == "exact"
+        fields, body = _rules(model, names, functions, is_exact=is_exact)
     else:
-        functions = []
-        fields, body = _tree(model, names)
+        fields, body = _tree(model, names, functions)
     dictionary = element(
         "TransformationDictionary",
-        *functions,
-        *_axes(model.variables, names),
+        *functions.defined.values(),
+        *axes,
         *fields,
     )
     root = element(
@@ -197,33 +198,28 @@ def _data_fields(model: Model, names: _Names) -> Iterator[Element]:
     )
 
 
-def _axes(variables: Sequence[Variable], names: _Names) -> Iterator[Element]:
-    """Yield the field of each combination, summed in the reference's order."""
+def _axes(
+    variables: Sequence[Variable], names: _Names, functions: Functions
+) -> Iterator[Element]:
+    """Yield the field of each combination; missing where a summand is not finite."""
     for variable in variables:
-        if not variable.parts:
-            continue
-        summands = [
-            apply(
-                "*",
-                constant(part.weight),
-                apply("-", ref(names.field[part.input]), constant(part.centre)),
-            )
-            for part in variable.parts
-        ]
-        total = summands[0]
-        for one in summands[1:]:
-            total = apply("+", total, one)
-        yield derived(names.field[variable.name], total)
+        if variable.parts:
+            summands = [
+                apply(
+                    "*",
+                    constant(part.weight),
+                    apply("-", ref(names.field[part.input]), constant(part.centre)),
+                )
+                for part in variable.parts
+            ]
+            yield derived(names.field[variable.name], functions.total(summands))
 
 
-def _usable(variables: Sequence[Variable], names: _Names) -> Element:
+def _usable(
+    variables: Sequence[Variable], names: _Names, functions: Functions
+) -> Element:
     """Return 1 where every value is there and finite, and 0 elsewhere."""
-    parts: list[Element] = []
-    for variable in variables:
-        x = ref(names.field[variable.name])
-        is_finite = apply("lessOrEqual", apply("abs", x), constant(_LARGEST))
-        finite = apply("if", is_finite, constant(1.0), constant(0.0))
-        parts.append(apply("if", apply("isMissing", x), constant(0.0), finite))
+    parts = [functions.finite(ref(names.field[v.name])) for v in variables]
     return joined("min", parts) if parts else constant(1.0)
 
 
@@ -268,10 +264,9 @@ def _model(
 
 
 def _rules(
-    rules: RuleBase, names: _Names, *, is_exact: bool
-) -> tuple[list[Element], list[Element], Element]:
-    """Return the functions, the derived fields and the model of a rule base."""
-    functions = Functions()
+    rules: RuleBase, names: _Names, functions: Functions, *, is_exact: bool
+) -> tuple[list[Element], Element]:
+    """Return the derived fields and the model of a rule base."""
     terms: dict[tuple[str, str], str] = {}
     fields: list[Element] = []
     for variable in rules.variables:
@@ -296,14 +291,14 @@ def _rules(
         whole = joined(how, parts) if parts else constant(1.0)
         fields.append(derived(strength, whole))
     usable, best = names.new("usable"), names.new("best")
-    fields.append(derived(usable, _usable(rules.variables, names)))
+    fields.append(derived(usable, _usable(rules.variables, names, functions)))
     fields.append(derived(best, joined("max", list(map(ref, strengths)))))
     winner = names.new("winner")
     fields.append(derived(winner, _winner(strengths, usable, best)))
     outputs = _outputs(rules, strengths, usable, names)
     nodes = _rule_nodes(rules, winner, names)
     body = _model(rules, names, outputs, nodes)
-    return list(functions.defined.values()), fields, body
+    return fields, body
 
 
 def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> Element:
@@ -377,10 +372,12 @@ def _predicate(field: str, operator: str, value: float) -> Element:
     )
 
 
-def _tree(tree: FuzzyTree, names: _Names) -> tuple[list[Element], Element]:
+def _tree(
+    tree: FuzzyTree, names: _Names, functions: Functions
+) -> tuple[list[Element], Element]:
     """Return the derived fields and the model of a tree."""
     usable = names.new("usable")
-    fields = [derived(usable, _usable(tree.variables, names))]
+    fields = [derived(usable, _usable(tree.variables, names, functions))]
     is_usable = _predicate(usable, "equal", 1.0)
     made: dict[int, Element] = {}  # by number; a node's children have higher ones
     for number in range(len(tree.nodes), 0, -1):

@@ -6,9 +6,17 @@ reference's bits in every engine that computes in doubles.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
-from fuzzytree.exporters.pmml_xml import Element, apply, constant, element, ref
+from fuzzytree.exporters.pmml_xml import (
+    Element,
+    apply,
+    constant,
+    element,
+    joined,
+    ref,
+)
 from fuzzytree.reference import BELOW_ONE
 from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side
 
@@ -43,6 +51,30 @@ class Functions:
                 return apply("min", below, above)
             case Points():
                 return self._points(shape, x)
+
+    def finite(self, x: Element) -> Element:
+        """Return 1 where a value is there and finite, and 0 elsewhere."""
+        value, zero = ref("value"), constant(0.0)
+        is_small = apply(
+            "lessOrEqual", apply("abs", value), constant(sys.float_info.max)
+        )
+        known = apply("if", is_small, constant(1.0), zero)
+        body = apply("if", apply("isMissing", value), zero, known)
+        return apply(self._define("finite", ("value",), body), x)
+
+    def total(self, summands: Sequence[Element]) -> Element:
+        """Return a sum from left to right, missing if a summand is not finite.
+
+        So infinities of both signs never meet: engines differ about what that is.
+        """
+        names = tuple(f"p{k}" for k in range(len(summands)))
+        parts = [ref(name) for name in names]
+        total = parts[0]
+        for part in parts[1:]:
+            total = apply("+", total, part)
+        usable = joined("min", [self.finite(part) for part in parts])
+        whole = apply("if", apply("equal", usable, constant(1.0)), total)
+        return apply(self._define(f"sum{len(names)}", names, whole), *summands)
 
     def _define(self, name: str, parameters: Sequence[str], body: Element) -> str:
         if name not in self.defined:

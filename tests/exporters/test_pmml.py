@@ -48,7 +48,9 @@ class File:
             name: None if math.isnan(value) else value for name, value in row.items()
         }
         for one in self.root.iter(f"{SPACE}DerivedField"):
-            fields[one.attrib["name"]] = self.value(one[0], fields)
+            value = self.value(one[0], fields)
+            fields[one.attrib["name"]] = value
+            assert value is None or not math.isnan(value)
         outputs: Fields = {
             one.attrib["name"]: self.value(one[0], fields)
             for one in self.root.iter(f"{SPACE}OutputField")
@@ -83,13 +85,15 @@ class File:
                 return self.value(one[1], fields)
             return self.value(one[2], fields) if len(one) > 2 else None
         given = [self.value(part, fields) for part in one]
-        if None in given:
-            return None
-        numbers = [number for number in given if number is not None]
         if name in self.functions:
             *parameters, body = self.functions[name]
             names = [parameter.attrib["name"] for parameter in parameters]
-            return self.value(body, dict(zip(names, numbers, strict=True)))
+            return self.value(body, dict(zip(names, given, strict=True)))
+        if None in given:
+            return None
+        numbers = [number for number in given if number is not None]
+        if name == "abs":
+            assert not math.isnan(numbers[0])
         return BUILT_IN[name](*numbers)
 
     def holds(self, one: ElementTree.Element, fields: Fields) -> bool:
@@ -145,6 +149,9 @@ def assert_alike(
     rows: list[dict[str, float]] = [dict(row) for row in probes(model, limit=count)]
     for name in model.inputs:
         rows += [rows[0] | {name: value} for value in (math.nan, math.inf, -math.inf)]
+    for one, other in itertools.product((1e308, math.inf, math.nan), repeat=2):
+        signs = itertools.cycle((one, -other, -one, other))
+        rows.append(dict(zip(model.inputs, signs, strict=False)))
     for row in rows:
         label, number, outputs = file.answer(row)
         expected = (

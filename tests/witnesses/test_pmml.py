@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import io
+import itertools
 import math
 import zipfile
 from pathlib import Path
@@ -91,6 +92,9 @@ def test_models_of_all_kinds_answer_alike_with_missing_and_infinite_values(
         for name in model.inputs:
             for value in (math.nan, math.inf, -math.inf):
                 rows.append(rows[0] | {name: value})
+        for one, other in itertools.product((1e308, math.inf, math.nan), repeat=2):
+            signs = itertools.cycle((one, -other, -one, other))
+            rows.append(dict(zip(model.inputs, signs, strict=False)))
         assert_alike(model, rows)
 
 
