@@ -1,0 +1,116 @@
+"""Fuzzy systems as ONNX: what stands in the file, and what is refused."""
+
+import json
+
+import numpy as np
+import onnx
+import pytest
+
+from fuzzytree.errors import DisagreementError, ReadError
+from fuzzytree.exporters import onnx_steps
+from fuzzytree.exporters.onnx import OPSETS, write
+from fuzzytree.exporters.onnx_compare import graph_difference
+from fuzzytree.rulebase import fingerprint
+from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.testing import random_rows, random_system
+
+SYSTEM = random_system(3, formulas="none")
+
+
+def test_the_same_system_gives_the_same_bytes() -> None:
+    assert write(SYSTEM).content == write(SYSTEM, verify=False).content
+
+
+def test_the_file_says_what_it_is() -> None:
+    found = onnx.load_model_from_string(write(SYSTEM).content)
+    facts = {one.key: one.value for one in found.metadata_props}
+    assert facts["fuzzytree.carrier"] == "system"
+    assert facts["fuzzytree.fingerprint"] == fingerprint(SYSTEM)
+    assert json.loads(facts["fuzzytree.columns"]) == list(SYSTEM.columns)
+    assert json.loads(facts["fuzzytree.names"]) == [o.name for o in SYSTEM.outputs]
+    assert {one.domain for one in found.opset_import} == {""}
+    assert [one.name for one in found.graph.output] == ["outputs", "status"]
+    onnx.checker.check_model(found, full_check=True)
+
+
+def test_an_opened_file_runs() -> None:
+    content = write(SYSTEM, outputs=("activations", "outputs", "status")).content
+    opened = open_onnx(content, "s.onnx")
+    assert (opened.carrier, opened.names) == ("system", ("y1", "y2"))
+    rows = random_rows(SYSTEM, 0, 50)
+    values = np.array([[row[name] for row in rows] for name in SYSTEM.columns])
+    assert opened.run_system is not None
+    found = opened.run_system(values)
+    right = infer_rows(SYSTEM, activations=True)(values)
+    assert found.activations is not None
+    assert right.activations is not None
+    np.testing.assert_allclose(found.outputs, right.outputs, rtol=1e-12)
+    np.testing.assert_allclose(found.activations, right.activations, rtol=1e-12)
+    assert found.status.tolist() == right.status.tolist()
+    with pytest.raises(ValueError, match="is a fuzzy system: call run_system"):
+        opened.run(values)
+
+
+@pytest.mark.parametrize("opset", OPSETS)
+def test_every_operator_set_gives_the_same_numbers(opset: int) -> None:
+    # Of maxima, bisectors and centroids: reductions and pads changed between sets.
+    for seed in (6, 13):
+        system = random_system(seed, formulas="none", defuzzifier="of curves")
+        write(system, opset=opset, ir=8 if opset < 20 else 10)
+
+
+def test_a_file_without_outputs_cannot_be_run() -> None:
+    content = write(SYSTEM, outputs=("status",)).content
+    with pytest.raises(ReadError, match="the file has no output 'outputs'"):
+        open_onnx(content, "s.onnx")
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"outputs": ("label",)}, "outputs: there is outputs, status, activations, "),
+        ({"dtype": "float32"}, "dtype: there is float64, not 'float32'"),
+        ({"signature": "all"}, "signature: there is needed, not 'all'"),
+        (
+            {"readable": True},
+            "readable is for rules: a system's graph has no functions",
+        ),
+        ({"plain": True}, "plain is for trees"),
+    ],
+)
+def test_options_of_trees_and_rules_are_refused(
+    options: dict[str, object], text: str
+) -> None:
+    with pytest.raises(ValueError, match=text):
+        write(SYSTEM, **options)  # type: ignore[arg-type] # wrong on purpose
+
+
+def test_a_system_s_outputs_are_no_model_s() -> None:
+    from fuzzytree.testing import random_tree
+
+    with pytest.raises(
+        ValueError, match="there is label, rule, strengths, status, not"
+    ):
+        write(random_tree(1), outputs=("outputs",))
+
+
+def test_a_graph_is_compared_with_a_fresh_one() -> None:
+    content = write(SYSTEM).content
+    assert graph_difference(content, SYSTEM) is None
+    found = graph_difference(content, random_system(4, formulas="none"))
+    assert found is not None
+
+
+@pytest.mark.parametrize(
+    ("operation", "operator"),
+    [("maximum", "Min"), ("multiply", "Add"), ("less", "Equal")],
+)
+def test_a_wrong_graph_is_not_returned(
+    operation: str, operator: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        onnx_steps, "_NODES", {**onnx_steps._NODES, operation: operator}
+    )
+    with pytest.raises(DisagreementError, match=r"gives other .* than the model where"):
+        write(SYSTEM, outputs=("outputs", "activations"))
