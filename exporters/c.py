@@ -10,11 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
-from fuzzytree.contracts import Format, Loss, Model, Written
+from fuzzytree.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c_axes import axes_code, lines_of, taking
 from fuzzytree.exporters.c_examples import examples_of, number_of, selftest_code
 from fuzzytree.exporters.c_rules import Tables, rules_code, tables_of
+from fuzzytree.exporters.c_system import (
+    SYSTEM_TYPES,
+    system_code,
+    system_heading,
+    system_selftest,
+)
 from fuzzytree.exporters.c_text import (
     DOUBLE,
     SINGLE,
@@ -27,6 +33,7 @@ from fuzzytree.exporters.c_text import (
 from fuzzytree.exporters.c_tree import Question, questions_of, tree_code
 from fuzzytree.numerics.narrowing import losses
 from fuzzytree.rulebase import RuleBase, fingerprint, sentence
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree, outline
 
 _NUMBERS = {"float64": DOUBLE, "float32": SINGLE}
@@ -39,6 +46,10 @@ _USE = """\
  */
 
 """
+
+_DECLARE = "#ifndef NAME_DECLARED\n#define NAME_DECLARED\n\n"
+
+_DEFINE = "\n#endif\n\n#ifndef NAME_HEADER\n\n"
 
 _LIMITS = """\
 #include <float.h>
@@ -103,23 +114,27 @@ name_answer name_strengths(const name_real *x, name_real *strengths);
 
 
 def write(
-    model: Model,
+    model: Document,
     /,
     *,
     allow_loss: bool = False,
     dtype: Literal["float64", "float32"] = "float64",
     name: str | None = None,
+    activations: bool = False,
 ) -> Written:
     """Return a model as the text of a C file, in ASCII.
 
     The file offers `NAME_decide(x)`, which returns class, rule (or leaf) and status;
-    for a rule base also `NAME_strengths(x, strengths)`.
+    for a rule base also `NAME_strengths(x, strengths)`; for a fuzzy system
+    `NAME_infer(x, outputs)` instead, which returns the status.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a fuzzy system.
         allow_loss: Whether to write what float32 cannot hold as near as it can.
-        dtype: The type of all numbers: double, or float.
+        dtype: The type of all numbers: double, or float. A fuzzy system needs double.
         name: The beginning of all names in the file; that of the model unless given.
+        activations: Of a fuzzy system: whether the degree of activation of every rule
+            stands behind the outputs.
 
     Raises:
         LossError: If float32 cannot hold a number of the model, unless allowed.
@@ -138,11 +153,33 @@ def write(
         raise ValueError(
             f"the name {name!r} cannot begin the names of C; {prefix!r} can"
         )
+    if isinstance(model, FuzzySystem):
+        if dtype != "float64":
+            raise ValueError("fuzzy systems are written in float64 only")
+        text = "".join(_system_text(model, prefix, activations=activations))
+        return Written(text.encode("ascii"))
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise LossError(_loss_text(model, lost))
     made = _Made(model, _NUMBERS[dtype], prefix)
     return Written("".join(made.text()).encode("ascii"), lost)
+
+
+def _system_text(
+    system: FuzzySystem, prefix: str, *, activations: bool
+) -> Iterator[str]:
+    yield from system_heading(system)
+    yield fill(_USE, prefix) + fill(_DECLARE, prefix)
+    yield fill("typedef double name_real;\n\n", prefix)
+    count = len(system.outputs) + activations * len(system.rules)
+    yield fill(f"#define NAME_INPUTS {len(system.columns)}u\n", prefix)
+    yield fill(f"#define NAME_OUTPUTS {count}u\n", prefix)
+    yield fill(SYSTEM_TYPES + _DEFINE, prefix)
+    yield fill(_checks(DOUBLE, is_arithmetic=True), prefix)
+    yield from system_code(system, prefix, activations=activations)
+    if not activations:
+        yield from system_selftest(system, prefix)
+    yield "\n#endif\n"
 
 
 def _loss_text(model: Model, lost: Sequence[Loss]) -> str:
@@ -151,6 +188,21 @@ def _loss_text(model: Model, lost: Sequence[Loss]) -> str:
     hint = "pass allow_loss=True to write it as stated, or choose dtype 'float64'"
     head = f"cannot write {model.name} as c float32: "
     return head + "\n  ".join([*lines[:10], *more, hint])
+
+
+def _checks(numbers: Numbers, *, is_arithmetic: bool) -> str:
+    """Return what refuses to compile where numbers are not those of IEEE."""
+    limits, exact = "DBL_MANT_DIG != 53 || DBL_MAX_EXP != 1024", "FLT_EVAL_METHOD == 0"
+    fuses = "__FP_FAST_FMA"
+    if numbers is SINGLE:
+        limits = "FLT_MANT_DIG != 24 || FLT_MAX_EXP != 128"
+        fuses = "__FP_FAST_FMAF"
+    else:
+        exact += " || FLT_EVAL_METHOD == 1"
+    text = _LIMITS.replace("LIMITS", limits)
+    if is_arithmetic:
+        text += _ARITHMETIC.replace("EVALUATION", exact)
+    return text.replace("KIND", numbers.name).replace("FUSES", fuses)
 
 
 class _Made:
@@ -168,12 +220,13 @@ class _Made:
 
     def text(self) -> Iterator[str]:
         """Yield the file."""
-        guard = "#ifndef NAME_DECLARED\n#define NAME_DECLARED\n\n"
         yield from _heading(self.model)
-        yield self._fill(_USE) + self._fill(guard)
+        yield self._fill(_USE) + self._fill(_DECLARE)
         yield from self._declarations()
-        yield self._fill("\n#endif\n\n#ifndef NAME_HEADER\n\n")
-        yield from self._checks()
+        yield self._fill(_DEFINE)
+        mixed = any(variable.parts for variable in self.model.variables)
+        is_arithmetic = mixed or self.tables is not None
+        yield self._fill(_checks(self.numbers, is_arithmetic=is_arithmetic))
         yield from self._defaults()
         variables = self.model.variables
         yield from axes_code(variables, self.line, self.numbers, self.prefix)
@@ -210,19 +263,6 @@ class _Made:
         yield self._fill(_TYPES).replace("RULE,", "rule," if rules else "leaf,")
         yield self._fill(_STRENGTHS_TYPE) if rules else ""
         yield "\n#ifdef __cplusplus\n}\n#endif\n"
-
-    def _checks(self) -> Iterator[str]:
-        is_double = self.numbers.name == "double"
-        limits = "DBL_MANT_DIG != 53 || DBL_MAX_EXP != 1024"
-        if not is_double:
-            limits = "FLT_MANT_DIG != 24 || FLT_MAX_EXP != 128"
-        exact = "FLT_EVAL_METHOD == 0" + (" || FLT_EVAL_METHOD == 1" * is_double)
-        text = _LIMITS.replace("LIMITS", limits)
-        if self.tables is not None or any(v.parts for v in self.model.variables):
-            text += _ARITHMETIC.replace("EVALUATION", exact)
-        fuses = "__FP_FAST_FMA" if is_double else "__FP_FAST_FMAF"
-        text = text.replace("KIND", self.numbers.name).replace("FUSES", fuses)
-        yield self._fill(text)
 
     def _defaults(self) -> Iterator[str]:
         semantics = self.model.semantics
@@ -274,7 +314,7 @@ def _heading(model: Model) -> Iterator[str]:
 FORMAT = Format(
     name="c",
     suffixes=(".c",),
-    carries=("tree", "rules"),
+    carries=("tree", "rules", "system"),
     write=write,
     dtype="float64",
 )

@@ -6,6 +6,7 @@ enumerators), so that nothing in it can be mistaken for code.
 
 from __future__ import annotations
 
+import math
 import string
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -44,12 +45,15 @@ class Numbers:
         return found
 
     def text(self, value: float) -> str:
-        """Return a finite number of the type as a constant.
+        """Return a number of the type as a constant; for infinite ones see math.h.
 
         Example:
             >>> DOUBLE.text(0.1), SINGLE.text(-2.0)
             ('0x1.999999999999ap-4', '-0x1p+1f')
         """
+        if not math.isfinite(value):
+            sign = "-" if value < 0 else ""
+            return "NAN" if math.isnan(value) else f"{sign}HUGE_VAL"
         digits, exponent = float(value).hex().split("p")
         if "." in digits:
             digits = digits.rstrip("0").rstrip(".")

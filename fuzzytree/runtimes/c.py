@@ -16,11 +16,19 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from fuzzytree.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.contracts import (
+    Model,
+    Outcome,
+    Run,
+    Runtime,
+    SystemOutcome,
+    SystemRun,
+)
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters.c import write
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.rows import checked
+from fuzzytree.system import FuzzySystem
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -42,7 +50,7 @@ _LOOP = """
 
 /* Answer many rows: x holds one line of `rows` values for each input. The strengths of
  * a row go to `fired`; where that is null, the winner alone is looked for. */
-extern void model_decide_many(const model_real *x, size_t rows, int64_t *rule,
+extern void model_many(const model_real *x, size_t rows, int64_t *rule,
     int64_t *status, model_real *fired, double *strengths)
 {
     model_real row[MODEL_INPUTS + 1];
@@ -54,6 +62,23 @@ extern void model_decide_many(const model_real *x, size_t rows, int64_t *rule,
         FIND
         rule[place] = found.rule;
         status[place] = found.status;
+    }
+}
+"""
+
+_INFER_LOOP = """
+#include <stddef.h>
+
+extern void model_many(const double *x, size_t rows, double *outputs, int64_t *status)
+{
+    double row[MODEL_INPUTS + 1], found[MODEL_OUTPUTS];
+    size_t place, line;
+    for (place = 0; place < rows; place++) {
+        for (line = 0; line < MODEL_INPUTS; line++)
+            row[line] = x[line * rows + place];
+        status[place] = model_infer(row, found);
+        for (line = 0; line < MODEL_OUTPUTS; line++)
+            outputs[line * rows + place] = found[line];
     }
 }
 """
@@ -86,8 +111,8 @@ def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) 
     except LossError as error:
         text = str(error).replace("cannot write", "cannot run", 1)
         raise LossError(text.partition("\n  pass allow_loss")[0]) from error
-    is_rules = isinstance(model, RuleBase)
-    decide = _compiled(content, is_rules)
+    find = _EITHER if isinstance(model, RuleBase) else _DECIDE
+    decide = _compiled(content, _LOOP.replace("FIND", find), 4)
     count = len(model.rules) if isinstance(model, RuleBase) and has_strengths else 0
     real = np.dtype(dtype)
 
@@ -120,21 +145,47 @@ def load_best_first(model: Model) -> Run:
     return load(model, has_strengths=False)
 
 
+def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:
+    """Return a function that answers rows of a fuzzy system by compiled C.
+
+    Args:
+        system: The system.
+        activations: Whether the degree of activation of each rule is wanted.
+
+    Raises:
+        MissingExtraError: If no compiler is installed.
+        FuzzyTreeError: If the compiler fails.
+    """
+    made = write(system, name="model", activations=activations)
+    infer = _compiled(made.content, _INFER_LOOP, 2)
+    outputs = len(system.outputs)
+    count = outputs + activations * len(system.rules)
+
+    def run(values: FloatArray) -> SystemOutcome:
+        given = np.ascontiguousarray(checked(values, system.columns))
+        rows = given.shape[1]
+        found, status = np.empty((count, rows)), np.empty(rows, np.int64)
+        infer(_at(given), rows, _at(found), _at(status))
+        degrees = found[outputs:] if activations else None
+        return SystemOutcome(found[:outputs], status, degrees)
+
+    return run
+
+
 def _at(array: npt.NDArray[np.generic] | None) -> int | None:
     return None if array is None else array.ctypes.data
 
 
 @lru_cache(maxsize=64)
-def _compiled(content: bytes, is_rules: bool) -> Decide:
-    """Return the function that answers many rows."""
-    loop = _LOOP.replace("FIND", _EITHER if is_rules else _DECIDE)
+def _compiled(content: bytes, loop: str, pointers: int) -> Decide:
+    """Return the function `model_many` of a file and a loop behind it."""
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
     if compiler is None:
         raise MissingExtraError(f"the runtime 'c' needs one of {', '.join(COMPILERS)}")
     with tempfile.TemporaryDirectory(prefix="fuzzytree-") as folder:
         path = Path(folder, "model.so")
         done = subprocess.run(
-            [compiler, *_OPTIONS, "-o", str(path)],
+            [compiler, *_OPTIONS, "-o", str(path), "-lm"],
             input=content + loop.encode("ascii"),
             capture_output=True,
             check=False,
@@ -143,18 +194,24 @@ def _compiled(content: bytes, is_rules: bool) -> Decide:
         if done.returncode:
             said = done.stderr.decode("utf-8", "replace").strip()[:1000]
             raise FuzzyTreeError(f"{compiler} cannot compile the model: {said}")
-        found = ctypes.CDLL(str(path)).model_decide_many
+        found = ctypes.CDLL(str(path)).model_many
     pointer = ctypes.c_void_p
-    found.argtypes = [pointer, ctypes.c_size_t, *[pointer] * 4]
+    found.argtypes = [pointer, ctypes.c_size_t, *[pointer] * pointers]
     found.restype = None
-    decide: Decide = found
-    return decide
+    many: Decide = found
+    return many
 
 
 _FLOAT32 = "numbers beyond float32, and different numbers that become one in it"
 
 RUNTIMES = (
-    Runtime("c", ("tree", "rules"), load, programs=COMPILERS),
+    Runtime(
+        "c",
+        ("tree", "rules", "system"),
+        load,
+        load_system,
+        programs=COMPILERS,
+    ),
     Runtime(
         "c best-first",
         ("rules",),

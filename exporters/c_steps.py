@@ -1,0 +1,326 @@
+"""The steps of a program as statements of C, straight on, with loops over samples."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+
+from fuzzytree.exporters.c_text import DOUBLE, real_lines
+from fuzzytree.programs.evaluate import still_results
+from fuzzytree.programs.steps import Program, Step
+
+_SIGNS = {
+    "add": "+",
+    "subtract": "-",
+    "multiply": "*",
+    "divide": "/",
+    "less": "<",
+    "at_most": "<=",
+    "equal": "==",
+    "and": "&&",
+    "or": "||",
+}
+
+LIBRARY: Mapping[str, str] = {
+    "absolute": "fabs",
+    "floor": "floor",
+    "ceiling": "ceil",
+    "round": "nearbyint",
+    "square_root": "sqrt",
+    "exponential": "exp",
+    "logarithm": "log",
+    "logarithm_10": "log10",
+    "logarithm_1p": "log1p",
+    "sine": "sin",
+    "cosine": "cos",
+    "tangent": "tan",
+    "arc_sine": "asin",
+    "arc_cosine": "acos",
+    "arc_tangent": "atan",
+    "hyperbolic_sine": "sinh",
+    "hyperbolic_cosine": "cosh",
+    "hyperbolic_tangent": "tanh",
+    "area_sine": "asinh",
+    "area_cosine": "acosh",
+    "area_tangent": "atanh",
+    "power": "pow",
+    "remainder": "fmod",
+    "arc_tangent_2": "atan2",
+}
+"""Functions of math.h."""
+
+HELPERS: Mapping[str, str] = {
+    "minimum": """
+static name_real name_minimum(name_real a, name_real b)
+{
+    return a < b || a != a ? a : b;
+}
+""",
+    "maximum": """
+static name_real name_maximum(name_real a, name_real b)
+{
+    return a > b || a != a ? a : b;
+}
+""",
+    "is_finite": """
+static int name_is_finite(name_real value)
+{
+    union { name_real value; uint64_t bits; } look;
+    look.value = value;
+    return ~(uint32_t)(look.bits >> 32) << 1 >> 21 != 0;
+}
+""",
+    "below": """
+/* How many numbers of a rising table are below a. */
+static name_real name_below(const name_real *table, unsigned long count, name_real a)
+{
+    unsigned long low = 0, middle;
+    while (low < count) {
+        middle = (low + count) / 2;
+        if (table[middle] < a)
+            low = middle + 1;
+        else
+            count = middle;
+    }
+    return (name_real)low;
+}
+""",
+    "pick": """
+/* The number of a table at place a, its first one if there is none. */
+static name_real name_pick(const name_real *table, unsigned long count, name_real a)
+{
+    return table[a >= 0 && a < (name_real)count ? (unsigned long)a : 0];
+}
+""",
+    "total": """
+/* The sum by halves of count numbers, and of zeros up to twice half. */
+static name_real name_total(const name_real *s, unsigned long count, name_real *sums,
+    unsigned long half)
+{
+    unsigned long i;
+    for (i = 0; i < half; i++)
+        sums[i] = s[i] + (i + half < count ? s[i + half] : 0);
+    while (half > 1) {
+        half /= 2;
+        for (i = 0; i < half; i++)
+            sums[i] += sums[i + half];
+    }
+    return sums[0];
+}
+""",
+    "bits": """
+/* The number that has some bits: infinite, or none. */
+static name_real name_bits(uint64_t bits)
+{
+    union { uint64_t bits; name_real value; } made;
+    made.bits = bits;
+    return made.value;
+}
+""",
+}
+"""Functions that some operations need."""
+
+_CARRIED = ("last", "highest", "lowest")  # along a loop
+_REDUCED = {"highest": "maximum", "lowest": "minimum"}
+
+
+def number_text(value: float) -> str:
+    """Return a number as it may stand in an expression."""
+    if math.isfinite(value):
+        text = f"{DOUBLE.text(value)} /* {value!r} */"
+        return f"({text})" if text.startswith("-") else text
+    (bits,) = struct.unpack("<Q", struct.pack("<d", abs(value)))
+    bits |= (1 << 63) * (value < 0)
+    return f"name_bits(UINT64_C({bits:#018x}))"
+
+
+class Steps:
+    """Writes the steps of one program.
+
+    What no input enters is computed here, once: single numbers stand in expressions,
+    those of samples in tables. What has samples is computed in loops, together as far
+    as no sum over all samples is needed in between.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.still = still_results(program)
+        self.needs: set[str] = set()
+        self.tables: list[tuple[str, Sequence[float]]] = []
+        self._table_names: dict[tuple[float, ...], str] = {}
+        self.round = self._rounds()
+        self.kept = self._kept()
+        self.body = list(self._body())
+
+    @property
+    def needs_library(self) -> bool:
+        """Whether math.h is needed, for functions or for infinite numbers in tables."""
+        numbers = (number for _, table in self.tables for number in table)
+        return not (self.needs.isdisjoint(LIBRARY) and all(map(math.isfinite, numbers)))
+
+    def table_text(self, prefix: str) -> Iterator[str]:
+        """Yield the tables."""
+        for name, values in self.tables:
+            yield f"static const double {prefix}_{name}[{len(values)}] = {{\n"
+            yield from real_lines(values, DOUBLE)
+            yield "};\n"
+
+    def value(self, place: int) -> str:
+        """Return a step's result as an expression, within a loop if it has samples."""
+        found = self.still[place]
+        if found is None:
+            step = self.program.steps[place]
+            if place in self.kept and step.samples:
+                return f"s{place}[i]"
+            return f"v{place}"
+        if isinstance(found, list):
+            return f"{self._table(tuple(map(float, found)))}[i]"
+        if isinstance(found, bool):
+            return str(int(found))
+        return self._number(found)
+
+    def _number(self, value: float) -> str:
+        if not math.isfinite(value):
+            self.needs.add("bits")
+        return number_text(value)
+
+    def _table(self, values: tuple[float, ...]) -> str:
+        """Return the name of a table."""
+        if values not in self._table_names:
+            self._table_names[values] = f"name_t{len(self.tables)}"
+            self.tables.append((f"t{len(self.tables)}", values))
+        return self._table_names[values]
+
+    def _rounds(self) -> list[int]:
+        """Return after how many loops each step can be computed."""
+        found: list[int] = []
+        for place, step in enumerate(self.program.steps):
+            moving = [a for a in step.arguments if self.still[a] is None]
+            after = max((found[a] for a in moving), default=0)
+            is_reduced = not step.samples and any(
+                self.program.steps[a].samples for a in moving
+            )
+            found.append(0 if self.still[place] is not None else after + is_reduced)
+        return found
+
+    def _kept(self) -> set[int]:
+        """Return the steps with samples that a later loop needs, or a sum by halves."""
+        kept: set[int] = set()
+        for place, step in enumerate(self.program.steps):
+            if step.operation in _CARRIED:
+                continue
+            for argument in step.arguments:
+                is_moving = self.still[argument] is None
+                if is_moving and self.program.steps[argument].samples:
+                    is_later = self.round[place] > self.round[argument]
+                    if is_later or step.operation == "total":
+                        kept.add(argument)
+        return kept
+
+    def _body(self) -> Iterator[str]:
+        moving = [p for p, found in enumerate(self.still) if found is None]
+        for turn in range(max((self.round[p] for p in moving), default=0) + 1):
+            now = [p for p in moving if self.round[p] == turn]
+            single = [p for p in now if not self.program.steps[p].samples]
+            reduced = [p for p in single if self._is_reduced(p)]
+            for place in reduced:
+                if self._is(place, "total"):
+                    yield from self._total(place)
+            for place in single:
+                if place not in reduced:
+                    yield f"    {self._declared(place)};\n"
+            counts = dict.fromkeys(self.program.steps[p].samples for p in now)
+            for count in counts:
+                if count:
+                    own = [p for p in now if self.program.steps[p].samples == count]
+                    yield from self._loop(own, count)
+
+    def _is(self, place: int, operation: str) -> bool:
+        return self.program.steps[place].operation == operation
+
+    def _is_reduced(self, place: int) -> bool:
+        step = self.program.steps[place]
+        return any(self.program.steps[a].samples for a in step.arguments)
+
+    def _declared(self, place: int) -> str:
+        step = self.program.steps[place]
+        return f"const {self._type(place)} v{place} = {self._expression(step)}"
+
+    def _type(self, place: int) -> str:
+        return "int" if self.program.steps[place].kind == "truth" else "name_real"
+
+    def _loop(self, places: Sequence[int], count: int) -> Iterator[str]:
+        """Yield a loop over samples, and what it carries along."""
+        carried = [
+            place
+            for place, step in enumerate(self.program.steps)
+            if step.operation in _CARRIED
+            and self.still[place] is None
+            and step.arguments[0] in places
+        ]
+        running = [p for p in places if self._is(p, "running")]
+        for place in places:
+            if place in self.kept:
+                yield f"    {self._type(place)} s{place}[{count}];\n"
+        for place in carried:
+            yield f"    name_real v{place} = 0;\n"
+        for place in running:
+            yield f"    name_real r{place} = 0;\n"
+        yield f"    for (i = 0; i < {count}; i++) {{\n"
+        for place in places:
+            if place in running:
+                (argument,) = self.program.steps[place].arguments
+                given = self.value(argument)
+                yield f"        r{place} = i == 0 ? {given} : r{place} + {given};\n"
+            if place in self.kept:
+                made = f"r{place}" if place in running else self._made(place)
+                yield f"        s{place}[i] = {made};\n"
+            elif place in running:
+                yield f"        const name_real v{place} = r{place};\n"
+            else:
+                yield f"        {self._declared(place)};\n"
+        for place in carried:
+            yield f"        {self._carried(place)};\n"
+        yield "    }\n"
+
+    def _made(self, place: int) -> str:
+        return self._expression(self.program.steps[place])
+
+    def _carried(self, place: int) -> str:
+        step = self.program.steps[place]
+        given = self.value(step.arguments[0])
+        if step.operation == "last":
+            return f"v{place} = {given}"
+        helper = _REDUCED[step.operation]
+        self.needs.add(helper)
+        return f"v{place} = i == 0 ? {given} : name_{helper}(v{place}, {given})"
+
+    def _total(self, place: int) -> Iterator[str]:
+        """Yield statements that sum an array by halves."""
+        (source,) = self.program.steps[place].arguments
+        count = self.program.steps[source].samples
+        half = max(1 << (count - 1).bit_length() >> 1, 1)
+        self.needs.add("total")
+        yield f"    name_real h{place}[{half}];\n"
+        yield f"    const name_real v{place} = name_total("
+        yield f"s{source}, {count}u, h{place}, {half}u);\n"
+
+    def _expression(self, step: Step) -> str:
+        operation = step.operation
+        given = [self.value(argument) for argument in step.arguments]
+        if operation == "input":
+            return f"x[{self.program.inputs.index(step.name)}]"
+        if operation in _SIGNS:
+            return f"{given[0]} {_SIGNS[operation]} {given[1]}"
+        if operation == "where":
+            return f"{given[0]} ? {given[1]} : {given[2]}"
+        if operation in ("not", "negate"):
+            return f"{'!' if operation == 'not' else '-'}{given[0]}"
+        self.needs.add(operation)
+        if operation in LIBRARY:
+            return f"{LIBRARY[operation]}({', '.join(given)})"
+        if step.table:
+            table = self._table(step.table)
+            return f"name_{operation}({table}, {len(step.table)}u, {given[0]})"
+        return f"name_{operation}({', '.join(given)})"

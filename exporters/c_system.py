@@ -1,0 +1,184 @@
+"""A fuzzy system as C: its program, straight on, and a self-test."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fuzzytree.exporters.c_steps import HELPERS, Steps
+from fuzzytree.exporters.c_text import fill, remark
+from fuzzytree.inference import infer
+from fuzzytree.probing import Row, system_probes
+from fuzzytree.programs.bounds import error_bounds
+from fuzzytree.programs.steps import Program
+from fuzzytree.programs.systems import from_system
+from fuzzytree.rulebase import fingerprint
+from fuzzytree.system import FuzzySystem, SystemInput, SystemOutput
+
+_ROWS = 64
+
+SYSTEM_TYPES = """
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum name_status {
+    NAME_DECIDED = 0,
+    NAME_UNCOVERED = 2, /* an output has no number of its own, but its default */
+    NAME_MISSING = 3 /* a value is infinite, or not a number; so are all outputs */
+};
+
+/* Compute NAME_OUTPUTS numbers of NAME_INPUTS values; return an enum name_status. */
+int name_infer(const name_real *x, name_real *outputs);
+
+#ifdef __cplusplus
+}
+#endif
+"""
+
+_MAIN = """
+static int name_is_near(name_real a, name_real b, name_real most)
+{
+    return a == b || (a != a && b != b) || (a - b <= most && b - a <= most);
+}
+
+int main(void)
+{
+    unsigned place, line, wrong = 0, count = sizeof name_example / sizeof *name_example;
+    for (place = 0; place < count; place++) {
+        union { uint64_t bits; name_real value; } made;
+        name_real x[NAME_INPUTS + 1], outputs[NAME_OUTPUTS], most[NAME_OUTPUTS];
+        name_real expected[NAME_OUTPUTS];
+        int status, is_right;
+        for (line = 0; line < NAME_INPUTS; line++) {
+            made.bits = name_example[place].x[line];
+            x[line] = made.value;
+        }
+        for (line = 0; line < NAME_OUTPUTS; line++) {
+            made.bits = name_example[place].outputs[line];
+            expected[line] = made.value;
+            made.bits = name_example[place].most[line];
+            most[line] = made.value;
+        }
+        status = name_infer(x, outputs);
+        is_right = status == name_example[place].status;
+        for (line = 0; line < NAME_OUTPUTS; line++)
+            if (!name_is_near(outputs[line], expected[line], most[line]))
+                is_right = 0;
+        if (!is_right) {
+            wrong++;
+            printf("example %u: status %d instead of %d; outputs and expected ones:",
+                place, status, name_example[place].status);
+            for (line = 0; line < NAME_OUTPUTS; line++)
+                printf(" %.17g %.17g", outputs[line], expected[line]);
+            printf("\\n");
+        }
+    }
+    printf("%u of %u examples answered as expected\\n", count - wrong, count);
+    return wrong != 0;
+}
+#endif
+"""
+
+
+def system_heading(system: FuzzySystem) -> Iterator[str]:
+    """Yield comments: what the system is called, and its variables."""
+    yield f'/* A fuzzy system, named "{remark(system.name)}". Written by fuzzytree.\n'
+    yield f" * Fingerprint: {fingerprint(system)}\n *\n * Inputs, in order:\n"
+    columns = [one for one in system.inputs if not one.parts]
+    for place, one in enumerate(columns):
+        yield f" *   x[{place}] {_described(one)}\n"
+    yield " * Outputs, in order:\n"
+    for place, output in enumerate(system.outputs):
+        yield f" *   outputs[{place}] {_described(output)}\n"
+    yield f" * Rules: {len(system.rules)}\n"
+
+
+def _described(one: SystemInput | SystemOutput) -> str:
+    return remark(f"{one.name} ({one.unit})" if one.unit else one.name)
+
+
+def system_code(
+    system: FuzzySystem, prefix: str, *, activations: bool
+) -> Iterator[str]:
+    """Yield the tables, helpers and the function of a system.
+
+    Args:
+        system: The system.
+        prefix: The beginning of all names.
+        activations: Whether the rules' degrees of activation follow the outputs.
+    """
+    program = from_system(system, activations=activations)
+    steps = Steps(program)
+    ends = list(_ends(program, steps))
+    if steps.needs_library:
+        yield "#include <math.h>\n"
+    yield "\n"
+    yield from steps.table_text(prefix)
+    for name, text in HELPERS.items():
+        if name in steps.needs:
+            yield fill(text, prefix)
+    yield fill("\nint name_infer(const name_real *x, name_real *outputs)\n{\n", prefix)
+    if any("for (i" in line for line in steps.body):
+        yield "    unsigned long i;\n"
+    if not program.inputs:
+        yield "    (void)x;\n"
+    for line in (*steps.body, *ends):
+        yield fill(line, prefix)
+    yield "}\n"
+
+
+def _ends(program: Program, steps: Steps) -> Iterator[str]:
+    numbers = [*program.of("output"), *program.of("activation")]
+    for line, place in enumerate(numbers):
+        yield f"    outputs[{line}] = {steps.value(place)};\n"
+    (status,) = program.of("status")
+    yield f"    return (int)({steps.value(status)});\n"
+
+
+def system_selftest(system: FuzzySystem, prefix: str) -> Iterator[str]:
+    """Yield the self-test of a system, behind a macro.
+
+    Outputs must be equal, or as near as functions of different libraries allow.
+    """
+    rows = system_probes(system, limit=_ROWS)
+    bounds = _bounds(system, rows)
+    inputs, outputs = max(len(system.columns), 1), len(system.outputs)
+    yield fill("\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n", prefix)
+    yield "\n/* Bits of the inputs, the outputs and their largest errors; the status.\n"
+    yield " * Errors are allowed only where a mathematical library is called. */\n"
+    yield "static const struct {\n"
+    yield f"    uint64_t x[{inputs}];\n    uint64_t outputs[{outputs}];\n"
+    yield f"    uint64_t most[{outputs}];\n    int status;\n"
+    yield fill(f"}} name_example[{len(rows)}] = {{\n", prefix)
+    for row, bound in zip(rows, bounds, strict=True):
+        found = infer(system, row)
+        given = [row[name] for name in system.columns]
+        shown = ", ".join(map(repr, given)) or "no inputs"
+        numbers = ", ".join(map(repr, found.outputs))
+        yield f"    /* {shown}: {numbers} */\n"
+        parts = ", ".join(map(_bits, (given, found.outputs, bound)))
+        yield f"    {{{parts}, {int(found.status)}}},\n"
+    yield "};\n"
+    yield fill(_MAIN, prefix)
+
+
+def _bounds(system: FuzzySystem, rows: Sequence[Row]) -> list[list[float]]:
+    """Return how far each output may be off, for each row."""
+    program = from_system(system)
+    table = np.array([[row[name] for row in rows] for name in program.inputs])
+    values = table.reshape(len(program.inputs), len(rows)).astype(np.float64)
+    found: list[list[float]] = error_bounds(program, values).T.tolist()
+    return [bounds[: len(system.outputs)] for bounds in found]
+
+
+def _bits(values: Sequence[float]) -> str:
+    words: list[str] = []
+    for value in values:
+        plain = math.nan if math.isnan(value) else value
+        (bits,) = struct.unpack("<Q", struct.pack("<d", plain))
+        words.append(f"UINT64_C({bits:#018x})")
+    return f"{{{', '.join(words) or '0'}}}"
