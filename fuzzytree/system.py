@@ -667,8 +667,10 @@ def _label_mistakes(
         texts = [*curve_mistakes(label.curve)]
         match label.curve:
             case Linear(weights=weights):
-                if len(weights) != columns:
-                    texts.append(f"{len(weights)} weights for {columns} inputs")
+                count = len(weights)
+                if count != columns:
+                    text = f"it needs a weight for each column: {columns}, not {count}"
+                    texts.append(text)
                 if not is_weighted:
                     text = "only a weighted average or sum takes a linear term"
                     texts.append(text)
@@ -819,14 +821,14 @@ def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
         of_block = f" of block {position + 1}" if len(system.blocks) > 1 else ""
         for index, rule in enumerate(block.rules):
             where = f"rule {index + 1}{of_block}"
-            texts = [
-                *_condition_mistakes(rule.when, block, terms),
-                *_conclusion_mistakes(rule.then, block, outputs, concludable),
-            ]
+            place = (*path, "rules", index)
+            for text in _condition_mistakes(rule.when, block, terms):
+                yield (*place, "when"), f"{where}: {text}"
+            for text in _conclusion_mistakes(rule.then, block, outputs, concludable):
+                yield (*place, "then"), f"{where}: {text}"
             if not 0.0 <= rule.weight <= 1.0:
-                texts.append(f"the weight must lie in [0, 1], not {rule.weight!r}")
-            for text in texts:
-                yield (*path, "rules", index), f"{where}: {text}"
+                text = f"the weight must lie in [0, 1], not {rule.weight!r}"
+                yield (*place, "weight"), f"{where}: {text}"
 
 
 def _activation_mistakes(path: Path, how: Activation) -> Iterator[Mistake]:

@@ -54,9 +54,9 @@ def records_at(
 def located(
     root: Node, mistakes: Iterable[Mistake], broken: Collection[Path] = ()
 ) -> Iterator[Found]:
-    """Yield mistakes with their places, but not those in broken variables."""
+    """Yield mistakes with their places, but not those in broken parts."""
     for path, text in mistakes:
-        if path[:2] not in broken:
+        if path[:2] not in broken and path[:4] not in broken:
             node = find(root, path)
             yield node.line, node.column, text
 

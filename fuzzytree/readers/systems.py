@@ -89,7 +89,7 @@ def read_system(root: MappingNode, found: list[Found]) -> FuzzySystem | None:
     broken: set[Path] = set()
     inputs = _inputs(kept, found, mistakes, broken)
     outputs = _outputs(kept, found, mistakes, broken)
-    blocks = _blocks(kept, found, mistakes, _spare(outputs or ()))
+    blocks = _blocks(kept, found, mistakes, broken, _spare(outputs or ()))
     found += located(root, mistakes)
     if head is None or inputs is None or outputs is None or blocks is None:
         return None
@@ -255,9 +255,13 @@ def _blocks(
     kept: Entries,
     found: list[Found],
     mistakes: list[Mistake],
+    broken: set[Path],
     spare: SystemRule | None,
 ) -> tuple[RuleBlock, ...] | None:
-    """Return the blocks; a broken one has operators that are never wrong."""
+    """Return the blocks; a broken one has operators that are never wrong.
+
+    In the place of a broken rule stands the spare one; None is returned without it.
+    """
     node = kept.get("blocks")
     if not isinstance(node, ListNode):
         if node is not None:
@@ -271,14 +275,17 @@ def _blocks(
         own = entries(item, layout.BlockOfSystem, found)
         head = record(own, layout.BlockHead, found)
         bound = records_at(own, "rules", layout.RuleOfSystem, found)
-        rules = [
-            _rule(("blocks", position, "rules", index), one, mistakes) or spare
-            for index, one in enumerate(bound or ())
-        ]
-        whole = [rule for rule in rules if rule is not None]
-        if len(whole) < len(rules):
-            return None
-        blocks.append(_block(head, tuple(whole)))
+        rules: list[SystemRule] = []
+        for index, one in enumerate(bound or ()):
+            path: Path = ("blocks", position, "rules", index)
+            rule = _rule(path, one, mistakes)
+            if rule is None:
+                broken.add(path)
+                rule = spare
+            if rule is None:
+                return None
+            rules.append(rule)
+        blocks.append(_block(head, tuple(rules)))
     return tuple(blocks)
 
 
