@@ -12,7 +12,7 @@ from fuzzytree.inference import infer
 from fuzzytree.probing import system_probes
 from fuzzytree.programs.bounds import error_bounds
 from fuzzytree.programs.systems import from_system
-from fuzzytree.runtimes import all_runtimes, find_runtime
+from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.systems import infer_rows, run_system
 from fuzzytree.system import (
     Call,
@@ -30,7 +30,9 @@ from fuzzytree.system import (
 )
 from fuzzytree.testing import random_rows, random_system
 
-RUNTIMES = [one for one in all_runtimes() if one.load_system is not None]
+RUNTIMES = [
+    one for one in all_runtimes() if one.load_system is not None and is_installed(one)
+]
 
 
 def values_of(system: FuzzySystem, rows: list[dict[str, float]]) -> np.ndarray:
@@ -46,13 +48,10 @@ def formula_system(expression: Expression) -> FuzzySystem:
     return FuzzySystem("f", (SystemInput("a"),), (output,), (RuleBlock((rule,)),))
 
 
-def test_three_runtimes_run_systems() -> None:
-    assert [one.name for one in RUNTIMES] == [
-        "reference",
-        "native",
-        "onnxruntime float64",
-    ]
-    assert all("system" in one.runs for one in RUNTIMES)
+def test_a_runtime_that_runs_systems_says_so() -> None:
+    names = [one.name for one in all_runtimes() if "system" in one.runs]
+    assert {one.name for one in RUNTIMES} <= set(names)
+    assert {"reference", "native", "onnxruntime float64"} <= set(names)
 
 
 @pytest.mark.parametrize("seed", range(30))
