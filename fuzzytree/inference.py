@@ -187,7 +187,9 @@ class _Run:
             for label in variable.labels
         }
         self.activations: list[float] = []
-        self.concluded: list[_Concluded] = []
+        self.concluded: dict[str, list[_Concluded]] = {
+            name: [] for name in self.outputs
+        }
         self.places = itertools.accumulate(
             (len(rule.then) for rule in system.rules), initial=0
         )
@@ -258,8 +260,7 @@ class _Run:
 
     def _of(self, output: SystemOutput) -> list[_Concluded]:
         """Return what was concluded of an output, in the order of the rules."""
-        found = [one for one in self.concluded if one.conclusion.output == output.name]
-        return sorted(found, key=lambda one: one.place)
+        return sorted(self.concluded[output.name], key=lambda one: one.place)
 
     def _conclude(
         self, block: RuleBlock, index: int, place: int, degree: float
@@ -271,7 +272,7 @@ class _Run:
             degree = hedges_applied(one.hedges, degree)
             if degree > 0.0:
                 noted = _Concluded(place + offset, one, degree, block.implication)
-                self.concluded.append(noted)
+                self.concluded[one.output].append(noted)
 
     def number(self, output: SystemOutput) -> float:
         """Return what an output's conclusions amount to; NaN if to nothing."""
