@@ -45,6 +45,9 @@ _NODES: Mapping[str, str] = {
 }
 """Operations that are one operator, in double in onnxruntime too."""
 
+_CHAINS: Mapping[str, str] = {"minimum": "Min", "maximum": "Max", "add": "Sum"}
+"""Operations of which an operator takes many arguments, and joins them in order."""
+
 _WORDS: Mapping[str, str] = {
     "tangent": "tan",
     "arc_sine": "asin",
@@ -92,22 +95,62 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
         A block of shape (rows,) for each result.
     """
     source = sheet.node("Transpose", "inputs", perm=[1, 0])
-    names: list[str] = []
-    for step, still in zip(program.steps, still_results(program), strict=True):
-        given = [names[place] for place in step.arguments]
-        if still is not None:
-            names.append(_constant(sheet, still))
-        elif step.operation == "input":
-            place = _whole(sheet, columns.index(step.name))
-            names.append(sheet.node("Gather", source, place))
+    still = still_results(program)
+    names: dict[int, str] = {}
+    links = _links(program, still)
+
+    def named(place: int) -> str:
+        known = still[place]
+        if known is not None and place not in names:  # only what a node takes
+            names[place] = _constant(sheet, known)
+        return names[place]
+
+    for place, step in enumerate(program.steps):
+        if still[place] is not None:
+            continue
+        if step.operation == "input":
+            row = _whole(sheet, columns.index(step.name))
+            names[place] = sheet.node("Gather", source, row)
+            continue
+        first = step.arguments[0]
+        given = [
+            named(argument) for argument in step.arguments if argument not in links
+        ]
+        given = links.get(first, []) + given
+        if place in links:
+            links[place] = given
+        elif len(given) > 2 and step.operation in _CHAINS:
+            names[place] = sheet.node(_CHAINS[step.operation], *given)
         else:
-            names.append(_node(sheet, step, given, program))
-    results = [names[result.step] for result in program.results]
-    is_still = [still_results(program)[r.step] is not None for r in program.results]
+            names[place] = _node(sheet, step, given, program)
+    places = [result.step for result in program.results]
     return [
-        _spread(sheet, source, name) if still else name
-        for name, still in zip(results, is_still, strict=True)
+        named(place) if still[place] is None else _spread(sheet, source, named(place))
+        for place in places
     ]
+
+
+def _links(program: Program, still: Sequence[Found | None]) -> dict[int, list[str]]:
+    """Return the steps that are taken only as the beginning of a chain like them.
+
+    Such a chain, `a + b + c + ...` from left to right, is one operator.
+    """
+    steps = program.steps
+    uses = [0] * len(steps)
+    for result in program.results:
+        uses[result.step] += 2
+    for step in steps:
+        for argument in step.arguments:
+            uses[argument] += 1
+    return {
+        step.arguments[0]: []
+        for step in steps
+        if step.operation in _CHAINS
+        and steps[step.arguments[0]].operation == step.operation
+        and steps[step.arguments[0]].samples == step.samples
+        and uses[step.arguments[0]] == 1
+        and still[step.arguments[0]] is None
+    }
 
 
 def _constant(sheet: Sheet, found: Found) -> str:

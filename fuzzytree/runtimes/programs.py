@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Function = Callable[..., Values]
 
 _WORKING_SET = 1 << 16  # numbers that all buffers of a chunk may hold together
-_SMALLEST_CHUNK, _LARGEST_CHUNK = 64, 1 << 13
+_SMALLEST_CHUNK, _LARGEST_CHUNK = 512, 1 << 13
 
 _UFUNCS: Mapping[str, Function] = {
     "add": np.add,
@@ -200,7 +200,7 @@ def plan_program(program: Program) -> Plan:
         tuple(calls),
         shelves,
         tuple(result.step for result in program.results),
-        min(max(rows, _SMALLEST_CHUNK), _LARGEST_CHUNK),
+        min(max(rows, 1 if widest else _SMALLEST_CHUNK), _LARGEST_CHUNK),
     )
 
 
