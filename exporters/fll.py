@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
@@ -37,7 +38,7 @@ from fuzzytree.readers.fll_meaning import differences
 from fuzzytree.readers.fll_rules import RULE_WORDS
 from fuzzytree.readers.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
 from fuzzytree.readers.lines import LONGEST_WORD
-from fuzzytree.rulebase import LR, Band, RuleBase
+from fuzzytree.rulebase import LR, Band, Points, RuleBase
 from fuzzytree.system import (
     FUNCTIONS,
     Activation,
@@ -47,10 +48,12 @@ from fuzzytree.system import (
     RuleBlock,
     SystemInput,
     SystemOutput,
+    Trapezoid,
 )
 
 _RESERVED: Final = (*RULE_WORDS, *FUNCTIONS, "fabs", "pow", "pi", "inf", "nan", "x")
 _NO_OUTPUT: Final = SystemOutput("y", (), None, None, Defuzzifier("weighted sum"))
+_FINEST: Final = 1e-3
 _TITLE: Final = "Written by fuzzytree."
 
 
@@ -238,7 +241,9 @@ def _text(system: FuzzySystem, names: _Names) -> Iterator[str]:
         yield f"  default: {float(default)!r}"
         yield "  lock-previous: false"
         yield from _terms(output, names)
-    always = f"{names.variables[system.variables[0].name]} is any"
+    # One with terms: pyfuzzylite takes a variable without them for none.
+    asked = next((one for one in system.variables if one.labels), system.outputs[0])
+    always = f"{names.variables[asked.name]} is any"
     for block in system.blocks:
         yield f"RuleBlock: {_line(block.name)}".rstrip()
         yield "  enabled: true"
@@ -309,8 +314,34 @@ def _remarks(system: FuzzySystem, names: _Names) -> Iterator[str]:
         yield f"units have no place: of {', '.join(map(repr, units[:5]))}" + (
             ", ..." if len(units) > 5 else ""
         )
+    fine = [one.name for one in system.variables if _is_fine(one)]
+    if fine:
+        yield (
+            "fuzzylite 6 takes values within 1e-6 for equal, and terms have corners "
+            f"nearly as close: of {', '.join(map(repr, fine[:5]))}"
+        )
+    yield (
+        "a missing or infinite value answers NaN here; the engines answer by the rules "
+        "that do not ask for it"
+    )
     if any(rule.name for rule in system.rules):
         yield "names of rules have no place"
+
+
+def _is_fine(variable: SystemInput | SystemOutput) -> bool:
+    """Return whether 1e-6 is more than a thousandth of a distance between corners."""
+    for label in variable.labels:
+        match label.curve:
+            case Points(values=values):
+                corners: Sequence[float] = values
+            case Trapezoid(a=a, b=b, c=c, d=d):
+                corners = [one for one in (a, b, c, d) if one is not None]
+            case _:
+                continue
+        gaps = (high - low for low, high in itertools.pairwise(corners))
+        if any(0.0 < gap < _FINEST for gap in gaps):
+            return True
+    return False
 
 
 FORMAT = Format(

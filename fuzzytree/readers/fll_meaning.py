@@ -7,8 +7,7 @@ and remarks say where fuzzylite 6 and pyfuzzylite 8 mean other things by one fil
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
-from types import MappingProxyType
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from msgspec.structs import replace
 
@@ -145,8 +144,7 @@ def differences(system: FuzzySystem) -> Iterator[str]:
             "a rule of degree 0 concludes nothing, as in fuzzylite 6; in pyfuzzylite "
             "'any' and 'not' in a conclusion make 1 of 0"
         )
-    curves = [label.curve for one in system.variables for label in one.labels]
-    yield from _curve_remarks(curves)
+    yield from _curve_remarks(system)
 
 
 def _joined_twice(output: SystemOutput, twice: Sequence[Label]) -> Iterator[str]:
@@ -187,28 +185,36 @@ def _inverse_remarks(output: SystemOutput, concluded: Sequence[Label]) -> Iterat
         )
 
 
-_TOLD = MappingProxyType(
-    {
-        "%": "'%' has the sign of its second number, as in pyfuzzylite; fuzzylite 6 "
-        "takes the first one's",
-        "min": "pyfuzzylite fails at 'min' in an output's curve",
-        "max": "pyfuzzylite fails at 'max' in an output's curve",
-        "round": "'round' takes a half to the even neighbour, as in pyfuzzylite; "
-        "fuzzylite 6 takes it away from 0",
-    }
-)
+_TRUTHS = frozenset({"le", "ge", "eq", "neq", "and", "or", "not"})
 
 
-def _curve_remarks(curves: Sequence[Curve]) -> Iterator[str]:
-    used = {
-        function
-        for curve in curves
-        if isinstance(curve, Formula)
-        for function in _functions_of(curve.expression)
-    }
-    for function, text in _TOLD.items():
-        if function in used:
-            yield f"formulas: {text}"
+def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
+    curves = [label.curve for one in system.variables for label in one.labels]
+    calls = list(_calls(curves))
+    used = {call.function for call in calls}
+    if "%" in used:
+        yield (
+            "formulas: '%' has the sign of its second number, as in pyfuzzylite; "
+            "fuzzylite 6 takes the first one's"
+        )
+    if "round" in used:
+        yield (
+            "formulas: 'round' takes a half to the even neighbour, as in pyfuzzylite; "
+            "fuzzylite 6 takes it away from 0"
+        )
+    looked_at = [
+        label.curve
+        for one in system.outputs
+        if not one.defuzzifier.is_weighted
+        for label in one.labels
+    ]
+    if {"min", "max"} & {call.function for call in _calls(looked_at)}:
+        yield "formulas: pyfuzzylite fails at 'min' and 'max' in an output's curve"
+    if any(_is_sum_of_truths(call) for call in calls):
+        yield (
+            "formulas: pyfuzzylite fails at sums of truths, or takes them for truths: "
+            "of le, ge, eq, neq, and, or, not"
+        )
     if any(isinstance(one, Concave) and one.inflection == one.end for one in curves):
         yield (
             "a Concave term that ends at its inflection is 1 above it, as in "
@@ -218,8 +224,25 @@ def _curve_remarks(curves: Sequence[Curve]) -> Iterator[str]:
         yield "fuzzylite 6 does not know Arc and SemiEllipse; pyfuzzylite does"
 
 
-def _functions_of(expression: Expression) -> Iterator[str]:
-    if isinstance(expression, Call):
-        yield expression.function
-        for argument in expression.arguments:
-            yield from _functions_of(argument)
+def _calls(curves: Iterable[Curve]) -> Iterator[Call]:
+    todo: list[Expression] = [
+        one.expression for one in curves if isinstance(one, Formula)
+    ]
+    while todo:
+        one = todo.pop()
+        if isinstance(one, Call):
+            yield one
+            todo += one.arguments
+
+
+def _is_sum_of_truths(call: Call) -> bool:
+    return call.function in ("+", "-", "negate") and all(map(_is_truth, call.arguments))
+
+
+def _is_truth(expression: Expression) -> bool:
+    """Return whether pyfuzzylite has a truth there, and no number."""
+    if not isinstance(expression, Call):
+        return False
+    if expression.function in ("*", "min", "max"):
+        return all(map(_is_truth, expression.arguments))
+    return expression.function in _TRUTHS

@@ -29,6 +29,7 @@ def plain_system(seed: int) -> FuzzySystem:
 
     Combinations become columns, unknown hedges and NOTs of several conditions go,
     curves are looked at in the middle of pieces, and bands and LR sets are trapezoids.
+    Conclusions lose `any` and `not`, by which the engines mean different things.
     """
     system = random_system(seed, has_odd_names=seed % 2 == 0)
     columns = len(system.inputs)
@@ -68,15 +69,20 @@ def _block(block: RuleBlock) -> RuleBlock:
         replace(
             rule,
             when=None if rule.when is None else _said(rule.when),
-            then=tuple(replace(one, hedges=_known(one.hedges)) for one in rule.then),
+            then=tuple(
+                replace(one, hedges=_known(one.hedges, ("any", "not")))
+                for one in rule.then
+            ),
         )
         for rule in block.rules
     )
     return replace(block, rules=rules)
 
 
-def _known(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
-    return tuple(hedge for hedge in hedges if hedge in _KNOWN)
+def _known(
+    hedges: tuple[Hedge, ...], without: tuple[Hedge, ...] = ()
+) -> tuple[Hedge, ...]:
+    return tuple(one for one in hedges if one in _KNOWN and one not in without)
 
 
 def _said(condition: Condition) -> Condition:

@@ -1,0 +1,251 @@
+"""Fuzzylite 6 and pyfuzzylite 8 run our FLL files, and we run theirs."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree import learn
+from fuzzytree.casting import Scores, pointed, winner
+from fuzzytree.exporters.fll import write
+from fuzzytree.inference import infer, input_values
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.probing import probes
+from fuzzytree.readers.fll import read
+from fuzzytree.reference import evaluate
+from fuzzytree.rulebase import (
+    Clause,
+    Kind,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
+from fuzzytree.system import FuzzySystem
+from fuzzytree.testing import random_rows, random_tree
+from tests.exporters.fll_systems import plain_system
+from tests.witnesses.corpus_fll import EXACT, corpus, corpus_table
+from tests.witnesses.fuzzylite_engine import (
+    Answers,
+    largest_difference,
+    run_library,
+    run_program,
+)
+
+ROOT = Path(__file__).parents[2]
+WINE = ROOT / "examples" / "wine" / "wine.csv"
+TIPPER = ROOT / "examples" / "tipper.fll"
+
+NEAR = 1e-2
+"""How near to the winner, at 1, fuzzylite 6 can take a rule for the winner: on axes of
+0.001 its equality within 1e-6 is a share of the slopes."""
+
+Row = Mapping[str, float]
+Need = Callable[[str], str]
+Engine = Callable[[bytes, Sequence[Sequence[float]]], Answers]
+
+
+@pytest.fixture(params=["fuzzylite 6", "pyfuzzylite 8"])
+def engine(
+    request: pytest.FixtureRequest, program: Need, library: Need, tmp_path: Path
+) -> Engine:
+    """Return how one of the two engines runs a file."""
+    if request.param == "pyfuzzylite 8":
+        library("fuzzylite")
+        return run_library
+    path = program("fuzzylite")
+    return lambda content, rows: run_program(path, content, rows, tmp_path)
+
+
+def wine_rows(inputs: Sequence[str]) -> list[Row]:
+    with WINE.open(newline="", encoding="utf-8") as file:
+        return [
+            {name: float(row[name]) for name in inputs} for row in csv.DictReader(file)
+        ]
+
+
+def finite(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows that have all values."""
+    return [row for row in rows if all(map(math.isfinite, row.values()))]
+
+
+def given(rules: RuleBase, rows: Sequence[Row]) -> list[list[float]]:
+    """Return rows with the value of each combination, as a file asks for them."""
+    from fuzzytree.casting import as_system
+
+    inputs = as_system(rules, "winner").inputs
+    return [list(input_values(inputs, row).values()) for row in rows]
+
+
+def assert_decided_alike(
+    engine: Engine, rules: RuleBase, rows: Sequence[Row], scores: Scores = "winner"
+) -> None:
+    """Compare the class of every row, and count the rules that were loaded."""
+    written = write(rules, allow_loss=True, scores=scores, tolerance=1e-4)
+    model = read(written.content, "model.fll").model
+    assert isinstance(model, RuleBase)
+    answers = engine(written.content, given(rules, rows))
+    extra = scores != "winner"
+    count = len({rule.then for rule in rules.rules}) if scores == "class" else None
+    assert answers.rules == (count or len(rules.rules)) + extra
+    for row, outputs in zip(rows, answers.outputs, strict=True):
+        assert winner(rules, outputs, scores) == evaluate(model, row).label
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(("entry", "is_mixed"), [(25.0, True), (1e9, False)])
+@pytest.mark.parametrize("kind", ["relative", "raw"])
+@pytest.mark.parametrize("scores", ["winner", "rule", "class"])
+def test_the_wine_rules_decide_alike_on_every_row(
+    engine: Engine, entry: float, is_mixed: bool, kind: Kind, scores: Scores
+) -> None:
+    tree = learn(WINE, target="cultivar", entry=entry)
+    assert any(v.parts for v in tree.variables) == is_mixed
+    rules = rules_from_tree(tree, kind)
+    rows = wine_rows(rules.inputs)
+    assert len(rows) == 178
+    assert_decided_alike(engine, rules, rows, scores)
+    if kind == "relative":
+        written = write(rules, allow_loss=True)
+        answers = engine(written.content, given(rules, rows))
+        labels = [rules.classes[round(number) - 1] for (number,) in answers.outputs]
+        assert labels == [evaluate(rules, row).label for row in rows]
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(6))
+def test_relative_rules_of_random_trees_decide_alike_at_their_edges(
+    engine: Engine, seed: int
+) -> None:
+    tree = random_tree(seed, leaves=8, combinations=0.0)
+    rules = rules_from_tree(tree)
+    rows = finite(probes(rules, limit=300))
+    written = write(rules, allow_loss=True, tolerance=1e-3)
+    answers = engine(written.content, given(rules, rows))
+    assert answers.rules == len(rules.rules)
+    for row, (number,) in zip(rows, answers.outputs, strict=True):
+        found = evaluate(rules, row)
+        strongest = sorted(found.strengths)[-2:]
+        is_near = engine is not run_library and strongest[0] > 1.0 - NEAR
+        assert is_near or rules.classes[round(number) - 1] == found.label
+
+
+UP, DOWN = Points((0.0, 1.0), (0.0, 1.0)), Points((0.0, 1.0), (1.0, 0.0))
+TIES = RuleBase(
+    "ties",
+    ("left", "right", "other"),
+    (
+        Variable("a", (Term("up", UP), Term("down", DOWN))),
+        Variable("b", (Term("up", UP), Term("down", DOWN))),
+    ),
+    (
+        Rule((Clause("a", ("up",)), Clause("b", ("up",))), "right"),
+        Rule((Clause("b", ("up",)), Clause("a", ("up",))), "left"),
+        Rule((Clause("a", ("up",)), Clause("b", ("down",))), "other"),
+    ),
+)
+
+
+@pytest.mark.parametrize("uncovered", [None, "right"])
+@pytest.mark.parametrize("scores", ["winner", "rule"])
+def test_ties_go_to_the_first_rule_and_uncovered_rows_to_the_default(
+    engine: Engine, uncovered: str | None, scores: Scores
+) -> None:
+    rules = replace(TIES, semantics=Semantics(uncovered=uncovered))
+    sides = (-0.5, 0.0, 0.25, 0.5, 0.75, 1.0, 1.5)
+    rows = [{"a": a, "b": b} for a in sides for b in sides]
+    answers = [evaluate(rules, row) for row in rows]
+    assert {one.label for one in answers} == {uncovered, "right", "other"}
+    assert_decided_alike(engine, rules, rows, scores)
+
+
+@pytest.mark.parametrize("scores", ["rule", "class"])
+def test_scores_are_the_strengths_of_rules(engine: Engine, scores: Scores) -> None:
+    rules, _ = pointed(rules_from_tree(random_tree(2, combinations=0.0), "raw"), 1e-2)
+    rows = finite(probes(rules, limit=100))
+    written = write(rules, allow_loss=True, scores=scores)
+    answers = engine(written.content, given(rules, rows))
+    for row, outputs in zip(rows, answers.outputs, strict=True):
+        strengths: dict[object, float] = {}
+        found = zip(rules.rules, evaluate(rules, row).strengths, strict=True)
+        for number, (rule, strength) in enumerate(found):
+            key = rule.then if scores == "class" else number
+            strengths[key] = max(strength, strengths.get(key, 0.0))
+        names = rules.classes if scores == "class" else range(len(rules.rules))
+        expected = [strengths.get(name, 0.0) for name in names]
+        again = [score / (1.0 - score) for score in outputs]
+        assert again == pytest.approx(expected, abs=1e-5)  # fuzzylite 6's equality
+
+
+def test_a_system_with_both_kinds_of_outputs_answers_alike(engine: Engine) -> None:
+    system = read(TIPPER.read_bytes(), "tipper.fll").model
+    assert isinstance(system, FuzzySystem)
+    rows = random_rows(system, 7, 40)
+    answers = engine(write(system).content, [list(row.values()) for row in rows])
+    assert answers.rules == len(system.rules)
+    ours = [infer(system, row).outputs for row in rows]
+    assert largest_difference(ours, answers.outputs) < 1e-5  # fuzzylite 6's equality
+
+
+TOLD = ("pyfuzzylite fails", "in pyfuzzylite", "pyfuzzylite adds")
+"""Remarks by which pyfuzzylite's answers may be others."""
+
+
+def is_sure(system: FuzzySystem, row: Row) -> bool:
+    """Return whether no rounding decides, and no degree is beyond what degrees are."""
+    found = infer(system, row)
+    methods = {one.defuzzifier.method for one in system.outputs}
+    is_smooth = methods <= {"centroid", "weighted average", "weighted sum"}
+    return is_smooth and all(one <= 1.0 for one in found.activations)
+
+
+@pytest.mark.heavy
+def test_random_systems_answer_alike_in_pyfuzzylite_or_a_remark_says_why(
+    library: Need,
+) -> None:
+    library("fuzzylite")
+    compared = others = 0
+    for seed in range(400):
+        system = plain_system(seed)
+        written = write(system)
+        assert written.losses == ()
+        if any(told in remark for told in TOLD for remark in written.remarks):
+            continue
+        rows = random_rows(system, seed, 6)
+        answers = run_library(written.content, [list(row.values()) for row in rows])
+        assert answers.rules == len(system.rules)
+        for row, theirs in zip(rows, answers.outputs, strict=True):
+            ours = infer(system, row).outputs
+            size = max([1.0, *(abs(one) for one in ours if math.isfinite(one))])
+            is_alike = largest_difference([ours], [theirs]) <= 1e-9 * size
+            assert is_alike or not is_sure(system, row), seed
+            compared += 1
+            others += not is_alike
+    assert compared >= 600
+    assert others <= 0.02 * compared
+
+
+@pytest.mark.heavy
+def test_every_file_that_fuzzylite_and_pyfuzzylite_ship_is_read_and_run_alike(
+    program: Need, library: Need, tmp_path: Path
+) -> None:
+    path = program("fuzzylite")
+    library("fuzzylite")
+    names = [name for name, _ in corpus()]
+    assert sum(name.startswith("Debian") for name in names) == 31
+    assert sum(name.startswith("pyfuzzylite") for name in names) == 61
+    for row in corpus_table(path, tmp_path):
+        assert row.rules > 0, row.reason
+        assert set(row.loaded) == {row.rules}, row.file
+        assert row.library is not None
+        assert row.library <= EXACT, row
+        assert row.onnx is not None
+        assert row.onnx <= EXACT, row
+        assert row.is_alike or row.reason, row
