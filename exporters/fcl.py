@@ -1,0 +1,463 @@
+"""FCL (IEC 61131-7) in four dialects: rule bases and fuzzy systems.
+
+`docs/fcl.md` says which engine reads which dialect, and where they differ.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from fuzzytree.casting import (
+    Scores,
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    flattened,
+    pointed,
+)
+from fuzzytree.casting.scores import Always
+from fuzzytree.contracts import Format, Loss, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.fcl_checklist import check_list
+from fuzzytree.exporters.fcl_dialects import WORDS, Dialect, Words
+from fuzzytree.exporters.fcl_rules import (
+    block_lines,
+    names_of_rules,
+    norm_losses,
+    rule_losses,
+    uses,
+    with_conditions,
+)
+from fuzzytree.exporters.fcl_terms import (
+    as_points,
+    number,
+    plain_linear,
+    term_text,
+    unspeakable,
+)
+from fuzzytree.exporters.fll_rules import speakable
+from fuzzytree.naming import Names
+from fuzzytree.readers.fcl import FACTS, read
+from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, MARK, PAIRS
+from fuzzytree.readers.fcl_variables import deviations
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.system import (
+    And,
+    FuzzySystem,
+    Or,
+    SystemInput,
+    SystemOutput,
+    questions,
+)
+
+__all__ = ["FORMAT", "check_list", "write"]
+
+_TITLE: Final = "Written by fuzzytree."
+
+
+def write(
+    model: RuleBase | FuzzySystem,
+    /,
+    *,
+    allow_loss: bool = False,
+    dialect: Dialect = "portable",
+    scores: Scores = "rule",
+    tolerance: float = 1e-6,
+    checklist: bool = False,
+) -> Written:
+    """Return a rule base or a system as an FCL file, in UTF-8.
+
+    Args:
+        model: The model.
+        allow_loss: Whether to write what the dialect cannot hold as near as it can.
+        dialect: `portable` is read alike by fuzzylite 6, jFuzzyLogic and JFML.
+        scores: What the outputs say of a rule base: a score for each rule (`rule`) or
+            class (`class`); see `fuzzytree.casting.scores`.
+        tolerance: The largest error of a degree where points stand for a curve.
+        checklist: Whether the standard's data check list is added as comments.
+
+    Raises:
+        LossError: If something would be lost, unless allowed; and always if rules,
+            terms or methods have no place in the dialect.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
+        >>> text = write(rules, allow_loss=True).content.decode()
+        >>> text.splitlines()[0]
+        '// FCL, dialect portable'
+    """
+    words = WORDS[dialect]
+    losses: list[Loss] = []
+    remarks: list[str] = []
+    facts = ""
+    if isinstance(model, RuleBase):
+        _check_scores(scores)
+        always: Always = "any" if words.has_hedges else "term"
+        rules, lost = pointed(model, tolerance)
+        losses += [*cast_losses(model, scores), *lost]
+        system = as_system(rules, scores, always=always)
+        remarks += cast_remarks(model, scores)
+        if model.kind == "relative" and lost:
+            remarks.append(
+                "the decisions are exact: every term is 1 where it was, and less "
+                "elsewhere, so the same rule wins in every row"
+            )
+        facts = FACTS + facts_of(rules, scores, always=always)
+    else:
+        system = plain_linear(model) if dialect == "jfuzzylogic" else model
+        system = with_conditions(system, words)
+        if system != model:
+            remarks.append(
+                "rules without a condition, or weighted sums, were rewritten"
+            )
+    system, lost = flattened(system)
+    losses += lost
+    system, more = as_points(system, words, tolerance)
+    losses += [*more, *_losses(system, words)]
+    if losses and not allow_loss:
+        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
+        raise LossError(f"cannot write {model.name} as fcl without loss:\n{listed}")
+    system = _refused(system, words)
+    names = _naming(system, words)
+    comments = [one for one in (MARK + dialect, facts) if one]
+    if checklist:
+        comments += [f" {line}" for line in check_list(system).splitlines()]
+    comments.append(f" {_TITLE}")
+    lines = [*(_comment(one, words) for one in comments), *_text(system, names, words)]
+    remarks += _remarks(system, names, words)
+    text = "\n".join(lines) + "\n"
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks))
+
+
+def _check_scores(scores: Scores) -> None:
+    if scores == "winner":
+        raise LossError(
+            "FCL activates all rules, and not the strongest alone; pass scores=rule "
+            "or scores=class"
+        )
+
+
+def _comment(text: str, words: Words) -> str:
+    if words.name == "iec":
+        return f"(*{text} *)"
+    return f"//{text}"
+
+
+class _Names(msgspec.Struct, frozen=True):
+    """The names in a file: of variables, blocks, and of the labels of each variable."""
+
+    system: str
+    variables: Names
+    labels: Mapping[str, Names]
+    blocks: tuple[str, ...]
+
+    def speak(self, variable: str, label: str | None) -> tuple[str, str]:
+        """Return the words for a variable and one of its labels."""
+        term = "any" if label is None else self.labels[variable][label]
+        return self.variables[variable], term
+
+    def changed(self) -> dict[str, str]:
+        """Return the names that are others in the file."""
+        found = dict(self.variables.changed)
+        for names in self.labels.values():
+            found.update(names.changed)
+        return found
+
+
+def _naming(system: FuzzySystem, words: Words) -> _Names:
+    def named(names: list[str], taken: Iterable[str] = ()) -> Names:
+        return Names.of(
+            names,
+            taken=taken,
+            first="abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
+            reserved=words.reserved,
+            ignores_case=words.ignores_case,
+        )
+
+    blocks = [one.name or f"block_{k}" for k, one in enumerate(system.blocks, 1)]
+    variables = named([one.name for one in system.variables])
+    return _Names(
+        system=named([system.name], variables.accepted.values())[system.name],
+        variables=variables,
+        labels={
+            one.name: named([label.name for label in one.labels])
+            for one in system.variables
+        },
+        blocks=tuple(named([name])[name] for name in blocks),
+    )
+
+
+def _losses(system: FuzzySystem, words: Words) -> Iterator[Loss]:
+    """Yield what an answer depends on and the dialect cannot say."""
+    default = DEFUZZIFIERS[words.name]
+    for one in system.inputs:
+        if one.clips:
+            yield Loss(f"input {one.name!r}", "its values are not held in its range")
+    for output in system.outputs:
+        where = f"output {output.name!r}"
+        how = output.defuzzifier
+        if not how.is_weighted and (how.samples, how.grid) != (
+            default.samples,
+            default.grid,
+        ):
+            yield Loss(
+                where,
+                f"{how.samples} values of its range are looked at; FCL does not say "
+                f"how many, {words.name} means {default.samples}",
+            )
+        if output.clips and words.name != "fuzzylite":
+            yield Loss(where, "its answer is not held in its range")
+        if not _says_nothing(output, words) and not _is_always_concluded(
+            output, system
+        ):
+            yield Loss(where, "NaN where no rule fires: engines keep the value before")
+        if words.name == "fuzzylite":
+            yield from deviations(output)
+        yield from _accu_losses(output, system, words)
+    yield from rule_losses(system, words)
+    for k, block in enumerate(system.blocks, 1):
+        pairs = JFUZZYLOGIC_PAIRS if words.name == "jfuzzylogic" else PAIRS
+        both = [
+            any(uses(rule.when, kind) for rule in block.rules) for kind in (And, Or)
+        ]
+        norm = block.conjunction
+        if not words.has_pair or not all(both) or norm is None:
+            continue
+        if pairs[norm] != block.disjunction:
+            what = f"AND {norm!r} brings OR {pairs[norm]!r} with it, and not "
+            yield Loss(f"rule block {k}", what + repr(block.disjunction))
+
+
+def _says_nothing(output: SystemOutput, words: Words) -> bool:
+    """Return whether a file can say what an output answers where no rule fires."""
+    return output.default is not None or words.name in ("fuzzylite", "iec")
+
+
+def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
+    """Return whether some rule concludes an output for every row."""
+    constants = {
+        (one.name, label.name)
+        for one in system.inputs
+        for label in one.labels
+        if set(getattr(label.curve, "degrees", ())) == {1.0}
+    }
+    for rule in system.rules:
+        if rule.weight == 0.0 or output.name not in {one.output for one in rule.then}:
+            continue
+        asked = list(questions(rule.when))
+        if all(
+            (one.variable, one.label) in constants or one.hedges == ("any",)
+            for one in asked
+        ):
+            return not any(one.hedges and one.label for one in asked)
+    return False
+
+
+def _accu_losses(
+    output: SystemOutput, system: FuzzySystem, words: Words
+) -> Iterator[Loss]:
+    """Yield what an output's aggregation means that the dialect cannot say."""
+    where = f"output {output.name!r}"
+    counts = Counter(
+        one.label
+        for rule in system.rules
+        for one in rule.then
+        if one.output == output.name
+    )
+    if output.defuzzifier.is_weighted and max(counts.values(), default=0) < 2:
+        return
+    norm = output.aggregation
+    if norm is None:
+        if words.name == "iec":
+            yield Loss(where, "the standard has no ACCU that sums; none is written")
+        return
+    sums_all = output.defuzzifier.is_weighted and not _has_accu(words)
+    if sums_all:
+        what = f"numbers are summed, and not joined by {norm!r} term by term"
+        yield Loss(where, what)
+        return
+    if words.name == "fuzzylite":
+        return
+    others = {
+        one.aggregation
+        for one in system.outputs
+        for block in system.blocks
+        if {one.name, output.name} <= {t.output for r in block.rules for t in r.then}
+        and not (one.defuzzifier.is_weighted and one.aggregation is None)
+    }
+    if len(others) > 1:
+        what = "its block has one ACCU for all outputs, and that is another one"
+        yield Loss(where, what)
+
+
+def _has_accu(words: Words) -> bool:
+    """Return whether ACCU counts where numbers are weighted."""
+    return words.name in ("iec", "jfuzzylogic")
+
+
+def _refused(system: FuzzySystem, words: Words) -> FuzzySystem:
+    """Return a system that the dialect has words for.
+
+    Raises:
+        LossError: With everything that has no place.
+    """
+    reasons = list(unspeakable(system, words))
+    for output in system.outputs:
+        where = f"output {output.name!r}"
+        method = output.defuzzifier.method
+        if method not in words.methods:
+            reason = f"the dialect {words.name} has no {method}"
+            if words.name == "portable" and not output.defuzzifier.is_weighted:
+                reason += (
+                    ": fuzzylite and jFuzzyLogic read no file with curves of outputs "
+                    "alike; pass dialect=fuzzylite, jfuzzylogic or iec"
+                )
+            reasons.append(f"{where}: {reason}")
+        norm = output.aggregation
+        is_curve = not output.defuzzifier.is_weighted
+        if is_curve and norm is not None and norm not in words.accus and words.accus:
+            reasons.append(f"{where}: the dialect {words.name} has no ACCU {norm!r}")
+    blocks = list(system.blocks)
+    for k, block in enumerate(system.blocks, 1):
+        reasons += norm_losses(block, k, words)
+        act = block.implication
+        if act is not None and act not in words.acts and words.acts:
+            reasons.append(f"rule block {k}: {words.name} has no ACT {act!r}")
+        if not words.has_not:
+            try:
+                blocks[k - 1] = speakable(block)
+            except LossError as error:
+                reasons.append(f"rule block {k}: {error}")
+    if any(rule.when is None for rule in system.rules) and not system.inputs:
+        reasons.append("a rule without a condition needs an input that it can ask")
+    if reasons:
+        listed = "\n".join(f"  {one}" for one in reasons)
+        raise LossError(f"cannot write {system.name} as fcl:\n{listed}")
+    return replace(system, blocks=tuple(blocks))
+
+
+def _text(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
+    """Yield the lines of a file."""
+    yield f"FUNCTION_BLOCK {names.system}"
+    yield "VAR_INPUT"
+    for one in system.inputs:
+        yield f"  {names.variables[one.name]} : REAL;"
+        if words.name == "jfuzzylogic":
+            yield from _range(one, words)
+    yield "END_VAR"
+    yield "VAR_OUTPUT"
+    for output in system.outputs:
+        yield f"  {names.variables[output.name]} : REAL;"
+    yield "END_VAR"
+    for one in system.inputs:
+        yield f"FUZZIFY {names.variables[one.name]}"
+        if words.name == "fuzzylite":
+            yield from _range(one, words)
+        yield from _terms(one, names, words)
+        yield "END_FUZZIFY"
+    for output in system.outputs:
+        yield from _defuzzify(output, names, words)
+    always = ""
+    if system.inputs:
+        always = f"{names.variables[system.inputs[0].name]} is any"
+    for block, name in zip(system.blocks, names.blocks, strict=True):
+        outputs = {one.output for rule in block.rules for one in rule.then}
+        accu = ""
+        if _has_accu(words):
+            accu = _accu(system, outputs, words)
+        yield from block_lines(block, name, words, names.speak, always, accu)
+    yield "END_FUNCTION_BLOCK"
+
+
+def _accu(system: FuzzySystem, outputs: set[str], words: Words) -> str:
+    for output in system.outputs:
+        norm = output.aggregation
+        if output.name in outputs and norm is not None and norm in words.accus:
+            return words.accus[norm]
+    return ""
+
+
+def _range(variable: SystemInput | SystemOutput, words: Words) -> Iterator[str]:
+    low, high = variable.low, variable.high
+    if low is not None and high is not None:
+        yield f"  RANGE := ({number(low)} .. {number(high)});"
+    elif words.name == "fuzzylite" and (low is not None or high is not None):
+        first = "-inf" if low is None else number(low)
+        last = "inf" if high is None else number(high)
+        yield f"  RANGE := ({first} .. {last});"
+
+
+def _terms(
+    variable: SystemInput | SystemOutput, names: _Names, words: Words
+) -> Iterator[str]:
+    for label in variable.labels:
+        name = names.labels[variable.name][label.name]
+        text = term_text(variable, label, words, names.variables.accepted)
+        yield f"  TERM {name} := {text};"
+
+
+def _defuzzify(output: SystemOutput, names: _Names, words: Words) -> Iterator[str]:
+    yield f"DEFUZZIFY {names.variables[output.name]}"
+    yield from _terms(output, names, words)
+    yield f"  METHOD : {words.methods[output.defuzzifier.method]};"
+    if words.name == "fuzzylite" and output.aggregation is not None:
+        yield f"  ACCU : {words.accus[output.aggregation]};"
+    if output.default is not None:
+        yield f"  DEFAULT := {number(output.default)};"
+    elif words.name == "fuzzylite":
+        yield "  DEFAULT := nan;"
+    if output.clips and words.name == "fuzzylite":
+        yield "  LOCK : RANGE;"
+    yield from _range(output, words)
+    yield "END_DEFUZZIFY"
+
+
+def _remarks(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
+    """Yield what else has no place in the file or has another form there."""
+    pairs = [f"{name!r} is {found}" for name, found in names.changed().items()]
+    if pairs:
+        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
+        yield f"names were changed: {shown}"
+    if any(one.unit for one in system.variables) or system.note:
+        yield "units and the note of the system have no place"
+    if names_of_rules(system.rules):
+        yield "names of rules have no place"
+    ranged = [one.name for one in system.inputs if one.low is not None]
+    if ranged and words.name in ("portable", "iec"):
+        yield f"ranges of inputs have no place: of {', '.join(map(repr, ranged[:5]))}"
+    if words.is_lower:
+        yield "fuzzylite 6 takes a value within 1e-6 of a point for that point"
+    is_curved = any(not one.defuzzifier.is_weighted for one in system.outputs)
+    if words.name == "jfuzzylogic" and is_curved:
+        yield (
+            "jFuzzyLogic looks at the low ends of 1000 pieces of a range, and not at "
+            "their middle: its answers are up to half a piece lower"
+        )
+    if words.name == "portable" and any(uses(rule.when, Or) for rule in system.rules):
+        yield "OR goes beyond what JFML reads: of its readers only the others agree"
+
+
+FORMAT = Format(
+    name="fcl",
+    suffixes=(".fcl",),
+    carries=("rules", "system"),
+    write=write,
+    read=read,
+    cannot=(
+        "a combination of columns; it becomes an input, to be given as its sum",
+        "polynomial flanks and LR sets; they become points",
+        "the strongest rule alone; each rule has a score, and the highest one wins",
+        "how many values of a range are looked at",
+        "inputs that are held in their range",
+        "portable: outputs with curves, hedges, more than one form of ACCU",
+    ),
+    dtype="float64",
+)

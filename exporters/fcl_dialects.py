@@ -1,0 +1,199 @@
+"""What each dialect of FCL has words for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, Literal
+
+import msgspec
+
+from fuzzytree.exporters.fll_terms import KNOWN
+from fuzzytree.system import (
+    FUNCTIONS,
+    Arc,
+    Bell,
+    Cosine,
+    DefuzzifierMethod,
+    Gaussian,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    Singleton,
+    SNorm,
+    TNorm,
+    Trapezoid,
+    TwoGaussians,
+)
+
+Dialect = Literal["portable", "iec", "fuzzylite", "jfuzzylogic"]
+
+
+class Words(msgspec.Struct, frozen=True):
+    """The words of a dialect, and what it can do.
+
+    Attributes:
+        name: The dialect.
+        ands: The words for AND.
+        ors: The words for OR.
+        acts: The words for ACT.
+        accus: The words for ACCU.
+        methods: The words for METHOD.
+        curves: The classes of curves that it has, beside points.
+        joiner: What stands between conclusions; empty where a rule has one.
+        is_lower: Whether rules are written in lower case, and have no `;`.
+        has_hedges: Whether it knows fuzzylite's hedges.
+        has_not: Whether NOT can stand before parentheses.
+        has_pair: Whether AND and OR belong together, so that one brings the other.
+        reserved: Words that are no names.
+        ignores_case: Whether names that differ only in case are alike.
+    """
+
+    name: Dialect
+    ands: Mapping[TNorm, str]
+    ors: Mapping[SNorm, str]
+    acts: Mapping[TNorm, str]
+    accus: Mapping[SNorm, str]
+    methods: Mapping[DefuzzifierMethod, str]
+    curves: tuple[type, ...] = ()
+    joiner: str = ", "
+    is_lower: bool = False
+    has_hedges: bool = False
+    has_not: bool = True
+    has_pair: bool = True
+    reserved: tuple[str, ...] = ()
+    ignores_case: bool = False
+
+
+_ANDS: Mapping[TNorm, str] = {
+    "minimum": "MIN",
+    "product": "PROD",
+    "bounded difference": "BDIF",
+}
+_ORS: Mapping[SNorm, str] = {
+    "maximum": "MAX",
+    "algebraic sum": "ASUM",
+    "bounded sum": "BSUM",
+}
+_ACTS: Mapping[TNorm, str] = {"minimum": "MIN", "product": "PROD"}
+_ACCUS: Mapping[SNorm, str] = {
+    "maximum": "MAX",
+    "bounded sum": "BSUM",
+    "normalized sum": "NSUM",
+}
+_METHODS: Mapping[DefuzzifierMethod, str] = {
+    "weighted average": "COGS",
+    "centroid": "COG",
+    "bisector": "COA",
+    "smallest of maximum": "LM",
+    "largest of maximum": "RM",
+}
+_FUZZYLITE_ANDS: Mapping[TNorm, str] = {
+    **_ANDS,
+    "drastic product": "DPROD",
+    "einstein product": "EPROD",
+    "hamacher product": "HPROD",
+    "nilpotent minimum": "NMIN",
+}
+_FUZZYLITE_ORS: Mapping[SNorm, str] = {
+    **_ORS,
+    "drastic sum": "DSUM",
+    "einstein sum": "ESUM",
+    "hamacher sum": "HSUM",
+    "nilpotent maximum": "NMAX",
+    "normalized sum": "NSUM",
+    "sum": "UnboundedSum",
+}
+
+_STANDARD: Final = (
+    *("accu", "act", "and", "asum", "bdif", "bsum", "coa", "cog", "cogs", "default"),
+    *("defuzzify", "end_defuzzify", "end_function_block", "end_fuzzify", "end_options"),
+    *("end_ruleblock", "end_var", "function_block", "fuzzify", "if", "is", "lm", "max"),
+    *("method", "min", "nc", "not", "nsum", "options", "or", "prod", "range", "real"),
+    *("rm", "rule", "ruleblock", "term", "then", "var_input", "var_output", "with"),
+    *("var", "int", "bool", "true", "false", "enabled", "lock", "any"),
+)
+_JFUZZYLOGIC: Final = (
+    *_STANDARD,
+    *("abs", "cosine", "cogf", "cos", "dmax", "dmin", "dsigm", "einstein", "exp"),
+    *("hamacher", "function", "gauss", "gauss2", "gbell", "ln", "log", "nipmin"),
+    *("nipmax", "mm", "probor", "sigm", "sin", "singletons", "sum", "tan", "trape"),
+    *("trian", "x"),
+)
+_FUZZYLITE: Final = (
+    *_STANDARD,
+    *FUNCTIONS,
+    *("fabs", "pow", "pi", "inf", "nan", "x", "very", "somewhat", "extremely"),
+    *("seldom", "previous"),
+)
+
+WORDS: Mapping[Dialect, Words] = MappingProxyType(
+    {
+        "portable": Words(
+            name="portable",
+            ands=_ANDS,
+            ors=_ORS,
+            acts={},
+            accus={},
+            methods={"weighted average": "COGS"},
+            joiner="",
+            is_lower=True,
+            has_not=False,
+            reserved=(*_FUZZYLITE, *_JFUZZYLOGIC),
+            ignores_case=True,
+        ),
+        "iec": Words(
+            name="iec",
+            ands=_ANDS,
+            ors=_ORS,
+            acts=_ACTS,
+            accus=_ACCUS,
+            methods=_METHODS,
+            reserved=_STANDARD,
+            ignores_case=True,
+        ),
+        "fuzzylite": Words(
+            name="fuzzylite",
+            ands=_FUZZYLITE_ANDS,
+            ors=_FUZZYLITE_ORS,
+            acts=_FUZZYLITE_ANDS,
+            accus=_FUZZYLITE_ORS,
+            methods={
+                **_METHODS,
+                "mean of maximum": "MM",
+                "weighted sum": "COGSS",
+            },
+            curves=tuple(one for one in KNOWN if one not in (Arc, SemiEllipse)),
+            joiner=" and ",
+            is_lower=True,
+            has_hedges=True,
+            has_not=False,
+            has_pair=False,
+            reserved=_FUZZYLITE,
+        ),
+        "jfuzzylogic": Words(
+            name="jfuzzylogic",
+            ands={
+                **_ANDS,
+                "drastic product": "DMIN",
+                "nilpotent minimum": "NIPMIN",
+                "hamacher product": "HAMACHER",
+            },
+            ors={
+                **_ORS,
+                "drastic sum": "DMAX",
+                "nilpotent maximum": "NIPMAX",
+                "einstein sum": "EINSTEIN",
+            },
+            acts=_ACTS,
+            accus={**_ACCUS, "algebraic sum": "PROBOR", "sum": "SUM"},
+            methods={**_METHODS, "mean of maximum": "MM"},
+            curves=(
+                *(Trapezoid, Gaussian, TwoGaussians, Bell, Sigmoid, Cosine),
+                *(SigmoidDifference, Singleton),
+            ),
+            reserved=_JFUZZYLOGIC,
+        ),
+    }
+)
+"""The words of every dialect."""

@@ -1,0 +1,195 @@
+"""Rules of FCL, and what their blocks say about operators."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from msgspec.structs import replace
+
+from fuzzytree.contracts import Loss
+from fuzzytree.exporters.fcl_dialects import Words
+from fuzzytree.exporters.fll_rules import Speak, hedge_losses, rule_text
+from fuzzytree.naming import unlike
+from fuzzytree.rulebase import Points
+from fuzzytree.system import (
+    And,
+    Condition,
+    FuzzySystem,
+    Hedge,
+    Is,
+    Label,
+    Not,
+    Or,
+    RuleBlock,
+    SystemRule,
+    questions,
+)
+
+
+def with_conditions(system: FuzzySystem, words: Words) -> FuzzySystem:
+    """Return a system whose rules all have a condition.
+
+    One that has none asks whether the first input is a term of degree 1 everywhere.
+    """
+    rules = [rule for block in system.blocks for rule in block.rules]
+    is_needed = any(rule.when is None for rule in rules)
+    if words.has_hedges or not is_needed or not system.inputs:
+        return system
+    first = system.inputs[0]
+    name = unlike("always", [label.name for label in first.labels])
+    label = Label(name, Points((0.0,), (1.0,)))
+    always = Is(first.name, name)
+    return replace(
+        system,
+        inputs=(replace(first, labels=(*first.labels, label)), *system.inputs[1:]),
+        blocks=tuple(
+            replace(
+                block,
+                rules=tuple(
+                    rule if rule.when is not None else replace(rule, when=always)
+                    for rule in block.rules
+                ),
+            )
+            for block in system.blocks
+        ),
+    )
+
+
+def block_lines(
+    block: RuleBlock, name: str, words: Words, speak: Speak, always: str, accu: str
+) -> Iterator[str]:
+    """Yield the lines of a block of rules.
+
+    Args:
+        block: The block; what the dialect has no words for was refused before.
+        name: Its name.
+        words: The dialect.
+        speak: The words for a variable and one of its labels.
+        always: What a rule without a condition asks.
+        accu: The word for ACCU; empty for none.
+    """
+    yield f"RULEBLOCK {name}"
+    yield from (f"  {line}" for line in _operators(block, words))
+    if block.implication is not None and block.implication in words.acts:
+        yield f"  ACT : {words.acts[block.implication]};"
+    if accu:
+        yield f"  ACCU : {accu};"
+    for number, rule in enumerate(block.rules, 1):
+        if words.joiner:
+            yield f"  RULE {number} : {_text(rule, words, speak, always)}"
+            continue
+        for one in rule.then:
+            alone = replace(rule, then=(one,))
+            yield f"  RULE {number} : {_text(alone, words, speak, always)}"
+    yield "END_RULEBLOCK"
+
+
+def _operators(block: RuleBlock, words: Words) -> Iterator[str]:
+    """Yield the lines for OR and AND: in this order, for the last one counts."""
+    uses_or = any(uses(rule.when, Or) for rule in block.rules)
+    uses_and = any(uses(rule.when, And) for rule in block.rules)
+    # The standard has one line for both; others read OR, and then AND.
+    says_or = uses_or if words.has_pair else True
+    says_and = True
+    if words.name == "iec":
+        says_or, says_and = uses_or and not uses_and, uses_and or not uses_or
+    if says_or and block.disjunction in words.ors and block.disjunction is not None:
+        yield f"OR : {words.ors[block.disjunction]};"
+    if says_and and block.conjunction in words.ands and block.conjunction is not None:
+        yield f"AND : {words.ands[block.conjunction]};"
+
+
+def _text(rule: SystemRule, words: Words, speak: Speak, always: str) -> str:
+    if words.is_lower:
+        end = ";" if words.name == "portable" else ""
+        return rule_text(rule, speak, always) + end
+    when = always if rule.when is None else _condition(rule.when, speak, 0)
+    then = words.joiner.join(
+        _asked(Is(one.output, one.label), speak) for one in rule.then
+    )
+    weight = "" if rule.weight == 1.0 else f" WITH {float(rule.weight)!r}"
+    return f"IF {when} THEN {then}{weight};"
+
+
+def _condition(condition: Condition, speak: Speak, level: int) -> str:
+    """Return a condition; what is nested always has parentheses."""
+    match condition:
+        case Is():
+            return _asked(condition, speak)
+        case Not(part=Is(hedges=()) as part):
+            return f"NOT ({_asked(part, speak)})"
+        case Not(part=part):
+            inner = _condition(part, speak, 0)
+            return f"NOT ({inner})"
+        case And(parts=parts) | Or(parts=parts):
+            word = " AND " if isinstance(condition, And) else " OR "
+            text = word.join(_condition(part, speak, level + 1) for part in parts)
+            return f"({text})" if level and len(parts) > 1 else text
+
+
+def _asked(one: Is, speak: Speak) -> str:
+    name, term = speak(one.variable, one.label)
+    hedges = [hedge for hedge in one.hedges if hedge == "not"]
+    text = f"{name} IS {'NOT ' if hedges else ''}{term}"
+    for _ in hedges[1:]:
+        text = f"NOT ({text})"
+    return text
+
+
+def uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
+    """Return whether a condition has an AND, or an OR, of several parts."""
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            is_one = isinstance(condition, kind) and len(parts) > 1
+            return is_one or any(uses(part, kind) for part in parts)
+        case Not(part=part):
+            return uses(part, kind)
+        case _:
+            return False
+
+
+def rule_losses(system: FuzzySystem, words: Words) -> Iterator[Loss]:
+    """Yield what rules say and the dialect has no words for."""
+    rules = system.rules
+    if words.has_hedges:
+        yield from hedge_losses(rules)
+        return
+    outputs = {one.name for one in system.outputs}
+    for number, rule in enumerate(rules, 1):
+        unknown = sorted({hedge for hedge in _hedges(rule) if hedge != "not"})
+        then = sorted({hedge for one in rule.then for hedge in one.hedges})
+        if unknown or then:
+            names = ", ".join(map(repr, [*unknown, *then]))
+            what = f"the dialect {words.name} has no {names}: left out"
+            yield Loss(f"rule {number}", what)
+        asked = {one.variable for one in questions(rule.when)} & outputs
+        if asked:
+            names = ", ".join(map(repr, sorted(asked)))
+            what = f"engines ask the value of {names}, and not how far it is concluded"
+            yield Loss(f"rule {number}", what)
+
+
+def _hedges(rule: SystemRule) -> Iterator[Hedge]:
+    for one in questions(rule.when):
+        yield from one.hedges
+
+
+def norm_losses(block: RuleBlock, number: int, words: Words) -> Iterator[str]:
+    """Yield the operators of a block that the dialect has no words for."""
+    where = f"rule block {number}"
+    uses_and = any(uses(rule.when, And) for rule in block.rules)
+    uses_or = any(uses(rule.when, Or) for rule in block.rules)
+    if uses_and and block.conjunction not in words.ands:
+        yield f"{where}: the dialect {words.name} has no AND {block.conjunction!r}"
+    if uses_or and block.disjunction not in words.ors:
+        yield f"{where}: the dialect {words.name} has no OR {block.disjunction!r}"
+    if block.activation.method != "general":
+        yield (
+            f"{where}: FCL activates all rules, and not {block.activation.method!r} "
+            "ones; a rule base can be written with scores=rule"
+        )
+
+
+def names_of_rules(rules: Sequence[SystemRule]) -> bool:
+    """Return whether some rule has a name, for which FCL has no place."""
+    return any(rule.name for rule in rules)

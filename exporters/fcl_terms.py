@@ -1,0 +1,227 @@
+"""Terms of FCL: numbers, lists of points, and the curves that a dialect has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from msgspec.structs import replace
+
+from fuzzytree.casting.points import EXACT, points_for
+from fuzzytree.contracts import Loss
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.fcl_dialects import Words
+from fuzzytree.exporters.fll_terms import degree_text, number_text, weighted_type
+from fuzzytree.rulebase import Points
+from fuzzytree.system import (
+    Bell,
+    Call,
+    Cosine,
+    Curve,
+    Expression,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Label,
+    Linear,
+    Name,
+    Number,
+    Sigmoid,
+    SigmoidDifference,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    Trapezoid,
+    TwoGaussians,
+)
+
+Names = Mapping[str, str]
+
+
+def number(value: float) -> str:
+    """Return a number in the fewest digits that read back as the same double."""
+    return repr(float(value))
+
+
+def term_text(
+    variable: SystemInput | SystemOutput, label: Label, words: Words, names: Names
+) -> str | None:
+    """Return the curve of a label; None if the dialect has none for it.
+
+    Args:
+        variable: Whose label it is.
+        label: The label; a curve that the dialect lacks has become points.
+        words: The dialect.
+        names: The names of variables in the file, for formulas.
+    """
+    is_weighted = (
+        isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted
+    )
+    curve = label.curve
+    if isinstance(curve, Singleton) and (is_weighted or words.name == "jfuzzylogic"):
+        return number(curve.value)
+    if isinstance(curve, Points) and not is_weighted and label.height == 1.0:
+        pairs = zip(curve.values, curve.degrees, strict=True)
+        return " ".join(f"({number(x)}, {number(y)})" for x, y in pairs)
+    if words.name == "fuzzylite":
+        if isinstance(variable, SystemOutput) and is_weighted:
+            return number_text(label, weighted_type(variable), names)
+        return degree_text(label, names)
+    if words.name != "jfuzzylogic" or label.height != 1.0:
+        return None
+    if is_weighted:
+        return _function_text(curve, names)
+    return _shape_text(curve)
+
+
+def _shape_text(curve: Curve) -> str | None:
+    parts: tuple[float, ...]
+    match curve:
+        case Trapezoid(a=a, b=b, c=c, d=d) if a is not None and d is not None:
+            word, parts = ("TRIAN", (a, b, d)) if b == c else ("TRAPE", (a, b, c, d))
+        case Gaussian(mean=mean, deviation=deviation):
+            word, parts = "GAUSS", (mean, deviation)
+        case TwoGaussians() if curve.left <= curve.right:
+            word = "GAUSS2"
+            left, right = curve.left, curve.right
+            parts = (left, curve.left_deviation, right, curve.right_deviation)
+        case Bell(center=center, width=width, slope=slope) if slope >= 0.0:
+            word, parts = "GBELL", (width, slope, center)
+        case Sigmoid(inflection=inflection, slope=slope):
+            word, parts = "SIGM", (slope, inflection)
+        case SigmoidDifference(first=one, second=two) if _is_plain(one, two):
+            word = "DSIGM"
+            parts = (one.slope, one.inflection, two.slope, two.inflection)
+        case Cosine(center=center, width=width):
+            word, parts = "COSINE", (width / 2.0, center)
+        case _:
+            return None
+    return " ".join([word, *map(number, parts)])
+
+
+def _is_plain(one: Sigmoid, two: Sigmoid) -> bool:
+    """Return whether the first sigmoid is nowhere below the second one."""
+    return one.slope == two.slope > 0.0 and one.inflection <= two.inflection
+
+
+_OPERATORS = frozenset({"+", "-", "*", "/", "^"})
+_FUNCTIONS = {
+    **{name: name.upper() for name in ("exp", "sin", "cos", "tan", "abs")},
+    "log": "LN",
+    "log10": "LOG",
+}
+
+
+def _function_text(curve: Curve, names: Names) -> str | None:
+    match curve:
+        case Formula(expression=expression):
+            text = _formula_text(expression, names)
+            return None if text is None else f"FUNCTION {text}"
+        case _:
+            return None
+
+
+def _formula_text(expression: Expression, names: Names) -> str | None:
+    """Return a formula for jFuzzyLogic, with all parentheses; None if it has none."""
+    match expression:
+        case Number(value=value) if value - value == 0.0:
+            return f"({number(value)})" if value < 0 else number(value)
+        case Name(name=name):
+            return names.get(name)
+        case Call(function=function, arguments=arguments):
+            given = [_formula_text(one, names) for one in arguments]
+            inner = [one for one in given if one is not None]
+            if len(inner) < len(given):
+                return None
+            if function in _OPERATORS:
+                return f"({f' {function} '.join(inner)})"
+            word = _FUNCTIONS.get(function)
+            return None if word is None else f"{word}({inner[0]})"
+        case _:
+            return None
+
+
+def as_points(
+    system: FuzzySystem, words: Words, tolerance: float
+) -> tuple[FuzzySystem, list[Loss]]:
+    """Return a system whose curves the dialect has words for, or points in their place.
+
+    Raises:
+        LossError: With every curve that points cannot stand for.
+    """
+    losses: list[Loss] = []
+    reasons: list[str] = []
+
+    def changed(variable: SystemInput | SystemOutput) -> tuple[Label, ...]:
+        if isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted:
+            return variable.labels
+        labels: list[Label] = []
+        for label in variable.labels:
+            where = f"term {label.name!r} of {variable.name!r}"
+            try:
+                labels.append(_pointed(label, variable, words, tolerance, losses))
+            except LossError as error:
+                reasons.append(f"  {where}: {error}")
+        return tuple(labels)
+
+    inputs = tuple(replace(one, labels=changed(one)) for one in system.inputs)
+    outputs = tuple(replace(one, labels=changed(one)) for one in system.outputs)
+    if reasons:
+        listed = "\n".join(reasons)
+        raise LossError(f"cannot write {system.name} as fcl:\n{listed}")
+    return replace(system, inputs=inputs, outputs=outputs), losses
+
+
+def _pointed(
+    label: Label,
+    variable: SystemInput | SystemOutput,
+    words: Words,
+    tolerance: float,
+    losses: list[Loss],
+) -> Label:
+    is_kept = isinstance(label.curve, (Points, *words.curves))
+    if is_kept and term_text(variable, label, words, {}) is not None:
+        return label
+    where = f"term {label.name!r} of {variable.name!r}"
+    found = points_for(label.curve, tolerance)
+    points = found.points
+    if found.bound > EXACT:
+        tail = f"; {found.tail}" if found.tail else ""
+        what = f"it becomes {len(points.values)} points joined by lines{tail}"
+        losses.append(Loss(where, what, found.bound))
+    if label.height != 1.0:
+        degrees = tuple(label.height * degree for degree in points.degrees)
+        points = replace(points, degrees=degrees)
+    return Label(label.name, points)
+
+
+def unspeakable(system: FuzzySystem, words: Words) -> Iterator[str]:
+    """Yield the terms that a dialect has no words for."""
+    names = {one.name: one.name for one in system.variables}
+    for variable in system.variables:
+        for label in variable.labels:
+            if term_text(variable, label, words, names) is None:
+                kind = type(label.curve).__name__
+                where = f"term {label.name!r} of {variable.name!r}"
+                yield f"{where}: the dialect {words.name} has no {kind} there"
+
+
+def plain_linear(system: FuzzySystem) -> FuzzySystem:
+    """Return a system whose weighted sums of inputs are formulas."""
+
+    def formula(label: Label) -> Label:
+        if not isinstance(label.curve, Linear):
+            return label
+        total: Expression = Number(0.0)
+        pairs = zip(label.curve.weights, system.columns, strict=True)
+        parts = [Call("*", (Number(weight), Name(name))) for weight, name in pairs]
+        if parts:
+            total = parts[0]
+        for part in parts[1:]:
+            total = Call("+", (total, part))
+        total = Call("+", (total, Number(label.curve.offset)))
+        return replace(label, curve=Formula(total))
+
+    outputs = tuple(
+        replace(one, labels=tuple(map(formula, one.labels))) for one in system.outputs
+    )
+    return replace(system, outputs=outputs)

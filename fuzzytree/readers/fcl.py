@@ -1,0 +1,171 @@
+"""FCL files (IEC 61131-7) of all dialects to fuzzy systems.
+
+Keywords may be in upper or lower case; names must be written alike everywhere. The
+dialect of a file is found out from the file, and told as a remark with the reasons:
+engines mean other things by the same words, and each file is taken as its own engine
+takes it. `docs/fcl.md` lists the differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from msgspec.structs import replace
+
+from fuzzytree.casting import as_rules
+from fuzzytree.contracts import Document, Reading
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.readers.fcl_blocks import Block, blocks_of
+from fuzzytree.readers.fcl_dialects import detected, norm_of
+from fuzzytree.readers.fcl_rules import ReadBlock, Scope, read_block
+from fuzzytree.readers.fcl_text import parsed, place
+from fuzzytree.readers.fcl_variables import (
+    Known,
+    known_variables,
+    read_input,
+    read_output,
+)
+from fuzzytree.readers.fll_words import Notes
+from fuzzytree.readers.nodes import Found, report
+from fuzzytree.system import FuzzySystem, SystemOutput
+
+FACTS = " facts "
+"""How the comment begins that says what rules have no place for in a system."""
+
+_MOST_LINES = 10  # among which the facts are looked for
+
+
+def read(content: bytes, name: str) -> Reading:
+    """Return the system of an FCL file, or the rule base that was written as one.
+
+    Only the first FUNCTION_BLOCK is read.
+
+    Args:
+        content: The file: UTF-8, or UTF-16 with its mark, or else Latin-1.
+        name: What messages call it.
+
+    Raises:
+        ReadError: With all mistakes of the file.
+
+    Example:
+        >>> text = '''FUNCTION_BLOCK washer
+        ... VAR_INPUT dirt : REAL; END_VAR
+        ... VAR_OUTPUT minutes : REAL; END_VAR
+        ... FUZZIFY dirt TERM much := (0, 0) (10, 1); END_FUZZIFY
+        ... DEFUZZIFY minutes
+        ...   TERM long := 60; METHOD : COGS; DEFAULT := 0;
+        ... END_DEFUZZIFY
+        ... RULEBLOCK one AND : MIN;
+        ...   RULE 1 : IF dirt IS much THEN minutes IS long;
+        ... END_RULEBLOCK
+        ... END_FUNCTION_BLOCK'''
+        >>> read(text.encode(), "washer.fcl").model.outputs[0].name
+        'minutes'
+    """
+    text = parsed(content, name)
+    notes = Notes(list(text.found), [], [])
+    dialect, sentence = detected(text)
+    notes.remarks.append(sentence)
+    if text.encoding != "UTF-8":
+        notes.remarks.append(f"the file is no UTF-8; it was read as {text.encoding}")
+    title, blocks = blocks_of(text, notes)
+    known = known_variables(blocks, dialect, notes)
+    inputs = tuple(read_input(one, known) for one in known.inputs)
+    outputs = tuple(read_output(one, known) for one in known.outputs)
+    labels = {one.name: [label.name for label in one.labels] for one in inputs}
+    labels |= {one.name: [label.name for label in one.labels] for one in outputs}
+    curved = {one.name for one in outputs if not one.defuzzifier.is_weighted}
+    scope = Scope(labels, set(known.outputs), curved, dialect, notes)
+    read_blocks = _rule_blocks(blocks, scope)
+    outputs = tuple(_aggregated(one, known, read_blocks) for one in outputs)
+    if not outputs and not notes.found:
+        notes.found.append((1, 1, "the file has no VAR_OUTPUT"))
+    if notes.found:
+        raise report(name, notes.found)
+    try:
+        rules = tuple(one.block for one in read_blocks)
+        system = FuzzySystem(title or "system", inputs, outputs, rules)
+    except InvalidModelError as error:
+        raise report(name, list(_places(error, known, read_blocks))) from error
+    model = _model(system, text.text, notes)
+    return Reading(model, tuple(notes.losses), tuple(notes.remarks))
+
+
+def _model(system: FuzzySystem, text: str, notes: Notes) -> Document:
+    """Return the rule base that a system stands for, or the system."""
+    facts = ""
+    for line in text.split("\n", _MOST_LINES)[:_MOST_LINES]:
+        if line[:2] in ("//", "(*") and line[2:].startswith(FACTS):
+            facts = line[2:].removeprefix(FACTS).removesuffix("*)").strip()
+    if not facts:
+        return system
+    rules = as_rules(system, facts)
+    if rules is not None:
+        return rules
+    text = "the facts in a comment belong to other rules; the file is read as a system"
+    notes.remarks.append(text)
+    return system
+
+
+def _rule_blocks(blocks: Sequence[Block], scope: Scope) -> list[ReadBlock]:
+    found: list[ReadBlock] = []
+    for block in blocks:
+        if block.kind != "RULEBLOCK":
+            continue
+        if block.is_disabled:
+            text = f"line {block.line}: a disabled block is left out"
+            scope.notes.remarks.append(text)
+        else:
+            found.append(read_block(block, scope))
+    return found
+
+
+def _aggregated(
+    output: SystemOutput, known: Known, blocks: Sequence[ReadBlock]
+) -> SystemOutput:
+    """Return an output with the aggregation that its block, or its rules' block, says.
+
+    Numbers are summed one by one in fuzzylite, whatever ACCU says, and everywhere if
+    it says nothing.
+    """
+    own = known.outputs[output.name].block
+    stated = [None if own is None else norm_of(own, "ACCU", known.notes)]
+    stated += [one.accu for one in blocks if output.name in one.concluded]
+    norms = [one for one in stated if one is not None]
+    where = f"output {output.name!r}"
+    if len(set(norms)) > 1:
+        what = f"its blocks say different ACCU; {norms[0]} is taken for all rules"
+        known.loss(where, what)
+    if output.defuzzifier.is_weighted:
+        if not norms or norms[0] == "sum":
+            return output
+        if known.dialect in ("fuzzylite", "portable"):
+            known.remark(f"{where}: numbers are summed; fuzzylite ignores ACCU here")
+            return output
+        return replace(output, aggregation=norms[0])
+    if norms:
+        return replace(output, aggregation=norms[0])
+    if known.dialect == "jfuzzylogic":
+        known.remark(f"{where}: ACCU is missing; SUM is taken, as in jFuzzyLogic")
+        return replace(output, aggregation="sum")
+    if any(output.name in one.concluded for one in blocks):
+        known.loss(where, "ACCU is missing, and engines differ; MAX is taken")
+    return replace(output, aggregation="maximum")
+
+
+def _places(
+    error: InvalidModelError, known: Known, blocks: Sequence[ReadBlock]
+) -> Iterator[Found]:
+    """Yield the mistakes of a system where they stand in the file."""
+    for path, sentence in error.mistakes:
+        line, column = 1, 1
+        match path:
+            case ("inputs", int() as k, *_):
+                line, column = place(list(known.inputs.values())[k].token)
+            case ("outputs", int() as k, *_):
+                line, column = place(list(known.outputs.values())[k].token)
+            case ("blocks", int() as b, "rules", int() as r, *_):
+                line, column = place(blocks[b].tokens[r])
+            case _:
+                pass
+        yield line, column, sentence
