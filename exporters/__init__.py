@@ -22,6 +22,7 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "python": (".py",),
         "sql": (".sql",),
         "c": (".c",),
+        "fcl": (".fcl",),
         "fll": (".fll",),
         "pmml": (".pmml",),
     }
