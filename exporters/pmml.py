@@ -1,4 +1,4 @@
-"""PMML 4.4: a tree or rule base that any engine of the Data Mining Group's format runs.
+"""PMML 4.4: models that any engine of the Data Mining Group's format runs.
 
 **Rules.** Each term, each combination and each rule's strength is a derived field. The
 number of the first strongest rule is one too: the least k whose strength equals the
@@ -6,20 +6,22 @@ largest. A tree model of one level then says its class; the node's number is the
 So the decision is that of the rule base, ties included. Degrees are arithmetic in the
 reference's order (`curves="exact"`), or PMML's own lists of points, `NormContinuous`.
 
-**Trees** are tree models with the same cuts.
+**Trees** are tree models with the same cuts. **Systems** are their programs
+(`fuzzytree.exporters.pmml_system`).
 
 A row with a value that is missing or not finite has a branch of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from fuzzytree.casting import pointed
-from fuzzytree.contracts import Format, Loss, Model, Written
+from fuzzytree.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml_shapes import Functions, norm_continuous
+from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
 from fuzzytree.exporters.pmml_xml import (
     Element,
     apply,
@@ -41,30 +43,32 @@ from fuzzytree.rulebase import (
     fingerprint,
     sentence,
 )
+from fuzzytree.system import FuzzySystem, SystemInput
 from fuzzytree.tree import FuzzyTree, Node, intervals
 
 _MISSING, _UNCOVERED = -1.0, 0.0  # numbers in the place of a rule's
 
 
 def write(
-    model: Model,
+    model: Document,
     /,
     *,
     allow_loss: bool = False,
     curves: Literal["exact", "points"] = "exact",
     tolerance: float = 1e-3,
 ) -> Written:
-    """Return a tree or a rule base as a PMML file, in UTF-8.
+    """Return a tree, a rule base or a system as a PMML file, in UTF-8.
 
     Args:
-        model: A tree or a rule base.
+        model: A tree, a rule base or a system.
         allow_loss: Whether curves may become points, if they are written as such.
         curves: `exact`: degrees are arithmetic, with the reference's bits. `points`:
             every term is a `NormContinuous`.
         tolerance: The largest error of a degree for `points`.
 
     Raises:
-        LossError: If curves would become points and `allow_loss` is False.
+        LossError: If curves would become points and `allow_loss` is False; if a system
+            needs too many fields, or functions that PMML does not have.
         ValueError: If `curves` is neither of the two.
 
     Example:
@@ -86,6 +90,8 @@ def write(
             raise LossError(
                 f"cannot write {model.name} as pmml with curves as points:\n  {listed}"
             )
+    if isinstance(model, FuzzySystem):
+        return _written_system(model)
     names = _Names.of(model)
     functions = Functions()
     axes = [*_axes(model.variables, names, functions)]
@@ -100,17 +106,79 @@ def write(
         *axes,
         *fields,
     )
-    root = element(
-        "PMML",
-        _header(model),
-        element("DataDictionary", *_data_fields(model, names)),
-        dictionary,
-        body,
-        version="4.4",
-        xmlns="http://www.dmg.org/PMML-4_4",
+    target = element(
+        "DataField",
+        *(element("Value", value=names.label[name]) for name in model.classes),
+        name=names.target,
+        optype="categorical",
+        dataType="string",
     )
+    data = element("DataDictionary", *_columns(model.variables, names.field), target)
+    content = _content(_header(model), data, dictionary, body)
+    remarks = [*_renamed("variable", names.field), *_renamed("class", names.label)]
+    return Written(content, losses, tuple(remarks))
+
+
+def _written_system(system: FuzzySystem) -> Written:
+    """Return a system: its program, and a model that hands on the first output."""
+    names = legal_names(one.name for one in system.variables)
+    taken = set(names.values())
+    made = SystemFields(system, names, taken)
+    first, *others = system.outputs
+    result = unlike("result", taken)
+    number = {"optype": "continuous", "dataType": "double"}
+    outputs = [
+        element(
+            "OutputField",
+            value,
+            name=names[one.name],
+            feature="transformedValue",
+            **number,
+        )
+        for one, value in zip(others, made.outputs[1:], strict=True)
+    ]
+    model = element(
+        "RegressionModel",
+        element(
+            "MiningSchema",
+            *(
+                element("MiningField", name=names[name], invalidValueTreatment="asIs")
+                for name in system.columns
+            ),
+            element("MiningField", name=names[first.name], usageType="target"),
+        ),
+        *([element("Output", *outputs)] if outputs else []),
+        element(
+            "RegressionTable",
+            element("NumericPredictor", name=result, coefficient="1"),
+            intercept="0",
+        ),
+        modelName=legal(system.name),
+        functionName="regression",
+    )
+    target = element("DataField", name=names[first.name], **number)
+    dictionary = element(
+        "TransformationDictionary",
+        *made.functions.values(),
+        *made.fields,
+        derived(result, made.outputs[0]),
+    )
+    data = element("DataDictionary", *_columns(system.inputs, names), target)
+    header = _heading(
+        f"A fuzzy system, named {system.name}.", {"fingerprint": fingerprint(system)}
+    )
+    content = _content(header, data, dictionary, model)
+    remarks = [*_renamed("variable", names)]
+    if made.is_inexact:
+        remarks.append("exp, powers and the like are good to a few last digits")
+    return Written(content, (), tuple(remarks))
+
+
+def _content(*parts: Element) -> bytes:
+    xmlns = "http://www.dmg.org/PMML-4_4"
+    root = element("PMML", *parts, version="4.4", xmlns=xmlns)
     text = f'<?xml version="1.0" encoding="UTF-8"?>\n{text_of(root)}\n'
-    return Written(text.encode("utf-8"), losses, tuple(_remarks(names)))
+    return text.encode("utf-8")
 
 
 class _Names(NamedTuple):
@@ -142,11 +210,10 @@ class _Names(NamedTuple):
         return found
 
 
-def _remarks(names: _Names) -> Iterator[str]:
-    for kind, changed in (("variable", names.field), ("class", names.label)):
-        for name, plain in changed.items():
-            if name != plain:
-                yield f"{kind} {name!r} is called {plain!r}: XML has no such characters"
+def _renamed(kind: str, names: Mapping[str, str]) -> Iterator[str]:
+    for name, plain in names.items():
+        if name != plain:
+            yield f"{kind} {name!r} is called {plain!r}: XML has no such characters"
 
 
 def _header(model: Model) -> Element:
@@ -157,11 +224,15 @@ def _header(model: Model) -> Element:
         "missing": _answer(model.semantics.missing),
         "and": model.semantics.conjunction,
     }
+    return _heading(f"A fuzzy {kind}, named {model.name}.", facts)
+
+
+def _heading(description: str, facts: Mapping[str, str]) -> Element:
     return element(
         "Header",
         *(_extension(name, text) for name, text in facts.items()),
         element("Application", name="fuzzytree"),
-        description=legal(f"A fuzzy {kind}, named {model.name}."),
+        description=legal(description),
     )
 
 
@@ -173,8 +244,10 @@ def _extension(name: str, value: str) -> Element:
     return element("Extension", extender="fuzzytree", name=name, value=legal(value))
 
 
-def _data_fields(model: Model, names: _Names) -> Iterator[Element]:
-    for variable in model.variables:
+def _columns(
+    variables: Iterable[Variable | SystemInput], names: Mapping[str, str]
+) -> Iterator[Element]:
+    for variable in variables:
         if variable.parts:
             continue
         known = {
@@ -185,17 +258,10 @@ def _data_fields(model: Model, names: _Names) -> Iterator[Element]:
         yield element(
             "DataField",
             *(_extension(name, text) for name, text in known.items() if text),
-            name=names.field[variable.name],
+            name=names[variable.name],
             optype="continuous",
             dataType="double",
         )
-    yield element(
-        "DataField",
-        *(element("Value", value=names.label[name]) for name in model.classes),
-        name=names.target,
-        optype="categorical",
-        dataType="string",
-    )
 
 
 def _axes(
@@ -442,8 +508,11 @@ def _compound(operator: str, parts: list[Element]) -> Element:
 FORMAT = Format(
     name="pmml",
     suffixes=(".pmml",),
-    carries=("tree", "rules"),
+    carries=("tree", "rules", "system"),
     write=write,
-    cannot=("a pmml file runs, but is not read back as a tree or rule base",),
+    cannot=(
+        "a pmml file runs, but is not read back as what it was written from",
+        f"systems of more than {MOST_FIELDS:,} steps, or functions that PMML lacks",
+    ),
     dtype="float64",
 )

@@ -10,9 +10,12 @@ from typing import Any, Literal
 from xml.etree import ElementTree
 
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml import write
+from fuzzytree.formulas import exponential, logarithm, power, quotient
+from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.probing import probes
 from fuzzytree.reference import descend, evaluate
@@ -26,7 +29,23 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.testing import random_tree, with_points
+from fuzzytree.system import (
+    Call,
+    Conclusion,
+    Defuzzifier,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Is,
+    Label,
+    Name,
+    Number,
+    RuleBlock,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+)
+from fuzzytree.testing import random_rows, random_system, random_tree, with_points
 from fuzzytree.tree import FuzzyTree
 
 SPACE = "{http://www.dmg.org/PMML-4_4}"
@@ -70,6 +89,10 @@ class File:
 
     def value(self, one: ElementTree.Element, fields: Fields) -> float | None:
         kind = one.tag.removeprefix(SPACE)
+        if kind == "Constant" and one.attrib.get("missing") == "true":
+            return None
+        if kind == "Constant" and one.attrib["dataType"] == "boolean":
+            return float(one.text == "true")
         if kind == "Constant":
             return float(one.text or "")
         if kind == "FieldRef":
@@ -92,9 +115,20 @@ class File:
         if None in given:
             return None
         numbers = [number for number in given if number is not None]
-        if name == "abs":
-            assert not math.isnan(numbers[0])
         return BUILT_IN[name](*numbers)
+
+    def numbers(self, row: Mapping[str, float]) -> list[float | None]:
+        """Return what a regression model hands on, and the outputs."""
+        fields: Fields = {
+            name: None if math.isnan(value) else value for name, value in row.items()
+        }
+        for one in self.root.iter(f"{SPACE}DerivedField"):
+            fields[one.attrib["name"]] = self.value(one[0], fields)
+        (predictor,) = self.root.iter(f"{SPACE}NumericPredictor")
+        outputs = [
+            self.value(one[0], fields) for one in self.root.iter(f"{SPACE}OutputField")
+        ]
+        return [fields[predictor.attrib["name"]], *outputs]
 
     def holds(self, one: ElementTree.Element, fields: Fields) -> bool:
         if one.tag == f"{SPACE}CompoundPredicate":
@@ -113,14 +147,31 @@ BUILT_IN: dict[str, Callable[..., float]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
-    "/": operator.truediv,
+    "/": quotient,
     "min": min,
     "max": max,
     "abs": abs,
     "product": lambda *numbers: math.prod(numbers),
     "equal": operator.eq,
+    "notEqual": operator.ne,
+    "lessThan": operator.lt,
     "lessOrEqual": operator.le,
     "greaterThan": operator.gt,
+    "and": lambda *truths: all(truths),
+    "or": lambda *truths: any(truths),
+    "not": operator.not_,
+    "floor": math.floor,
+    "ceil": math.ceil,
+    "rint": round,
+    "exp": exponential,
+    "sqrt": math.sqrt,
+    "pow": power,
+    "ln": logarithm,
+    "log10": math.log10,
+    "cos": math.cos,
+    "sin": math.sin,
+    "tanh": math.tanh,
+    "atan": math.atan,
 }
 
 
@@ -214,6 +265,63 @@ def test_points_are_pmmls_own_lists_where_asked(seed: int) -> None:
     rules = with_points(rules_from_tree(random_tree(seed)), seed, share=1.0)
     assert write(rules, curves="points").losses == ()
     assert_alike(rules, curves="points", room=1e-12)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4, 6, 8, 12, 15, 16])
+def test_a_system_has_the_references_bits(seed: int) -> None:
+    system = random_system(seed)
+    file = File(write(system).content)
+    rows = random_rows(system, seed, 6)
+    rows.append(rows[0] | {system.columns[0]: math.nan})
+    rows.append(rows[0] | {system.columns[-1]: math.inf})
+    for row in rows:
+        expected = infer(system, row).outputs
+        for found, number in zip(file.numbers(row), expected, strict=True):
+            assert found == number or (found is None and math.isnan(number))
+
+
+def test_a_system_may_have_any_names() -> None:
+    how = Defuzzifier("weighted average")
+    names = ("step 1", "step", "result", "number add", "a\x00")
+    inputs = tuple(map(SystemInput, names))
+    output = SystemOutput("a_", (), None, None, how, default=4.0)
+    written = write(FuzzySystem("s", inputs, (output,), ()))
+    assert written.remarks == (
+        "variable 'a\\x00' is called 'a_ 2': XML has no such characters",
+    )
+    row = {name.replace("\x00", "_ 2"): 0.0 for name in names}
+    assert File(written.content).numbers(row) == [4.0]
+
+
+def test_a_system_of_too_many_steps_is_refused() -> None:
+    curve = Gaussian(0.0, 1.0)
+    output = SystemOutput(
+        "y",
+        (Label("all", curve),),
+        0.0,
+        1.0,
+        Defuzzifier("centroid", 50_000),
+        "maximum",
+    )
+    rule = SystemRule(None, (Conclusion("y", "all"),))
+    dirt = SystemInput("dirt", (Label("high", curve),))
+    rules = (replace(rule, when=Is("dirt", "high")),)
+    block = RuleBlock(rules, implication="minimum")
+    with pytest.raises(
+        LossError, match=r"fields, and engines hold no more than 20,000"
+    ):
+        write(FuzzySystem("s", (dirt,), (output,), (block,)))
+
+
+def test_functions_that_pmml_lacks_are_named() -> None:
+    angle = Formula(Call("atan2", (Name("dirt"), Number(2.0))))
+    how = Defuzzifier("weighted average")
+    output = SystemOutput("y", (Label("angle", angle),), None, None, how)
+    dirt = SystemInput("dirt")
+    block = RuleBlock((SystemRule(None, (Conclusion("y", "angle"),)),))
+    with pytest.raises(LossError) as caught:
+        write(FuzzySystem("s", (dirt,), (output,), (block,)))
+    assert str(caught.value) == "cannot write s as pmml, which has no arc tangent 2"
 
 
 def odd(*names: str, **semantics: str) -> RuleBase:

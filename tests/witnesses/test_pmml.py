@@ -14,11 +14,13 @@ import pytest
 
 from fuzzytree import learn
 from fuzzytree.exporters.pmml import write
+from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.probing import probes
 from fuzzytree.reference import Answer, descend, evaluate
 from fuzzytree.rulebase import Kind, RuleBase, Semantics
-from fuzzytree.testing import random_tree, with_points
+from fuzzytree.system import FuzzySystem
+from fuzzytree.testing import random_rows, random_system, random_tree, with_points
 from fuzzytree.tree import FuzzyTree
 
 pytestmark = pytest.mark.heavy  # Java takes seconds to start
@@ -98,6 +100,34 @@ def test_models_of_all_kinds_answer_alike_with_missing_and_infinite_values(
         assert_alike(model, rows)
 
 
+def system_rows(system: FuzzySystem) -> list[dict[str, float]]:
+    rows = random_rows(system, 1, 40)
+    for name in system.columns:
+        for value in (math.nan, math.inf, -math.inf):
+            rows.append(rows[0] | {name: value})
+    return rows
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_systems_of_all_kinds_give_the_references_numbers(
+    library: Any, seed: int
+) -> None:
+    pandas = importlib.import_module("pandas")
+    engine = importlib.import_module(library("jpmml_evaluator"))
+    system = random_system(seed)
+    rows = system_rows(system)
+    evaluator = engine.make_evaluator(write(system).content).verify()
+    found = evaluator.evaluateAll(pandas.DataFrame(rows), error_col=None)[0]
+    for (_, line), row in zip(found.iterrows(), rows, strict=True):
+        expected = infer(system, row).outputs
+        for output, number in zip(system.outputs, expected, strict=True):
+            given = line[output.name]
+            if math.isnan(number):
+                assert given is None or math.isnan(given)
+            else:  # the engine's own exp and pow
+                assert given == pytest.approx(number, rel=1e-14, abs=1e-300)
+
+
 def test_relative_rules_written_as_points_decide_alike(library: Any) -> None:
     library("jpmml_evaluator")
     pandas = importlib.import_module("pandas")
@@ -129,7 +159,14 @@ def test_our_files_are_valid_by_the_published_schema(library: Any) -> None:
         schema = etree.XMLSchema(etree.parse(io.BytesIO(archive.read("pmml.xsd"))))
     tree = random_tree(3, semantics=Semantics("min", "class 1", "class 2"))
     raw = rules_from_tree(tree, "raw")
-    for model in (tree, rules_from_tree(tree), raw, with_points(raw, 1)):
+    for model in (
+        tree,
+        rules_from_tree(tree),
+        raw,
+        with_points(raw, 1),
+        random_system(0),
+        random_system(15),
+    ):
         schema.assertValid(etree.fromstring(write(model).content))
     points = write(raw, allow_loss=True, curves="points").content
     schema.assertValid(etree.fromstring(points))

@@ -1,0 +1,311 @@
+"""Fuzzy systems as PMML: their program, a derived field for each of its steps.
+
+What has no number (NaN) is a missing value in the file. PMML's own functions differ in
+what they make of one, so each operation is a function of the file that says it: a
+comparison with a missing value does not hold, arithmetic with one gives one, and so
+does what has no result, such as 0 / 0 or the root of a negative number.
+
+A step that has many samples becomes a field for each of them.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping
+
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.pmml_xml import Element, apply, constant, element, ref
+from fuzzytree.naming import unlike
+from fuzzytree.programs.operations import INEXACT, LOGICAL, NUMERIC, OPERATIONS
+from fuzzytree.programs.steps import Program, Step
+from fuzzytree.programs.systems import from_system
+from fuzzytree.system import FuzzySystem
+
+MOST_FIELDS = 20_000
+"""The most derived fields of a file: engines look each other's values up one by one."""
+
+_MISSING = Element("Constant", {"dataType": "double", "missing": "true"})
+_A, _B = ref("a"), ref("b")
+_PLAIN: Mapping[str, str] = {
+    "add": "+",
+    "subtract": "-",
+    "multiply": "*",
+    "absolute": "abs",
+    "floor": "floor",
+    "ceiling": "ceil",
+    "round": "rint",
+    "exponential": "exp",
+    "arc_tangent": "atan",
+    "hyperbolic_sine": "sinh",
+    "hyperbolic_cosine": "cosh",
+    "hyperbolic_tangent": "tanh",
+    "minimum": "min",
+    "maximum": "max",
+}
+_ZERO, _ONE = constant(0.0), constant(1.0)
+_ENDLESS = apply("greaterThan", apply("abs", _A), constant(sys.float_info.max))
+_PARTIAL: Mapping[str, tuple[Element, Element]] = {
+    # The result, and where there is none.
+    "divide": (
+        apply("/", _A, _B),
+        apply("and", apply("equal", _A, _ZERO), apply("equal", _B, _ZERO)),
+    ),
+    "square_root": (apply("sqrt", _A), apply("lessThan", _A, _ZERO)),
+    "logarithm": (apply("ln", _A), apply("lessThan", _A, _ZERO)),
+    "logarithm_10": (apply("log10", _A), apply("lessThan", _A, _ZERO)),
+    "logarithm_1p": (apply("ln1p", _A), apply("lessThan", _A, constant(-1.0))),
+    "sine": (apply("sin", _A), _ENDLESS),
+    "cosine": (apply("cos", _A), _ENDLESS),
+    "tangent": (apply("tan", _A), _ENDLESS),
+    "arc_sine": (apply("asin", _A), apply("greaterThan", apply("abs", _A), _ONE)),
+    "arc_cosine": (apply("acos", _A), apply("greaterThan", apply("abs", _A), _ONE)),
+    "power": (
+        apply("pow", _A, _B),
+        apply(
+            "and",
+            apply("lessThan", _A, _ZERO),
+            apply("notEqual", _B, apply("floor", _B)),
+        ),
+    ),
+}
+_COMPARED: Mapping[str, str] = {
+    "less": "lessThan",
+    "at_most": "lessOrEqual",
+    "equal": "equal",
+}
+_LOGIC: Mapping[str, str] = {"and": "and", "or": "or", "not": "not"}
+
+Value = Element | float | bool  # an expression, or what it is
+
+
+class SystemFields:
+    """The functions and fields of a system.
+
+    Attributes:
+        functions: The definition of each operation that is used, by name.
+        fields: A derived field for each value that is computed, in order.
+        outputs: The field of each output of the system.
+        is_inexact: Whether an operation's last digits are the engine's own.
+    """
+
+    def __init__(
+        self, system: FuzzySystem, fields: Mapping[str, str], taken: set[str]
+    ) -> None:
+        program = from_system(system)
+        if program.size > MOST_FIELDS:
+            raise LossError(
+                f"cannot write {system.name} as pmml: it would need {program.size:,} "
+                f"fields, and engines hold no more than {MOST_FIELDS:,} well"
+            )
+        _refuse_unknown(system.name, program)
+        self.is_inexact = any(step.operation in INEXACT for step in program.steps)
+        self.functions: dict[str, Element] = {}
+        self.fields: list[Element] = []
+        self._inputs = fields
+        self._prefix = _prefix(taken)
+        values: list[list[Value]] = []
+        for place, step in enumerate(program.steps):
+            values.append(self._values(place, step, values))
+        self.outputs: list[Element] = []
+        for place in program.of("output"):
+            (found,) = values[place]
+            self.outputs.append(_expression(found))
+
+    def _values(self, place: int, step: Step, values: list[list[Value]]) -> list[Value]:
+        """Return the value of a step, or one for each of its samples."""
+        given = [values[argument] for argument in step.arguments]
+        match step.operation:
+            case "constant":
+                return [step.number]
+            case "input":
+                return [ref(self._inputs[step.name])]
+            case "index":
+                return [float(k) for k in range(step.samples)]
+            case "total":
+                return [self._total(place, given[0])]
+            case "running":
+                return self._running(place, given[0])
+            case "last":
+                return given[0][-1:]
+            case "highest" | "lowest":
+                operation = "maximum" if step.operation == "highest" else "minimum"
+                return [self._carried(place, operation, given[0])]
+            case "below" | "pick":
+                one = given[0]
+                return [
+                    self._field(f"{place} {k}", _table(step, value), "number")
+                    for k, value in enumerate(one)
+                ]
+            case _:
+                return [
+                    self._one(
+                        f"{place} {k}" if step.samples else f"{place}",
+                        step.operation,
+                        [one[k] if len(one) > 1 else one[0] for one in given],
+                    )
+                    for k in range(step.samples or 1)
+                ]
+
+    def _one(self, name: str, operation: str, given: list[Value]) -> Value:
+        """Return an operation on some values, as a field unless it is known now."""
+        if not any(isinstance(one, Element) for one in given):
+            known = NUMERIC.get(operation) or LOGICAL[operation]
+            return known(*given)
+        kind = OPERATIONS[operation].gives
+        if operation == "where":
+            condition, *others = given
+            if not isinstance(condition, Element):
+                return others[0] if condition else others[1]
+            expression = apply("if", condition, *map(_expression, others))
+        else:
+            self._define(operation)
+            expression = apply(_own(operation), *map(_expression, given))
+        return self._field(name, expression, kind)
+
+    def _field(self, name: str, expression: Element, kind: str) -> Element:
+        full = f"{self._prefix}{name}"
+        is_truth = kind == "truth"
+        self.fields.append(
+            element(
+                "DerivedField",
+                expression,
+                name=full,
+                optype="categorical" if is_truth else "continuous",
+                dataType="boolean" if is_truth else "double",
+            )
+        )
+        return ref(full)
+
+    def _total(self, place: int, samples: list[Value]) -> Value:
+        """Return the sum by halves, as `fuzzytree.inference.tree_sum` has it."""
+        size = 1 << (len(samples) - 1).bit_length()
+        level = [*samples, *([0.0] * (size - len(samples)))]
+        count = 0
+        while len(level) > 1:
+            half = len(level) // 2
+            added: list[Value] = []
+            for a, b in zip(level[:half], level[half:], strict=True):
+                added.append(self._one(f"{place} {count}", "add", [a, b]))
+                count += 1
+            level = added
+        return level[0]
+
+    def _running(self, place: int, samples: list[Value]) -> list[Value]:
+        found = samples[:1]
+        for k, one in enumerate(samples[1:]):
+            found.append(self._one(f"{place} {k}", "add", [found[-1], one]))
+        return found
+
+    def _carried(self, place: int, operation: str, samples: list[Value]) -> Value:
+        found = samples[0]
+        for k, one in enumerate(samples[1:]):
+            found = self._one(f"{place} {k}", operation, [found, one])
+        return found
+
+    def _define(self, operation: str) -> None:
+        """Define an operation, for numbers that may be missing."""
+        if operation in self.functions:
+            return
+        known = OPERATIONS[operation]
+        names = ("a", "b", "c")[: len(known.takes)]
+        kinds = {
+            "number": ("continuous", "double"),
+            "truth": ("categorical", "boolean"),
+        }
+        parameters = [
+            element("ParameterField", name=name, optype=op, dataType=dtype)
+            for name, (op, dtype) in zip(
+                names, (kinds[kind] for kind in known.takes), strict=True
+            )
+        ]
+        optype, dtype = kinds[known.gives]
+        self.functions[operation] = element(
+            "DefineFunction",
+            *parameters,
+            _body(operation, names),
+            name=_own(operation),
+            optype=optype,
+            dataType=dtype,
+        )
+
+
+def _refuse_unknown(name: str, program: Program) -> None:
+    known = {*_PLAIN, *_PARTIAL, *_COMPARED, *_LOGIC, "negate", "is_finite", "where"}
+    known |= {"constant", "input", "index", "total", "running", "last"}
+    known |= {"highest", "lowest", "below", "pick"}
+    unknown = sorted({step.operation for step in program.steps} - known)
+    if unknown:
+        words = ", ".join(one.replace("_", " ") for one in unknown)
+        raise LossError(f"cannot write {name} as pmml, which has no {words}")
+
+
+def _own(operation: str) -> str:
+    """Return what an operation is called in a file: unlike any of PMML's own."""
+    return f"number {operation.replace('_', ' ')}"
+
+
+def _prefix(taken: set[str]) -> str:
+    """Return how the names of fields start: as no other name does."""
+    found = "step"
+    while any(name.startswith(f"{found} ") for name in taken):
+        found = unlike(found, {found, *taken})
+    return f"{found} "
+
+
+def _body(operation: str, names: tuple[str, ...]) -> Element:
+    given = [ref(name) for name in names]
+    if operation in _LOGIC:
+        return apply(_LOGIC[operation], *given)
+    is_missing = [apply("isMissing", one) for one in given]
+    nothing = apply("or", *is_missing) if len(given) > 1 else is_missing[0]
+    if operation in _COMPARED:
+        return apply("if", nothing, _truth(False), apply(_COMPARED[operation], *given))
+    if operation == "is_finite":
+        largest = constant(sys.float_info.max)
+        is_small = apply("lessOrEqual", apply("abs", _A), largest)
+        return apply("if", nothing, _truth(False), is_small)
+    if operation in _PARTIAL:
+        result, none = _PARTIAL[operation]
+        return apply("if", nothing, _MISSING, apply("if", none, _MISSING, result))
+    if operation == "negate":
+        return apply("if", nothing, _MISSING, apply("-", _ZERO, _A))
+    return apply("if", nothing, _MISSING, apply(_PLAIN[operation], *given))
+
+
+def _truth(value: bool) -> Element:
+    return Element("Constant", {"dataType": "boolean"}, (), str(value).lower())
+
+
+def _expression(value: Value) -> Element:
+    """Return a value as an expression; an infinity as what overflows to it."""
+    match value:
+        case Element():
+            return value
+        case bool():
+            return _truth(value)
+        case float() if math.isnan(value):
+            return _MISSING
+        case float() if math.isinf(value):
+            largest = math.copysign(sys.float_info.max, value)
+            return apply("*", constant(largest), constant(2.0))
+        case _:
+            return constant(value)
+
+
+def _table(step: Step, value: Value) -> Element:
+    """Return a number that is looked up by halving."""
+    table, x = step.table, _expression(value)
+    is_pick = step.operation == "pick"
+
+    def within(first: int, last: int) -> Element:
+        if first == last:
+            return constant(table[first] if is_pick else float(first))
+        middle = (first + last) // 2
+        limit = middle + 0.5 if is_pick else table[middle]
+        is_low = apply("lessOrEqual", x, constant(limit))
+        return apply("if", is_low, within(first, middle), within(middle + 1, last))
+
+    whole = within(0, len(table) - 1 if is_pick else len(table))
+    first = constant(table[0] if is_pick else 0.0)
+    return apply("if", apply("isMissing", x), first, whole)
