@@ -22,8 +22,10 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "python": (".py",),
         "sql": (".sql",),
         "c": (".c",),
-        "fcl": (".fcl",),
+        "fis": (".fis",),
+        "fml": (".fml", ".xml"),
         "fll": (".fll",),
+        "fcl": (".fcl",),
         "pmml": (".pmml",),
     }
 )

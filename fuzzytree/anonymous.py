@@ -288,7 +288,8 @@ def _block(
 def _ordered(condition: Condition, block: RuleBlock) -> Condition:
     """Return a condition whose parts stand in order where it changes no bit.
 
-    An AND within an AND is one AND under min, and so is an OR within an OR under max.
+    An AND at the beginning of an AND is one AND with it, under min anywhere; the same
+    holds for OR and max.
     """
     match condition:
         case Not(part=part):
@@ -310,6 +311,8 @@ def _ordered(condition: Condition, block: RuleBlock) -> Condition:
                     ),
                     key=repr,
                 )
+            elif isinstance(found[0], kind):
+                found[:1] = found[0].parts
             return found[0] if len(found) == 1 else kind(tuple(found))
         case _:
             return condition

@@ -1,0 +1,446 @@
+"""FML (IEEE 1855-2016): rule bases and systems as XML that is valid by the schema.
+
+`docs/fml.md` describes the file. Every name is an XML ID, unlike all others of the
+document: terms are called `variable.term`. The standard's numbers have 32 bits; the
+file holds all digits of the doubles, and a remark says what a reader may make of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
+from xml.sax.saxutils import escape, quoteattr
+
+from msgspec.structs import replace
+
+from fuzzytree.casting import (
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    flattened,
+    pointed,
+)
+from fuzzytree.casting.shapes import shape_of
+from fuzzytree.contracts import Format, Loss, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
+from fuzzytree.naming import DIGITS, LETTERS, Names
+from fuzzytree.readers.fml import FACTS, reading
+from fuzzytree.readers.fml_words import FAR, METHODS, NAMESPACE, SNORMS, TNORMS, USUAL
+from fuzzytree.rulebase import Points, RuleBase
+from fuzzytree.system import (
+    Activation,
+    Curve,
+    FuzzySystem,
+    Gaussian,
+    Label,
+    Linear,
+    RuleBlock,
+    SCurve,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    Trapezoid,
+    TwoGaussians,
+)
+
+_ALLOWED: Final = (Trapezoid, Gaussian, SCurve, Singleton)
+_FLOAT32: Final = (
+    "the standard's numbers have 32 bits: a reader that keeps to it changes each "
+    "number by a share of up to 6e-8 (2^-24); corners of curves move by that, values "
+    "beyond 3.4e38 are infinite, and degrees that differ by less become equal, so that "
+    "another rule can win in rows that near to a corner or to a tie"
+)
+
+
+def write(
+    model: RuleBase | FuzzySystem,
+    /,
+    *,
+    allow_loss: bool = False,
+    tolerance: float = 1e-6,
+) -> Written:
+    """Return a rule base or a system as an FML file.
+
+    Args:
+        model: The model. Of a rule base each rule has a score, see
+            `fuzzytree.casting.scores`.
+        allow_loss: Whether to write what FML cannot hold as near as it can.
+        tolerance: The largest error of a degree where points stand for a curve.
+
+    Raises:
+        LossError: If something would be lost, unless allowed; and always if the rules
+            have no place in FML.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
+        >>> text = write(rules, allow_loss=True).content.decode()
+        >>> 'xmlns="http://www.ieee1855.org"' in text
+        True
+    """
+    losses: list[Loss] = []
+    remarks = [_FLOAT32]
+    facts = ""
+    if isinstance(model, RuleBase):
+        rules, lost = pointed(model, tolerance)
+        system = as_system(rules, always="term")
+        losses += [*cast_losses(model), *lost]
+        remarks = [*cast_remarks(model), *remarks]
+        facts = facts_of(rules, always="term")
+    else:
+        system = model
+    system, lost = flattened(system)
+    losses += lost
+    system, lost = _with_known_curves(system, tolerance)
+    losses += [*lost, *_losses(system)]
+    found = rules_of(system)
+    if losses and not allow_loss:
+        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
+        raise LossError(f"cannot write {model.name} as fml without loss:\n{listed}")
+    names = _Naming(system, found)
+    remarks += names.remarks
+    lines = _lines(system, found, names, facts)
+    content = ("\n".join(lines) + "\n").encode("utf-8")
+    return Written(content, tuple(losses), tuple(remarks))
+
+
+class _Naming:
+    """The IDs of a document."""
+
+    def __init__(self, system: FuzzySystem, rules: Rules) -> None:
+        asked = [one.name for one in system.variables]
+        self.variables = _ids(asked)
+        taken = self.variables.accepted.values()
+        self.system = _ids([system.name], taken)[system.name]
+        self.labels: dict[str, Names] = {}
+        for one in system.variables:
+            known = [label.name for label in one.labels]
+            known += [made.name for made in rules.made.get(one.name, ())]
+            self.labels[one.name] = _ids(known)
+        changed = {**self.variables.changed}
+        if self.system != system.name:
+            changed[system.name] = self.system
+        for names in self.labels.values():
+            changed |= names.changed
+        pairs = [f"{name!r} is {found}" for name, found in changed.items()]
+        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
+        self.remarks = [f"names were changed: {shown}"] if pairs else []
+
+    def term(self, variable: str, label: str) -> str:
+        """Return the ID of a term."""
+        return f"{self.variables[variable]}.{self.labels[variable][label]}"
+
+
+def _ids(names: Iterable[str], taken: Iterable[str] = ()) -> Names:
+    """Return names without a dot, which parts a variable from its term."""
+    first, rest = LETTERS + "_", LETTERS + DIGITS + "_-"
+    return Names.of(names, first=first, rest=rest, taken=taken)
+
+
+def _with_known_curves(
+    system: FuzzySystem, tolerance: float
+) -> tuple[FuzzySystem, tuple[Loss, ...]]:
+    """Return a system whose curves FML has; a height is in its points."""
+    has_heights = any(
+        label.height != 1.0 for one in system.variables for label in one.labels
+    )
+    is_one_sided = all(
+        _shape(label.curve) is not None
+        for one in system.variables
+        for label in one.labels
+        if isinstance(label.curve, TwoGaussians)
+    )
+    allowed: tuple[type, ...] = () if has_heights else _ALLOWED
+    if is_one_sided and not has_heights:
+        allowed = (*allowed, TwoGaussians)
+    system, lost = pointed(system, tolerance, allowed=allowed)
+    if not has_heights:
+        return system, lost
+    losses = [*lost]
+
+    def changed(one: SystemInput | SystemOutput) -> tuple[Label, ...]:
+        return tuple(_scaled(one.name, label, losses) for label in one.labels)
+
+    inputs = tuple(replace(one, labels=changed(one)) for one in system.inputs)
+    outputs = tuple(replace(one, labels=changed(one)) for one in system.outputs)
+    return replace(system, inputs=inputs, outputs=outputs), tuple(losses)
+
+
+def _scaled(variable: str, label: Label, losses: list[Loss]) -> Label:
+    if label.height == 1.0 or isinstance(label.curve, Singleton | Linear):
+        return replace(label, height=1.0)
+    where = f"term {label.name!r} of {variable!r}"
+    if not isinstance(label.curve, Points):
+        raise LossError(f"{where} has the height {label.height!r}; FML knows none")
+    what = f"its height {label.height!r} is in its points, which are rounded"
+    losses.append(Loss(where, what, 2.0**-52))
+    degrees = tuple(label.height * degree for degree in label.curve.degrees)
+    return Label(label.name, Points(label.curve.values, degrees))
+
+
+def _losses(system: FuzzySystem) -> Iterator[Loss]:
+    for output in system.outputs:
+        where, how = f"output {output.name!r}", output.defuzzifier
+        if how.method == "weighted sum":
+            yield Loss(where, "FML averages; the weighted sum becomes an average")
+        if how.is_weighted and output.aggregation is not None:
+            what = f"{output.aggregation} of rules of one term becomes a sum"
+            yield Loss(where, what)
+        if how.is_weighted:
+            continue
+        if (how.samples, how.grid) != (USUAL.samples, USUAL.grid):
+            yield Loss(
+                where,
+                f"its curve is looked at in {how.samples} values ({how.grid}), and FML "
+                f"does not say so; it is read as {USUAL.samples} ({USUAL.grid})",
+            )
+        if output.aggregation not in SNORMS.values():
+            yield Loss(where, f"FML has no {output.aggregation}; MAX stands for it")
+    for variable in system.variables:
+        if variable.clips:
+            what = "values are not moved into the range"
+            yield Loss(f"variable {variable.name!r}", what)
+    for number, block in enumerate(system.blocks, 1):
+        if block.activation != Activation():
+            what = f"all rules are activated, not by {block.activation.method}"
+            yield Loss(f"block {number} of rules", what)
+        norms = (block.disjunction,)
+        for norm in norms:
+            if norm is not None and norm not in SNORMS.values():
+                yield Loss(
+                    f"block {number} of rules", f"FML has no {norm}; MAX stands for it"
+                )
+
+
+def _lines(
+    system: FuzzySystem, rules: Rules, names: _Naming, facts: str
+) -> Iterator[str]:
+    yield '<?xml version="1.0" encoding="UTF-8"?>'
+    if facts:
+        yield f"<!-- {FACTS}{facts} -->"
+    yield f'<fuzzySystem xmlns="{NAMESPACE}" name="{names.system}">'
+    yield "  <knowledgeBase>"
+    for one in system.inputs:
+        yield from _input(one, rules, names)
+    for output in system.outputs:
+        yield from _output(output, names)
+    yield "  </knowledgeBase>"
+    number = 0
+    for place, (kind, block, held) in enumerate(rules.bases, 1):
+        tag = f"{kind}RuleBase"
+        norms = _norms(block)
+        act = "" if kind == "tsk" else f' activationMethod="{_t(block.implication)}"'
+        yield f'  <{tag} name="rules.{place}."{act}{norms}>'
+        for rule in held:
+            number += 1
+            yield from _rule(rule, number, (kind == "tsk", norms), names)
+        yield f"  </{tag}>"
+    yield "</fuzzySystem>"
+
+
+def _norms(block: RuleBlock) -> str:
+    return (
+        f' andMethod="{_t(block.conjunction)}" '
+        f'orMethod="{_word(SNORMS, block.disjunction, "MAX")}"'
+    )
+
+
+def _t(norm: str | None) -> str:
+    return _word(TNORMS, norm, "MIN")
+
+
+def _word(known: Mapping[str, str], meant: str | None, default: str) -> str:
+    return next((word for word, one in known.items() if one == meant), default)
+
+
+def _input(one: SystemInput, rules: Rules, names: _Naming) -> Iterator[str]:
+    yield (f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="input">')
+    for label in one.labels:
+        yield from _term("fuzzyTerm", one.name, label, names)
+    if not one.labels:  # the schema wants one
+        yield f'      <fuzzyTerm name="{names.variables[one.name]}.any">'
+        yield '        <pointSetShape><point x="0.0" y="1.0"/></pointSetShape>'
+        yield "      </fuzzyTerm>"
+    for made in rules.made.get(one.name, ()):
+        yield f'      <fuzzyTerm name="{names.term(one.name, made.name)}">'
+        yield "        <circularDefinition>"
+        yield from made.lines(names.term, one.name)
+        yield "        </circularDefinition>"
+        yield "      </fuzzyTerm>"
+    yield "    </fuzzyVariable>"
+
+
+def _head(one: SystemInput | SystemOutput, names: _Naming) -> str:
+    scale = (
+        f" scale={quoteattr(one.unit)}" if one.unit.isprintable() and one.unit else ""
+    )
+    return f'name="{names.variables[one.name]}"{scale}'
+
+
+def _domain(one: SystemInput | SystemOutput) -> str:
+    low, high = _range(one)
+    return f' domainleft="{_float(low)}" domainright="{_float(high)}"'
+
+
+def _range(one: SystemInput | SystemOutput) -> tuple[float, float]:
+    """Return a range, guessed from the points of its terms where it is unknown."""
+    near: list[float] = []
+    for label in one.labels:
+        shape = shape_of(label.curve)
+        near += shape.values if isinstance(shape, Points) else ()
+    low = one.low if one.low is not None else min(near, default=0.0)
+    high = one.high if one.high is not None else max(near, default=1.0)
+    return (low, high) if low < high else (low - 1.0, low + 1.0)
+
+
+def _output(one: SystemOutput, names: _Naming) -> Iterator[str]:
+    default = math.nan if one.default is None else one.default
+    last = f' defaultValue="{_float(default)}">'
+    if not one.defuzzifier.is_weighted:
+        method = _word(METHODS, one.defuzzifier.method, "COG")
+        join = _word(SNORMS, one.aggregation, "MAX")
+        yield (
+            f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="output"'
+            f' accumulation="{join}" defuzzifier="{method}"{last}'
+        )
+        kind, tag = "fuzzyTerm", "fuzzyVariable"
+    elif _is_tsk(one):
+        yield (
+            f'    <tskVariable {_head(one, names)} type="output" combination="WA"{last}'
+        )
+        for label in one.labels:
+            yield from _tsk_term(one.name, label, names)
+        yield "    </tskVariable>"
+        return
+    else:
+        yield (
+            f'    <tsukamotoVariable {_head(one, names)}{_domain(one)} type="output"'
+            f' combination="WA"{last}'
+        )
+        kind, tag = "tsukamotoTerm", "tsukamotoVariable"
+    for label in one.labels:
+        yield from _term(kind, one.name, label, names)
+    yield f"    </{tag}>"
+
+
+def _is_tsk(one: SystemOutput) -> bool:
+    return all(isinstance(label.curve, Singleton | Linear) for label in one.labels)
+
+
+def _tsk_term(variable: str, label: Label, names: _Naming) -> Iterator[str]:
+    numbers: tuple[float, ...] = ()
+    match label.curve:
+        case Singleton(value=value):
+            order, numbers = 0, (value,)
+        case Linear(weights=weights, offset=offset):
+            order, numbers = 1, (offset, *weights)
+        case _:
+            order = 0
+    yield f'      <tskTerm name="{names.term(variable, label.name)}" order="{order}">'
+    for number in numbers:
+        yield f"        <tskValue>{_float(number)}</tskValue>"
+    yield "      </tskTerm>"
+
+
+def _term(kind: str, variable: str, label: Label, names: _Naming) -> Iterator[str]:
+    yield f'      <{kind} name="{names.term(variable, label.name)}">'
+    found = _shape(label.curve)
+    if found is not None:
+        name, numbers = found
+        given = " ".join(
+            f'param{k}="{_float(number)}"' for k, number in enumerate(numbers, 1)
+        )
+        yield f"        <{name} {given}/>"
+    else:
+        points = shape_of(label.curve)
+        assert isinstance(points, Points)  # others are refused or became points
+        tag = "pointSetMonotonicShape" if kind == "tsukamotoTerm" else "pointSetShape"
+        yield f'        <{tag} interpolationMethod="linear">'
+        for x, y in zip(points.values, points.degrees, strict=True):
+            yield f'          <point x="{_float(x)}" y="{_float(y)}"/>'
+        yield f"        </{tag}>"
+    yield f"      </{kind}>"
+
+
+def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
+    """Return a shape with parameters; None if the curve must be points."""
+    match curve:
+        case Points(values=(a, b), degrees=(0.0, 1.0)):
+            return "rightLinearShape", (a, b)
+        case Points(values=(a, b), degrees=(1.0, 0.0)):
+            return "leftLinearShape", (a, b)
+        case Trapezoid(a=float(a), b=b, c=c, d=float(d)) if a < b and c < d:
+            is_peak = b == c
+            numbers = (a, b, d) if is_peak else (a, b, c, d)
+            return "triangularShape" if is_peak else "trapezoidShape", numbers
+        case Gaussian(mean=mean, deviation=deviation):
+            return "gaussianShape", (mean, deviation)
+        case TwoGaussians(left=c, left_deviation=s, right=right) if right >= FAR:
+            return "rightGaussianShape", (c, s)
+        case TwoGaussians(left=left, right=c, right_deviation=s) if left <= -FAR:
+            return "leftGaussianShape", (c, s)
+        case SCurve(start=a, end=b) if a != b:
+            return ("sShape", (a, b)) if a < b else ("zShape", (b, a))
+        case _:
+            return None
+
+
+def _rule(
+    rule: Rule, number: int, about: tuple[bool, str], names: _Naming
+) -> Iterator[str]:
+    is_tsk, norms = about
+    tag = "tskRule" if is_tsk else "rule"
+    connector = "or" if rule.is_or else "and"
+    yield (
+        f'    <{tag} name="rule.{number}."{norms} connector="{connector}" '
+        f'weight="{_float(rule.weight)}">'
+    )
+    yield "      <antecedent>"
+    for variable, label, modifier in rule.asked:
+        given = f' modifier="{modifier}"' if modifier else ""
+        yield from _clause("clause", given, (variable, label), names, 8)
+    yield "      </antecedent>"
+    start, then, clause = "consequent", "then", "clause"
+    if is_tsk:
+        start, then, clause = "tskConsequent", "tskThen", "tskClause"
+    yield f"      <{start}>"
+    yield f"        <{then}>"
+    for concluded in rule.concluded:
+        yield from _clause(clause, "", concluded, names, 10)
+    yield f"        </{then}>"
+    yield f"      </{start}>"
+    yield f"    </{tag}>"
+
+
+def _clause(
+    tag: str, given: str, named: tuple[str, str], names: _Naming, indent: int
+) -> Iterable[str]:
+    pad = " " * indent
+    yield f"{pad}<{tag}{given}>"
+    yield f"{pad}  <variable>{escape(names.variables[named[0]])}</variable>"
+    yield f"{pad}  <term>{escape(names.term(*named))}</term>"
+    yield f"{pad}</{tag}>"
+
+
+def _float(number: float) -> str:
+    """Return the shortest digits of a number; XML calls a missing one NaN."""
+    return "NaN" if math.isnan(number) else repr(float(number))
+
+
+FORMAT = Format(
+    name="fml",
+    suffixes=(".fml", ".xml"),
+    carries=("rules", "system"),
+    write=write,
+    read=reading,
+    cannot=(
+        "a rule that mixes and and or over several inputs",
+        "hedges of conclusions, and two hedges in a row other than not behind one",
+        "other ways to activate rules than all, weighted sums, numbers of samples",
+        "combinations of inputs: each becomes an input",
+    ),
+)

@@ -1,0 +1,256 @@
+"""Rules as FML says them: clauses that are all joined by and, or all by or.
+
+Several terms of one variable, joined otherwise than the rule, are a term of their own
+with a circular definition: that is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+import msgspec
+
+from fuzzytree.errors import LossError
+from fuzzytree.naming import unlike
+from fuzzytree.readers.fml_words import MODIFIERS, SNORMS, TNORMS
+from fuzzytree.rulebase import Points
+from fuzzytree.system import (
+    And,
+    Condition,
+    FuzzySystem,
+    Hedge,
+    Is,
+    Linear,
+    Not,
+    Or,
+    RuleBlock,
+    SCurve,
+    Singleton,
+    SystemOutput,
+    SystemRule,
+    questions,
+)
+
+Clause = tuple[str, str, str]
+"""A variable, a term, and a modifier, which may be empty."""
+
+_WORDS: Final[dict[Hedge, str]] = {meant: word for word, meant in MODIFIERS.items()}
+
+
+class Made(msgspec.Struct, frozen=True):
+    """A term that is an and or an or of others.
+
+    Attributes:
+        name: What it is called.
+        parts: The terms and whether they are negated.
+        word: `and` or `or`.
+        norm: How they are joined, as FML says it.
+    """
+
+    name: str
+    parts: tuple[tuple[str, bool], ...]
+    word: str
+    norm: str
+
+    def lines(self, term: Callable[[str, str], str], variable: str) -> Iterator[str]:
+        """Yield the definition: two parts at a time, the first ones innermost."""
+        key = "t-norm" if self.word == "and" else "t-conorm"
+        pad = " " * 10
+        for _ in self.parts[1:]:
+            yield f'{pad}<{self.word} {key}="{self.norm}">'
+        for place, (label, is_negated) in enumerate(self.parts):
+            given = ' complement="true"' if is_negated else ""
+            yield f"{pad}  <termName{given}>{term(variable, label)}</termName>"
+            if place:
+                yield f"{pad}</{self.word}>"
+
+
+class Rule(msgspec.Struct, frozen=True):
+    """A rule with its clauses."""
+
+    asked: tuple[Clause, ...]
+    concluded: tuple[tuple[str, str], ...]
+    weight: float
+    is_or: bool
+
+
+Base = tuple[str, RuleBlock, tuple[Rule, ...]]
+"""The kind (mamdani, tsk, tsukamoto), the block it comes from, and its rules."""
+
+
+class Rules(msgspec.Struct, frozen=True):
+    """All rules, and the terms that they need, by variable."""
+
+    bases: tuple[Base, ...]
+    made: dict[str, list[Made]]
+
+
+def rules_of(system: FuzzySystem) -> Rules:
+    """Return the rules of a system.
+
+    Raises:
+        LossError: With every rule that has no place in FML.
+    """
+    kinds = {one.name: _kind(one) for one in system.outputs}
+    taken = {one.name: [label.name for label in one.labels] for one in system.inputs}
+    rules = Rules((), {})
+    bases: list[Base] = []
+    reasons: list[str] = []
+    number = 0
+    for block in system.blocks:
+        found: dict[str, list[Rule]] = {}
+        for rule in block.rules:
+            number += 1
+            try:
+                for kind, one in _rules(rule, block, kinds, (rules.made, taken)):
+                    found.setdefault(kind, []).append(one)
+            except LossError as error:
+                reasons.append(f"  rule {number}: {error}")
+        bases += [(kind, block, tuple(several)) for kind, several in found.items()]
+    reasons += [
+        f"  output {name!r}: its terms are of several kinds, and FML has one for each"
+        for name, kind in kinds.items()
+        if kind == "mixed"
+    ]
+    if len(system.variables) < 2:
+        reasons.append("  FML needs at least two variables")
+    if not any(several for _, _, several in bases) and not reasons:
+        reasons.append("  FML needs at least one rule")
+    if reasons:
+        listed = "\n".join(reasons)
+        raise LossError(f"cannot write {system.name} as fml:\n{listed}")
+    return Rules(tuple(bases), rules.made)
+
+
+def _kind(output: SystemOutput) -> str:
+    if not output.defuzzifier.is_weighted:
+        return "mamdani"
+    curves = [label.curve for label in output.labels]
+    if all(isinstance(curve, Singleton | Linear) for curve in curves):
+        return "tsk"
+    is_monotone = all(
+        isinstance(curve, SCurve)
+        or (isinstance(curve, Points) and sorted(curve.degrees) == [0.0, 1.0])
+        for curve in curves
+    )
+    return "tsukamoto" if is_monotone else "mixed"
+
+
+def _rules(
+    rule: SystemRule,
+    block: RuleBlock,
+    kinds: dict[str, str],
+    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+) -> Iterator[tuple[str, Rule]]:
+    """Yield a rule for each kind of output that it concludes."""
+    if rule.when is None:
+        raise LossError("it asks nothing, and a rule of FML must")
+    if any(one.hedges for one in rule.then):
+        raise LossError("FML has no hedges of conclusions")
+    is_or = isinstance(rule.when, Or)
+    asked: list[Clause] = []
+    for part in _flat(rule.when, block):
+        asked.append(_clause(part, block, kinds, known))
+    for kind in dict.fromkeys(kinds[one.output] for one in rule.then):
+        concluded = tuple(
+            (one.output, one.label) for one in rule.then if kinds[one.output] == kind
+        )
+        yield kind, Rule(tuple(asked), concluded, rule.weight, is_or)
+
+
+def _flat(condition: Condition, block: RuleBlock) -> list[Condition]:
+    """Return what is joined; an and within an and joins its own parts."""
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            is_or = isinstance(condition, Or)
+            norm = block.disjunction if is_or else block.conjunction
+            found: list[Condition] = []
+            for place, part in enumerate(parts):
+                is_open = place == 0 or norm in ("minimum", "maximum")
+                is_same = isinstance(part, type(condition))
+                found += _flat(part, block) if is_same and is_open else [part]
+            return found
+        case _:
+            return [condition]
+
+
+def _clause(
+    condition: Condition,
+    block: RuleBlock,
+    kinds: dict[str, str],
+    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+) -> Clause:
+    match condition:
+        case Is(variable=variable) if variable in kinds:
+            raise LossError(f"it asks the output {variable!r}")
+        case Is(variable=variable, label=label, hedges=hedges):
+            return _question(variable, label, hedges, known)
+        case Not(part=Is(variable=variable, label=label, hedges=hedges)):
+            return _question(variable, label, ("not", *hedges), known)
+        case Not(part=And() | Or() as part):
+            variable, label, _ = _made(part, block, known)
+            return variable, label, "not"
+        case And() | Or():
+            return _made(condition, block, known)
+        case _:
+            raise LossError("it has a not within a not")
+
+
+def _question(
+    variable: str,
+    label: str | None,
+    hedges: Sequence[Hedge],
+    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+) -> Clause:
+    if hedges[-1:] == ("any",) and len(hedges) == 1:
+        names = known[1][variable]
+        if not names:
+            raise LossError(f"{variable!r} has no term that could be asked for")
+        return variable, label or names[0], "any"
+    if label is None or len(hedges) > 1 or any(one not in _WORDS for one in hedges):
+        raise LossError(f"FML has no way to say {' '.join(hedges)!r}")
+    return variable, label, _WORDS[hedges[0]] if hedges else ""
+
+
+def _made(
+    condition: And | Or,
+    block: RuleBlock,
+    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+) -> Clause:
+    """Return a clause that asks a term made of several of one variable."""
+    asked = [*questions(condition)]
+    variables = {one.variable for one in asked}
+    if len(variables) > 1 or len(asked) != len(condition.parts):
+        raise LossError("it mixes and, or and not over several inputs")
+    (variable,) = variables
+    parts: list[tuple[str, bool]] = []
+    for part in condition.parts:
+        match part:
+            case Is(label=str(label), hedges=()):
+                parts.append((label, False))
+            case (
+                Is(label=str(label), hedges=("not",))
+                | Not(part=Is(label=str(label), hedges=()))
+            ):
+                parts.append((label, True))
+            case _:
+                raise LossError(f"terms of {variable!r} are joined with hedges")
+    is_or = isinstance(condition, Or)
+    norms = SNORMS if is_or else TNORMS
+    meant = block.disjunction if is_or else block.conjunction
+    norm = next((word for word, one in norms.items() if one == meant), None)
+    if norm is None:
+        raise LossError(f"FML has no {meant}")
+    word = "or" if is_or else "and"
+    if len(parts) == 1:
+        return variable, parts[0][0], "not" if parts[0][1] else ""
+    made, taken = known
+    for one in made.setdefault(variable, []):
+        if (one.parts, one.word, one.norm) == (tuple(parts), word, norm):
+            return variable, one.name, ""
+    shown = f" {word} ".join(f"{'not ' * is_not}{label}" for label, is_not in parts)
+    name = unlike(shown[:60], taken[variable])
+    taken[variable].append(name)
+    made[variable].append(Made(name, tuple(parts), word, norm))
+    return variable, name, ""

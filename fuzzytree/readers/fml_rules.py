@@ -1,0 +1,329 @@
+"""The rule bases of FML as blocks of rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+import msgspec
+
+from fuzzytree.contracts import Loss
+from fuzzytree.readers import fml_words as words
+from fuzzytree.readers.fml_terms import Notes, number
+from fuzzytree.readers.xml import Element
+from fuzzytree.rulebase import name_choice
+from fuzzytree.system import (
+    And,
+    Conclusion,
+    Condition,
+    Hedge,
+    Is,
+    Not,
+    Or,
+    RuleBlock,
+    SNorm,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+)
+
+_RULES: Final = {
+    "mamdaniRuleBase": ("rule", "consequent", "then", "else", "clause"),
+    "tsukamotoRuleBase": ("rule", "consequent", "then", "else", "clause"),
+    "tskRuleBase": ("tskRule", "tskConsequent", "tskThen", "tskElse", "tskClause"),
+}
+
+
+_MOST_LEVELS: Final = 20
+_MOST_ASKED: Final = 1_000_000
+
+
+class Variables(msgspec.Struct, frozen=True):
+    """What rules can ask and conclude.
+
+    Attributes:
+        labels: For each variable the names of its terms: in rules, and in the system.
+        circular: Terms that are an and or an or of others.
+        outputs: The outputs by name.
+        negated: Terms that are the complement of their shape.
+        spent: One entry for each term that was asked, so that terms which are made of
+            others many times over come to an end.
+    """
+
+    labels: dict[str, dict[str, str]]
+    circular: dict[tuple[str, str], Element]
+    outputs: dict[str, SystemOutput]
+    negated: set[tuple[str, str]] = msgspec.field(default_factory=set)
+    spent: list[None] = msgspec.field(default_factory=list)
+
+
+class _Norms(msgspec.Struct, frozen=True):
+    conjunction: TNorm
+    disjunction: SNorm
+    implication: TNorm | None
+
+
+def blocks_of(
+    bases: Sequence[Element], variables: Variables, notes: Notes
+) -> tuple[RuleBlock, ...]:
+    """Return the rule bases; rules in a row with equal norms are one block."""
+    blocks: list[RuleBlock] = []
+    for base in bases:
+        if base.name not in _RULES:
+            what = "has no place in a system here"
+            if base.name != "anYaRuleBase":
+                what = f"is no rule base; {name_choice(base.name[:40], _RULES)}"
+            notes.wrong(base, f"<{base.name[:40]}> {what}")
+            continue
+        name = base.attributes.get("name", "")
+        rule_name, *_ = _RULES[base.name]
+        run: list[SystemRule] = []
+        norms: _Norms | None = None
+        for element in base.children:
+            if element.name != rule_name:
+                notes.wrong(element, f"<{element.name[:40]}> is no <{rule_name}>")
+                continue
+            meant = _norms(base, element, notes)
+            if norms is not None and meant != norms and run:
+                blocks.append(_block(run, norms, name))
+                run = []
+            norms = meant
+            rule = _rule(base, element, (variables, norms), notes)
+            run += [rule] if rule is not None else []
+        if norms is not None and run:
+            blocks.append(_block(run, norms, name))
+    return tuple(blocks)
+
+
+def _block(rules: Sequence[SystemRule], norms: _Norms, name: str) -> RuleBlock:
+    how = norms.conjunction, norms.disjunction, norms.implication
+    return RuleBlock(tuple(rules), *how, name=name)
+
+
+def _norms(base: Element, rule: Element, notes: Notes) -> _Norms:
+    """Return the norms of a rule: its own, or those of its base."""
+
+    def word(key: str, default: str) -> tuple[Element, str]:
+        for element in (rule, base):
+            if key in element.attributes:
+                return element, element.attributes[key]
+        return base, default
+
+    element, text = word("andMethod", "MIN")
+    conjunction = words.TNORMS.get(text)
+    if conjunction is None:
+        notes.wrong(element, _unknown("andMethod", text, words.TNORMS))
+    element, text = word("orMethod", "MAX")
+    disjunction = words.SNORMS.get(text)
+    if disjunction is None:
+        notes.wrong(element, _unknown("orMethod", text, words.SNORMS))
+    implication: TNorm | None = None
+    if base.name == "mamdaniRuleBase":
+        text = base.attributes.get("activationMethod", "MIN")
+        implication = words.TNORMS.get(text)
+        if implication is None:
+            notes.wrong(base, _unknown("activationMethod", text, words.TNORMS))
+    return _Norms(conjunction or "minimum", disjunction or "maximum", implication)
+
+
+def _unknown(key: str, text: str, known: Iterable[str]) -> str:
+    return f"no {key} {text[:40]!r}; {name_choice(text[:40], known)}"
+
+
+def _rule(
+    base: Element, element: Element, about: tuple[Variables, _Norms], notes: Notes
+) -> SystemRule | None:
+    _, consequent, then, otherwise, clause = _RULES[base.name]
+    before = len(notes.found)
+    name = element.attributes.get("name", "")
+    asked = _only(element, "antecedent", notes)
+    concluded = _only(element, consequent, notes)
+    if asked is None or concluded is None:
+        return None
+    parts = [
+        part
+        for one in asked.all("clause")
+        if (part := _question(one, about, notes)) is not None
+    ]
+    if not parts and len(notes.found) == before:
+        notes.wrong(asked, f"rule {name!r} asks nothing")
+    for one in concluded.all(otherwise):
+        what = "its else is left out"
+        notes.losses.append(Loss(f"rule {name!r}, line {one.line}", what))
+    wanted = _only(concluded, then, notes)
+    found = [
+        conclusion
+        for child in ([] if wanted is None else wanted.all(clause))
+        if (conclusion := _conclusion(child, about[0], name, notes)) is not None
+    ]
+    weight = number(element, "weight", notes, 1.0)
+    if len(notes.found) > before:
+        return None
+    if not 0.0 <= weight <= 1.0:
+        notes.wrong(element, f"the weight must lie in [0, 1], not {weight!r}")
+        return None
+    connector = element.attributes.get("connector", "and").lower()
+    if connector not in ("and", "or"):
+        notes.wrong(element, f"the connector is and or or, not {connector[:20]!r}")
+        return None
+    joined = (Or if connector == "or" else And)(tuple(parts))
+    when: Condition = parts[0] if len(parts) == 1 else joined
+    return SystemRule(when, tuple(found), weight, name)
+
+
+def _only(element: Element, name: str, notes: Notes) -> Element | None:
+    found = element.all(name)
+    if len(found) != 1:
+        what = f"<{element.name}> needs one <{name}>, and has {len(found)}"
+        notes.wrong(element, what)
+        return None
+    return found[0]
+
+
+def _named(
+    clause: Element, variables: Variables, notes: Notes
+) -> tuple[str, str] | None:
+    """Return the variable and the term of a clause, as the file calls them."""
+    variable, term = _only(clause, "variable", notes), _only(clause, "term", notes)
+    if variable is None or term is None:
+        return None
+    if variable.text not in variables.labels:
+        choice = name_choice(variable.text[:40], variables.labels)
+        notes.wrong(variable, f"no variable {variable.text[:40]!r}; {choice}")
+        return None
+    known = variables.labels[variable.text]
+    if term.text not in known:
+        choice = name_choice(term.text[:40], known)
+        what = f"{variable.text!r} has no term {term.text[:40]!r}; {choice}"
+        notes.wrong(term, what)
+        return None
+    return variable.text, term.text
+
+
+def _modifier(clause: Element, notes: Notes) -> tuple[Hedge, ...]:
+    word = clause.attributes.get("modifier")
+    if word is None:
+        return ()
+    if word in words.MODIFIERS:
+        return (words.MODIFIERS[word],)
+    if word not in words.OTHER_MODIFIERS and not word.startswith("custom_"):
+        known = [*words.MODIFIERS, *words.OTHER_MODIFIERS]
+        notes.wrong(clause, _unknown("modifier", word, known))
+        return ()
+    what = f"the modifier {word!r} has no meaning here and is left out"
+    notes.losses.append(Loss(f"line {clause.line}", what))
+    return ()
+
+
+def _question(
+    clause: Element, about: tuple[Variables, _Norms], notes: Notes
+) -> Condition | None:
+    named = _named(clause, about[0], notes)
+    if named is None:
+        return None
+    hedges = _modifier(clause, notes)
+    asked = _asked(named, about, notes, 0)
+    if hedges == ("any",):
+        return Is(named[0], None, ("any",))
+    match asked:
+        case Is(variable=variable, label=label, hedges=before):
+            return Is(variable, label, (*hedges, *before))
+        case None:
+            return None
+        case _ if hedges == ("not",):
+            return Not(asked)
+        case _ if not hedges:
+            return asked
+        case _:
+            what = f"{hedges[0]!r} of a term that is made of others has no place here"
+            notes.wrong(clause, what)
+            return None
+
+
+def _asked(
+    named: tuple[str, str], about: tuple[Variables, _Norms], notes: Notes, level: int
+) -> Condition | None:
+    """Return what a term asks: itself, or what it is made of."""
+    variables, _ = about
+    definition = variables.circular.get(named)
+    if definition is None:
+        label = variables.labels[named[0]][named[1]]
+        hedges: tuple[Hedge, ...] = ("not",) if named in variables.negated else ()
+        return Is(named[0], label, hedges)
+    variables.spent.append(None)
+    if level > _MOST_LEVELS or len(variables.spent) > _MOST_ASKED:
+        what = f"the term {named[1]!r} is made of too many others, or of itself"
+        notes.wrong(definition, what)
+        return None
+    parts = [
+        part
+        for child in definition.children
+        if (part := _joined(child, named[0], about, notes, level)) is not None
+    ]
+    if len(parts) != 1:
+        notes.wrong(definition, f"the term {named[1]!r} needs one <and> or <or>")
+        return None
+    return Not(parts[0]) if named in variables.negated else parts[0]
+
+
+def _joined(
+    element: Element,
+    variable: str,
+    about: tuple[Variables, _Norms],
+    notes: Notes,
+    level: int,
+) -> Condition | None:
+    """Return an <and>, an <or> or a <termName> of a circular definition."""
+    variables, norms = about
+    if element.name == "termName":
+        if element.text not in variables.labels[variable]:
+            choice = name_choice(element.text[:40], variables.labels[variable])
+            what = f"{variable!r} has no term {element.text[:40]!r}; {choice}"
+            notes.wrong(element, what)
+            return None
+        found = _asked((variable, element.text), about, notes, level + 1)
+        is_not = element.attributes.get("complement", "false").lower() == "true"
+        if is_not and isinstance(found, Is):
+            return Is(variable, found.label, ("not", *found.hedges))
+        return Not(found) if is_not and found is not None else found
+    key, known, meant = (
+        ("t-norm", words.TNORMS, norms.conjunction)
+        if element.name == "and"
+        else ("t-conorm", words.SNORMS, norms.disjunction)
+    )
+    if element.name not in ("and", "or"):
+        notes.wrong(element, f"<{element.name[:40]}> is no <and>, <or> or <termName>")
+        return None
+    word = element.attributes.get(key, "MIN" if element.name == "and" else "MAX")
+    if known.get(word) != meant:
+        what = f"it is joined by {word[:20]}, and the rule by {meant}; both must agree"
+        notes.wrong(element, what)
+    parts = [
+        part
+        for child in element.children
+        if (part := _joined(child, variable, about, notes, level)) is not None
+    ]
+    if len(parts) != 2:
+        notes.wrong(element, f"<{element.name}> needs two parts, not {len(parts)}")
+        return None
+    kind = And if element.name == "and" else Or
+    first, second = parts
+    # From left to right: (a and b) and c is a and b and c.
+    inner = first.parts if isinstance(first, kind) else (first,)
+    return kind((*inner, second))
+
+
+def _conclusion(
+    clause: Element, variables: Variables, rule: str, notes: Notes
+) -> Conclusion | None:
+    named = _named(clause, variables, notes)
+    if named is None:
+        return None
+    if named[0] not in variables.outputs:
+        notes.wrong(clause, f"rule {rule!r} concludes {named[0]!r}, which is an input")
+        return None
+    if "modifier" in clause.attributes:
+        word = clause.attributes["modifier"][:40]
+        what = f"the modifier {word!r} of a conclusion is left out"
+        notes.losses.append(Loss(f"rule {rule!r}", what))
+    return Conclusion(named[0], variables.labels[named[0]][named[1]])
