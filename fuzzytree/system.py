@@ -9,259 +9,127 @@ that could change an answer stands in the values below.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from types import MappingProxyType
-from typing import Final, Literal
+from collections.abc import Iterator, Mapping
+from typing import Literal
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
-    LR,
-    Band,
     Mistake,
     Part,
     Path,
-    Points,
     Value,
     name_choice,
     name_mistakes,
     part_mistakes,
     range_mistakes,
-    shape_mistakes,
 )
+from fuzzytree.system_curves import (
+    FUNCTIONS,
+    MOST_LEVELS,
+    Arc,
+    Bell,
+    Binary,
+    Call,
+    Concave,
+    Cosine,
+    Curve,
+    Expression,
+    Formula,
+    Gaussian,
+    Linear,
+    Name,
+    Number,
+    PiCurve,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Spike,
+    Trapezoid,
+    TwoGaussians,
+    curve_mistakes,
+    names_in,
+    width_mistakes,
+)
+from fuzzytree.system_rules import (
+    Activation,
+    ActivationMethod,
+    And,
+    Conclusion,
+    Condition,
+    Hedge,
+    Is,
+    Not,
+    Or,
+    Relation,
+    RuleBlock,
+    SNorm,
+    SystemRule,
+    Terms,
+    TNorm,
+    activation_mistakes,
+    condition_mistakes,
+    questions,
+    reference_mistakes,
+)
+
+__all__ = [
+    "FUNCTIONS",
+    "MOST_LEVELS",
+    "MOST_SAMPLES",
+    "Activation",
+    "ActivationMethod",
+    "And",
+    "Arc",
+    "Bell",
+    "Binary",
+    "Call",
+    "Concave",
+    "Conclusion",
+    "Condition",
+    "Cosine",
+    "Curve",
+    "Defuzzifier",
+    "DefuzzifierMethod",
+    "Expression",
+    "Formula",
+    "FuzzySystem",
+    "Gaussian",
+    "Grid",
+    "Hedge",
+    "Is",
+    "Label",
+    "Linear",
+    "Name",
+    "Not",
+    "Number",
+    "Or",
+    "PiCurve",
+    "Relation",
+    "RuleBlock",
+    "SCurve",
+    "SNorm",
+    "SemiEllipse",
+    "Sigmoid",
+    "SigmoidDifference",
+    "SigmoidProduct",
+    "Singleton",
+    "Spike",
+    "SystemInput",
+    "SystemOutput",
+    "SystemRule",
+    "TNorm",
+    "Trapezoid",
+    "TwoGaussians",
+    "curve_mistakes",
+    "names_in",
+    "questions",
+]
 
 MOST_SAMPLES = 100_000
 """The most values at which an output's range is looked at."""
-
-MOST_LEVELS = 100
-"""The deepest nesting of conditions and formulas."""
-
-
-class Trapezoid(Value, frozen=True, tag="trapezoid"):
-    """Rises from `a` to `b`, is 1 on the closed plateau `b <= x <= c`, falls to `d`.
-
-    A triangle has `b == c`, a rectangle `a == b` and `c == d`. Below `b` the degree is
-    `(x - a) / (b - a)`, above `c` it is `(d - x) / (d - c)`; 0 outside `[a, d]`.
-
-    Attributes:
-        a: Where it leaves 0; None makes it 1 up to `c`.
-        b: Where it reaches 1; at least `a`.
-        c: Where it leaves 1; at least `b`.
-        d: Where it reaches 0; at least `c`; None makes it 1 from `b` on.
-    """
-
-    a: float | None
-    b: float
-    c: float
-    d: float | None
-
-
-class Gaussian(Value, frozen=True, tag="gaussian"):
-    """`exp(-(x - mean)^2 / (2 deviation^2))`."""
-
-    mean: float
-    deviation: float
-
-
-class TwoGaussians(Value, frozen=True, tag="two gaussians"):
-    """The product of a gaussian below `left` and another one above `right`, else 1.
-
-    Fuzzylite calls it GaussianProduct, MATLAB gauss2mf. The factors are 1 for
-    `x >= left` and for `x <= right`.
-    """
-
-    left: float
-    left_deviation: float
-    right: float
-    right_deviation: float
-
-
-class Bell(Value, frozen=True, tag="bell"):
-    """`1 / (1 + |(x - center) / width|^(2 slope))`."""
-
-    center: float
-    width: float
-    slope: float
-
-
-class Sigmoid(Value, frozen=True, tag="sigmoid"):
-    """`1 / (1 + exp(-slope (x - inflection)))`."""
-
-    inflection: float
-    slope: float
-
-
-class SigmoidDifference(Value, frozen=True, tag="sigmoid difference"):
-    """The absolute difference of two sigmoids."""
-
-    first: Sigmoid
-    second: Sigmoid
-
-
-class SigmoidProduct(Value, frozen=True, tag="sigmoid product"):
-    """The product of two sigmoids."""
-
-    first: Sigmoid
-    second: Sigmoid
-
-
-class SCurve(Value, frozen=True, tag="s"):
-    """Two parabolas that rise from 0 at `start` to 1 at `end`; with end < start, falls.
-
-    With `t = (x - start) / (end - start)`: `2 t^2` up to t = 1/2, then
-    `1 - 2 (1 - t)^2`; 0 and 1 beyond. MATLAB's smf, and zmf where `end < start`.
-    """
-
-    start: float
-    end: float
-
-
-class PiCurve(Value, frozen=True, tag="pi"):
-    """An S curve from `a` to `b`, 1 up to `c`, then one that falls to `d`."""
-
-    a: float
-    b: float
-    c: float
-    d: float
-
-
-class Cosine(Value, frozen=True, tag="cosine"):
-    """`(1 + cos(2 pi / width (x - center))) / 2` within half a width, else 0."""
-
-    center: float
-    width: float
-
-
-class Concave(Value, frozen=True, tag="concave"):
-    """`(end - inflection) / (2 end - inflection - x)` before `end`, 1 from it on.
-
-    Where `inflection > end` it falls: `(inflection - end) / (inflection - 2 end + x)`
-    behind `end`, 1 up to it.
-    """
-
-    inflection: float
-    end: float
-
-
-class Spike(Value, frozen=True, tag="spike"):
-    """`exp(-|10 / width (x - center)|)`."""
-
-    center: float
-    width: float
-
-
-class Arc(Value, frozen=True, tag="arc"):
-    """A quarter of an ellipse that rises from 0 at `start` to 1 at `end`, then 1.
-
-    With `end < start` it falls: 1 up to `end`, 0 from `start` on.
-    """
-
-    start: float
-    end: float
-
-
-class SemiEllipse(Value, frozen=True, tag="semi ellipse"):
-    """The upper half of an ellipse from `start` to `end`, 0 outside."""
-
-    start: float
-    end: float
-
-
-class Binary(Value, frozen=True, tag="binary"):
-    """1 on one side of `start`, `start` included, and 0 on the other."""
-
-    start: float
-    is_above: bool = True
-
-
-class Singleton(Value, frozen=True, tag="singleton"):
-    """1 at one value, 0 elsewhere; as a conclusion, the number itself."""
-
-    value: float
-
-
-class Linear(Value, frozen=True, tag="linear"):
-    """A conclusion that is a weighted sum of the inputs, in order, plus an offset.
-
-    Summed from left to right, the offset last. As many weights as the system has
-    inputs.
-    """
-
-    weights: tuple[float, ...]
-    offset: float = 0.0
-
-
-class Number(Value, frozen=True, tag="number"):
-    """A number of a formula."""
-
-    value: float
-
-
-class Name(Value, frozen=True, tag="name"):
-    """A variable of a formula: an input, an output before this one, or `x` itself.
-
-    `x` is the value whose degree is asked for; in a weighted conclusion it is the
-    conclusion's degree. A term of an input may name inputs only.
-    """
-
-    name: str
-
-
-class Call(Value, frozen=True, tag="call"):
-    """An operation or a function of a formula, such as `+`, `^`, `sqrt` or `max`.
-
-    `FUNCTIONS` lists them, and `fuzzytree.formulas` says what they do.
-    """
-
-    function: str
-    arguments: tuple[Expression, ...]
-
-
-Expression = Number | Name | Call
-
-_OF_TWO: tuple[str, ...] = (
-    *("+", "-", "*", "/", "%", "^", "and", "or", "lt", "le", "gt", "ge", "eq", "neq"),
-    *("min", "max", "atan2", "fmod"),
-)
-_OF_ONE: tuple[str, ...] = (
-    *("negate", "not", "abs", "sqrt", "exp", "log", "log10", "log1p", "floor", "ceil"),
-    *("round", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
-    *("asinh", "acosh", "atanh"),
-)
-FUNCTIONS: Final[Mapping[str, int]] = MappingProxyType(
-    {**dict.fromkeys(_OF_TWO, 2), **dict.fromkeys(_OF_ONE, 1)}
-)
-"""How many arguments each function of a formula takes."""
-
-
-class Formula(Value, frozen=True, tag="formula"):
-    """An arithmetic expression; `x` is the value whose degree is asked for."""
-
-    expression: Expression
-
-
-Curve = (
-    Band
-    | LR
-    | Points
-    | Trapezoid
-    | Gaussian
-    | TwoGaussians
-    | Bell
-    | Sigmoid
-    | SigmoidDifference
-    | SigmoidProduct
-    | SCurve
-    | PiCurve
-    | Cosine
-    | Concave
-    | Spike
-    | Arc
-    | SemiEllipse
-    | Binary
-    | Singleton
-    | Linear
-    | Formula
-)
 
 
 class Label(Value, frozen=True):
@@ -276,167 +144,6 @@ class Label(Value, frozen=True):
     name: str
     curve: Curve
     height: float = 1.0
-
-
-TNorm = Literal[
-    "minimum",
-    "product",
-    "bounded difference",
-    "drastic product",
-    "einstein product",
-    "hamacher product",
-    "nilpotent minimum",
-]
-"""An AND. With a and b: min; a b; max(0, a + b - 1); min(a, b) if max(a, b) = 1, else
-0; a b / (2 - (a + b - a b)); a b / (a + b - a b), 0 if both are 0; min(a, b) if
-a + b > 1, else 0."""
-
-SNorm = Literal[
-    "maximum",
-    "algebraic sum",
-    "bounded sum",
-    "drastic sum",
-    "einstein sum",
-    "hamacher sum",
-    "nilpotent maximum",
-    "normalized sum",
-    "sum",
-]
-"""An OR. With a and b: max; a + b - a b; min(1, a + b); max(a, b) if min(a, b) = 0,
-else 1; (a + b) / (1 + a b); (a + b - 2 a b) / (1 - a b), 1 if a b = 1; max(a, b) if
-a + b < 1, else 1; (a + b) / max(1, a + b); a + b."""
-
-Hedge = Literal[
-    "any",
-    "not",
-    "very",
-    "somewhat",
-    "extremely",
-    "seldom",
-    "cubed",
-    "very very",
-    "plus",
-    "minus",
-    "cube root",
-]
-"""What is done to a degree d: 1; 1 - d; d d; sqrt(d); 2 d d up to 1/2, then
-1 - 2 (1 - d)(1 - d); sqrt(d / 2) up to 1/2, then 1 - sqrt((1 - d) / 2); d d d;
-(d d)(d d); d^1.25; d^0.75; d^(1/3)."""
-
-
-class Is(Value, frozen=True, tag="is"):
-    """`variable is hedge ... label`; of an output, how far it was concluded so far.
-
-    Attributes:
-        variable: An input or an output.
-        label: One of its labels; None only behind the hedge `any`.
-        hedges: As they are read, from left to right; the last is applied first.
-    """
-
-    variable: str
-    label: str | None
-    hedges: tuple[Hedge, ...] = ()
-
-
-class And(Value, frozen=True, tag="and"):
-    """Conditions joined by the block's conjunction, from left to right."""
-
-    parts: tuple[Condition, ...]
-
-
-class Or(Value, frozen=True, tag="or"):
-    """Conditions joined by the block's disjunction, from left to right."""
-
-    parts: tuple[Condition, ...]
-
-
-class Not(Value, frozen=True, tag="not"):
-    """1 minus the degree of a condition."""
-
-    part: Condition
-
-
-Condition = Is | And | Or | Not
-
-
-class Conclusion(Value, frozen=True):
-    """`output is hedge ... label`; hedges change the degree of activation.
-
-    They act on the conclusions of the rule that stand behind it too, as in fuzzylite:
-    of `a is very high and b is low` both get the square of the rule's degree.
-    """
-
-    output: str
-    label: str
-    hedges: tuple[Hedge, ...] = ()
-
-
-class SystemRule(Value, frozen=True):
-    """IF a condition holds THEN some conclusions are activated.
-
-    Attributes:
-        when: The condition; None holds always. It may ask an output: of a label of it
-            the degrees concluded so far, joined by the output's aggregation (summed if
-            None), by earlier blocks, and by rules of this block that were run before,
-            unless its activation must know all degrees first (`highest`, `lowest`,
-            `proportional`).
-        then: The conclusions.
-        weight: What the degree of the condition is multiplied by, in [0, 1].
-        name: For people; may be empty.
-    """
-
-    when: Condition | None
-    then: tuple[Conclusion, ...]
-    weight: float = 1.0
-    name: str = ""
-
-
-ActivationMethod = Literal[
-    "general", "first", "last", "highest", "lowest", "proportional", "threshold"
-]
-Relation = Literal["<", "<=", "==", "!=", ">=", ">"]
-
-
-class Activation(Value, frozen=True):
-    """Which of a block's rules are activated, of those whose degree is above 0.
-
-    Attributes:
-        method: `general`: all. `first`, `last`: at most `count` of them in the order of
-            the rules or against it, whose degree is at least `threshold`; the block is
-            run in that order. `highest`,
-            `lowest`: at most `count` of them by degree, the first of equals first.
-            `proportional`: all, each degree divided by their sum. `threshold`: those
-            whose degree stands in `relation` to `threshold`.
-        count: How many.
-        threshold: A degree.
-        relation: How a degree must compare with the threshold.
-    """
-
-    method: ActivationMethod = "general"
-    count: int = 1
-    threshold: float = 0.0
-    relation: Relation = ">="
-
-
-class RuleBlock(Value, frozen=True):
-    """Rules with the operators that they share; blocks are run in order.
-
-    Attributes:
-        rules: The rules, in order.
-        conjunction: The AND; None where no rule needs one.
-        disjunction: The OR; None where no rule needs one.
-        implication: How an activated rule limits its conclusion's curve; None where the
-            outputs are weighted numbers.
-        activation: Which rules are activated.
-        name: For people; may be empty.
-    """
-
-    rules: tuple[SystemRule, ...]
-    conjunction: TNorm | None = "minimum"
-    disjunction: SNorm | None = "maximum"
-    implication: TNorm | None = None
-    activation: Activation = Activation()
-    name: str = ""
 
 
 DefuzzifierMethod = Literal[
@@ -577,32 +284,6 @@ class FuzzySystem(Value, frozen=True):
         return tuple(rule for block in self.blocks for rule in block.rules)
 
 
-def questions(condition: Condition | None) -> Iterator[Is]:
-    """Yield what a condition asks, from left to right."""
-    match condition:
-        case Is():
-            yield condition
-        case And(parts=parts) | Or(parts=parts):
-            for part in parts:
-                yield from questions(part)
-        case Not(part=part):
-            yield from questions(part)
-        case None:
-            return
-
-
-def names_in(expression: Expression) -> Iterator[str]:
-    """Yield the names that a formula uses, from left to right."""
-    match expression:
-        case Name(name=name):
-            yield name
-        case Call(arguments=arguments):
-            for argument in arguments:
-                yield from names_in(argument)
-        case Number():
-            return
-
-
 def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     if not system.name:
         yield ("name",), "a system needs a name"
@@ -690,97 +371,6 @@ def _name_mistakes(expression: Expression, names: Mapping[str, None]) -> Iterato
             yield f"no variable {name!r}; {name_choice(name, names)}"
 
 
-def curve_mistakes(curve: Curve) -> Iterator[str]:
-    """Yield what is wrong with a curve, without saying whose it is."""
-    match curve:
-        case Band() | LR() | Points():
-            yield from shape_mistakes(curve)
-        case Trapezoid(a=a, b=b, c=c, d=d):
-            corners = [corner for corner in (a, b, c, d) if corner is not None]
-            shown = ", ".join(map(repr, corners))
-            if not all(map(math.isfinite, corners)) or corners != sorted(corners):
-                yield f"the corners must be finite and rise: {shown}"
-            elif not math.isfinite(corners[-1] - corners[0]):
-                yield f"the corners are too far apart: {shown}"
-        case (
-            SigmoidDifference(first=first, second=second)
-            | SigmoidProduct(first=first, second=second)
-        ):
-            yield from curve_mistakes(first)
-            yield from curve_mistakes(second)
-        case Linear(weights=weights, offset=offset):
-            if not all(map(math.isfinite, (*weights, offset))):
-                yield "the weights and the offset must be finite"
-        case Formula(expression=expression):
-            if _depth(expression) > MOST_LEVELS:
-                yield f"the formula is nested deeper than {MOST_LEVELS} levels"
-            else:
-                yield from _formula_mistakes(expression)
-        case _:
-            yield from _number_mistakes(curve)
-
-
-def _formula_mistakes(expression: Expression) -> Iterator[str]:
-    match expression:
-        case Number(value=value) if not math.isfinite(value):
-            yield f"the numbers of a formula must be finite, not {value!r}"
-        case Call(function=function, arguments=arguments):
-            needed = FUNCTIONS.get(function)
-            if needed is None:
-                yield f"no function {function!r}; {name_choice(function, FUNCTIONS)}"
-            elif len(arguments) != needed:
-                yield f"{function!r} takes {needed} arguments, not {len(arguments)}"
-            for argument in arguments:
-                yield from _formula_mistakes(argument)
-        case _:
-            return
-
-
-_ABOVE_ZERO = {"deviation", "left_deviation", "right_deviation", "width"}
-
-
-def _number_mistakes(curve: Curve) -> Iterator[str]:
-    for field in curve.__struct_fields__:
-        value: float = getattr(curve, field)
-        name = field.replace("_", " ")
-        if not math.isfinite(value):
-            yield f"the {name} must be finite, not {value!r}"
-        elif field in _ABOVE_ZERO and value <= 0.0:
-            yield f"the {name} must be above 0, not {value!r}"
-    match curve:
-        case PiCurve(a=a, b=b, c=c, d=d):
-            if not a <= b <= c <= d:
-                yield f"the corners must rise: {a!r}, {b!r}, {c!r}, {d!r}"
-            yield from _width_mistakes(a, d)
-        case SCurve(start=start, end=end) | Concave(inflection=start, end=end):
-            yield from _width_mistakes(start, end)
-        case Arc(start=start, end=end):
-            if start == end:
-                yield f"an arc must start and end at different values, not at {end!r}"
-            yield from _width_mistakes(start, end)
-        case SemiEllipse(start=start, end=end):
-            if start >= end:
-                yield f"the end must lie above the start {start!r}, not at {end!r}"
-            yield from _width_mistakes(start, end)
-        case _:
-            return
-
-
-def _width_mistakes(start: float, end: float) -> Iterator[str]:
-    if math.isfinite(start) and math.isfinite(end) and not math.isfinite(end - start):
-        yield f"{start!r} and {end!r} are too far apart"
-
-
-def _depth(expression: Expression) -> int:
-    deepest, todo = 0, [(expression, 1)]
-    while todo:
-        one, level = todo.pop()
-        deepest = max(deepest, level)
-        if isinstance(one, Call) and level <= MOST_LEVELS:
-            todo += [(argument, level + 1) for argument in one.arguments]
-    return deepest
-
-
 def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]:
     how = output.defuzzifier
     if output.default is not None and not math.isfinite(output.default):
@@ -794,7 +384,7 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
     if output.low is None or output.high is None or output.low >= output.high:
         yield path, f"output {output.name!r} needs a range for its {how.method}"
     else:
-        yield from ((path, text) for text in _width_mistakes(output.low, output.high))
+        yield from ((path, text) for text in width_mistakes(output.low, output.high))
     if output.aggregation is None:
         yield path, f"output {output.name!r} needs an aggregation for its {how.method}"
     if not 2 <= how.samples <= MOST_SAMPLES:
@@ -803,9 +393,6 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
             f"output {output.name!r}: {how.samples} samples; "
             f"there must be 2 to {MOST_SAMPLES}",
         )
-
-
-Terms = Mapping[str, Mapping[str, None]]
 
 
 def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
@@ -817,44 +404,18 @@ def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     concludable: Terms = {name: terms[name] for name in outputs}
     for position, block in enumerate(system.blocks):
         path: Path = ("blocks", position)
-        yield from _activation_mistakes((*path, "activation"), block.activation)
+        yield from activation_mistakes((*path, "activation"), block.activation)
         of_block = f" of block {position + 1}" if len(system.blocks) > 1 else ""
         for index, rule in enumerate(block.rules):
             where = f"rule {index + 1}{of_block}"
             place = (*path, "rules", index)
-            for text in _condition_mistakes(rule.when, block, terms):
+            for text in condition_mistakes(rule.when, block, terms):
                 yield (*place, "when"), f"{where}: {text}"
             for text in _conclusion_mistakes(rule.then, block, outputs, concludable):
                 yield (*place, "then"), f"{where}: {text}"
             if not 0.0 <= rule.weight <= 1.0:
                 text = f"the weight must lie in [0, 1], not {rule.weight!r}"
                 yield (*place, "weight"), f"{where}: {text}"
-
-
-def _activation_mistakes(path: Path, how: Activation) -> Iterator[Mistake]:
-    if how.count < 1:
-        yield path, f"at least 1 rule is activated, not {how.count}"
-    if not 0.0 <= how.threshold <= 1.0:
-        yield path, f"the threshold must lie in [0, 1], not {how.threshold!r}"
-
-
-def _condition_mistakes(
-    condition: Condition | None, block: RuleBlock, terms: Terms
-) -> Iterator[str]:
-    if _levels(condition) > MOST_LEVELS:
-        yield f"nested deeper than {MOST_LEVELS} levels"
-        return
-    if _is_empty(condition):
-        yield "it joins no conditions at all"
-    for asked in questions(condition):
-        if asked.label is not None or asked.variable not in terms:
-            yield from _reference_mistakes(asked.variable, asked.label, terms)
-        elif not asked.hedges or asked.hedges[-1] != "any":
-            yield f"{asked.variable!r} is asked without a term"
-    if block.conjunction is None and _uses(condition, And):
-        yield "it needs a conjunction, and its block has none"
-    if block.disjunction is None and _uses(condition, Or):
-        yield "it needs a disjunction, and its block has none"
 
 
 def _conclusion_mistakes(
@@ -866,51 +427,8 @@ def _conclusion_mistakes(
     if not then:
         yield "it concludes nothing"
     for one in then:
-        yield from _reference_mistakes(one.output, one.label, terms)
+        yield from reference_mistakes(one.output, one.label, terms)
         output = outputs.get(one.output)
         is_curve = output is not None and not output.defuzzifier.is_weighted
         if is_curve and block.implication is None:
             yield f"{one.output!r} needs an implication in its block"
-
-
-def _reference_mistakes(
-    variable: str, label: str | None, terms: Terms
-) -> Iterator[str]:
-    if variable not in terms:
-        yield f"no variable {variable!r}; {name_choice(variable, terms)}"
-    elif label is not None and label not in terms[variable]:
-        choice = name_choice(label, terms[variable])
-        yield f"{variable!r} has no term {label!r}; {choice}"
-
-
-def _is_empty(condition: Condition | None) -> bool:
-    """Return whether a condition joins nothing anywhere."""
-    if isinstance(condition, And | Or) and not condition.parts:
-        return True
-    return any(map(_is_empty, _parts(condition)))
-
-
-def _levels(condition: Condition | None) -> int:
-    deepest, todo = 0, [(condition, 1)]
-    while todo:
-        one, level = todo.pop()
-        deepest = max(deepest, level)
-        if level <= MOST_LEVELS:
-            todo += [(part, level + 1) for part in _parts(one)]
-    return deepest
-
-
-def _parts(condition: Condition | None) -> Iterable[Condition]:
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            return parts
-        case Not(part=part):
-            return (part,)
-        case _:
-            return ()
-
-
-def _uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
-    if isinstance(condition, kind):
-        return True
-    return any(_uses(part, kind) for part in _parts(condition))
