@@ -347,9 +347,9 @@ def proved(
         DisagreementError: If the file is read back as another model, though the writer
             and the reader told of nothing.
     """
-    if form.dtype is not None:
-        return _certified(model, form, dtype)
     if form.read is None:
+        if form.dtype is not None:
+            return _certified(model, form, dtype)
         return Proof("unproved", f"files in the format {form.name} are not read back")
     again = form.read(written.content, form.name)
     match likeness(model, written, again):

@@ -113,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _forget_stdout()
         return 141
     except FuzzyTreeError as error:
-        say(str(error))
+        say(_error_text(error, words[0] if words else ""))
         return 2
     except OSError as error:
         say(f"cannot go on: {reason(error)}")
@@ -139,6 +139,14 @@ def _interruptible() -> Generator[None]:
         except Exception:
             check()
             raise
+
+
+def _error_text(error: FuzzyTreeError, verb: str) -> str:
+    """Return a message with what it asks for in the words of the command line."""
+    offer = "pass allow_loss=True"
+    if verb in ("run", "check", "convert", "export"):
+        return str(error).replace(offer, "pass --allow-loss")
+    return str(error).replace(offer, "use `fuzzytree convert --allow-loss`")
 
 
 def _usage_text(error: click.ClickException) -> str:

@@ -1,0 +1,447 @@
+"""`fuzzytree convert` tells what it read, lost, wrote and proved."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from msgspec.structs import replace
+
+import fuzzytree as ft
+from fuzzytree.cli import main
+from fuzzytree.contracts import Document, Loss, Reading, Written
+from fuzzytree.errors import LossError
+from fuzzytree.exporters import TABLE, yaml
+from fuzzytree.random_systems import random_system
+from fuzzytree.readers.yaml import reading
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.samples import samples
+from fuzzytree.system import FuzzySystem
+from tests.cli.conftest import Call, grip
+
+HELP = "\n  fuzzytree convert --help tells more\n"
+TIPPER = Path(__file__).resolve().parent.parent.parent / "examples" / "tipper.fll"
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    (folder / "tipper.fll").write_bytes(TIPPER.read_bytes())
+
+
+def test_what_was_read_written_and_proved_is_told(call: Call) -> None:
+    code, out, err = call("convert", "tipper.fll", "tipper.yaml")
+    content = Path("tipper.yaml").read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    assert (code, out) == (0, "")
+    assert err == (
+        "read     tipper.fll fll: fuzzy system, 2 inputs, 1 output, 3 rules, 8 terms\n"
+        f"wrote    tipper.yaml yaml, {len(content)} bytes, sha256 {digest}\n"
+        "proved   equal       read back from the file, "
+        "the fuzzy system is equal in every number\n"
+        "next     fuzzytree check tipper.fll tipper.yaml\n"
+    )
+    assert ft.load("tipper.yaml") == ft.load("tipper.fll")
+
+
+def test_the_next_command_works(call: Call) -> None:
+    assert call("convert", "tipper.fll", "tipper.yaml", "--quiet") == (0, "", "")
+    code, out, err = call("check", "tipper.fll", "tipper.yaml", "--limit", "60")
+    assert code == 0, out
+    assert err.endswith("comparisons, and none disagrees\n")
+
+
+def test_json_tells_the_same_facts(call: Call) -> None:
+    code, out, err = call("convert", "tipper.fll", "t.yaml", "--json", "--quiet")
+    content = Path("t.yaml").read_bytes()
+    assert (code, err) == (0, "")
+    assert json.loads(out) == {
+        "read": {
+            "file": "tipper.fll",
+            "format": "fll",
+            "carrier": "system",
+            "name": "tipper",
+            "inputs": ["service", "food"],
+            "outputs": ["tip"],
+            "rules": 3,
+            "terms": 8,
+            "losses": [],
+            "remarks": [],
+        },
+        "format": "yaml",
+        "carrier": "system",
+        "file": "t.yaml",
+        "bytes": len(content),
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "losses": [],
+        "remarks": [],
+        "proof": {
+            "verdict": "equal",
+            "sentence": "read back from the file, "
+            "the fuzzy system is equal in every number",
+        },
+        "certificate": None,
+        "next": "fuzzytree check tipper.fll t.yaml",
+    }
+
+
+def test_a_tree_goes_through_a_format_of_others_and_back(call: Call) -> None:
+    assert call("convert", "grip.yaml", "grip.fll", "--quiet")[0] == 0
+    assert call("convert", "grip.fll", "back.yaml", "--quiet")[0] == 0
+    back = ft.load("back.yaml")
+    assert isinstance(back, RuleBase)
+    assert ft.run(back, "grasps.csv").classes == ft.run(grip(), "grasps.csv").classes
+
+
+def test_streams_name_their_formats(call: Call) -> None:
+    words = ("convert", "-", "-", "--from", "fll", "--to", "yaml")
+    code, out, err = call(*words, stdin=TIPPER.read_bytes())
+    assert code == 0
+    assert out.encode() == ft.export(ft.load("tipper.fll"), "yaml").content
+    assert err.startswith("read     - fll: fuzzy system")
+    assert "next" not in err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("-", "a.yaml"), "`-` has no suffix; name the format with --from" + HELP),
+        (("a.yaml", "-"), "`-` has no suffix; name the format with --to" + HELP),
+        (
+            ("grip.yaml", "a.yalm"),
+            f"no format '.yalm'; there is {', '.join(TABLE)} (did you mean '.yaml'?); "
+            "name one of them with --to" + HELP,
+        ),
+        (
+            ("grip.yaml", "a.yaml", "--to", "yalm"),
+            f"no format 'yalm'; there is {', '.join(TABLE)} (did you mean 'yaml'?)"
+            + HELP,
+        ),
+        (
+            ("grip.yalm", "a.yaml"),
+            "grip.yalm: has the suffix '.yalm'; "
+            f"there is {', '.join(TABLE)} (did you mean '.yaml'?)\n",
+        ),
+        (("folder.yaml", "a.yaml"), "folder.yaml: cannot be read: is a directory\n"),
+        (("empty.fll", "a.yaml"), "empty.fll:1:1: the file is empty\n"),
+        (("no.fll", "a.yaml"), "no.fll: cannot be read: no such file or directory\n"),
+        (
+            ("grip.onnx", "a.yaml"),
+            "grip.onnx: a file in the format onnx is not read back as a model; "
+            "keep the YAML file beside it\n",
+        ),
+        (
+            ("grip.yaml", "a.onnx", "--set", "opset"),
+            "--set opset: must be NAME=VALUE" + HELP,
+        ),
+        (
+            ("grip.yaml", "a.onnx", "--set", "opset=new"),
+            "opset: must be a whole number, not 'new'" + HELP,
+        ),
+        (
+            ("grip.yaml", "a.onnx", "--set", "dtype=float23"),
+            "dtype: must be float64, mixed, float32 (did you mean 'float32'?), "
+            "not 'float23'" + HELP,
+        ),
+        (
+            ("grip.yaml", "a.onnx", "--set", "verify=maybe"),
+            "verify: must be yes or no, not 'maybe'" + HELP,
+        ),
+        (
+            ("grip.yaml", "a.yaml", "--dialect", "iec"),
+            "yaml has no option 'dialect'; it has none" + HELP,
+        ),
+        (
+            ("grip.yaml", "a.onnx", "--set", "ir=8", "--set", "ir=9"),
+            "the option 'ir' is given twice" + HELP,
+        ),
+        (
+            ("tipper.fll", "a.py"),
+            "cannot write tipper as python: its outputs are numbers, "
+            "and rules decide for a class\n",
+        ),
+        (
+            ("tipper.fll", "a.yaml", "--as", "tree"),
+            "--as tree: tipper is a fuzzy system, and no tree can be made of it" + HELP,
+        ),
+    ],
+    ids=lambda one: " ".join(one) if isinstance(one, tuple) else "",
+)
+def test_what_cannot_be_had_is_one_sentence(
+    call: Call, words: tuple[str, ...], message: str
+) -> None:
+    Path("folder.yaml").mkdir()
+    Path("empty.fll").touch()
+    code, out, err = call("convert", *words)
+    err = "".join(x for x in err.splitlines(keepends=True) if not x.startswith("read "))
+    assert (code, out, err) == (2, "", message)
+    assert not list(Path.cwd().glob("a.*"))
+
+
+def test_a_terminal_is_no_input(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    terminal = SimpleNamespace(buffer=SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("sys.stdin", terminal)
+    assert main(["convert", "-", "a.yaml", "--from", "fll"]) == 2
+    assert capsys.readouterr().err == (
+        "`-` reads standard input, which is a terminal; name a file, or pipe one in"
+        + HELP
+    )
+
+
+def test_options_reach_the_writer(call: Call) -> None:
+    words = ("--set", "dtype=float32", "--set", "outputs=label,rule,status")
+    assert call("convert", "grip.yaml", "a.onnx", "--as", "rules", *words)[0] == 0
+    facts = json.loads(call("show", "a.onnx", "--json")[1])
+    assert (facts["dtype"], facts["outputs"]) == (
+        "float32",
+        ["label", "rule", "status"],
+    )
+
+
+def test_every_format_that_reads_a_system_writes_it_again(call: Call) -> None:
+    for name in ("fll", "yaml"):
+        suffix = TABLE[name][0]
+        assert call("convert", "tipper.fll", f"again{suffix}")[0] == 0
+        assert ft.load(f"again{suffix}") == ft.load("tipper.fll")
+
+
+# --- losses, in YAML that loses something
+
+
+def _lossy(monkeypatch: pytest.MonkeyPatch, *, on_read: bool, on_write: bool) -> None:
+    losses = (
+        Loss("default of 'tip'", "becomes 0"),
+        Loss("term 'low' of 'tip'", "becomes 9 points", 0.0125),
+    )
+
+    def write(model: Document, /, *, allow_loss: bool = False) -> Written:
+        written = yaml.write(model)
+        if not on_write:
+            return written
+        if not allow_loss:
+            raise LossError(
+                "cannot write it as yaml: default of 'tip': becomes 0; term 'low' of "
+                "'tip': becomes 9 points; pass allow_loss=True to write it as stated"
+            )
+        return replace(written, losses=losses)
+
+    def read(content: bytes, name: str) -> Reading:
+        model = reading(content, name).model
+        return Reading(model, losses if on_read else (), ("the dialect is northern",))
+
+    monkeypatch.setattr(yaml, "FORMAT", replace(yaml.FORMAT, read=read, write=write))
+
+
+LOST = (
+    "lost     default of 'tip': becomes 0\n"
+    "lost     term 'low' of 'tip': becomes 9 points (largest error 0.013)\n"
+)
+
+
+def test_a_loss_of_writing_is_refused_with_all_losses(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _lossy(monkeypatch, on_read=False, on_write=True)
+    code, out, err = call("convert", "tipper.fll", "a.yaml")
+    assert (code, out) == (1, "")
+    assert err.splitlines()[1] == (
+        "cannot write it as yaml: default of 'tip': becomes 0; term 'low' of 'tip': "
+        "becomes 9 points; pass --allow-loss to write it as stated"
+    )
+    assert not Path("a.yaml").exists()
+
+
+def test_a_loss_of_reading_is_refused_with_all_losses(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert call("convert", "tipper.fll", "tipper.yaml")[0] == 0
+    _lossy(monkeypatch, on_read=True, on_write=False)
+    code, out, err = call("convert", "tipper.yaml", "a.fll")
+    assert (code, out) == (1, "")
+    assert err == (
+        "read     tipper.yaml yaml: "
+        "fuzzy system, 2 inputs, 1 output, 3 rules, 8 terms\n"
+        "remark   the dialect is northern\n"
+        f"{LOST}nothing is written; pass --allow-loss to write what is left\n"
+    )
+    assert not Path("a.fll").exists()
+    code, out, _ = call("convert", "tipper.yaml", "a.fll", "--json")
+    facts = json.loads(out)
+    assert (code, facts["file"], len(facts["read"]["losses"])) == (1, None, 2)
+
+
+def test_losses_that_are_allowed_are_told(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _lossy(monkeypatch, on_read=False, on_write=True)
+    code, _, err = call("convert", "tipper.fll", "a.yaml", "--allow-loss")
+    assert code == 0
+    assert LOST in err
+    assert Path("a.yaml").exists()
+
+
+def test_a_file_with_losses_is_run_shown_and_checked_only_if_allowed(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert call("convert", "tipper.fll", "tipper.yaml")[0] == 0
+    Path("meals.csv").write_text("service,food\n3,8\n", "utf-8")
+    _lossy(monkeypatch, on_read=True, on_write=False)
+    refusal = (
+        "tipper.yaml: a model cannot hold all that the file says:\n"
+        "  default of 'tip': becomes 0\n"
+        "  term 'low' of 'tip': becomes 9 points (largest error 0.013)\n"
+        "  pass --allow-loss to read it as stated\n"
+    )
+    for words in (("run", "tipper.yaml", "meals.csv"), ("check", "tipper.yaml")):
+        assert call(*words) == (2, "", refusal)
+        assert call(*words, "--allow-loss", "--quiet")[0] == 0
+    code, out, err = call("show", "tipper.yaml")
+    assert code == 0
+    assert out.startswith("tipper: fuzzy system")
+    assert err == f"{LOST}remark   the dialect is northern\n"
+
+
+# --- in Python
+
+
+def test_a_conversion_in_python_tells_the_same() -> None:
+    found = ft.convert("tipper.fll", ".yaml")
+    assert isinstance(found.model, FuzzySystem)
+    assert (found.source, found.read_as, found.to) == ("tipper.fll", "fll", "yaml")
+    assert found.proof.verdict == "equal"
+    again = ft.convert(found.reading, "fll", scores="winner")
+    assert again.proof.verdict in ("equal", "alike")
+
+
+def test_losses_in_python_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    ft.convert("tipper.fll", "yaml")
+    ft.save(ft.load("tipper.fll"), "tipper.yaml")
+    _lossy(monkeypatch, on_read=True, on_write=True)
+    with pytest.raises(LossError) as caught:
+        ft.load("tipper.yaml")
+    assert str(caught.value).endswith("pass allow_loss=True to read it as stated")
+    assert isinstance(ft.load("tipper.yaml", allow_loss=True), FuzzySystem)
+    assert len(ft.read("tipper.yaml").losses) == 2
+    with pytest.raises(LossError):
+        ft.convert("tipper.yaml", "fll")
+    with pytest.raises(LossError):
+        ft.convert("tipper.fll", "yaml")
+    found = ft.convert("tipper.yaml", "yaml", allow_loss=True)
+    assert found.proof.verdict == "equal"
+
+
+@pytest.mark.parametrize("name", ["relative rules", "raw rules (LR curves)"])
+def test_relative_rules_keep_their_decisions_where_curves_become_points(
+    call: Call, name: str
+) -> None:
+    ft.save(samples()[name], "rules.yaml")
+    code, _, err = call("convert", "rules.yaml", "a.fll", "--allow-loss")
+    assert code == 0
+    assert "becomes" in err or "points" in err
+    if name == "relative rules":
+        assert "probes, as it must for relative terms" in err
+
+
+def test_a_smaller_tolerance_gives_a_smaller_bound(call: Call) -> None:
+    ft.save(samples()["relative rules"], "rules.yaml")
+    bounds = []
+    for tolerance in ("1e-2", "1e-5"):
+        words = ("--tolerance", tolerance, "--allow-loss", "--json", "--quiet")
+        facts = json.loads(call("convert", "rules.yaml", "a.fll", *words)[1])
+        bounds.append(max(loss["bound"] or 0 for loss in facts["losses"]))
+    assert 0.0 < bounds[1] <= 1e-5 < bounds[0] <= 1e-2
+
+
+def test_verbs_for_classes_refuse_a_system_in_one_sentence(call: Call) -> None:
+    for verb in ("bench", "stability", "needs"):
+        code, out, err = call(verb, "tipper.fll")
+        assert (code, out) == (2, "")
+        assert err == (
+            "tipper is a fuzzy system, which decides for no class; "
+            f"{verb} needs a tree or a rule base\n"
+        )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_system_answers_the_same_in_python_and_on_the_command_line(
+    call: Call, seed: int
+) -> None:
+    system = random_system(seed)
+    ft.save(system, "any.yaml")
+    rows = [",".join(system.columns), *(",".join(["0.5"] * 3) for _ in range(2)), ",,"]
+    Path("rows.csv").write_text("\n".join(rows) + "\n", "utf-8")
+    code, out, err = call("run", "any.yaml", "rows.csv")
+    assert code == 0
+    assert out == ft.run(system, "rows.csv").to_csv()
+    assert "1 without a needed value" in err
+    found = ft.run("any.yaml", "rows.csv")
+    assert isinstance(found, ft.Outputs)
+    assert found.columns()["status"][-1] == "missing"
+    assert str(found).startswith("3 rows: ")
+
+
+def test_why_tells_the_rules_of_a_system_with_their_degrees(call: Call) -> None:
+    Path("meals.csv").write_text("service,food\n5,0\n", "utf-8")
+    code, out, _ = call("run", "tipper.fll", "meals.csv", "--why", "--quiet")
+    assert code == 0
+    assert "1 1. IF service is poor or food is rancid THEN tip is cheap; " in out
+    assert "1 2. IF service is good THEN tip is average; " in out
+
+
+def test_strengths_of_the_rules_of_a_system_are_columns(call: Call) -> None:
+    Path("meals.csv").write_text("service,food\n5,0\n", "utf-8")
+    words = ("run", "tipper.fll", "meals.csv", "--json", "--quiet")
+    row = json.loads(call(*words, "--strengths", "rule")[1])
+    assert list(row) == ["tip", "status", *(f"strength of rule {k}" for k in (1, 2, 3))]
+    assert row["strength of rule 2"] == 1.0
+    code, _, err = call(*words, "--strengths", "class")
+    assert code == 2
+    assert err.startswith("--strengths class: tipper is a fuzzy system")
+
+
+def test_a_system_is_shown_with_its_rules_and_terms(call: Call) -> None:
+    code, out, err = call("show", "tipper.fll")
+    assert (code, err) == (0, "")
+    assert out == SHOWN
+    facts = json.loads(call("show", "tipper.fll", "--json")[1])
+    assert facts["carrier"] == "system"
+    assert facts["rules"][1]["text"] == "IF service is good THEN tip is average"
+
+
+SHOWN = """\
+tipper: fuzzy system, 2 inputs, 1 output, 3 rules, 8 terms
+inputs   2: service, food
+outputs  1: tip
+answers  missing value: nan
+
+rules: AND is minimum; OR is maximum; all rules
+1. IF service is poor or food is rancid THEN tip is cheap
+2. IF service is good THEN tip is average
+3. IF service is excellent or food is delicious THEN tip is generous
+
+service, 0 to 10
+  poor       gaussian: mean 0, deviation 1.5
+  good       gaussian: mean 5, deviation 1.5
+  excellent  gaussian: mean 10, deviation 1.5
+
+food, 0 to 10
+  rancid     1 from 0 to 1, rises from 0 at 0, falls to 0 at 3
+  delicious  1 from 9 to 10, rises from 0 at 7, falls to 0 at 10
+
+tip, 0 to 30
+  weighted average; no rule: nan
+  cheap     5
+  average   15
+  generous  25
+"""
+
+
+def test_an_old_file_survives_a_conversion_that_fails(call: Call) -> None:
+    Path("a.py").write_text("old", "utf-8")
+    assert call("convert", "tipper.fll", "a.py")[0] == 2
+    assert Path("a.py").read_text("utf-8") == "old"
+    assert not list(Path.cwd().glob(".*.part"))
