@@ -321,8 +321,8 @@ def _remarks(system: FuzzySystem, names: _Names) -> Iterator[str]:
             f"nearly as close: of {', '.join(map(repr, fine[:5]))}"
         )
     yield (
-        "a missing or infinite value answers NaN here; the engines answer by the rules "
-        "that do not ask for it"
+        "fuzzylite answers a row with a missing or infinite value all the same, by the "
+        "rules that do not ask for it"
     )
     if any(rule.name for rule in system.rules):
         yield "names of rules have no place"

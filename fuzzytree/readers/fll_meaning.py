@@ -202,6 +202,11 @@ def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
             "formulas: 'round' takes a half to the even neighbour, as in pyfuzzylite; "
             "fuzzylite 6 takes it away from 0"
         )
+    if any(map(_asks_numbers, calls)):
+        yield (
+            "formulas: what is not 0 is true for 'and', 'or' and 'not', as in "
+            "pyfuzzylite; in fuzzylite 6 only 1 is true"
+        )
     looked_at = [
         label.curve
         for one in system.outputs
@@ -237,6 +242,14 @@ def _calls(curves: Iterable[Curve]) -> Iterator[Call]:
 
 def _is_sum_of_truths(call: Call) -> bool:
     return call.function in ("+", "-", "negate") and all(map(_is_truth, call.arguments))
+
+
+def _asks_numbers(call: Call) -> bool:
+    """Return whether a logical function gets a number that may be neither 0 nor 1."""
+    return call.function in ("and", "or", "not") and not all(
+        _is_truth(one) or (isinstance(one, Call) and one.function in ("lt", "gt"))
+        for one in call.arguments
+    )
 
 
 def _is_truth(expression: Expression) -> bool:
