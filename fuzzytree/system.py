@@ -14,9 +14,12 @@ from typing import Literal
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
+    LR,
+    Band,
     Mistake,
     Part,
     Path,
+    Points,
     Value,
     name_choice,
     name_mistakes,
@@ -77,12 +80,14 @@ from fuzzytree.system_rules import (
 
 __all__ = [
     "FUNCTIONS",
+    "LR",
     "MOST_LEVELS",
     "MOST_SAMPLES",
     "Activation",
     "ActivationMethod",
     "And",
     "Arc",
+    "Band",
     "Bell",
     "Binary",
     "Call",
@@ -107,6 +112,7 @@ __all__ = [
     "Number",
     "Or",
     "PiCurve",
+    "Points",
     "Relation",
     "RuleBlock",
     "SCurve",
