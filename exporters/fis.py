@@ -25,6 +25,7 @@ from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
 from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
+from fuzzytree.losses import refusal
 from fuzzytree.naming import Names
 from fuzzytree.readers.fis import DEFAULTS, DIALECT, FACTS, reading
 from fuzzytree.readers.fis_words import (
@@ -115,8 +116,7 @@ def write(
     if curves == "standard":
         losses += _private_losses(terms, dialect)
     if losses and not allow_loss:
-        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
-        raise LossError(f"cannot write {model.name} as fis without loss:\n{listed}")
+        raise refusal(model.name, "fis", losses)
     names = _Naming(system, terms)
     remarks += names.remarks
     text = _text(system, (terms, lines), (comments, names), dialect, remarks)

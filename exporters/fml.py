@@ -26,6 +26,7 @@ from fuzzytree.casting.shapes import shape_of
 from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
+from fuzzytree.losses import refusal
 from fuzzytree.naming import DIGITS, LETTERS, Names
 from fuzzytree.readers.fml import FACTS, reading
 from fuzzytree.readers.fml_words import FAR, METHODS, NAMESPACE, SNORMS, TNORMS, USUAL
@@ -99,8 +100,7 @@ def write(
     losses += [*lost, *_losses(system)]
     found = rules_of(system)
     if losses and not allow_loss:
-        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
-        raise LossError(f"cannot write {model.name} as fml without loss:\n{listed}")
+        raise refusal(model.name, "fml", losses)
     names = _Naming(system, found)
     remarks += names.remarks
     lines = _lines(system, found, names, facts)

@@ -29,12 +29,12 @@ def refusal(model: str, to: str, losses: Sequence[Loss]) -> LossError:
 
     Example:
         >>> print(refusal("grip", "turtle", [Loss("AND", "a product becomes min")]))
-        cannot write grip as turtle: something would be lost
+        cannot write grip as turtle without loss:
           AND: a product becomes min
           pass allow_loss=True to write it as stated
     """
     listed = "".join(f"  {loss_text(loss)}\n" for loss in losses)
     return LossError(
-        f"cannot write {model[:100]} as {to}: something would be lost\n{listed}"
+        f"cannot write {model[:100]} as {to} without loss:\n{listed}"
         "  pass allow_loss=True to write it as stated"
     )

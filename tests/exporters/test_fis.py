@@ -378,6 +378,7 @@ def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
         "  output 'y': FIS has no default, 0.25, where no rule fires",
         "  variable 'y': values are not moved into the range",
         "  block 2 of rules: the file has one set of norms, those of the first block",
+        "  pass allow_loss=True to write it as stated",
     ]
 
 
