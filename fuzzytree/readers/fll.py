@@ -20,7 +20,7 @@ from fuzzytree.readers.fll_variables import (
     read_variables,
     vocabulary_of,
 )
-from fuzzytree.readers.fll_words import Notes, Section, read_page
+from fuzzytree.readers.fll_words import MOST_BYTES, Notes, Section, read_page
 from fuzzytree.readers.lines import decoded
 from fuzzytree.readers.nodes import MOST_SHOWN, report
 from fuzzytree.rulebase import Path
@@ -49,7 +49,7 @@ def read(content: bytes, name: str) -> Reading:
         ('food',)
     """
     notes = Notes([], [], [])
-    page = read_page(decoded(content, name), notes)
+    page = read_page(decoded(content, name, MOST_BYTES), notes)
     system = None
     if not notes.is_full:
         system = _system(page.sections, PurePath(name).stem, notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, Literal, TypeVar
@@ -31,6 +32,11 @@ KEYS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """What each kind of section may say."""
 
 T = TypeVar("T")
+
+MOST_BYTES: Final = 32 * 2**20
+MOST_LINES: Final = 500_000
+MOST_WORDS: Final = 20_000
+"""Of one line: enough for 4096 points, or for a rule of 5000 questions."""
 
 _REPEATED = frozenset({"term", "rule"})
 
@@ -132,8 +138,9 @@ class Entry(msgspec.Struct, frozen=True):
         return self.line, self.start, sentence
 
     def words(self, signs: str = "") -> tuple[Word, ...]:
-        """Return the words of the value."""
-        return tuple(words(self.value, self.line, self.start, signs))
+        """Return the words of the value, as many as a line may have."""
+        found = words(self.value, self.line, self.start, signs)
+        return tuple(itertools.islice(found, MOST_WORDS))
 
     @property
     def end(self) -> Word:
@@ -172,6 +179,11 @@ def read_page(text: str, notes: Notes) -> Page:
     """Return the sections of a text; what is wrong with its lines is noted."""
     comments: list[str] = []
     heads: list[tuple[Entry, list[Entry]]] = []
+    count = max(text.count("\n"), text.count("\r"))
+    if count > MOST_LINES:
+        found = f"{count:,} lines are more than the {MOST_LINES:,} that are read"
+        notes.found.append((MOST_LINES + 1, 1, found))
+        return Page((), ())
     for number, line in enumerate(split_lines(text), 1):
         said, sign, comment = line.partition("#")
         if sign:
@@ -179,7 +191,7 @@ def read_page(text: str, notes: Notes) -> Page:
         if not said.strip() or notes.is_full:
             continue
         entry = _entry(said, number, notes)
-        if entry is None:
+        if entry is None or _is_too_long(entry, notes):
             continue
         if entry.key in KEYS:
             heads.append((entry, []))
@@ -187,8 +199,8 @@ def read_page(text: str, notes: Notes) -> Page:
             heads[-1][1].append(entry)
     sections = tuple(Section(head, tuple(entries)) for head, entries in heads)
     for extra in [one for one in sections if one.kind == "Engine"][1:]:
-        text = "a second Engine; a file holds one"
-        notes.found.append((extra.head.line, extra.head.column, text))
+        found = "a second Engine; a file holds one"
+        notes.found.append((extra.head.line, extra.head.column, found))
     return Page(sections, tuple(comments))
 
 
@@ -201,6 +213,17 @@ def _entry(text: str, line: int, notes: Notes) -> Entry | None:
         return None
     start = len(key) + 2 + len(value) - len(value.lstrip())
     return Entry(key.strip(), value.strip(), line, column, start)
+
+
+def _is_too_long(entry: Entry, notes: Notes) -> bool:
+    if len(entry.value) < MOST_WORDS:
+        return False
+    found = words(entry.value, entry.line, entry.start, "()")
+    extra = next(itertools.islice(found, MOST_WORDS - 1, None), None)
+    if extra is not None:
+        sentence = f"a line of more words than the {MOST_WORDS:,} that are read"
+        notes.found.append(extra.mistake(sentence))
+    return extra is not None
 
 
 def _belongs(

@@ -436,7 +436,7 @@ def test_of_two_terms_with_one_name_the_second_counts_and_the_first_is_a_loss() 
         (b"\0", "x.fll:1:1: character U+0000; the file may be damaged"),
         (b"Engine: \xe9", "byte 0xe9 is not UTF-8; the file must be saved as UTF-8"),
         ("Engine: a".encode("utf-16"), "a file of UTF-16; it must be saved as UTF-8"),
-        (b"a" * (5 * 2**20), "x.fll: 5,242,880 bytes are more than the 4,194,304"),
+        (b"a" * (33 * 2**20), "x.fll: 34,603,008 bytes are more than the 33,554,432"),
     ],
 )
 def test_what_is_no_text_file_is_told_in_one_sentence(
@@ -459,6 +459,11 @@ def test_what_is_no_text_file_is_told_in_one_sentence(
         "z" * 1_000_000 + ": " + "z" * 1_000_000,
         "activation: " + "z" * 2_000_000,
         "\n".join(f"k{number}: 1" for number in range(200_000)),
+        "\n" * 30_000_000,
+        ("rule: if " + "(" * 200_000 + "\n") * 30,
+        ("term: d Discrete " + "1 " * 100_000 + "\n") * 30,
+        "#" * 30_000_000,
+        ("rule: if a is " + "lo or a is " * 5_000 + "low then b is c\n") * 100,
     ],
 )
 def test_hostile_lines_end_soon_in_a_message(line: str) -> None:
