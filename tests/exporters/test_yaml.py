@@ -31,7 +31,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 from fuzzytree.tree import FuzzyTree, Leaf
 
 POSITIVE = Path(__file__).parents[1] / "example-files" / "positive"
@@ -284,7 +284,7 @@ def test_what_no_file_can_hold_is_refused() -> None:
 def test_a_file_that_would_not_be_read_again_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("fuzzytree.exporters.yaml.MOST_BYTES", 500)
+    monkeypatch.setattr("fuzzytree.exporters.yaml_text.MOST_BYTES", 500)
     with pytest.raises(LossError) as caught:
         write(random_tree(1))
     assert str(caught.value) == (
@@ -298,15 +298,16 @@ def test_the_writer_counts_the_nodes_that_the_reader_counts(
     monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     tree = random_tree(seed, leaves=9)
-    for model in (tree, rules_from_tree(tree), rules_from_tree(tree, "raw")):
+    rules, raw = rules_from_tree(tree), rules_from_tree(tree, "raw")
+    for model in (tree, rules, raw, random_system(seed)):
         monkeypatch.undo()
         content = write(model).content
         root, _ = compose(content, "x.yaml")
         count = _size(root)
-        monkeypatch.setattr("fuzzytree.exporters.yaml.MOST_NODES", count)
+        monkeypatch.setattr("fuzzytree.exporters.yaml_text.MOST_NODES", count)
         monkeypatch.setattr("fuzzytree.readers.nodes.MOST_NODES", count)
         assert read(write(model).content, "x.yaml") == model
-        monkeypatch.setattr("fuzzytree.exporters.yaml.MOST_NODES", count - 1)
+        monkeypatch.setattr("fuzzytree.exporters.yaml_text.MOST_NODES", count - 1)
         with pytest.raises(LossError):
             write(model)
 
@@ -324,7 +325,7 @@ def _size(node: nodes.Node) -> int:
 def test_the_format_says_what_it_carries() -> None:
     assert FORMAT.name == "yaml"
     assert FORMAT.suffixes == (".yaml", ".yml")
-    assert FORMAT.carries == ("tree", "rules")
+    assert FORMAT.carries == ("tree", "rules", "system")
     assert FORMAT.cannot == ()
     assert FORMAT.write is write
     assert FORMAT.read is not None
