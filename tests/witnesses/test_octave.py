@@ -1,0 +1,155 @@
+"""Octave's fuzzy-logic-toolkit and fuzzylite 6 run our FIS files, and we run theirs."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from fuzzytree import learn
+from fuzzytree.casting import as_system, flattened, winner
+from fuzzytree.exporters.fis import write
+from fuzzytree.inference import infer, input_values
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.readers.fis import reading
+from fuzzytree.reference import evaluate
+from fuzzytree.rulebase import Kind, RuleBase
+from fuzzytree.system import FuzzySystem
+from fuzzytree.testing import random_rows
+from tests.exporters.test_fis import random_fis
+from tests.witnesses.corpus_fis import EXACT, NEAR, corpus, corpus_table
+from tests.witnesses.fuzzylite_engine import largest_difference, run_program
+from tests.witnesses.octave_engine import DISCRETEMF, answers
+
+ROOT = Path(__file__).parents[2]
+WINE = ROOT / "examples" / "wine" / "wine.csv"
+
+Need = Callable[[str], str]
+
+
+def system_of(content: bytes) -> FuzzySystem:
+    """Return what a file of ours says, as a system whose combinations are inputs."""
+    model = reading(content, "model.fis").model
+    if isinstance(model, RuleBase):
+        model = flattened(as_system(model, always="term"))[0]
+    assert isinstance(model, FuzzySystem)
+    return model
+
+
+def ours(content: bytes, rows: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
+    system = system_of(content)
+    return [
+        infer(system, dict(zip(system.columns, row, strict=True))).outputs
+        for row in rows
+    ]
+
+
+@pytest.mark.heavy
+def test_the_wine_rules_have_the_same_scores_in_octave_and_decide_alike(
+    program: Need, tmp_path: Path
+) -> None:
+    octave = program("octave")
+    files: dict[str, tuple[bytes, list[list[float]]]] = {}
+    told: dict[str, tuple[RuleBase, list[dict[str, float]]]] = {}
+    for entry in (25.0, 1e9):
+        tree = learn(WINE, target="cultivar", entry=entry)
+        assert any(v.parts for v in tree.variables) == (entry == 25.0)
+        kinds: tuple[Kind, ...] = ("relative", "raw")
+        for kind in kinds:
+            rules = rules_from_tree(tree, kind)
+            with WINE.open(newline="", encoding="utf-8") as file:
+                rows = [
+                    {name: float(row[name]) for name in rules.inputs}
+                    for row in csv.DictReader(file)
+                ]
+            inputs = as_system(rules).inputs
+            given = [list(input_values(inputs, row).values()) for row in rows]
+            written = write(rules, allow_loss=True, tolerance=1e-4)
+            name = f"{kind}{int(entry)}"
+            files[name] = written.content, given
+            told[name] = rules, rows
+    found = answers(octave, tmp_path, files)
+    for name, (content, given) in files.items():
+        rules, rows = told[name]
+        assert found[name].rules == len(rules.rules) + 1
+        assert len(found[name].rows) == 178
+        assert not any(map(math.isnan, (x for row in found[name].rows for x in row)))
+        assert largest_difference(ours(content, given), found[name].rows) <= EXACT
+        if rules.kind == "relative":
+            for row, scores in zip(rows, found[name].rows, strict=True):
+                assert winner(rules, scores) == evaluate(rules, row).label
+
+
+@pytest.mark.heavy
+def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
+    program: Need, tmp_path: Path
+) -> None:
+    fuzzylite = program("fuzzylite")
+    rules = rules_from_tree(learn(WINE, target="cultivar"))
+    with WINE.open(newline="", encoding="utf-8") as file:
+        rows = [
+            {name: float(row[name]) for name in rules.inputs}
+            for row in csv.DictReader(file)
+        ]
+    inputs = as_system(rules).inputs
+    given = [list(input_values(inputs, row).values()) for row in rows]
+    content = write(rules, allow_loss=True, dialect="fuzzylite", tolerance=1e-4).content
+    run = run_program(fuzzylite, content, given, tmp_path, kind="fis")
+    assert run.rules == len(rules.rules) + 1
+    for row, scores in zip(rows, run.outputs, strict=True):
+        assert winner(rules, scores) == evaluate(rules, row).label
+    assert largest_difference(ours(content, given), run.outputs) <= NEAR
+
+
+@pytest.mark.heavy
+def test_random_systems_answer_alike_in_octave(program: Need, tmp_path: Path) -> None:
+    octave = program("octave")
+    files: dict[str, tuple[bytes, list[list[float]]]] = {}
+    kinds: set[bool] = set()
+    for seed in range(30):
+        system = random_fis(seed, "octave")
+        kinds.add(system.outputs[0].defuzzifier.is_weighted)
+        rows = [[*row.values()] for row in random_rows(system, seed, 25)]
+        inside = [row for row in rows if all(-5.0 <= x <= 5.0 for x in row)]
+        files[f"s{seed}"] = write(system).content, inside
+    assert kinds == {True, False}
+    found = answers(octave, tmp_path, files)
+    compared = 0
+    for name, (content, rows) in files.items():
+        system = system_of(content)
+        assert found[name].rules <= len(system.rules)
+        for row, theirs in zip(rows, found[name].rows, strict=True):
+            inference = infer(system, dict(zip(system.columns, row, strict=True)))
+            if any(map(math.isnan, inference.outputs)):
+                continue  # Octave stops, or answers 0 / 0
+            sizes = [1.0, *map(abs, inference.outputs)]
+            assert largest_difference([inference.outputs], [theirs]) <= 1e-9 * max(
+                sizes
+            ), name
+            compared += 1
+    assert compared >= 200
+
+
+@pytest.mark.heavy
+def test_every_file_that_octave_and_fuzzylite_ship_is_read_and_run_alike(
+    program: Need, tmp_path: Path
+) -> None:
+    octave, fuzzylite = program("octave"), program("fuzzylite")
+    names = [name for name, _ in corpus()]
+    assert sum(name.startswith("Octave") for name in names) == 6
+    assert sum(name.startswith("fuzzylite") for name in names) == 29
+    for row in corpus_table(octave, fuzzylite, tmp_path):
+        # Octave's hedges act on each conclusion alone: there a rule can become several.
+        assert row.rules >= row.loaded > 0, row
+        assert row.engine == "octave" or row.rules == row.loaded, row
+        assert row.onnx is not None
+        assert row.onnx <= EXACT, row
+        assert row.is_alike or row.reason, row
+
+
+def test_the_page_shows_the_function_for_points_that_is_tested() -> None:
+    page = (ROOT / "docs" / "fis.md").read_text(encoding="utf-8")
+    assert f"```matlab\n{DISCRETEMF}```" in page
