@@ -58,7 +58,8 @@ def from_sklearn(
         TypeError: If it is no decision tree for classes, such as a forest or a
             regressor.
         ValueError: If it is not fitted, or names or widths do not fit.
-        LossError: If it has several outputs, or asks whether a value is missing.
+        LossError: If it has several outputs, asks whether a value is missing, or has
+            learnt where missing values go.
 
     Example:
         >>> from sklearn.tree import DecisionTreeClassifier
@@ -179,6 +180,7 @@ class _Arrays(NamedTuple):
                     f"{named.columns[column]!r} is missing"
                 )
             cuts.append(exact_cut(threshold) if start >= 0 else 0.0)
+        _refuse_directions(tree, columns, named)
         winners = np.argmax(tree.value[:, 0, :], axis=1).tolist()
         counts = tree.n_node_samples.tolist()
         return _Arrays(left, right, columns, cuts, winners, counts)
@@ -189,6 +191,24 @@ class _Arrays(NamedTuple):
             {c for c, start in zip(self.column, self.left, strict=True) if start >= 0}
         )
         return {named.columns[place]: place for place in places}
+
+
+def _refuse_directions(tree: Any, columns: list[int], named: _Names) -> None:
+    """Refuse a tree that learnt where missing values go.
+
+    A node that saw none sends them to the child with more rows. Another direction was
+    learnt; one that happens to be the same cannot be told apart.
+    """
+    for place, goes_left in enumerate(tree.missing_go_to_left.tolist()):
+        left, right = int(tree.children_left[place]), int(tree.children_right[place])
+        if left < 0:
+            continue
+        counts = tree.n_node_samples
+        if bool(goes_left) != bool(counts[left] > counts[right]):
+            raise LossError(
+                "cannot read a tree that learnt where missing values of "
+                f"{named.columns[columns[place]]!r} go"
+            )
 
 
 def _widths(

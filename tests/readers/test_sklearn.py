@@ -192,6 +192,16 @@ def test_a_tree_that_asks_for_missing_values_is_refused() -> None:
     assert str(caught.value) == ("cannot read a tree that asks whether 'x1' is missing")
 
 
+def test_a_tree_that_learnt_where_missing_values_go_is_refused() -> None:
+    tree = trees.DecisionTreeClassifier()
+    tree.fit([[0.0], [0.0], [0.0], [1.0], [math.nan]], ["a", "a", "a", "b", "b"])
+    with pytest.raises(LossError) as caught:
+        from_sklearn(tree, columns=["force"])
+    assert str(caught.value) == (
+        "cannot read a tree that learnt where missing values of 'force' go"
+    )
+
+
 def test_several_outputs_are_refused() -> None:
     tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], [[0, 1], [1, 0]])
     with pytest.raises(LossError) as caught:
