@@ -122,10 +122,13 @@ def write(
     losses += lost
     system, more = as_points(system, words, tolerance)
     losses += [*more, *_losses(system, words)]
+    system = _refused(system, words)
     if losses and not allow_loss:
         listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
-        raise LossError(f"cannot write {model.name} as fcl without loss:\n{listed}")
-    system = _refused(system, words)
+        raise LossError(
+            f"cannot write {model.name} as fcl ({dialect}) without loss:\n{listed}\n"
+            "  pass allow_loss=True to write it so"
+        )
     names = _naming(system, words)
     comments = [one for one in (MARK + dialect, facts) if one]
     if checklist:

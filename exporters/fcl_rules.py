@@ -10,7 +10,7 @@ from fuzzytree.contracts import Loss
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fll_rules import Speak, hedge_losses, rule_text
 from fuzzytree.naming import unlike
-from fuzzytree.rulebase import Points
+from fuzzytree.readers.fcl_rules import ALWAYS
 from fuzzytree.system import (
     And,
     Condition,
@@ -37,7 +37,7 @@ def with_conditions(system: FuzzySystem, words: Words) -> FuzzySystem:
         return system
     first = system.inputs[0]
     name = unlike("always", [label.name for label in first.labels])
-    label = Label(name, Points((0.0,), (1.0,)))
+    label = Label(name, ALWAYS)
     always = Is(first.name, name)
     return replace(
         system,

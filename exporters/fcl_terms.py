@@ -189,6 +189,8 @@ def _pointed(
         what = f"it becomes {len(points.values)} points joined by lines{tail}"
         losses.append(Loss(where, what, found.bound))
     if label.height != 1.0:
+        what = f"its height {label.height!r} is multiplied into its points"
+        losses.append(Loss(where, what, EXACT))
         degrees = tuple(label.height * degree for degree in points.degrees)
         points = replace(points, degrees=degrees)
     return Label(label.name, points)

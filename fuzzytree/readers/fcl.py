@@ -16,8 +16,13 @@ from fuzzytree.casting import as_rules
 from fuzzytree.contracts import Document, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers.fcl_blocks import Block, blocks_of
-from fuzzytree.readers.fcl_dialects import detected, norm_of
-from fuzzytree.readers.fcl_rules import ReadBlock, Scope, read_block
+from fuzzytree.readers.fcl_dialects import detected, is_marked, norm_of
+from fuzzytree.readers.fcl_rules import (
+    ReadBlock,
+    Scope,
+    read_block,
+    without_questions,
+)
 from fuzzytree.readers.fcl_text import parsed, place
 from fuzzytree.readers.fcl_variables import (
     Known,
@@ -93,12 +98,14 @@ def read(content: bytes, name: str) -> Reading:
 
 def _model(system: FuzzySystem, text: str, notes: Notes) -> Document:
     """Return the rule base that a system stands for, or the system."""
+    if not is_marked(text):
+        return system
     facts = ""
     for line in text.split("\n", _MOST_LINES)[:_MOST_LINES]:
         if line[:2] in ("//", "(*") and line[2:].startswith(FACTS):
             facts = line[2:].removeprefix(FACTS).removesuffix("*)").strip()
     if not facts:
-        return system
+        return without_questions(system)
     rules = as_rules(system, facts)
     if rules is not None:
         return rules

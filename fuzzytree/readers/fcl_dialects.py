@@ -161,6 +161,11 @@ def detected(text: FclText) -> tuple[Dialect, str]:
     return best, sentence
 
 
+def is_marked(text: str) -> bool:
+    """Return whether a file says that it was written here."""
+    return _first_line(text) is not None
+
+
 def _first_line(text: str) -> Dialect | None:
     line, _, _ = text.partition("\n")
     if line[:2] not in ("//", "(*") or not line[2:].startswith(MARK):

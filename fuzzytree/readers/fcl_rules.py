@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
+from typing import Final
 
 import msgspec
 from lark import Token
@@ -28,10 +29,11 @@ from fuzzytree.readers.fcl_text import (
 )
 from fuzzytree.readers.fll_words import Notes
 from fuzzytree.readers.lines import number_of
-from fuzzytree.rulebase import name_choice
+from fuzzytree.rulebase import Points, name_choice
 from fuzzytree.system import (
     And,
     Conclusion,
+    FuzzySystem,
     Hedge,
     Is,
     Not,
@@ -40,6 +42,7 @@ from fuzzytree.system import (
     SNorm,
     SystemRule,
     TNorm,
+    questions,
 )
 from fuzzytree.system import Condition as Meant
 
@@ -286,3 +289,41 @@ def _uses(condition: Meant | None, kind: type[And] | type[Or]) -> bool:
             return _uses(part, kind)
         case _:
             return False
+
+
+ALWAYS: Final = Points((0.0,), (1.0,))
+"""The curve of a term that rules without a condition ask, where they must ask."""
+
+
+def without_questions(system: FuzzySystem) -> FuzzySystem:
+    """Return a system that was written here, with rules that have no condition again.
+
+    The writer lets them ask whether the first input is `any`, or its last term, which
+    it adds.
+    """
+    if not system.inputs:
+        return system
+    first = system.inputs[0]
+    asked: Meant = Is(first.name, None, ("any",))
+    if first.labels and first.labels[-1].curve == ALWAYS:
+        asked = Is(first.name, first.labels[-1].name)
+        first = replace(first, labels=first.labels[:-1])
+    others = [
+        one
+        for rule in system.rules
+        if rule.when is not None and rule.when != asked
+        for one in questions(rule.when)
+    ]
+    if asked in others or all(rule.when != asked for rule in system.rules):
+        return system
+    blocks = tuple(
+        replace(
+            block,
+            rules=tuple(
+                replace(rule, when=None) if rule.when == asked else rule
+                for rule in block.rules
+            ),
+        )
+        for block in system.blocks
+    )
+    return replace(system, inputs=(first, *system.inputs[1:]), blocks=blocks)
