@@ -32,7 +32,6 @@ _NODES: Mapping[str, str] = {
     "exponential": "Exp",
     "logarithm": "Log",
     "sine": "Sin",
-    "cosine": "Cos",
     "hyperbolic_tangent": "Tanh",
     "power": "Pow",
     "less": "Less",
@@ -185,6 +184,8 @@ def _node(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> s
         case "is_finite":
             size = sheet.node("Abs", *given)
             return sheet.node("Less", size, _number(sheet, np.inf))
+        case "cosine":
+            return _cosine(sheet, given[0])
         case "remainder":
             return sheet.node("Mod", *given, fmod=1)
         case "below":
@@ -205,6 +206,14 @@ def _node(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> s
             return _reduced(sheet, "ReduceMin", given[0])
         case _:
             raise ValueError(f"no operator computes {step.operation} in double")
+
+
+def _cosine(sheet: Sheet, angle: str) -> str:
+    """Return 1 - 2 sin^2(a / 2), for many an onnxruntime has no cosine in double."""
+    sine = sheet.node("Sin", sheet.node("Mul", angle, _number(sheet, 0.5)))
+    square = sheet.node("Mul", sine, sine)
+    twice = sheet.node("Mul", square, _number(sheet, 2.0))
+    return sheet.node("Sub", _number(sheet, 1.0), twice)
 
 
 def _below(sheet: Sheet, step: Step, value: str) -> str:

@@ -31,12 +31,13 @@ PAIR_ULPS: Mapping[str, float] = {
     "logarithm": 4.0,
     "power": 4.0,
     "sine": 4.0,
-    "cosine": 4.0,
+    "cosine": 12.0,
     "hyperbolic_tangent": 16.0,
 }
 """Units in the last place by which two libraries may differ; 8 for others. Measured
-against 200 bits: at most 1.5 (exp, log, pow), 6.4 (tanh), of the C library, numpy and
-onnxruntime. Of sines and cosines the units are those of 1."""
+against exact values: at most 1.5 (exp, log, pow), 6.4 (tanh), of the C library, numpy
+and onnxruntime. Of sines and cosines the units are those of 1: at most 1.3 and 7.3, as
+graphs compute a cosine from a sine."""
 
 _MONOTONE: Mapping[str, Callable[..., Array]] = {
     "floor": np.floor,
