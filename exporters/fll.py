@@ -150,7 +150,10 @@ def _naming(system: FuzzySystem) -> _Names:
 
 
 def _accepted(names: Sequence[str]) -> Names:
-    return Names.of(names, reserved=_RESERVED, longest=LONGEST_WORD)
+    # Words are reserved in small letters only: a variable may be called X.
+    taken = {name.lower() for name in names if name != name.lower()} - {*names}
+    reserved = [word for word in _RESERVED if word not in taken]
+    return Names.of(names, reserved=reserved, longest=LONGEST_WORD)
 
 
 def _with_pointed_numbers(

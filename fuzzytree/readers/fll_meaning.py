@@ -176,12 +176,15 @@ def _depends_on_degree(label: Label) -> bool:
 
 def _inverse_remarks(output: SystemOutput, concluded: Sequence[Label]) -> Iterator[str]:
     """Yield whether fuzzylite 6 finds other values at which a term has a degree."""
-    curves = [one.curve for one in concluded if not isinstance(one.curve, Points)]
-    if any(value_at(one, 0.5) is not None for one in curves):
+    if any(
+        value_at(one.curve, 0.5) is not None
+        and (one.height != 1.0 or not isinstance(one.curve, Points))
+        for one in concluded
+    ):
         yield (
             f"output {output.name!r}: where a term has a degree is what pyfuzzylite "
-            "says; fuzzylite 6 differs for falling Concave terms, and near 0 and 1 for "
-            "others"
+            "says; fuzzylite 6 differs for Concave terms and for heights, and near 0 "
+            "and 1 for others"
         )
 
 

@@ -54,12 +54,14 @@ class Place(msgspec.Struct, frozen=True):
         inputs: The names of all inputs, in order.
         names: The names of all variables.
         is_weighted: Whether its variable is an output of weighted numbers.
+        is_inverse: Whether a weighted output asks where monotone terms have a degree.
     """
 
     variable: str
     inputs: tuple[str, ...]
     names: Collection[str]
     is_weighted: bool = False
+    is_inverse: bool = False
 
 
 class Term(msgspec.Struct, frozen=True):
@@ -127,6 +129,10 @@ def read_term(
             if len(numbers) > count:
                 height = numbers.pop()
             curve = _made(kind, make, numbers)
+            if place.is_inverse and known in ("SShape", "ZShape"):
+                # Where it has a degree has a formula, though it ends before it starts.
+                start, end = numbers if known == "SShape" else reversed(numbers)
+                curve = SCurve(start, end)
         case _:
             choice = name_choice(kind.text, CLASSES)
             raise _error(kind, f"no term {kind.text!r}; {choice}")
@@ -315,7 +321,7 @@ def as_degree(label: Label) -> Label:
     back has the same degrees and does not count as monotone.
     """
     match label.curve:
-        case Points(values=values, degrees=degrees) if len(values) == 2:
+        case Points(values=(a, b) as values, degrees=degrees) if a < b:
             # A second point at the end is a step of no height.
             again = Points((*values, values[-1]), (*degrees, degrees[-1]))
             return msgspec.structs.replace(label, curve=again)

@@ -130,7 +130,12 @@ def _variable(section: Section, name: str, place: Place, notes: Notes) -> Known:
     is_output = section.kind == "OutputVariable"
     how = _defuzzifier(section, name, notes) if is_output else None
     if how is not None:
-        place = msgspec.structs.replace(place, is_weighted=how[0].is_weighted)
+        is_weighted = how[0].is_weighted
+        place = msgspec.structs.replace(
+            place,
+            is_weighted=is_weighted,
+            is_inverse=is_weighted and how[1] != "TakagiSugeno",
+        )
     terms, kept, said = _terms(section, place, notes)
     low, high = _range(section.one_of("range"), notes)
     clips = fll.truth(section.one_of("lock-range"), False, notes)

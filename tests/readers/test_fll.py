@@ -254,6 +254,17 @@ def test_a_number_after_takagi_and_sugeno_is_the_degree_at_the_activation(
         assert found == pytest.approx(expected, abs=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("term", "curve"),
+    [("SShape 2 1", SCurve(2.0, 1.0)), ("ZShape 2 1", SCurve(1.0, 2.0))],
+)
+def test_a_curve_that_ends_before_it_starts_has_degrees_somewhere_all_the_same(
+    term: str, curve: Curve
+) -> None:
+    assert output_of(term, "WeightedAverage").curve == curve
+    assert isinstance(output_of(term, "WeightedAverage TakagiSugeno").curve, Points)
+
+
 def test_only_monotone_terms_are_asked_where_they_have_a_degree() -> None:
     ramp = Points((1.0, 3.0), (0.0, 1.0))
     assert output_of("Ramp 1 3", "WeightedAverage Tsukamoto").curve == ramp

@@ -46,8 +46,8 @@ EXACT = 1e-12
 
 REASONS = {
     "Laundry": "fuzzylite 6 takes degrees within 1e-6 of the maximum for maxima",
-    "tsukamoto": "fuzzylite 6 finds other values for falling Concave terms and for "
-    "degrees near 0 and 1",
+    "tsukamoto": "fuzzylite 6 finds other values for Concave terms and for degrees "
+    "near 0 and 1",
     "juggler": "of terms with one name fuzzylite 6 takes the first one",
     "arc": "fuzzylite 6 does not know Arc",
     "semi_ellipse": "fuzzylite 6 does not know SemiEllipse",

@@ -194,6 +194,54 @@ def test_a_system_with_both_kinds_of_outputs_answers_alike(engine: Engine) -> No
     assert largest_difference(ours, answers.outputs) < 1e-5  # fuzzylite 6's equality
 
 
+TERMS = (
+    *("Arc 1 3", "Arc 3 1", "Bell 0 2 3", "Binary 0.25 inf", "Binary 0.6 -inf"),
+    *("Concave 1 2", "Concave 2 1", "Constant 3", "Cosine 0.5 2", "Discrete 0 0 1 1"),
+    *("Discrete 0 1 0.5 0.25 1 0 0.5", "Function x*2+a", "Gaussian 0.5 2 0.75"),
+    *("GaussianProduct 0.1 2 0.8 4", "Linear 2 1", "Linear 2", "PiShape 0 0.2 0.4 1"),
+    *("Ramp 1 2", "Ramp 2 1 0.9", "Rectangle 0 0.5", "SemiEllipse 0 2", "Sigmoid 1 -2"),
+    *("SigmoidDifference 0 2 3 4", "SigmoidProduct 0 2 3 4", "Spike 1 2"),
+    *("SShape 1 2", "SShape 2 1", "ZShape 1 2", "ZShape 1 1", "Triangle 0 0.5 1 0.75"),
+    *("Trapezoid 0 0.2 0.4 1", "Trapezoid -inf 0 0.25 1"),
+)
+TYPES = ("", " Automatic", " TakagiSugeno", " Tsukamoto")
+
+
+@pytest.mark.parametrize("kind", TYPES)
+@pytest.mark.parametrize("method", ["WeightedAverage", "WeightedSum"])
+def test_weighted_numbers_of_every_term_are_read_as_the_engines_take_them(
+    program: Need, library: Need, tmp_path: Path, method: str, kind: str
+) -> None:
+    path = program("fuzzylite")
+    library("fuzzylite")
+    rows = [[value] for value in (0.0, 0.1, 0.3, 0.5, 0.77, 0.95)]
+    compared = 0
+    for term in TERMS:
+        lines = [
+            *("Engine: e", "InputVariable: a", "  range: 0 1", "  term: up Ramp 0 1"),
+            *("OutputVariable: b", "  range: 0 1", f"  defuzzifier: {method}{kind}"),
+            *(f"  term: t {term}", "RuleBlock:", "  activation: General"),
+            "  rule: if a is up then b is t",
+        ]
+        content = "\n".join(lines).encode()
+        reading = read(content, "t.fll")
+        assert isinstance(reading.model, FuzzySystem)
+        ours = [infer(reading.model, {"a": value}).outputs for (value,) in rows]
+        is_told = any("fuzzylite 6" in one for one in reading.remarks)
+        runs: list[Callable[[], Answers]] = [lambda: run_library(content, rows)]  # noqa: B023
+        if not is_told and not term.startswith("Arc"):  # fuzzylite 6 lacks it
+            runs.append(lambda: run_program(path, content, rows, tmp_path))  # noqa: B023
+        for run in runs:
+            try:
+                theirs = run().outputs
+            except (RuntimeError, AttributeError):  # "term does not support tsukamoto"
+                assert "Tsukamoto" in kind, term
+                continue
+            assert largest_difference(ours, theirs) < 1e-12, term
+            compared += 1
+    assert compared >= len(TERMS)
+
+
 TOLD = ("pyfuzzylite fails", "in pyfuzzylite", "pyfuzzylite adds")
 """Remarks by which pyfuzzylite's answers may be others."""
 
