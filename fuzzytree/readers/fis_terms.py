@@ -27,6 +27,10 @@ About = tuple[str, Dialect, tuple[bool, int, tuple[str, ...]] | None]
 how many inputs there are, and the names of the variables up to it."""
 
 
+_WRONG = Formula(Number(0.0))
+"""Stands for a curve with a mistake, so that rules find their terms."""
+
+
 def labels_of(
     entries: Sequence[Entry], count: Entry | None, about: About, notes: Notes
 ) -> tuple[Label, ...]:
@@ -55,24 +59,22 @@ def labels_of(
             notes.found.append((count.line, count.column, what))
     labels: list[Label] = []
     for number in sorted(numbered):
-        label = _label(numbered[number], about, [one.name for one in labels], notes)
-        labels += [label] if label else []
+        taken = [one.name for one in labels]
+        labels.append(_label(numbered[number], about, taken, notes))
     return tuple(labels)
 
 
-def _label(
-    entry: Entry, about: About, taken: Sequence[str], notes: Notes
-) -> Label | None:
+def _label(entry: Entry, about: About, taken: Sequence[str], notes: Notes) -> Label:
     written = text.term_of(entry, notes.found)
     if written is None:
-        return None
+        return Label(entry.key, _WRONG)
     name = written.name or entry.key
     found = unlike(name, taken)
     if found != written.name:
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
         notes.remarks.append(f"{what}; here it is {found!r}")
     curve = _curve(written, entry, about, notes)
-    return None if curve is None else Label(found, curve)
+    return Label(found, _WRONG if curve is None else curve)
 
 
 def _curve(
