@@ -19,6 +19,8 @@ from fuzzytree.contracts import Dtype, Model, Outcome
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.onnx import OLDEST, Output, write
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.programs.bounds import error_bounds
+from fuzzytree.programs.systems import from_system
 from fuzzytree.reference import descend, evaluate
 from fuzzytree.rulebase import (
     LR,
@@ -39,11 +41,14 @@ from fuzzytree.rulebase import (
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.runtimes.reference import load as load_reference
-from fuzzytree.testing import probe_values, random_tree
+from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.testing import probe_values, random_rows, random_system, random_tree
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    from fuzzytree.contracts import FloatArray
 
     Arrays = dict[str, npt.NDArray[np.generic]]
 
@@ -476,3 +481,38 @@ def test_the_oldest_onnxruntime_gives_equal_bits(version: str, tmp_path: Path) -
                 old = found[f"{name} {output}"]
                 is_real = array.dtype.kind == "f"
                 assert np.array_equal(old, array.astype(old.dtype), equal_nan=is_real)
+
+
+@pytest.mark.heavy
+def test_the_oldest_onnxruntime_runs_systems(tmp_path: Path) -> None:
+    version = OLDEST["system"]
+    values: Arrays = {}
+    expected: dict[str, tuple[FloatArray, FloatArray]] = {}
+    for seed in range(40):
+        system = random_system(seed)
+        try:
+            content = write(system, outputs=("outputs",)).content
+        except LossError:  # a function that onnxruntime lacks
+            continue
+        rows = random_rows(system, seed, 30)
+        table = np.array([[row[name] for name in system.columns] for row in rows])
+        name = f"{seed}.onnx"
+        (tmp_path / name).write_bytes(content)
+        values[name] = table
+        bounds = error_bounds(from_system(system), table.T)[: len(system.outputs)]
+        expected[name] = infer_rows(system)(table.T).outputs.T, bounds.T
+    assert len(expected) > 20
+    np.savez(tmp_path / "values.npz", allow_pickle=False, **values)
+    script = tmp_path / "run.py"
+    script.write_text(OLD_SCRIPT)
+    python = old_python(tmp_path / "old", version)
+    command = [str(python), str(script), str(tmp_path), version]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    with np.load(tmp_path / "answers.npz") as found:
+        for name, (right, allowed) in expected.items():
+            given = found[name + " outputs"]
+            is_same = (given == right) | (np.isnan(given) & np.isnan(right))
+            with np.errstate(invalid="ignore"):
+                is_near = np.abs(given - right) <= allowed
+            assert (is_same | is_near).all(), name
