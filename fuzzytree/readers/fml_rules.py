@@ -35,7 +35,7 @@ _RULES: Final = {
 
 
 _MOST_LEVELS: Final = 20
-_MOST_ASKED: Final = 1_000_000
+_MOST_ASKED: Final = 50_000
 
 
 class Variables(msgspec.Struct, frozen=True):

@@ -15,7 +15,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.readers.nodes import report
 
 MOST_BYTES: Final = 16 * 2**20
-MOST_ELEMENTS: Final = 500_000
+MOST_ELEMENTS: Final = 200_000
 MOST_LEVELS: Final = 64
 LONGEST_TEXT: Final = 100_000
 
@@ -78,6 +78,8 @@ def parse(content: bytes, name: str) -> Document:
     except expat.ExpatError as error:
         sentence = f"no well-formed XML: {expat.ErrorString(error.code)}"
         raise report(name, [(error.lineno, error.offset + 1, sentence)]) from error
+    except ReadError:
+        raise
     except (LookupError, ValueError) as error:  # an encoding that Python does not know
         raise report(name, [(1, 1, "the file's encoding is unknown")]) from error
     assert building.root is not None  # a document without a root is not well-formed
