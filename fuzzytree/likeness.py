@@ -25,7 +25,14 @@ from fuzzytree.rulebase import (
     fingerprint,
     shapes_of,
 )
-from fuzzytree.system import FuzzySystem
+from fuzzytree.system import (
+    Condition,
+    Curve,
+    FuzzySystem,
+    Is,
+    Trapezoid,
+    questions,
+)
 
 Likeness = Literal["equal", "alike", "renamed", "other"]
 
@@ -56,12 +63,77 @@ def is_alike(model: Document, other: Document) -> bool:
     A rule base is like each of the systems that decide alike, and straight curves are
     like the points that have their degrees to 2^-52.
     """
-    mark = fingerprint(anonymous(other))
-    if any(fingerprint(anonymous(one)) == mark for one in _stand_ins(model)):
+    mark = _mark(other)
+    if any(_mark(one) == mark for one in _stand_ins(model)):
         return True
     if isinstance(model, RuleBase) and isinstance(other, RuleBase):
         return _have_the_same_lines(model, other)
     return False
+
+
+def _mark(model: Document) -> str:
+    if isinstance(model, FuzzySystem):
+        model = _settled(model)
+    return fingerprint(anonymous(model))
+
+
+def _settled(system: FuzzySystem) -> FuzzySystem:
+    """Return a system whose rules ask nothing where the answer is always 1.
+
+    Formats without rules that always hold ask a term of degree 1 everywhere; it goes
+    too, unless another rule asks it. A missing value answers NaN either way.
+    """
+    everywhere = {
+        (one.name, label.name)
+        for one in system.inputs
+        for label in one.labels
+        if label.height == 1.0 and _is_everywhere(label.curve)
+    }
+
+    def asks(when: Condition | None) -> Condition | None:
+        match when:
+            case Is(variable=name, label=label, hedges=()) if (
+                label is not None and (name, label) in everywhere
+            ):
+                return None
+            case Is(label=None, hedges=("any",)):
+                return None
+            case _:
+                return when
+
+    blocks = tuple(
+        replace(
+            block,
+            rules=tuple(replace(rule, when=asks(rule.when)) for rule in block.rules),
+        )
+        for block in system.blocks
+    )
+    if blocks == system.blocks:
+        return system
+    asked = {
+        (one.variable, one.label)
+        for block in blocks
+        for rule in block.rules
+        for one in questions(rule.when)
+    }
+    idle = everywhere - asked
+    inputs = tuple(
+        replace(
+            one, labels=tuple(x for x in one.labels if (one.name, x.name) not in idle)
+        )
+        for one in system.inputs
+    )
+    return replace(system, inputs=inputs, blocks=blocks)
+
+
+def _is_everywhere(curve: Curve) -> bool:
+    match curve:
+        case Band(low=None, high=None) | Trapezoid(a=None, d=None):
+            return True
+        case Points(degrees=degrees):
+            return set(degrees) == {1.0}
+        case _:
+            return False
 
 
 def _have_the_same_lines(one: RuleBase, other: RuleBase) -> bool:

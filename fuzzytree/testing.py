@@ -75,7 +75,7 @@ __all__ = [
 ]
 
 
-def check_exporter(form: Format | str, *, seed: int = 0) -> None:
+def check_exporter(form: Format | str, *, seed: int = 0, rounds: int = 2) -> None:
     """Try whatever a format must do, and tell everything that it does wrong.
 
     It writes some seventy models of the kinds that the format says it carries: with
@@ -87,6 +87,7 @@ def check_exporter(form: Format | str, *, seed: int = 0) -> None:
     Args:
         form: The format, or the name of one that is installed.
         seed: Of the random models and the damaged files.
+        rounds: How many random trees, rule bases and systems are tried.
 
     Raises:
         DisagreementError: It lists every failure, a sentence each.
@@ -96,20 +97,21 @@ def check_exporter(form: Format | str, *, seed: int = 0) -> None:
         >>> check_exporter("yaml")
     """
     form = find_format(form) if isinstance(form, str) else form
-    found = failures(form, exporter_models(seed), seed=seed)
+    found = failures(form, exporter_models(seed, rounds), seed=seed)
     if found:
         listed = "\n".join(f"  {text}" for text in found)
         raise DisagreementError(f"{form.name} fails in {len(found)} points:\n{listed}")
 
 
-def exporter_models(seed: int = 0) -> Iterator[tuple[str, Document]]:
+def exporter_models(seed: int = 0, rounds: int = 2) -> Iterator[tuple[str, Document]]:
     """Yield the models that `check_exporter` tries, each with a title.
 
     Args:
         seed: Of the random ones.
+        rounds: How many random trees; there are twice as many systems.
     """
     yield from samples().items()
-    for number in range(seed, seed + 2):
+    for number in range(seed, seed + rounds):
         tree = random_tree(number, leaves=5)
         yield f"random_tree({number})", tree
         for kind in ("relative", "raw"):
@@ -117,7 +119,7 @@ def exporter_models(seed: int = 0) -> Iterator[tuple[str, Document]]:
             yield f"{kind} rules of random_tree({number})", rules
         points = with_points(rules_from_tree(tree, conjunction="product"), number)
         yield f"with_points of random_tree({number})", points
-    for number in range(seed, seed + 5):
+    for number in range(seed, seed + 2 * rounds):
         yield f"random_system({number})", random_system(number)
     for start in range(0, len(ODD_NAMES), 4):
         names = ODD_NAMES[start : start + 4]

@@ -40,14 +40,14 @@ for form in all_formats():
 
 @pytest.mark.parametrize("name", TABLE)
 def test_every_format_of_the_table_keeps_its_promises(name: str) -> None:
-    check_exporter(name)
+    check_exporter(name, rounds=0)
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("seed", [100, 200])
+@pytest.mark.parametrize("seed", [0, 100])
 @pytest.mark.parametrize("name", TABLE)
-def test_other_models_change_nothing_about_that(name: str, seed: int) -> None:
-    check_exporter(name, seed=seed)
+def test_random_models_change_nothing_about_that(name: str, seed: int) -> None:
+    check_exporter(name, seed=seed, rounds=5)
 
 
 @pytest.mark.heavy
@@ -224,7 +224,7 @@ def _with_unnamed_option() -> Format:
 )
 def test_a_broken_promise_is_a_sentence(broken: Format, sentence: str) -> None:
     with pytest.raises(DisagreementError) as caught:
-        check_exporter(broken)
+        check_exporter(broken, rounds=0)
     assert sentence in str(caught.value)
     count = len(str(caught.value).splitlines()) - 1
     assert re.match(rf"\S+ fails in {count} points:\n", str(caught.value))
@@ -240,7 +240,7 @@ def test_a_format_that_cannot_carry_something_may_refuse_it() -> None:
             return replace(written, losses=(Loss("AND", "becomes min"),))
         return YAML.write(model, allow_loss=allow_loss)
 
-    check_exporter(replace(YAML, write=write))
+    check_exporter(replace(YAML, write=write), rounds=1)
 
 
 def test_a_format_that_is_not_there_is_a_value_error() -> None:

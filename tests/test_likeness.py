@@ -23,6 +23,7 @@ from fuzzytree.rulebase import (
     Variable,
 )
 from fuzzytree.samples import samples
+from fuzzytree.system import FuzzySystem, Is, Label, Trapezoid
 
 RULES = samples()["point lists"]
 TREE = samples()["tree"]
@@ -56,6 +57,28 @@ def test_no_sample_is_like_another() -> None:
         if name != other_name and is_alike(one, other)
     ]
     assert alike == []
+
+
+def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> None:
+    always = samples()["a conclusion without a condition"]
+    assert isinstance(always, FuzzySystem)
+    heat, damp = always.inputs
+    label = Label("always", Trapezoid(None, 0.0, 0.0, None))
+    block = always.blocks[0]
+
+    def asking(label: Label) -> FuzzySystem:
+        rules = tuple(
+            replace(one, when=one.when or Is("heat", label.name)) for one in block.rules
+        )
+        return replace(
+            always,
+            inputs=(replace(heat, labels=(*heat.labels, label)), damp),
+            blocks=(replace(block, rules=rules),),
+        )
+
+    assert is_alike(always, asking(label))
+    assert not is_alike(always, asking(replace(label, height=0.5)))
+    assert not is_alike(always, asking(Label("near", Trapezoid(None, 0.0, 9.0, 10.0))))
 
 
 def test_another_name_needs_a_remark() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import bisect
 import itertools
 import math
+import sys
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import NamedTuple
@@ -17,6 +18,8 @@ from typing import NamedTuple
 from fuzzytree.errors import LossError
 from fuzzytree.numerics.curves import BELOW_ONE
 from fuzzytree.rulebase import MOST_POINTS, Points
+
+_FARTHEST = Fraction(sys.float_info.max)  # between neighbouring points
 
 
 class _Knot(NamedTuple):
@@ -123,13 +126,16 @@ def rounded(lines: Lines) -> tuple[Points, float]:
 
 
 def _needed(lines: Lines) -> Iterator[_Knot]:
-    """Yield the knots at which something changes."""
+    """Yield the knots at which something changes, none too far from the next."""
+    kept = lines[0].x
     for place, knot in enumerate(lines):
         if 0 < place < len(lines) - 1 and knot.at == knot.above:
             before, after = lines[place - 1], lines[place + 1]
             left = (knot.at - before.above) * (after.x - knot.x)
-            if left == (after.at - knot.above) * (knot.x - before.x):
+            is_straight = left == (after.at - knot.above) * (knot.x - before.x)
+            if is_straight and after.x - kept <= _FARTHEST:
                 continue
+        kept = knot.x
         yield knot
 
 

@@ -82,3 +82,11 @@ def test_a_product_with_too_many_points_is_refused() -> None:
     ramp = lines_of(Points((0.0, 1.0), (0.0, 1.0)))
     with pytest.raises(LossError, match="the product of two curves needs more than"):
         product(ramp, ramp, 1e-12)
+
+
+def test_points_that_would_be_too_far_apart_keep_one_between() -> None:
+    far = Points((-1e308, 0.0, 1e308), (0.5, 0.5, 0.5))
+    points, error = rounded(lines_of(far))
+    assert (points.values, error) == ((-1e308, 0.0, 1e308), 0.0)
+    near = Points((-1e307, 0.0, 1e307), (0.5, 0.5, 0.5))
+    assert rounded(lines_of(near))[0].values == (-1e307, 1e307)
