@@ -87,7 +87,8 @@ def check_exporter(form: Format | str, *, seed: int = 0, rounds: int = 2) -> Non
     Args:
         form: The format, or the name of one that is installed.
         seed: Of the random models and the damaged files.
-        rounds: How many random trees, rule bases and systems are tried.
+        rounds: How many random trees, rule bases and systems are tried, and how many
+            more files are damaged.
 
     Raises:
         DisagreementError: It lists every failure, a sentence each.
@@ -97,7 +98,8 @@ def check_exporter(form: Format | str, *, seed: int = 0, rounds: int = 2) -> Non
         >>> check_exporter("yaml")
     """
     form = find_format(form) if isinstance(form, str) else form
-    found = failures(form, exporter_models(seed, rounds), seed=seed)
+    models = exporter_models(seed, rounds)
+    found = failures(form, models, seed=seed, damaged=1 + rounds)
     if found:
         listed = "\n".join(f"  {text}" for text in found)
         raise DisagreementError(f"{form.name} fails in {len(found)} points:\n{listed}")
