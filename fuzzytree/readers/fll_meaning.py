@@ -210,6 +210,12 @@ def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
             "formulas: what is not 0 is true for 'and', 'or' and 'not', as in "
             "pyfuzzylite; in fuzzylite 6 only 1 is true"
         )
+    degrees = [label.curve for one in system.inputs for label in one.labels]
+    if any(isinstance(one, Formula) for one in degrees):
+        yield (
+            "formulas: a degree below 0 concludes nothing, as in fuzzylite 6; "
+            "pyfuzzylite counts it"
+        )
     looked_at = [
         label.curve
         for one in system.outputs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 import msgspec
 
@@ -13,7 +14,7 @@ from fuzzytree.readers import fll_words as fll
 from fuzzytree.readers.fll_rules import RuleError, Variable, Vocabulary, read_rule
 from fuzzytree.readers.fll_terms import Place, Term, TermError, read_term
 from fuzzytree.readers.fll_words import Entry, Notes, Section
-from fuzzytree.readers.lines import LONGEST_WORD
+from fuzzytree.readers.lines import LONGEST_WORD, Word, number_of
 from fuzzytree.rulebase import Points
 from fuzzytree.system import (
     Defuzzifier,
@@ -24,6 +25,8 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
 )
+
+MOST_VARIABLES: Final = 2000
 
 _DROPPED = re.compile(r"[^\w.]")
 
@@ -69,18 +72,22 @@ class ReadBlock(msgspec.Struct, frozen=True):
 def read_variables(sections: Sequence[Section], notes: Notes) -> list[Known]:
     """Return the inputs and outputs of a file; their mistakes are noted."""
     found = [one for one in sections if one.kind in ("InputVariable", "OutputVariable")]
+    if len(found) > MOST_VARIABLES:
+        sentence = f"more variables than the {MOST_VARIABLES:,} that are read"
+        notes.found.append(found[MOST_VARIABLES].head.mistake(sentence))
+        return []
     names = [_variable_name(one, notes) for one in found]
-    inputs = tuple(
-        name
-        for name, one in zip(names, found, strict=True)
-        if one.kind == "InputVariable"
-    )
-    for place, (name, one) in enumerate(zip(names, found, strict=True)):
-        if name in names[:place]:
+    pairs = list(zip(names, found, strict=True))
+    inputs = tuple(name for name, one in pairs if one.kind == "InputVariable")
+    known: set[str] = set()
+    for name, one in pairs:
+        if name in known:
             notes.found.append(one.head.mistake(f"a second variable {name!r}"))
+        known.add(name)
+    place = Place("", inputs, dict.fromkeys(names))
     return [
-        _variable(one, name, Place(name, inputs, dict.fromkeys(names)), notes)
-        for name, one in zip(names, found, strict=True)
+        _variable(one, name, msgspec.structs.replace(place, variable=name), notes)
+        for name, one in pairs
         if not notes.is_full
     ]
 
@@ -226,22 +233,29 @@ def _term(entry: Entry, place: Place, notes: Notes) -> Term | None:
         term = read_term(name, kind, rest, place, formula)
     except TermError as error:
         notes.found.extend(error.found)
-        return Term(
-            Label(name, Singleton(0.0)), ""
-        )  # rules may ask for it all the same
-    _tell_step(term, place, notes)
+        # Rules may ask for it all the same.
+        return Term(Label(name, Singleton(0.0)), "")
+    _tell_odd(term, rest, place, notes)
     return term
 
 
-def _tell_step(term: Term, place: Place, notes: Notes) -> None:
+def _tell_odd(term: Term, rest: Sequence[Word], place: Place, notes: Notes) -> None:
+    """Note a term by which the two engines mean other things."""
+    where = f"term {term.label.name!r} of {place.variable!r}"
+    if term.kind == "Rectangle":
+        start, end = (number_of(word.text) or 0.0 for word in rest[:2])
+        if start > end:
+            notes.remarks.append(
+                f"{where} ends before it starts: its ends are exchanged, as in "
+                "pyfuzzylite; fuzzylite 6 makes it 0 everywhere"
+            )
     curve = term.label.curve
     if term.kind != "Discrete" or not isinstance(curve, Points):
         return
     if len(set(curve.values)) < len(curve.values):
         notes.remarks.append(
-            f"term {term.label.name!r} of {place.variable!r} has a step: at the value "
-            "itself its first degree holds, as in fuzzylite 6; pyfuzzylite takes the "
-            "second"
+            f"{where} has a step: at the value itself its first degree holds, as in "
+            "fuzzylite 6; pyfuzzylite takes the second"
         )
 
 

@@ -474,6 +474,7 @@ def test_what_is_no_text_file_is_told_in_one_sentence(
         ("rule: if " + "(" * 200_000 + "\n") * 30,
         ("term: d Discrete " + "1 " * 100_000 + "\n") * 30,
         "#" * 30_000_000,
+        "InputVariable: a\n" * 100_000,
         ("rule: if a is " + "lo or a is " * 5_000 + "low then b is c\n") * 100,
     ],
 )
