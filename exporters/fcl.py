@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
@@ -26,11 +25,11 @@ from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_checklist import check_list
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect, Words
+from fuzzytree.exporters.fcl_losses import accu_of, has_accu, losses_of
 from fuzzytree.exporters.fcl_rules import (
     block_lines,
     names_of_rules,
     norm_losses,
-    rule_losses,
     uses,
     with_conditions,
 )
@@ -44,16 +43,13 @@ from fuzzytree.exporters.fcl_terms import (
 from fuzzytree.exporters.fll_rules import speakable
 from fuzzytree.naming import Names
 from fuzzytree.readers.fcl import FACTS, read
-from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, MARK, PAIRS
-from fuzzytree.readers.fcl_variables import deviations
+from fuzzytree.readers.fcl_dialects import MARK
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.system import (
-    And,
     FuzzySystem,
     Or,
     SystemInput,
     SystemOutput,
-    questions,
 )
 
 __all__ = ["FORMAT", "check_list", "write"]
@@ -121,7 +117,7 @@ def write(
     system, lost = flattened(system)
     losses += lost
     system, more = as_points(system, words, tolerance)
-    losses += [*more, *_losses(system, words)]
+    losses += [*more, *losses_of(system, words)]
     system = _refused(system, words)
     if losses and not allow_loss:
         listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
@@ -198,114 +194,6 @@ def _naming(system: FuzzySystem, words: Words) -> _Names:
     )
 
 
-def _losses(system: FuzzySystem, words: Words) -> Iterator[Loss]:
-    """Yield what an answer depends on and the dialect cannot say."""
-    default = DEFUZZIFIERS[words.name]
-    for one in system.inputs:
-        if one.clips:
-            yield Loss(f"input {one.name!r}", "its values are not held in its range")
-    for output in system.outputs:
-        where = f"output {output.name!r}"
-        how = output.defuzzifier
-        if not how.is_weighted and (how.samples, how.grid) != (
-            default.samples,
-            default.grid,
-        ):
-            yield Loss(
-                where,
-                f"{how.samples} values of its range are looked at; FCL does not say "
-                f"how many, {words.name} means {default.samples}",
-            )
-        if output.clips and words.name != "fuzzylite":
-            yield Loss(where, "its answer is not held in its range")
-        if not _says_nothing(output, words) and not _is_always_concluded(
-            output, system
-        ):
-            yield Loss(where, "NaN where no rule fires: engines keep the value before")
-        if words.name == "fuzzylite":
-            yield from deviations(output)
-        yield from _accu_losses(output, system, words)
-    yield from rule_losses(system, words)
-    for k, block in enumerate(system.blocks, 1):
-        pairs = JFUZZYLOGIC_PAIRS if words.name == "jfuzzylogic" else PAIRS
-        both = [
-            any(uses(rule.when, kind) for rule in block.rules) for kind in (And, Or)
-        ]
-        norm = block.conjunction
-        if not words.has_pair or not all(both) or norm is None:
-            continue
-        if pairs[norm] != block.disjunction:
-            what = f"AND {norm!r} brings OR {pairs[norm]!r} with it, and not "
-            yield Loss(f"rule block {k}", what + repr(block.disjunction))
-
-
-def _says_nothing(output: SystemOutput, words: Words) -> bool:
-    """Return whether a file can say what an output answers where no rule fires."""
-    return output.default is not None or words.name in ("fuzzylite", "iec")
-
-
-def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
-    """Return whether some rule concludes an output for every row."""
-    constants = {
-        (one.name, label.name)
-        for one in system.inputs
-        for label in one.labels
-        if set(getattr(label.curve, "degrees", ())) == {1.0}
-    }
-    for rule in system.rules:
-        if rule.weight == 0.0 or output.name not in {one.output for one in rule.then}:
-            continue
-        asked = list(questions(rule.when))
-        if all(
-            (one.variable, one.label) in constants or one.hedges == ("any",)
-            for one in asked
-        ):
-            return not any(one.hedges and one.label for one in asked)
-    return False
-
-
-def _accu_losses(
-    output: SystemOutput, system: FuzzySystem, words: Words
-) -> Iterator[Loss]:
-    """Yield what an output's aggregation means that the dialect cannot say."""
-    where = f"output {output.name!r}"
-    counts = Counter(
-        one.label
-        for rule in system.rules
-        for one in rule.then
-        if one.output == output.name
-    )
-    if output.defuzzifier.is_weighted and max(counts.values(), default=0) < 2:
-        return
-    norm = output.aggregation
-    if norm is None:
-        if words.name == "iec":
-            yield Loss(where, "the standard has no ACCU that sums; none is written")
-        return
-    sums_all = output.defuzzifier.is_weighted and not _has_accu(words)
-    if sums_all:
-        what = f"numbers are summed, and not joined by {norm!r} term by term"
-        yield Loss(where, what)
-        return
-    if words.name == "fuzzylite":
-        return
-    others = {
-        one.aggregation
-        for one in system.outputs
-        for block in system.blocks
-        if {one.name, output.name} <= {t.output for r in block.rules for t in r.then}
-        and not (one.defuzzifier.is_weighted and one.aggregation is None)
-    }
-    if len(others) > 1:
-        what = "its block has one ACCU for all outputs, and that is another one"
-        yield Loss(where, what)
-
-
-def _has_accu(words: Words) -> bool:
-    """Return whether ACCU counts where numbers are weighted."""
-    return words.name in ("iec", "jfuzzylogic")
-
-
 def _refused(system: FuzzySystem, words: Words) -> FuzzySystem:
     """Return a system that the dialect has words for.
 
@@ -373,19 +261,10 @@ def _text(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
         always = f"{names.variables[system.inputs[0].name]} is any"
     for block, name in zip(system.blocks, names.blocks, strict=True):
         outputs = {one.output for rule in block.rules for one in rule.then}
-        accu = ""
-        if _has_accu(words):
-            accu = _accu(system, outputs, words)
+        norm = accu_of(system, outputs, words) if has_accu(words) else None
+        accu = "" if norm is None else words.accus[norm]
         yield from block_lines(block, name, words, names.speak, always, accu)
     yield "END_FUNCTION_BLOCK"
-
-
-def _accu(system: FuzzySystem, outputs: set[str], words: Words) -> str:
-    for output in system.outputs:
-        norm = output.aggregation
-        if output.name in outputs and norm is not None and norm in words.accus:
-            return words.accus[norm]
-    return ""
 
 
 def _range(variable: SystemInput | SystemOutput, words: Words) -> Iterator[str]:

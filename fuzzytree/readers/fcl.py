@@ -23,7 +23,8 @@ from fuzzytree.readers.fcl_rules import (
     read_block,
     without_questions,
 )
-from fuzzytree.readers.fcl_text import parsed, place
+from fuzzytree.readers.fcl_statements import place
+from fuzzytree.readers.fcl_text import parsed
 from fuzzytree.readers.fcl_variables import (
     Known,
     known_variables,

@@ -9,11 +9,9 @@ import msgspec
 from lark import Token
 
 from fuzzytree.contracts import Loss
-from fuzzytree.readers.fcl_text import (
-    ENDINGS,
+from fuzzytree.readers.fcl_statements import (
     Declaration,
     Ending,
-    FclText,
     Header,
     Range,
     RuleText,
@@ -22,6 +20,7 @@ from fuzzytree.readers.fcl_text import (
     TermText,
     place,
 )
+from fuzzytree.readers.fcl_text import ENDINGS, FclText
 from fuzzytree.readers.fll_words import Notes
 
 _ALLOWED: Mapping[str, tuple[str, ...]] = MappingProxyType(

@@ -10,11 +10,10 @@ from typing import Final, Literal, NamedTuple, TypeVar
 from lark import Token
 
 from fuzzytree.readers.fcl_blocks import Block
-from fuzzytree.readers.fcl_text import (
+from fuzzytree.readers.fcl_statements import (
     Asked,
     Condition,
     Declaration,
-    FclText,
     Header,
     Joined,
     Negated,
@@ -23,6 +22,7 @@ from fuzzytree.readers.fcl_text import (
     TermText,
     place,
 )
+from fuzzytree.readers.fcl_text import FclText
 from fuzzytree.readers.fll_terms import CLASSES
 from fuzzytree.readers.fll_words import METHODS, S_NORMS, T_NORMS, Method, Notes
 from fuzzytree.rulebase import name_choice
@@ -136,11 +136,12 @@ _ORDER: Final[list[Dialect]] = ["fuzzylite", "jfuzzylogic", "pyit2fls", "iec"]
 
 
 class Evidence(NamedTuple):
-    """Something that only one dialect has."""
+    """Something that only one dialect has; `weight` is 1 where others may have it."""
 
     dialect: Dialect
     what: str
     line: int
+    weight: int = 2
 
 
 def detected(text: FclText) -> tuple[Dialect, str]:
@@ -149,7 +150,9 @@ def detected(text: FclText) -> tuple[Dialect, str]:
     if named is not None:
         return named, f"the dialect is {SHOWN[named]}: the first line says so"
     found = list(_evidence(text))
-    counts = Counter(one.dialect for one in dict.fromkeys(found))
+    counts: Counter[Dialect] = Counter()
+    for one in {(one.dialect, one.what): one for one in found}.values():
+        counts[one.dialect] += one.weight
     best: Dialect = max(_ORDER, key=lambda one: (counts[one], -_ORDER.index(one)))
     if not counts[best]:
         return "iec", "the dialect is IEC 61131-7: nothing speaks for another one"
@@ -209,8 +212,16 @@ def _evidence(text: FclText) -> Iterator[Evidence]:
                         "RANGE among the variables",
                         line.line if isinstance(line, Token) and line.line else 1,
                     )
+    for sign, dialect in _COMMENTS.items():
+        before, found, _ = text.text.partition(sign)
+        if found:
+            line = before.count("\n") + 1
+            yield Evidence(dialect, f"comments {sign}", line, 1)
     if text.text.startswith("//Code automatically generated with fuzzylite"):
         yield Evidence("fuzzylite", "its first line", 1)
+
+
+_COMMENTS: Mapping[str, Dialect] = MappingProxyType({"(*": "iec", "/*": "jfuzzylogic"})
 
 
 def _of_shape(word: Token) -> Iterator[Evidence]:
@@ -233,6 +244,9 @@ def _of_setting(
         yield Evidence("fuzzylite", keyword.upper(), line)
     if keyword.type == "ACCU" and block == "DEFUZZIFY":
         yield Evidence("fuzzylite", "ACCU in DEFUZZIFY", line)
+    elif keyword.type == "ACCU":  # fuzzylite refuses it there
+        yield Evidence("iec", "ACCU in RULEBLOCK", line)
+        yield Evidence("jfuzzylogic", "ACCU in RULEBLOCK", line, 1)
     is_default = keyword.type == "DEFAULT"
     if is_default and (words[0].upper() == "NAN" or len(words) > 1):
         shown = " | ".join(map(str, words))
@@ -250,7 +264,7 @@ def _of_rule(rule: RuleText) -> Iterator[Evidence]:
     if is_any or any(word.upper() in _HEDGES for word in words):
         yield Evidence("fuzzylite", "hedges", line)
     if is_lower(rule):
-        yield Evidence("fuzzylite", "rules in lower case", line)
+        yield Evidence("fuzzylite", "rules in lower case", line, 1)
     elif len(rule.conclusions) > 1:
         if rule.has_comma:
             yield Evidence("iec", "conclusions with ','", line)

@@ -19,7 +19,7 @@ from fuzzytree.readers.fcl_dialects import (
     norm_of,
     t_norm_of,
 )
-from fuzzytree.readers.fcl_text import (
+from fuzzytree.readers.fcl_statements import (
     Asked,
     Condition,
     Joined,
@@ -155,7 +155,7 @@ def _hedges(words: Sequence[Token], scope: Scope) -> tuple[Hedge, ...]:
 def _known_variable(
     token: Token, terms: Mapping[str, Collection[str]], notes: Notes
 ) -> bool:
-    if str(token) in terms:
+    if str(token) in terms or notes.is_full:
         return True
     sentence = f"no variable {str(token)!r}; {name_choice(token[:99], terms)}"
     notes.found.append((*place(token), sentence))
@@ -165,8 +165,8 @@ def _known_variable(
 def _known(asked: Asked, terms: Mapping[str, Collection[str]], notes: Notes) -> str:
     label = asked.words[-1]
     if _known_variable(asked.variable, terms, notes):
-        known = terms[str(asked.variable)]
-        if str(label) not in known:
+        known = terms.get(str(asked.variable), ())
+        if str(label) not in known and not notes.is_full:
             choice = name_choice(label[:99], known)
             whose = repr(str(asked.variable))
             sentence = f"{whose} has no term {str(label)!r}; {choice}"

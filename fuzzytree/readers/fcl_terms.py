@@ -11,7 +11,7 @@ import msgspec
 from lark import Token
 
 from fuzzytree.readers.fcl_dialects import Dialect
-from fuzzytree.readers.fcl_text import TermText, place
+from fuzzytree.readers.fcl_statements import TermText, place
 from fuzzytree.readers.fll_terms import CLASSES, Place, Term, TermError, read_term
 from fuzzytree.readers.lines import Word, number_of
 from fuzzytree.rulebase import LR, Band, Points, name_choice

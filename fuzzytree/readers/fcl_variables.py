@@ -13,7 +13,7 @@ from fuzzytree.contracts import Loss
 from fuzzytree.readers import fcl_terms
 from fuzzytree.readers.fcl_blocks import Block
 from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS, METHOD_WORDS, Dialect
-from fuzzytree.readers.fcl_text import Declaration, Range, TermText, place
+from fuzzytree.readers.fcl_statements import Declaration, Range, TermText, place
 from fuzzytree.readers.fll_terms import Place, Term, TermError, as_degree
 from fuzzytree.readers.fll_words import Notes
 from fuzzytree.readers.lines import number_of

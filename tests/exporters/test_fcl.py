@@ -123,7 +123,7 @@ def test_the_scores_of_a_file_decide_as_the_rules_do(
     for seed in range(3):
         tree = random_tree(seed, leaves=5)
         rules = rules_from_tree(tree, "relative" if kind == "relative" else "raw")
-        content = write(rules, dialect=dialect, allow_loss=True).content
+        content = write(rules, dialect=dialect, allow_loss=True, tolerance=1e-3).content
         plain = re.sub(rb"(//|\(\*) facts [^\n]*\n", b"", content)
         system = read(plain, "x.fcl").model
         assert isinstance(system, FuzzySystem)
@@ -143,7 +143,9 @@ def test_the_scores_of_a_file_decide_as_the_rules_do(
                 assert answer == expected.label
             else:
                 best = sorted(expected.strengths)[-2:]
-                assert answer == expected.label or best[1] - best[0] < 1e-5
+                assert answer == expected.label or best[1] - best[0] < 2e-3 * len(
+                    rules.variables
+                )
 
 
 def _plain(system: FuzzySystem) -> FuzzySystem:
@@ -282,7 +284,7 @@ def test_random_systems_are_written_alike_or_refused_with_reasons(
     dialect: Dialect,
 ) -> None:
     exact = 0
-    for seed in range(120):
+    for seed in range(100 if dialect == "fuzzylite" else 25):
         system = _tamed(random_system(seed, formulas="none"), dialect)
         content = _content(system, dialect)
         if content is None:
@@ -378,7 +380,20 @@ def test_several_accus_in_one_block_are_a_loss() -> None:
     )
     blocks = tuple(replace(one, implication="minimum") for one in system.blocks)
     made = replace(system, outputs=(outputs, others), blocks=blocks)
-    with pytest.raises(LossError, match="its block has one ACCU for all outputs"):
+    with pytest.raises(
+        LossError, match=r"joined by .maximum., and not by .bounded sum"
+    ):
+        write(made, dialect="jfuzzylogic")
+
+
+def test_numbers_that_an_accu_of_others_would_join_are_a_loss() -> None:
+    system = _with_default(_sample("several outputs"))
+    first, second = system.outputs
+    outputs = (replace(first, aggregation="maximum"), second)
+    (block,) = system.blocks
+    twice = replace(block, rules=(*block.rules, *block.rules))
+    made = replace(system, outputs=outputs, blocks=(twice,))
+    with pytest.raises(LossError, match=r"joined by .maximum', and not one by one"):
         write(made, dialect="jfuzzylogic")
 
 
