@@ -752,3 +752,54 @@ def test_random_systems_show_everything_that_a_system_can_have() -> None:
     hedges = set(get_args(Hedge))
     others = {*get_args(DefuzzifierMethod), *get_args(Grid)}
     assert kinds | norms | hedges | others <= seen
+
+
+def test_a_rule_that_was_not_chosen_concludes_nothing_under_a_hedge() -> None:
+    then = (Conclusion("y", "three", ("not",)),)
+    rules = [rule(A_UP), SystemRule(A_DOWN, then)]
+    for method in ("lowest", "first"):
+        block = RuleBlock((), activation=Activation(method))
+        found = infer(system(rules, LABELS, block=block), {"a": 0.25, "b": 0.0})
+        assert found.activations == (0.25, 0.0)
+        assert found.outputs == (0.25,)
+
+
+def test_the_last_sample_is_the_end_of_the_range() -> None:
+    for grid in ("ends", "half ends"):
+        how = Defuzzifier("centroid", 12, grid)
+        found = samples_of(SystemOutput("y", (), 0.1, 0.9, how, "maximum"))
+        assert len(found) == 12
+        assert found[0] == 0.1
+        assert found[-1] == 0.9
+    assert 0.1 + 11 * ((0.9 - 0.1) / 11) != 0.9  # without which the test is idle
+
+
+def test_degrees_above_1_are_bounded_by_the_aggregation_that_joins_them() -> None:
+    block = RuleBlock((), disjunction="sum")
+    rules = [rule(Or((A_DOWN, B_UP))), rule(ECHO, "three")]
+    asked = system(rules, LABELS, aggregation="bounded sum", block=block)
+    found = infer(asked, {"a": 0.25, "b": 0.75})
+    assert found.activations == (1.5, 1.0)
+    assert found.outputs == (1.0 * 1.0 + 1.0 * 3.0,)
+
+
+@pytest.mark.parametrize("method", ["general", "last", "highest"])
+def test_numbers_are_added_in_the_order_of_the_rules(method: Any) -> None:
+    labels = [
+        Label(f"n{k}", Singleton(value)) for k, value in enumerate((1e16, -1e16, 1.0))
+    ]
+    rules = [rule(None, label.name) for label in labels]
+    block = RuleBlock((), activation=Activation(method, 3))
+    found = infer(system(rules, labels, block=block), {"a": 0.0, "b": 0.0})
+    assert found.outputs == (1.0,)  # from the end it would be 0
+
+
+def test_a_combination_is_of_values_within_their_ranges() -> None:
+    held = SystemInput("a", (UP,), 0.0, 0.5, clips=True)
+    mix = SystemInput("mix", (UP,), parts=(Part("a", 2.0, 0.25), Part("b", 1.0)))
+    asked = system([rule(B_UP)])
+    asked = replace(asked, inputs=(held, SystemInput("b", (UP,)), mix))
+    block = RuleBlock((rule(Is("mix", "up")),))
+    asked = replace(asked, blocks=(block,))
+    found = infer(asked, {"a": 9.0, "b": 0.125})
+    assert found.activations == (2.0 * (0.5 - 0.25) + 0.125,)
