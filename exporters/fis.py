@@ -19,6 +19,7 @@ from fuzzytree.casting import (
     cast_remarks,
     facts_of,
     flattened,
+    joined_outputs,
     pointed,
 )
 from fuzzytree.contracts import Format, Loss, Written
@@ -221,6 +222,7 @@ def _lines(system: FuzzySystem, terms: Terms) -> list[Line]:
 def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
     """Yield what the one set of methods of a file cannot say of a system."""
     first = system.outputs[0]
+    joined = joined_outputs(system)
     for output in system.outputs:
         where = f"output {output.name!r}"
         how = output.defuzzifier
@@ -241,6 +243,8 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             yield Loss(where, f"joined by {first.aggregation}, as of the first output")
         elif how.is_weighted and output.aggregation and dialect != "octave":
             what = f"{output.aggregation} becomes a sum: {dialect} knows no other here"
+            if output.name not in joined:
+                what = "it is added in the order of the rules: only rounding differs"
             yield Loss(where, what)
         if output.default is not None and dialect != "fuzzylite":
             yield Loss(

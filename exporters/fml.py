@@ -20,6 +20,7 @@ from fuzzytree.casting import (
     cast_remarks,
     facts_of,
     flattened,
+    joined_outputs,
     pointed,
 )
 from fuzzytree.casting.shapes import shape_of
@@ -183,12 +184,15 @@ def _scaled(variable: str, label: Label, losses: list[Loss]) -> Label:
 
 
 def _losses(system: FuzzySystem) -> Iterator[Loss]:
+    joined = joined_outputs(system)
     for output in system.outputs:
         where, how = f"output {output.name!r}", output.defuzzifier
         if how.method == "weighted sum":
             yield Loss(where, "FML averages; the weighted sum becomes an average")
         if how.is_weighted and output.aggregation is not None:
             what = f"{output.aggregation} of rules of one term becomes a sum"
+            if output.name not in joined:
+                what = "it is added in the order of the rules: only rounding differs"
             yield Loss(where, what)
         if how.is_weighted:
             continue
@@ -261,8 +265,8 @@ def _input(one: SystemInput, rules: Rules, names: _Naming) -> Iterator[str]:
     yield (f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="input">')
     for label in one.labels:
         yield from _term("fuzzyTerm", one.name, label, names)
-    if not one.labels:  # the schema wants one
-        yield f'      <fuzzyTerm name="{names.variables[one.name]}.any">'
+    if not one.labels:  # the schema wants one; nobody can ask it
+        yield f'      <fuzzyTerm name="{names.variables[one.name]}.">'
         yield '        <pointSetShape><point x="0.0" y="1.0"/></pointSetShape>'
         yield "      </fuzzyTerm>"
     for made in rules.made.get(one.name, ()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.casting.facts import as_rules, facts_of
+from fuzzytree.casting.joining import joined_outputs
 from fuzzytree.casting.points import pointed
 from fuzzytree.casting.scores import (
     Always,
@@ -23,6 +24,7 @@ __all__ = [
     "cast_remarks",
     "facts_of",
     "flattened",
+    "joined_outputs",
     "pointed",
     "winner",
 ]

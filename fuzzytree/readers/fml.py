@@ -139,12 +139,13 @@ def _terms(
     """Return the names and elements of terms, and note how each is called in rules."""
     variable = element.attributes.get("name", "")
     kind = element.name.replace("Variable", "Term")
-    terms = element.all(kind)
+    start = f"{variable}."
+    # A term called `variable.` stands where the schema wants one and there is none.
+    terms = [t for t in element.all(kind) if t.attributes.get("name") != start]
     for other in element.children:
         if other.name != kind:
             notes.wrong(other, f"<{other.name[:40]}> stands where <{kind}> does")
     given = [term.attributes.get("name", "") for term in terms]
-    start = f"{variable}."
     is_ours = all(one.startswith(start) and len(one) > len(start) for one in given)
     taken: list[str] = []
     for term, one in zip(terms, given, strict=True):

@@ -277,3 +277,14 @@ def test_the_same_model_gives_the_same_bytes() -> None:
 
 def test_fml_is_in_the_table_of_formats() -> None:
     assert find_format(".fml").read is not None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rules_with_combinations_are_read_back_equal_where_facts_are_there(
+    seed: int,
+) -> None:
+    rules, _ = pointed(rules_from_tree(random_tree(seed, combinations=1.0)), 1e-3)
+    assert any(variable.parts for variable in rules.variables)
+    written = write(rules, allow_loss=True)
+    assert all(loss.where.startswith("combination ") for loss in written.losses)
+    assert reading(written.content, "r.fml").model == rules
