@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal
+from collections.abc import Callable, Mapping
+from typing import Literal, cast
 
 import msgspec
 
-from fuzzytree.contracts import Document, Format
+from fuzzytree.contracts import Document, Format, Written
 from fuzzytree.converting import carrier_of, formed
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.likeness import likeness
+from fuzzytree.options import options_of
 from fuzzytree.samples import samples
 
 Outcome = Literal["equal", "alike", "written", "points", "lossy", "refused", "no"]
@@ -46,13 +47,17 @@ class Ability(msgspec.Struct, frozen=True):
 
 
 def abilities(
-    form: Format, models: Mapping[str, Document] | None = None
+    form: Format,
+    models: Mapping[str, Document] | None = None,
+    *,
+    dialect: str | None = None,
 ) -> tuple[Ability, ...]:
     """Return what comes of each sample in a format.
 
     Args:
         form: The format.
         models: The samples; those of `fuzzytree.samples` unless given.
+        dialect: Of the file; the writer's own unless given.
 
     Raises:
         MissingExtraError: If a package is missing that the format needs.
@@ -63,18 +68,38 @@ def abilities(
         'written'
     """
     found = samples() if models is None else models
-    return tuple(_ability(form, name, model) for name, model in found.items())
+    options = {} if dialect is None else {"dialect": dialect}
+    return tuple(_ability(form, name, model, options) for name, model in found.items())
 
 
-def _ability(form: Format, name: str, model: Document) -> Ability:
+def dialects_of(form: Format) -> tuple[str, ...]:
+    """Return the dialects that a format's writer knows, its own first.
+
+    Example:
+        >>> from fuzzytree.exporters import find_format
+        >>> dialects_of(find_format("fcl"))[0]
+        'portable'
+    """
+    for one in options_of(form):
+        if one.name == "dialect":
+            others = [choice for choice in one.choices if choice != one.default]
+            return (str(one.default), *others)
+    return ()
+
+
+def _ability(
+    form: Format, name: str, model: Document, options: Mapping[str, str]
+) -> Ability:
     try:
         given = formed(model, form)
     except LossError:
         return Ability(name, "no")
     if carrier_of(given) not in form.carries:
         return Ability(name, "no")
+    # Each writer checks its own options; the protocol knows the common one alone.
+    write = cast("Callable[..., Written]", form.write)
     try:
-        written = form.write(given, allow_loss=True)
+        written = write(given, allow_loss=True, **options)
     except MissingExtraError:
         raise
     except FuzzyTreeError as error:

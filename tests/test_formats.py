@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.abilities import MEANINGS, abilities
+from fuzzytree.abilities import MEANINGS, abilities, dialects_of
 from fuzzytree.contracts import Document, Loss, Written
-from fuzzytree.converting import carrier_of, formed
+from fuzzytree.converting import formed
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, find_format
 from fuzzytree.report.formats import SIGNS, ability_table
@@ -31,6 +31,12 @@ YAML = find_format("yaml")
 
 def _page() -> str:
     made = ability_table({one.name: abilities(one) for one in all_formats()})
+    for form in all_formats():
+        known = {name: abilities(form, dialect=name) for name in dialects_of(form)}
+        lines = zip(*known.values(), strict=True)
+        if any(len({one.outcome for one in line}) > 1 for line in lines):
+            table = ability_table(known, legend=False)
+            made += f"\nThe dialects of {form.name}:\n\n{table}"
     text = PAGE.read_text("utf-8")
     return MARKED.sub(lambda found: f"{found[1]}{made}\n{found[2]}", text)
 
@@ -50,6 +56,15 @@ def test_trying_every_format_takes_a_moment() -> None:
 def test_there_is_a_sample_of_every_kind_of_model() -> None:
     kinds = {type(model) for model in samples().values()}
     assert kinds == {FuzzyTree, RuleBase, FuzzySystem}
+
+
+def test_each_dialect_of_a_format_is_tried() -> None:
+    assert dialects_of(YAML) == ()
+    fcl = find_format("fcl")
+    assert dialects_of(fcl) == ("portable", "iec", "fuzzylite", "jfuzzylogic")
+    one = {"Sugeno, linear": samples()["Sugeno, linear"]}
+    assert abilities(fcl, one)[0].outcome == "refused"
+    assert abilities(fcl, one, dialect="fuzzylite")[0].outcome == "alike"
 
 
 def test_every_outcome_has_a_sign_and_a_meaning() -> None:

@@ -62,7 +62,9 @@ def command(name: str | None, as_json: bool) -> None:
     answer("\n".join(text.runtime_lines(runtimes, missing)))
 
 
-def _abilities(form: Format, missing: set[str]) -> tuple[Ability, ...] | str:
+def _abilities(
+    form: Format, missing: set[str], dialect: str | None = None
+) -> tuple[Ability, ...] | str:
     """Return what a format can carry, or why that cannot be tried."""
     from fuzzytree.abilities import abilities
     from fuzzytree.errors import FuzzyTreeError
@@ -71,7 +73,7 @@ def _abilities(form: Format, missing: set[str]) -> tuple[Ability, ...] | str:
     if form.extra in missing:
         return f"not tried: the extra {form.extra!r} is not installed"
     try:
-        return abilities(form)
+        return abilities(form, dialect=dialect)
     except FuzzyTreeError as error:
         return f"not tried: {error}"
     except Exception as error:
@@ -82,14 +84,17 @@ def _abilities(form: Format, missing: set[str]) -> tuple[Ability, ...] | str:
 
 
 def _tell_one(form: Format, missing: set[str], *, as_json: bool) -> None:
+    from fuzzytree.abilities import dialects_of
     from fuzzytree.options import options_of
     from fuzzytree.report import formats as shown
 
     found = _abilities(form, missing)
+    dialects = {name: _abilities(form, missing, name) for name in dialects_of(form)}
     if as_json:
-        answer_json(_facts(form, found, missing))
+        known = {k: v for k, v in dialects.items() if not isinstance(v, str)}
+        answer_json({**_facts(form, found, missing), "dialects": known})
         return
-    answer("\n".join(shown.detail_lines(form, found, options_of(form))))
+    answer("\n".join(shown.detail_lines(form, found, options_of(form), dialects)))
 
 
 def _facts(

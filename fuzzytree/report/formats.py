@@ -12,6 +12,8 @@ from fuzzytree.report.text import aligned
 Found = Mapping[str, tuple[Ability, ...] | str]
 """The abilities of each format, or why there are none."""
 
+_LONGEST = 120  # characters of a reason
+
 SIGNS = {
     "equal": "=",
     "alike": "~",
@@ -36,13 +38,20 @@ def ability_lines(found: Found) -> Iterator[str]:
             yield f"  {name}: {reason}"
 
 
-def ability_table(found: Found) -> str:
-    """Return the same table as Markdown."""
+def ability_table(found: Found, *, legend: bool = True) -> str:
+    """Return the same table as Markdown.
+
+    Args:
+        found: The abilities of each format.
+        legend: Whether the meanings of the signs stand below.
+    """
     head, *rows = _rows(found)
     lines = [head, ["---", *[":-:"] * (len(head) - 1)], *rows]
     table = "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    legend = "".join(f"- `{SIGNS[one]}` {text}\n" for one, text in MEANINGS.items())
-    return f"{table}\n{legend}"
+    if not legend:
+        return table
+    signs = "".join(f"- `{SIGNS[one]}` {text}\n" for one, text in MEANINGS.items())
+    return f"{table}\n{signs}"
 
 
 def _rows(found: Found) -> Iterator[Sequence[str]]:
@@ -55,7 +64,10 @@ def _rows(found: Found) -> Iterator[Sequence[str]]:
 
 
 def detail_lines(
-    form: Format, found: tuple[Ability, ...] | str, options: Sequence[OptionFacts]
+    form: Format,
+    found: tuple[Ability, ...] | str,
+    options: Sequence[OptionFacts],
+    dialects: Found,
 ) -> Iterator[str]:
     """Yield everything that is known of one format.
 
@@ -63,6 +75,7 @@ def detail_lines(
         form: The format.
         found: What it can carry, or why that is not known.
         options: The options of its writer.
+        dialects: What it can carry in each of its dialects, if it has several.
     """
     reads = "read and written" if form.read else "written"
     computes = f", computes in {form.dtype}" if form.dtype else ""
@@ -81,6 +94,9 @@ def detail_lines(
         return
     rows = [(f"  {one.sample}", *_told(one)) for one in found]
     yield from aligned(rows)
+    if dialects:
+        yield ""
+        yield from ability_lines(dialects)
 
 
 def _default(one: OptionFacts) -> str:
@@ -96,7 +112,7 @@ def _default(one: OptionFacts) -> str:
 
 
 def _told(one: Ability) -> tuple[str, str]:
-    reason = one.reasons[0].splitlines()[0] if one.reasons else ""
+    reason = " ".join(one.reasons[0].split())[:_LONGEST] if one.reasons else ""
     if len(one.reasons) > 1:
         reason += f" (and {len(one.reasons) - 1} more)"
     bound = "" if one.bound is None else f"within {one.bound:.1g}: "
