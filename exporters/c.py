@@ -138,7 +138,7 @@ def write(
 
     Raises:
         LossError: If float32 cannot hold a number of the model, unless allowed.
-        ValueError: If the number type or the name is not one of C.
+        ValueError: If an option is not one of the above, or the name not one of C.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -158,6 +158,8 @@ def write(
             raise ValueError("fuzzy systems are written in float64 only")
         text = "".join(_system_text(model, prefix, activations=activations))
         return Written(text.encode("ascii"))
+    if activations:
+        raise ValueError("activations are those of fuzzy systems")
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise LossError(_loss_text(model, lost))

@@ -18,7 +18,7 @@ from fuzzytree.reference import Answer, Status, descend, evaluate
 from fuzzytree.tree import FuzzyTree
 
 _RANDOM_ROWS = 100  # that probes ends with, before the special values
-_MOST_ROWS = 64
+_MOST_ROWS = 160
 _FEWEST_ROWS = 8
 _STRENGTHS = 20_000  # of all rows together
 
@@ -60,17 +60,22 @@ def examples_of(
     found: list[Example] = []
     rows = rows_of(model, len(tables.label) if tables else 1)
     for row in rows:
-        with np.errstate(all="ignore"):
-            given = {name: float(numbers.kind(row[name])) for name in model.inputs}
-            if numbers.kind is np.float64:
-                answer = _reference(model, given)
-            else:
-                answer = _computed(model, asked, tables, line, numbers, given)
+        if numbers.kind is np.float64:
+            given = row
+            answer = _reference(model, given)
+        else:
+            given = {name: _as_float(value) for name, value in row.items()}
+            answer = _computed(model, asked, tables, line, numbers, given)
         label = number_of(answer.label, model)
         digest = digest_of(answer.strengths, numbers)
-        values = tuple(given.values())
+        values = tuple(given[name] for name in model.inputs)
         found.append(Example(values, label, answer.rule, int(answer.status), digest))
     return found
+
+
+@np.errstate(over="ignore")
+def _as_float(value: float) -> float:
+    return float(np.float32(value))
 
 
 def number_of(label: str | None, model: Model) -> int:
@@ -91,7 +96,8 @@ def _computed(
     row: Row,
 ) -> Answer:
     """Return the answer that the tables give in their number type."""
-    values = axis_values(model.variables, line, tuple(row.values()), numbers)
+    given = [row[name] for name in model.inputs]
+    values = axis_values(model.variables, line, given, numbers)
     if isinstance(model, FuzzyTree) or tables is None:
         if values is None:
             return Answer(0, model.semantics.missing, Status.MISSING)

@@ -23,6 +23,7 @@ from fuzzytree.rulebase import Variable
 Real = np.float64 | np.float32
 
 
+@np.errstate(all="ignore")
 def axis_values(
     variables: Sequence[Variable],
     line: Mapping[str, int],
@@ -56,6 +57,7 @@ def leaf(asked: Sequence[Question], values: Sequence[Real], numbers: Numbers) ->
     return place - len(asked) + 1
 
 
+@np.errstate(all="ignore")
 def strengths(
     tables: Tables, values: Sequence[Real], numbers: Numbers, *, is_product: bool
 ) -> tuple[float, ...]:

@@ -510,11 +510,12 @@ def _data(tables: Tables, numbers: Numbers, prefix: str) -> Iterator[str]:
             yield fill(f"#define NAME_{name} {size}u\n", prefix)
     about = "The numbers of ends of plateaus, of sides of sets, and of points."
     yield "\n"
-    yield from real_table(f"{prefix}_number", tables.number or [0.0], about, numbers)
+    if tables.kind:
+        yield from real_table(f"{prefix}_number", tables.number, about, numbers)
     for name, values, about in (
-        ("kind", tables.kind, "What each of them is."),
-        ("count", tables.count, "How many coefficients or points it has."),
-        ("first", tables.first, "Where its numbers begin."),
+        ("kind", tables.kind or None, "What each of them is."),
+        ("count", tables.count or None, "How many coefficients or points it has."),
+        ("first", tables.first or None, "Where its numbers begin."),
         ("term_first", tables.term_first, "Where each term begins among them."),
         ("clause_first", tables.clause_first, "Where the terms of a clause begin."),
         ("clause_term", tables.clause_term, "The terms of all clauses."),

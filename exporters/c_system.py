@@ -10,7 +10,7 @@ import numpy as np
 
 from fuzzytree.exporters.c_steps import HELPERS, Steps
 from fuzzytree.exporters.c_text import fill, remark
-from fuzzytree.inference import infer
+from fuzzytree.inference import Inference, infer
 from fuzzytree.probing import Row, system_probes
 from fuzzytree.programs.bounds import error_bounds
 from fuzzytree.programs.steps import Program
@@ -18,7 +18,9 @@ from fuzzytree.programs.systems import from_system
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.system import FuzzySystem, SystemInput, SystemOutput
 
-_ROWS = 64
+_ROWS = 100
+_PROBES = 400
+_SHARE = 1e-6  # of a number: its error where no bound is known
 
 SYSTEM_TYPES = """
 #ifdef __cplusplus
@@ -144,8 +146,7 @@ def system_selftest(system: FuzzySystem, prefix: str) -> Iterator[str]:
 
     Outputs must be equal, or as near as functions of different libraries allow.
     """
-    rows = system_probes(system, limit=_ROWS)
-    bounds = _bounds(system, rows)
+    examples = _examples(system)
     inputs, outputs = max(len(system.columns), 1), len(system.outputs)
     yield fill("\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n", prefix)
     yield "\n/* Bits of the inputs, the outputs and their largest errors; the status.\n"
@@ -153,10 +154,8 @@ def system_selftest(system: FuzzySystem, prefix: str) -> Iterator[str]:
     yield "static const struct {\n"
     yield f"    uint64_t x[{inputs}];\n    uint64_t outputs[{outputs}];\n"
     yield f"    uint64_t most[{outputs}];\n    int status;\n"
-    yield fill(f"}} name_example[{len(rows)}] = {{\n", prefix)
-    for row, bound in zip(rows, bounds, strict=True):
-        found = infer(system, row)
-        given = [row[name] for name in system.columns]
+    yield fill(f"}} name_example[{len(examples)}] = {{\n", prefix)
+    for given, found, bound in examples:
         shown = ", ".join(map(repr, given)) or "no inputs"
         numbers = ", ".join(map(repr, found.outputs))
         yield f"    /* {shown}: {numbers} */\n"
@@ -164,6 +163,27 @@ def system_selftest(system: FuzzySystem, prefix: str) -> Iterator[str]:
         yield f"    {{{parts}, {int(found.status)}}},\n"
     yield "};\n"
     yield fill(_MAIN, prefix)
+
+
+def _examples(
+    system: FuzzySystem,
+) -> list[tuple[list[float], Inference, list[float]]]:
+    """Return inputs, answers and their largest errors, those of small errors first.
+
+    Where no bound of an error is known, a share of the number stands in its place.
+    """
+    rows = system_probes(system, limit=_PROBES)
+    every: list[tuple[list[float], Inference, list[float]]] = []
+    for row, bounds in zip(rows, _bounds(system, rows), strict=True):
+        found = infer(system, row)
+        most = [
+            min(bound, _SHARE * max(abs(number), 1.0)) if number == number else 0.0
+            for bound, number in zip(bounds, found.outputs, strict=True)
+        ]
+        every.append(([row[name] for name in system.columns], found, most))
+    every.sort(key=lambda one: max(one[2]))
+    step = max(len(every) // (2 * _ROWS), 1)
+    return every[: _ROWS * step : step]
 
 
 def _bounds(system: FuzzySystem, rows: Sequence[Row]) -> list[list[float]]:

@@ -1,0 +1,205 @@
+"""Generated C: what stands in it, whatever a model says, and what it refuses."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.c import FORMAT, write
+from fuzzytree.exporters.c_axes import lines_of
+from fuzzytree.exporters.c_examples import digest_of
+from fuzzytree.exporters.c_expected import axis_values, leaf, strengths
+from fuzzytree.exporters.c_rules import tables_of
+from fuzzytree.exporters.c_steps import number_text
+from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
+from fuzzytree.exporters.c_tree import questions_of
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.reference import Status, descend, evaluate
+from fuzzytree.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
+from fuzzytree.testing import probes, random_system, random_tree, with_points
+from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+
+HOSTILE = (
+    "*/ int x; /*",
+    "/*/",
+    "**//",
+    "??/\n#error",
+    '"; system("',
+    "\\",
+    "int",
+    "\u202e é ☂ \u2028 \r\n",
+    "%s%n",
+    "1st",
+    "A" * 100,
+    "a" * 100,
+)
+
+
+def hostile_rules() -> RuleBase:
+    terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
+    inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
+    rules = tuple(Rule((Clause(name, (name,)),), name) for name in HOSTILE)
+    return RuleBase("*/ # ??/\n", HOSTILE, inputs, rules)
+
+
+def edge_tree(cut: float) -> FuzzyTree:
+    terms = Term("low", Band(high=cut)), Term("high", Band(low=cut))
+    branches = Branch(("low",), leaf=1), Branch(("high",), leaf=2)
+    return FuzzyTree(
+        "edge",
+        ("no", "yes"),
+        (Variable("x", terms),),
+        (Node("x", (cut,), (0, 1), branches),),
+        (Leaf("no"), Leaf("yes")),
+    )
+
+
+def test_text_of_a_model_is_never_code() -> None:
+    content = write(hostile_rules()).content
+    text = content.decode("ascii")
+    assert "??" not in text
+    code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    assert "/*" not in code
+    assert "*/" not in code
+    for word in ("int x;", "#error\n", 'system("', "\\"):
+        assert word not in code.replace("\\n", "")
+
+
+def test_a_comment_is_one_line_that_cannot_end() -> None:
+    for name in HOSTILE:
+        found = remark(name)
+        assert found.isascii()
+        assert found.isprintable()
+        assert "*/" not in f"{found} */"[:-2]
+        assert not {"/*", "??"} & {found[i : i + 2] for i in range(len(found))}
+
+
+def test_constants_are_unlike_and_not_too_long() -> None:
+    found = constants("GRIP_CLASS_", HOSTILE)
+    assert len(set(found)) == len(HOSTILE)
+    assert all(len(name) <= 63 and re.fullmatch(r"[A-Z0-9_]+", name) for name in found)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("Grip 2", "grip_2"),
+        ("2 hands", "model_2_hands"),
+        ("", "model"),
+        ("wine quality of the north", "wine_quality_of_the"),
+    ],
+)
+def test_a_prefix_is_made_of_the_model_s_name(name: str, expected: str) -> None:
+    assert prefix_of(name) == expected
+
+
+def test_writing_twice_gives_the_same_bytes() -> None:
+    for model in (random_tree(4), rules_from_tree(random_tree(4)), random_system(4)):
+        assert write(model).content == write(model).content
+
+
+def test_numbers_are_written_with_all_their_bits() -> None:
+    values = [0.1, -1e-320, 5e-324, 1.7976931348623157e308, -0.0, 3.0, 1 / 3]
+    for value in values:
+        assert float.fromhex(DOUBLE.text(value)) == value
+        single = float(np.float32(min(value, 1e38)))
+        text = SINGLE.text(single)
+        assert text.endswith("f")
+        assert float.fromhex(text[:-1]) == single
+    assert number_text(-0.25) == "(-0x1p-2 /* -0.25 */)"
+    assert number_text(float("-inf")) == "name_bits(UINT64_C(0xfff0000000000000))"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_tables_of_a_tree_say_what_the_reference_says(seed: int) -> None:
+    tree = random_tree(seed, leaves=9, combinations=0.3)
+    line = lines_of(tree.variables)
+    asked = questions_of(tree, line)
+    assert len(asked) == sum(len(node.cuts) for node in tree.nodes)
+    for row in probes(tree, limit=300):
+        found = descend(tree, row)
+        given = [row[name] for name in tree.inputs]
+        values = axis_values(tree.variables, line, given, DOUBLE)
+        if found.status is Status.MISSING:
+            assert values is None
+        else:
+            assert values is not None
+            assert leaf(asked, values, DOUBLE) == found.rule
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+def test_the_tables_of_rules_say_what_the_reference_says(
+    seed: int, conjunction: str
+) -> None:
+    is_product = conjunction == "product"
+    tree = random_tree(seed, leaves=6, combinations=0.3)
+    rules = rules_from_tree(
+        tree,
+        "raw" if seed % 2 else "relative",
+        conjunction="product" if is_product else "min",
+    )
+    rules = with_points(rules, seed)
+    line = lines_of(rules.variables)
+    tables = tables_of(rules, line, DOUBLE)
+    for row in probes(rules, limit=200):
+        found = evaluate(rules, row)
+        given = [row[name] for name in rules.inputs]
+        values = axis_values(rules.variables, line, given, DOUBLE)
+        if found.status is Status.MISSING:
+            assert values is None
+            continue
+        assert values is not None
+        fired = strengths(tables, values, DOUBLE, is_product=is_product)
+        assert fired == found.strengths
+
+
+def test_rules_that_begin_alike_share_their_beginning() -> None:
+    rules = rules_from_tree(random_tree(2, leaves=30))
+    places = tables_of(rules, lines_of(rules.variables), DOUBLE).places
+    assert sorted(filter(None, places.rule)) == list(range(1, 31))
+    assert len(places.rule) < sum(len(rule.when) for rule in rules.rules) / 2
+    assert max(places.depth) == max(len(rule.when) for rule in rules.rules)
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_a_digest_changes_with_the_last_bit_of_any_strength(place: int) -> None:
+    given = [0.25, 1.0, 0.5]
+    changed = given.copy()
+    changed[place] = float(np.nextafter(given[place], 0.0))
+    assert digest_of(given, DOUBLE) != digest_of(changed, DOUBLE)
+    assert digest_of([0.0], DOUBLE) == digest_of([-0.0], DOUBLE)
+
+
+def test_what_float_cannot_hold_is_refused_with_every_loss() -> None:
+    with pytest.raises(LossError) as caught:
+        write(edge_tree(1e300), dtype="float32")
+    largest = float(np.finfo(np.float32).max)
+    assert str(caught.value) == (
+        "cannot write edge as c float32: node 1: cut 1e+300 lies beyond float32; "
+        f"{largest!r} stands\n"
+        "  pass allow_loss=True to write it as stated, or choose dtype 'float64'"
+    )
+    written = write(edge_tree(1e300), dtype="float32", allow_loss=True)
+    assert len(written.losses) == 1
+    assert "0x1.fffffep+127f" in written.content.decode()
+
+
+def test_wrong_options_are_named() -> None:
+    tree = random_tree(0)
+    with pytest.raises(ValueError, match="float64 and float32, not 'mixed'"):
+        write(tree, dtype="mixed")  # type: ignore[arg-type] # that is the test
+    with pytest.raises(ValueError, match="'Grip' cannot begin the names of C; 'grip'"):
+        write(tree, name="Grip")
+    with pytest.raises(ValueError, match="in float64 only"):
+        write(random_system(0), dtype="float32")
+    with pytest.raises(ValueError, match="activations are those of fuzzy systems"):
+        write(tree, activations=True)
+
+
+def test_the_format_carries_all_models() -> None:
+    assert FORMAT.carries == ("tree", "rules", "system")
+    assert FORMAT.read is None
