@@ -136,7 +136,7 @@ _ORDER: Final[list[Dialect]] = ["fuzzylite", "jfuzzylogic", "pyit2fls", "iec"]
 
 
 class Evidence(NamedTuple):
-    """Something that only one dialect has; `weight` is 1 where others may have it."""
+    """Something that a dialect has; the more it weighs the fewer others have it too."""
 
     dialect: Dialect
     what: str
@@ -226,9 +226,9 @@ _COMMENTS: Mapping[str, Dialect] = MappingProxyType({"(*": "iec", "/*": "jfuzzyl
 
 def _of_shape(word: Token) -> Iterator[Evidence]:
     if str(word) in CLASSES:
-        yield Evidence("fuzzylite", f"the term class {word}", word.line or 1)
+        yield Evidence("fuzzylite", f"the term class {word}", word.line or 1, 4)
     elif word.upper() in _OF_JFUZZYLOGIC or word.upper() == "FUNCTION":
-        yield Evidence("jfuzzylogic", f"the shape {word}", word.line or 1)
+        yield Evidence("jfuzzylogic", f"the shape {word}", word.line or 1, 4)
 
 
 def _of_setting(
@@ -267,7 +267,8 @@ def _of_rule(rule: RuleText) -> Iterator[Evidence]:
         yield Evidence("fuzzylite", "rules in lower case", line, 1)
     elif len(rule.conclusions) > 1:
         if rule.has_comma:
-            yield Evidence("iec", "conclusions with ','", line)
+            yield Evidence("iec", "conclusions with ','", line, 1)
+            yield Evidence("jfuzzylogic", "conclusions with ','", line, 1)
         else:
             yield Evidence("pyit2fls", "conclusions with AND", line)
     elif rule.is_grouped:

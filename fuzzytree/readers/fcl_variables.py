@@ -245,6 +245,8 @@ def _estimated(
 ) -> tuple[float, float]:
     """Return the range that an output's terms span, where the file says none."""
     name = str(named.token)
+    if known.notes.found:  # a term that was not read is no reason to ask for a range
+        return 0.0, 1.0
     ends = [fcl_terms.extent(label.curve) for label in labels]
     spans = [one for one in ends if one is not None]
     if not spans or known.dialect == "fuzzylite":

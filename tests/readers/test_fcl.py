@@ -254,11 +254,25 @@ def test_the_dialect_is_told_with_the_reasons() -> None:
     assert "ENABLED (line 11)" in remark
 
 
+def test_one_shape_of_jfuzzylogic_is_enough() -> None:
+    text = STANDARD.replace("(2, 0) (6, 1)", "TRIAN 2 6 6")
+    assert _read(text).remarks[0].startswith("the dialect is jFuzzyLogic: the shape")
+
+
 def test_small_letters_alone_do_not_make_a_file_of_fuzzylite() -> None:
     reading = _read(STANDARD.replace(" IS ", " is ").replace("IF ", "if "))
     assert reading.model == _system(STANDARD)
     assert reading.remarks[0].startswith("the dialect is IEC 61131-7: ACCU in")
     assert "fuzzylite would have rules in lower case" in reading.remarks[0]
+
+
+def test_a_comma_between_conclusions_is_that_of_the_standard() -> None:
+    text = PYIT2FLS.replace(
+        "(fan IS fast AND vent IS open)", "fan IS fast, vent IS open"
+    )
+    remark = _read(text).remarks[0]
+    assert "conclusions with ',' (line 29)" in remark
+    assert len(_system(text).rules[1].then) == 2
 
 
 def test_what_is_kept_between_rows_is_a_loss() -> None:

@@ -22,7 +22,12 @@ from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Kind, Points, RuleBase
 from fuzzytree.samples import samples
 from fuzzytree.system import And, Condition, Defuzzifier, FuzzySystem, Or
-from fuzzytree.testing import random_rows, random_tree, with_points
+from fuzzytree.testing import (
+    exporter_models,
+    random_rows,
+    random_tree,
+    with_points,
+)
 from tests.witnesses.corpus_fcl import EXACT, corpus, corpus_table
 from tests.witnesses.fuzzylite_engine import largest_difference, run_program
 
@@ -133,6 +138,27 @@ def test_a_system_answers_alike_in_fuzzylite(
     answers = run_program(path, written.content, given, tmp_path, kind="fcl")
     is_mixed = any(_mixes(rule.when) for rule in system.rules)
     assert answers.rules == len(system.rules) or is_mixed
+    ours = [infer(system, row).outputs for row in rows]
+    assert largest_difference(ours, answers.outputs) < NEAR
+
+
+ODD = [
+    (title, model)
+    for title, model in exporter_models()
+    if isinstance(model, FuzzySystem) and title.startswith("a system named")
+]
+
+
+@pytest.mark.parametrize(("title", "system"), ODD, ids=range(len(ODD)))
+def test_names_of_all_sorts_reach_fuzzylite(
+    program: Need, tmp_path: Path, title: str, system: FuzzySystem
+) -> None:
+    written = write(system, dialect="fuzzylite", allow_loss=True)
+    rows = random_rows(system, 8, 20)
+    given = [list(row.values()) for row in rows]
+    path = program("fuzzylite")
+    answers = run_program(path, written.content, given, tmp_path, kind="fcl")
+    assert answers.rules == len(system.rules), title
     ours = [infer(system, row).outputs for row in rows]
     assert largest_difference(ours, answers.outputs) < NEAR
 
