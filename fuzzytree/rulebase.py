@@ -561,11 +561,13 @@ def name_choice(wrong: str, names: Iterable[str]) -> str:
     import difflib
 
     known = list(dict.fromkeys(names))
+    # A message has one line, whatever is in a name.
+    lines = [one if one.isprintable() else repr(one) for one in known[:12]]
     if len(known) > _MOST_COMPARED:
-        return f"there are {len(known)}: {', '.join(known[:12])}, ..."
+        return f"there are {len(known)}: {', '.join(lines)}, ..."
     if not known:
         return "there is none"
-    shown = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+    shown = ", ".join(lines) + (", ..." if len(known) > 12 else "")
     close = difflib.get_close_matches(wrong, known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     return f"there is {shown}{hint}"

@@ -16,6 +16,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
     fingerprint,
+    name_choice,
     sentence,
 )
 
@@ -244,3 +245,7 @@ def test_a_name_that_no_file_can_hold_is_refused() -> None:
         "the name '\\ud800' cannot be written as UTF-8\n"
         "class '\\udfff' cannot be written as UTF-8"
     )
+
+
+def test_a_choice_of_names_stands_in_one_line() -> None:
+    assert name_choice("b", ["a\nb", "c"]) == "there is 'a\\nb', c"
