@@ -6,6 +6,7 @@ and remarks say where fuzzylite 6 and pyfuzzylite 8 mean other things by one fil
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
@@ -135,6 +136,11 @@ def differences(system: FuzzySystem) -> Iterator[str]:
             ]
             twice = [one for one in concluded if counts[output.name, one.name] > 1]
             yield from _joined_twice(output, twice)
+            if any(map(_is_infinite_at_zero, concluded)):
+                yield (
+                    f"output {output.name!r}: a rule of degree 0 counts nothing, as in "
+                    "fuzzylite 6; pyfuzzylite multiplies 0 by an infinite number"
+                )
             yield from _inverse_remarks(output, concluded)
     hedges = {
         hedge for rule in system.rules for one in rule.then for hedge in one.hedges
@@ -144,7 +150,26 @@ def differences(system: FuzzySystem) -> Iterator[str]:
             "a rule of degree 0 concludes nothing, as in fuzzylite 6; in pyfuzzylite "
             "'any' and 'not' in a conclusion make 1 of 0"
         )
+    yield from _area_remarks(system.outputs)
     yield from _curve_remarks(system)
+
+
+def _area_remarks(outputs: Sequence[SystemOutput]) -> Iterator[str]:
+    """Yield what fuzzylite 6 does with curves in another way."""
+    looked_at = [one for one in outputs if not one.defuzzifier.is_weighted]
+    methods = {one.defuzzifier.method for one in looked_at}
+    if "bisector" in methods:
+        yield (
+            "Bisector is one of the values that are looked at, as in pyfuzzylite; "
+            "fuzzylite 6 takes one between them"
+        )
+    if any(method.endswith("maximum") for method in methods):
+        yield "fuzzylite 6 counts degrees within 1e-6 of the maximum to the maxima"
+    if any(one.default is not None for one in looked_at):
+        yield (
+            "where conclusions have no area the default answers, as in pyfuzzylite; "
+            "fuzzylite 6 answers NaN"
+        )
 
 
 def _joined_twice(output: SystemOutput, twice: Sequence[Label]) -> Iterator[str]:
@@ -174,6 +199,16 @@ def _depends_on_degree(label: Label) -> bool:
             return True
 
 
+def _is_infinite_at_zero(label: Label) -> bool:
+    """Return whether a label's number at degree 0 is, or may be, no finite number."""
+    if isinstance(label.curve, Formula):
+        asked = "x" in names_in(label.curve.expression)
+        functions = {call.function for call in _calls([label.curve])}
+        return asked and bool(functions & {"/", "^", "log", "log10", "%", "fmod"})
+    found = value_at(label.curve, 0.0)
+    return found is not None and not math.isfinite(found)
+
+
 def _inverse_remarks(output: SystemOutput, concluded: Sequence[Label]) -> Iterator[str]:
     """Yield whether fuzzylite 6 finds other values at which a term has a degree."""
     if any(
@@ -189,6 +224,7 @@ def _inverse_remarks(output: SystemOutput, concluded: Sequence[Label]) -> Iterat
 
 
 _TRUTHS = frozenset({"le", "ge", "eq", "neq", "and", "or", "not"})
+_SAFE = frozenset({*_TRUTHS, "lt", "gt", "*", "/", "^", "min", "max"})
 
 
 def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
@@ -211,7 +247,10 @@ def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
             "pyfuzzylite; in fuzzylite 6 only 1 is true"
         )
     degrees = [label.curve for one in system.inputs for label in one.labels]
-    if any(isinstance(one, Formula) for one in degrees):
+    formulas = [one.expression for one in degrees if isinstance(one, Formula)]
+    if any({*names_in(one)} - {"x"} for one in formulas):
+        yield "formulas: fuzzylite 6 knows no variables in those of inputs' terms"
+    if formulas:
         yield (
             "formulas: a degree below 0 concludes nothing, as in fuzzylite 6; "
             "pyfuzzylite counts it"
@@ -224,10 +263,20 @@ def _curve_remarks(system: FuzzySystem) -> Iterator[str]:
     ]
     if {"min", "max"} & {call.function for call in _calls(looked_at)}:
         yield "formulas: pyfuzzylite fails at 'min' and 'max' in an output's curve"
-    if any(_is_sum_of_truths(call) for call in calls):
+    outputs = {one.name for one in system.outputs}
+    if any(
+        call.function in ("min", "max") and outputs & {*names_in(call)}
+        for call in calls
+    ):
         yield (
-            "formulas: pyfuzzylite fails at sums of truths, or takes them for truths: "
-            "of le, ge, eq, neq, and, or, not"
+            "formulas: 'min' and 'max' of an output without a number have none; the "
+            "engines take the other argument"
+        )
+    if any(map(_computes_with_truths, calls)):
+        yield (
+            "formulas: le, ge, eq, neq, and, or, not are the numbers 0 and 1; "
+            "pyfuzzylite fails at sums and functions of them, adds them as truths, or "
+            "computes in half precision"
         )
     if any(isinstance(one, Concave) and one.inflection == one.end for one in curves):
         yield (
@@ -249,8 +298,9 @@ def _calls(curves: Iterable[Curve]) -> Iterator[Call]:
             todo += one.arguments
 
 
-def _is_sum_of_truths(call: Call) -> bool:
-    return call.function in ("+", "-", "negate") and all(map(_is_truth, call.arguments))
+def _computes_with_truths(call: Call) -> bool:
+    """Return whether pyfuzzylite computes something else with truths than numbers."""
+    return call.function not in _SAFE and all(map(_is_truth, call.arguments))
 
 
 def _asks_numbers(call: Call) -> bool:
@@ -262,9 +312,11 @@ def _asks_numbers(call: Call) -> bool:
 
 
 def _is_truth(expression: Expression) -> bool:
-    """Return whether pyfuzzylite has a truth there, and no number."""
+    """Return whether pyfuzzylite can have a truth there, and no number."""
     if not isinstance(expression, Call):
         return False
-    if expression.function in ("*", "min", "max"):
+    if expression.function in ("min", "max"):
+        return any(map(_is_truth, expression.arguments))
+    if expression.function == "*":
         return all(map(_is_truth, expression.arguments))
     return expression.function in _TRUTHS

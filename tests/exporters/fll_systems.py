@@ -24,14 +24,16 @@ from fuzzytree.testing import random_system
 _KNOWN: tuple[Hedge, ...] = ("any", "not", "very", "somewhat", "extremely", "seldom")
 
 
-def plain_system(seed: int) -> FuzzySystem:
+def plain_system(seed: int, *, outputs: int = 2, rules: int = 8) -> FuzzySystem:
     """Return `random_system(seed)` without what FLL lacks.
 
     Combinations become columns, unknown hedges and NOTs of several conditions go,
     curves are looked at in the middle of pieces, and bands and LR sets are trapezoids.
     Conclusions lose `any` and `not`, by which the engines mean different things.
     """
-    system = random_system(seed, has_odd_names=seed % 2 == 0)
+    system = random_system(
+        seed, outputs=outputs, rules=rules, has_odd_names=seed % 2 == 0
+    )
     columns = len(system.inputs)
     return replace(
         system,

@@ -177,6 +177,10 @@ def test_a_system_is_written_word_by_word() -> None:
         "rules that do not ask for it",
         "a rule of degree 0 concludes nothing, as in fuzzylite 6; in pyfuzzylite 'any' "
         "and 'not' in a conclusion make 1 of 0",
+        "Bisector is one of the values that are looked at, as in pyfuzzylite; "
+        "fuzzylite 6 takes one between them",
+        "where conclusions have no area the default answers, as in pyfuzzylite; "
+        "fuzzylite 6 answers NaN",
         "fuzzylite 6 does not know Arc and SemiEllipse; pyfuzzylite does",
     )
 
