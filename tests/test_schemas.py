@@ -117,15 +117,18 @@ def test_every_exception_of_the_schemas_is_an_example() -> None:
     assert stems >= BEYOND_A_SCHEMA
 
 
-@pytest.mark.parametrize("kind", ["rules", "tree"])
+@pytest.mark.parametrize(
+    ("schema", "name"),
+    [("rulebase", "iris-rules"), ("tree", "iris-tree"), ("system", "system-curves")],
+)
 def test_check_jsonschema_accepts_an_example(
-    kind: str, capsys: pytest.CaptureFixture[str]
+    schema: str, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from check_jsonschema import main  # type: ignore[import-untyped]  # as above
 
-    schema = {"rules": "rulebase.schema.json", "tree": "tree.schema.json"}[kind]
-    path = EXAMPLES / "positive" / f"iris-{kind}.yaml"
-    arguments = ["--schemafile", str(ROOT / "schemas" / schema), str(path)]
+    path = EXAMPLES / "positive" / f"{name}.yaml"
+    whole = ROOT / "schemas" / f"{schema}.schema.json"
+    arguments = ["--schemafile", str(whole), str(path)]
     with pytest.raises(SystemExit) as caught:
         main(arguments)
     assert caught.value.code == 0, capsys.readouterr().out
