@@ -201,12 +201,20 @@ def _lines(system: FuzzySystem, terms: Terms) -> list[Line]:
     """
     lines: list[Line] = []
     reasons: list[str] = []
-    for number, rule in enumerate(system.rules, 1):
+    placed = [(block, rule) for block in system.blocks for rule in block.rules]
+    for number, (block, rule) in enumerate(placed, 1):
         try:
-            lines += lines_of(rule, terms)
+            lines += lines_of(rule, block, terms, number)
         except LossError as error:
             reasons.append(f"  rule {number}: {error}")
+    is_weighted = system.outputs[0].defuzzifier.is_weighted
     for output in system.outputs:
+        if output.defuzzifier.is_weighted != is_weighted:
+            reasons.append(
+                f"  output {output.name!r}: a file is Mamdani or Sugeno as a whole, "
+                "and the first output is the other"
+            )
+            continue
         for label in output.labels:
             if _term(output, label, terms.dialect) is None:
                 reasons.append(

@@ -13,6 +13,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.casting.shapes import shape_of
+from fuzzytree.casting.splitting import split
 from fuzzytree.contracts import Loss
 from fuzzytree.errors import LossError
 from fuzzytree.naming import unlike
@@ -29,6 +30,7 @@ from fuzzytree.system import (
     Label,
     Not,
     Or,
+    RuleBlock,
     SystemOutput,
     SystemRule,
     questions,
@@ -157,12 +159,32 @@ class Terms:
                 raise LossError(f"one input is asked several things, joined by {norm}")
 
 
-def lines_of(rule: SystemRule, terms: Terms) -> list[Line]:
-    """Return a rule as lines; more than one where it concludes an output twice.
+def lines_of(
+    rule: SystemRule, block: RuleBlock, terms: Terms, number: int
+) -> list[Line]:
+    """Return a rule as lines.
+
+    More than one where it concludes an output twice, or mixes and and or.
 
     Raises:
         LossError: If it has no place in FIS.
     """
+    try:
+        return _lines(rule, terms)
+    except LossError:
+        is_joined = terms.dialect == "octave" or not any(
+            one.defuzzifier.is_weighted for one in terms.system.outputs
+        )
+        rules = split(rule, block, terms.system) if is_joined else ()
+        if len(rules) < 2:
+            raise
+    lines = [line for one in rules for line in _lines(one, terms)]
+    what = f"it is {len(rules)} rules, joined by maximum: that says the same"
+    terms.losses.append(Loss(f"rule {number}", what, 0.0))
+    return lines
+
+
+def _lines(rule: SystemRule, terms: Terms) -> list[Line]:
     is_or = isinstance(rule.when, Or)
     asked = _asked(rule.when, terms)
     found: list[dict[str, str]] = []

@@ -100,6 +100,7 @@ def write(
     system, lost = _with_known_curves(system, tolerance)
     losses += [*lost, *_losses(system)]
     found = rules_of(system)
+    losses += found.losses
     if losses and not allow_loss:
         raise refusal(model.name, "fml", losses)
     names = _Naming(system, found)

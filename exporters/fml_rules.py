@@ -11,6 +11,8 @@ from typing import Final
 
 import msgspec
 
+from fuzzytree.casting.splitting import split
+from fuzzytree.contracts import Loss
 from fuzzytree.errors import LossError
 from fuzzytree.naming import unlike
 from fuzzytree.readers.fml_words import MODIFIERS, SNORMS, TNORMS
@@ -80,10 +82,11 @@ Base = tuple[str, RuleBlock, tuple[Rule, ...]]
 
 
 class Rules(msgspec.Struct, frozen=True):
-    """All rules, and the terms that they need, by variable."""
+    """All rules, the terms that they need, by variable, and what was lost."""
 
     bases: tuple[Base, ...]
     made: dict[str, list[Made]]
+    losses: list[Loss]
 
 
 def rules_of(system: FuzzySystem) -> Rules:
@@ -94,7 +97,7 @@ def rules_of(system: FuzzySystem) -> Rules:
     """
     kinds = {one.name: _kind(one) for one in system.outputs}
     taken = {one.name: [label.name for label in one.labels] for one in system.inputs}
-    rules = Rules((), {})
+    rules = Rules((), {}, [])
     bases: list[Base] = []
     reasons: list[str] = []
     number = 0
@@ -103,10 +106,16 @@ def rules_of(system: FuzzySystem) -> Rules:
         for rule in block.rules:
             number += 1
             try:
-                for kind, one in _rules(rule, block, kinds, (rules.made, taken)):
-                    found.setdefault(kind, []).append(one)
+                several = _placed(rule, block, system, kinds, (rules.made, taken))
             except LossError as error:
                 reasons.append(f"  rule {number}: {error}")
+                continue
+            if len(several) > len({kind for kind, _ in several}):
+                count = len(several)
+                what = f"it is {count} rules, joined by maximum: that says the same"
+                rules.losses.append(Loss(f"rule {number}", what, 0.0))
+            for kind, one in several:
+                found.setdefault(kind, []).append(one)
         bases += [(kind, block, tuple(several)) for kind, several in found.items()]
     reasons += [
         f"  output {name!r}: its terms are of several kinds, and FML has one for each"
@@ -120,7 +129,25 @@ def rules_of(system: FuzzySystem) -> Rules:
     if reasons:
         listed = "\n".join(reasons)
         raise LossError(f"cannot write {system.name} as fml:\n{listed}")
-    return Rules(tuple(bases), rules.made)
+    return Rules(tuple(bases), rules.made, rules.losses)
+
+
+def _placed(
+    rule: SystemRule,
+    block: RuleBlock,
+    system: FuzzySystem,
+    kinds: dict[str, str],
+    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+) -> list[tuple[str, Rule]]:
+    """Return a rule by the kind of its outputs; several if it mixes and and or."""
+    try:
+        return [*_rules(rule, block, kinds, known)]
+    except LossError:
+        is_curve = all(kinds[one.output] == "mamdani" for one in rule.then)
+        rules = split(rule, block, system) if is_curve else ()
+        if len(rules) < 2:
+            raise
+    return [pair for one in rules for pair in _rules(one, block, kinds, known)]
 
 
 def _kind(output: SystemOutput) -> str:

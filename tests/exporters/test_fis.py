@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import get_args
 
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.anonymous import anonymous
 from fuzzytree.casting import as_system, flattened, pointed
@@ -432,3 +433,16 @@ def test_fis_is_in_the_table_of_formats() -> None:
 def test_a_dialect_that_is_none_is_refused() -> None:
     with pytest.raises(ValueError, match="no dialect 'scilab'; there is matlab"):
         write(rules_from_tree(random_tree(0)), dialect="scilab")  # type: ignore[arg-type]
+
+
+def test_a_rule_that_mixes_and_and_or_becomes_several_under_maximum() -> None:
+    mixed = And((Or((Is("a", "low"), Is("b", "low"))), Is("a", "high")))
+    system = _sugeno(SystemRule(mixed, (_small(),)))
+    (output,) = system.outputs
+    system = replace(system, outputs=(replace(output, aggregation="maximum"),))
+    with pytest.raises(LossError, match="it is 2 rules, joined by maximum"):
+        write(system)
+    written = write(system, allow_loss=True)
+    assert rows(written) == ["3 0, 1 (1.0) : 1", "2 1, 1 (1.0) : 1"]
+    with pytest.raises(LossError, match="rule 1: it mixes and, or and not"):
+        write(system, allow_loss=True, dialect="fuzzylite")

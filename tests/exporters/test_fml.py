@@ -288,3 +288,22 @@ def test_rules_with_combinations_are_read_back_equal_where_facts_are_there(
     written = write(rules, allow_loss=True)
     assert all(loss.where.startswith("combination ") for loss in written.losses)
     assert reading(written.content, "r.fml").model == rules
+
+
+def test_a_rule_that_mixes_and_and_or_becomes_several_under_maximum() -> None:
+    system = next(
+        one
+        for one in map(random_fml, range(20))
+        if one.blocks[0].implication and one.blocks[0].conjunction == "minimum"
+    )
+    mixed = And((Or((Is("x0", "t0"), Is("x1", "t0"))), Is("x2", "t0")))
+    rule = SystemRule(mixed, (Conclusion("y", "t0"),))
+    system = replace(system, blocks=(replace(system.blocks[0], rules=(rule,)),))
+    with pytest.raises(LossError, match="rule 1: it is 2 rules, joined by maximum"):
+        write(system)
+    again = reading(write(system, allow_loss=True).content, "s.fml").model
+    assert isinstance(again, FuzzySystem)
+    assert [one.when for one in again.rules] == [
+        And((Is("x0", "t0"), Is("x2", "t0"))),
+        And((Is("x1", "t0"), Is("x2", "t0"))),
+    ]
