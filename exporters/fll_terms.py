@@ -215,8 +215,7 @@ def _inverse(label: Label) -> Expression:
             return parse(f"{inflection!r} - log(1 / {d} - 1) / {slope!r}")
         case SCurve(start=start, end=end):
             low_part = f"{start!r} + {end - start!r} * sqrt(0.5 * {d})"
-            rest = f"sqrt(max(0.5 * (1 - {d}), 0))"
-            high_part = f"{end!r} - {end - start!r} * {rest}"
+            high_part = f"{end!r} - {end - start!r} * sqrt(0.5 * (1 - {d}))"
             return parse(f"le({d}, 0.5) * ({low_part}) + gt({d}, 0.5) * ({high_part})")
         case Concave(inflection=inflection, end=end):
             return parse(f"{end!r} - {end - inflection!r} * (1 / {d} - 1)")
