@@ -35,6 +35,7 @@ from fuzzytree.system import (
     Expression,
     Formula,
     FuzzySystem,
+    Hedge,
     Is,
     Label,
     Name,
@@ -334,7 +335,8 @@ def _condition(condition: Condition, names: Names, labels: Labels) -> Condition:
     match condition:
         case Is(variable=variable, label=label, hedges=hedges):
             known = labels[variable]
-            return Is(names[variable], None if label is None else known[label], hedges)
+            name = None if label is None else known[label]
+            return Is(names[variable], name, _hedges(hedges))
         case And(parts=parts):
             return And(tuple(_condition(one, names, labels) for one in parts))
         case Or(parts=parts):
@@ -347,4 +349,13 @@ def _condition(condition: Condition, names: Names, labels: Labels) -> Condition:
 
 
 def _conclusion(one: Conclusion, names: Names, labels: Labels) -> Conclusion:
-    return Conclusion(names[one.output], labels[one.output][one.label], one.hedges)
+    label = labels[one.output][one.label]
+    return Conclusion(names[one.output], label, _hedges(one.hedges))
+
+
+def _hedges(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
+    """Return hedges with `very very` as two: both are the square of the square."""
+    found: list[Hedge] = []
+    for hedge in hedges:
+        found += ["very", "very"] if hedge == "very very" else [hedge]
+    return tuple(found)

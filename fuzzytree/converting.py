@@ -351,7 +351,13 @@ def proved(
         if form.dtype is not None:
             return _certified(model, form, dtype)
         return Proof("unproved", f"files in the format {form.name} are not read back")
-    again = form.read(written.content, form.name)
+    try:
+        again = form.read(written.content, form.name)
+    except ReadError as error:
+        raise DisagreementError(
+            f"{model.name} as {form.name} cannot be read back, and is not written:\n"
+            f"{error}"
+        ) from error
     match likeness(model, written, again):
         case "equal":
             what = CALLED[carrier_of(model)]

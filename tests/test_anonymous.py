@@ -9,11 +9,13 @@ from fuzzytree.anonymous import anonymous
 from fuzzytree.contracts import Document
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.random_systems import random_system
-from fuzzytree.rulebase import Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.system import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,
+    Hedge,
+    Is,
     Label,
     RuleBlock,
     Singleton,
@@ -108,6 +110,18 @@ def test_what_a_number_depends_on_stays(changes: dict[str, object]) -> None:
 
 def test_the_range_of_an_output_that_is_clipped_stays() -> None:
     assert anonymous(_system(clips=True, low=0.5)) != anonymous(_system(clips=True))
+
+
+def test_very_very_is_very_twice() -> None:
+    def asking(*hedges: Hedge) -> FuzzySystem:
+        ramp = Label("low", Points((0.0, 1.0), (0.0, 1.0)))
+        rule = SystemRule(Is("x", "low", hedges), (Conclusion("y", "one"),))
+        return replace(
+            _system(), inputs=(SystemInput("x", (ramp,)),), blocks=(RuleBlock((rule,)),)
+        )
+
+    assert anonymous(asking("very very")) == anonymous(asking("very", "very"))
+    assert anonymous(asking("very very")) != anonymous(asking("very"))
 
 
 def test_a_rule_base_is_not_its_tree() -> None:

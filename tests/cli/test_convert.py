@@ -236,6 +236,21 @@ def _lossy(monkeypatch: pytest.MonkeyPatch, *, on_read: bool, on_write: bool) ->
     monkeypatch.setattr(yaml, "FORMAT", replace(yaml.FORMAT, read=read, write=write))
 
 
+def test_a_file_that_cannot_be_read_back_is_not_written(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def planted(model: Document, /, *, allow_loss: bool = False) -> Written:
+        return Written(b"nonsense\n")
+
+    monkeypatch.setattr(yaml, "FORMAT", replace(yaml.FORMAT, write=planted))
+    code, out, err = call("convert", "tipper.fll", "a.yaml", "--quiet")
+    assert (code, out) == (2, "")
+    assert err.startswith(
+        "tipper as yaml cannot be read back, and is not written:\nyaml:1:1: "
+    )
+    assert not Path("a.yaml").exists()
+
+
 LOST = (
     "lost     default of 'tip': becomes 0\n"
     "lost     term 'low' of 'tip': becomes 9 points (largest error 0.013)\n"
