@@ -316,7 +316,10 @@ def _remarks(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
     if ranged and words.name in ("portable", "iec"):
         yield f"ranges of inputs have no place: of {', '.join(map(repr, ranged[:5]))}"
     if words.is_lower:
-        yield "fuzzylite 6 takes a value within 1e-6 of a point for that point"
+        yield (
+            "fuzzylite 6 takes values within 1e-6 for equal, as of a point, and rules "
+            "of lesser degrees for none"
+        )
     is_curved = any(not one.defuzzifier.is_weighted for one in system.outputs)
     if words.name == "jfuzzylogic" and is_curved:
         yield (

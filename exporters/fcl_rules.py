@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from msgspec.structs import replace
 
@@ -100,39 +100,42 @@ def _operators(block: RuleBlock, words: Words) -> Iterator[str]:
 
 
 def _text(rule: SystemRule, words: Words, speak: Speak, always: str) -> str:
-    if words.is_lower:
-        end = ";" if words.name == "portable" else ""
-        return rule_text(rule, speak, always) + end
-    when = always if rule.when is None else _condition(rule.when, speak, 0)
+    if words.has_hedges:
+        return rule_text(rule, speak, always)
+    says = str.lower if words.is_lower else str.upper
+    when = always if rule.when is None else _condition(rule.when, speak, says)
     then = words.joiner.join(
-        _asked(Is(one.output, one.label), speak) for one in rule.then
+        _asked(Is(one.output, one.label), speak, says) for one in rule.then
     )
-    weight = "" if rule.weight == 1.0 else f" WITH {float(rule.weight)!r}"
-    return f"IF {when} THEN {then}{weight};"
+    weight = "" if rule.weight == 1.0 else f"{says(' with ')}{float(rule.weight)!r}"
+    return f"{says('if ')}{when}{says(' then ')}{then}{weight};"
 
 
-def _condition(condition: Condition, speak: Speak, level: int) -> str:
-    """Return a condition; what is nested always has parentheses."""
+def _condition(
+    condition: Condition, speak: Speak, says: Callable[[str], str], level: int = 0
+) -> str:
+    """Return a condition; what is nested always has parentheses.
+
+    So it does not matter that jFuzzyLogic reads AND and OR from left to right.
+    """
     match condition:
         case Is():
-            return _asked(condition, speak)
-        case Not(part=Is(hedges=()) as part):
-            return f"NOT ({_asked(part, speak)})"
+            return _asked(condition, speak, says)
         case Not(part=part):
-            inner = _condition(part, speak, 0)
-            return f"NOT ({inner})"
+            return f"{says('not ')}({_condition(part, speak, says)})"
         case And(parts=parts) | Or(parts=parts):
-            word = " AND " if isinstance(condition, And) else " OR "
-            text = word.join(_condition(part, speak, level + 1) for part in parts)
+            word = says(" and " if isinstance(condition, And) else " or ")
+            inner = [_condition(part, speak, says, level + 1) for part in parts]
+            text = word.join(inner)
             return f"({text})" if level and len(parts) > 1 else text
 
 
-def _asked(one: Is, speak: Speak) -> str:
+def _asked(one: Is, speak: Speak, says: Callable[[str], str]) -> str:
     name, term = speak(one.variable, one.label)
-    hedges = [hedge for hedge in one.hedges if hedge == "not"]
-    text = f"{name} IS {'NOT ' if hedges else ''}{term}"
-    for _ in hedges[1:]:
-        text = f"NOT ({text})"
+    nots = one.hedges.count("not")
+    text = f"{name}{says(' is not ' if nots else ' is ')}{term}"
+    for _ in range(nots - 1):
+        text = f"{says('not ')}({text})"
     return text
 
 
@@ -183,6 +186,11 @@ def norm_losses(block: RuleBlock, number: int, words: Words) -> Iterator[str]:
         yield f"{where}: the dialect {words.name} has no AND {block.conjunction!r}"
     if uses_or and block.disjunction not in words.ors:
         yield f"{where}: the dialect {words.name} has no OR {block.disjunction!r}"
+    asked = [one for rule in block.rules for one in questions(rule.when)]
+    if not words.has_hedges and any(one.label is None for one in asked):
+        yield f"{where}: the dialect {words.name} has no 'any'"
+    if words.name == "portable" and any(one.hedges.count("not") > 1 for one in asked):
+        yield f"{where}: the dialect portable has one 'not' in front of a term"
     if block.activation.method != "general":
         yield (
             f"{where}: FCL activates all rules, and not {block.activation.method!r} "

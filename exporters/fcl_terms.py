@@ -63,9 +63,11 @@ def term_text(
         pairs = zip(curve.values, curve.degrees, strict=True)
         return " ".join(f"({number(x)}, {number(y)})" for x, y in pairs)
     if words.name == "fuzzylite":
+        text = degree_text(label, names)
         if isinstance(variable, SystemOutput) and is_weighted:
-            return number_text(label, weighted_type(variable), names)
-        return degree_text(label, names)
+            text = number_text(label, weighted_type(variable), names)
+        is_new = text is not None and text.startswith(("Arc ", "SemiEllipse "))
+        return None if is_new else text  # fuzzylite 6 does not know the two
     if words.name != "jfuzzylogic" or label.height != 1.0:
         return None
     if is_weighted:

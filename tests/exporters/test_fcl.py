@@ -21,30 +21,21 @@ from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.random_systems import random_rows, random_system
 from fuzzytree.readers.fcl import read
-from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Points, RuleBase
 from fuzzytree.samples import samples
 from fuzzytree.system import (
-    Activation,
     And,
-    Arc,
-    Concave,
     Condition,
     Defuzzifier,
     FuzzySystem,
     Is,
-    Label,
     Not,
     Or,
     RuleBlock,
-    SCurve,
-    Singleton,
-    SystemOutput,
-    Trapezoid,
-    questions,
 )
 from fuzzytree.testing import random_tree, with_points
+from tests.exporters.fcl_systems import tamed
 
 DIALECTS: tuple[Dialect, ...] = get_args(Dialect)
 SAMPLES = {
@@ -202,90 +193,13 @@ def test_a_file_without_losses_reads_as_a_system_of_equal_answers(
         )
 
 
-PLAIN = Trapezoid(-1.0, 0.0, 1.0, 2.0)
-
-
-def _tamed(system: FuzzySystem, dialect: Dialect) -> FuzzySystem:
-    """Return a system without what FCL has no place for, whatever the dialect."""
-    inputs = tuple(
-        replace(one, clips=False, labels=_curved(one.labels, dialect))
-        for one in system.inputs
-        if not one.parts
-    )
-    known = {one.name for one in inputs} | {one.name for one in system.outputs}
-    outputs = tuple(_tamed_output(one, dialect) for one in system.outputs)
-    blocks = tuple(
-        replace(
-            block,
-            activation=Activation(),
-            rules=tuple(
-                replace(
-                    rule,
-                    when=None if rule.when is None else _spoken(rule.when),
-                    then=tuple(replace(one, hedges=()) for one in rule.then),
-                )
-                for rule in block.rules
-                if {one.variable for one in questions(rule.when)} <= known
-            ),
-        )
-        for block in system.blocks
-    )
-    return FuzzySystem(system.name, inputs, outputs, blocks)
-
-
-def _curved(labels: tuple[Label, ...], dialect: Dialect) -> tuple[Label, ...]:
-    kept = (Points, *WORDS[dialect].curves)
-    return tuple(
-        one if isinstance(one.curve, kept) else replace(one, curve=PLAIN)
-        for one in labels
-    )
-
-
-def _tamed_output(output: SystemOutput, dialect: Dialect) -> SystemOutput:
-    how = DEFUZZIFIERS[dialect]
-    if output.defuzzifier.is_weighted:
-        how = Defuzzifier("weighted average")
-    is_odd = {type(one.curve) for one in output.labels} & {SCurve, Concave, Arc}
-    labels = output.labels
-    if how.is_weighted and is_odd:
-        labels = tuple(replace(one, curve=Singleton(2.5)) for one in labels)
-    if not how.is_weighted:
-        labels = _curved(labels, dialect)
-    aggregation = None if how.is_weighted else output.aggregation
-    return replace(
-        output,
-        labels=labels,
-        defuzzifier=how,
-        aggregation=aggregation,
-        default=0.5,
-        clips=False,
-    )
-
-
-def _spoken(condition: Condition) -> Condition:
-    """Return a condition whose hedges fuzzylite knows."""
-    match condition:
-        case Is(hedges=hedges):
-            kept = tuple(one for one in hedges if one in SPOKEN)
-            return replace(condition, hedges=kept)
-        case And(parts=parts):
-            return And(tuple(map(_spoken, parts)))
-        case Or(parts=parts):
-            return Or(tuple(map(_spoken, parts)))
-        case Not(part=part):
-            return Not(_spoken(part))
-
-
-SPOKEN = ("any", "not", "very", "somewhat", "extremely", "seldom")
-
-
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_random_systems_are_written_alike_or_refused_with_reasons(
     dialect: Dialect,
 ) -> None:
     exact = 0
     for seed in range(100 if dialect == "fuzzylite" else 25):
-        system = _tamed(random_system(seed, formulas="none"), dialect)
+        system = tamed(random_system(seed, formulas="none"), dialect)
         content = _content(system, dialect)
         if content is None:
             continue
@@ -355,6 +269,24 @@ def test_scores_of_classes_join_rules_by_or(dialect: Dialect) -> None:
     rules = with_points(rules, 0, share=1.0)
     written = write(rules, dialect=dialect, scores="class", allow_loss=True)
     assert read(written.content, "x.fcl").model == rules
+
+
+@pytest.mark.parametrize("dialect", ["portable", "iec", "jfuzzylogic"])
+def test_an_and_within_an_or_has_parentheses_for_those_who_read_from_the_left(
+    dialect: Dialect,
+) -> None:
+    text = _text(_with_default(_sample("OR")), dialect).upper()
+    assert "IF (HEAT IS LOW AND DAMP IS DRY) OR HEAT IS HIGH THEN" in text
+
+
+def test_a_question_for_any_has_no_place_but_in_fuzzylite() -> None:
+    system = _with_default(_sample("Sugeno, numbers"))
+    (block,) = system.blocks
+    rules = tuple(replace(one, when=Is("heat", None, ("any",))) for one in block.rules)
+    made = replace(system, blocks=(replace(block, rules=rules),))
+    assert "if heat is any then" in _text(made, "fuzzylite")
+    with pytest.raises(LossError, match="the dialect jfuzzylogic has no 'any'"):
+        write(made, dialect="jfuzzylogic", allow_loss=True)
 
 
 def test_several_accus_in_one_block_are_a_loss() -> None:

@@ -13,8 +13,10 @@ from msgspec.structs import replace
 
 from fuzzytree import learn
 from fuzzytree.casting import as_system, pointed, winner
+from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import write
 from fuzzytree.exporters.fcl_dialects import Dialect
+from fuzzytree.exporters.fll import write as write_fll
 from fuzzytree.inference import infer, input_values
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.readers.fcl import read
@@ -25,9 +27,11 @@ from fuzzytree.system import And, Condition, Defuzzifier, FuzzySystem, Or
 from fuzzytree.testing import (
     exporter_models,
     random_rows,
+    random_system,
     random_tree,
     with_points,
 )
+from tests.exporters.fcl_systems import tamed
 from tests.witnesses.corpus_fcl import EXACT, corpus, corpus_table
 from tests.witnesses.fuzzylite_engine import largest_difference, run_program
 
@@ -140,6 +144,37 @@ def test_a_system_answers_alike_in_fuzzylite(
     assert answers.rules == len(system.rules) or is_mixed
     ours = [infer(system, row).outputs for row in rows]
     assert largest_difference(ours, answers.outputs) < NEAR
+
+
+@pytest.mark.heavy
+def test_fuzzylite_answers_random_systems_alike_in_both_of_its_languages(
+    program: Need, tmp_path: Path
+) -> None:
+    path = program("fuzzylite")
+    compared = ours_too = 0
+    for seed in range(60):
+        system = tamed(random_system(seed, formulas="none"), "fuzzylite")
+        try:
+            contents = {
+                "fcl": write(system, dialect="fuzzylite").content,
+                "fll": write_fll(system).content,
+            }
+        except LossError:
+            continue
+        rows = random_rows(system, seed, 12)
+        given = [list(row.values()) for row in rows]
+        fcl, fll = (
+            run_program(path, content, given, tmp_path, kind=kind).outputs
+            for kind, content in contents.items()
+        )
+        for row, one, other in zip(rows, fcl, fll, strict=True):
+            ours = infer(system, row).outputs
+            size = max([1.0, *(abs(number) for number in ours if number == number)])
+            assert largest_difference([one], [other]) <= 1e-9 * size
+            ours_too += largest_difference([one], [ours]) <= NEAR * size
+            compared += 1
+    assert compared >= 400
+    assert ours_too >= 0.85 * compared  # it takes degrees below 1e-6 for none
 
 
 ODD = [
