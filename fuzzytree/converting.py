@@ -256,8 +256,9 @@ def formed(
     found = as_rules(model, None)
     if found is None:
         raise LossError(
-            f"cannot write {model.name} as {form.name}: its outputs are numbers, and "
-            "rules decide for a class"
+            f"cannot write {model.name} as {form.name}: it carries "
+            f"{' or '.join(form.carries)}, and this is a fuzzy system whose outputs "
+            "are numbers"
         )
     return found
 

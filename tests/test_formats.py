@@ -143,8 +143,8 @@ def test_a_system_whose_outputs_are_numbers_is_no_rule_base() -> None:
     with pytest.raises(LossError) as caught:
         formed(samples()["Mamdani, centroid"], replace(YAML, carries=("rules",)))
     assert str(caught.value) == (
-        "cannot write fan as yaml: its outputs are numbers, "
-        "and rules decide for a class"
+        "cannot write fan as yaml: it carries rules, "
+        "and this is a fuzzy system whose outputs are numbers"
     )
 
 

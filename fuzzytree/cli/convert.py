@@ -187,7 +187,7 @@ def carry(
         quiet: Whether nothing is told but errors.
     """
     from fuzzytree.cli.carriers import carried
-    from fuzzytree.converting import carrier_of, proved
+    from fuzzytree.converting import carrier_of, export, proved
     from fuzzytree.losses import loss_text
     from fuzzytree.report import systems
 
@@ -212,20 +212,19 @@ def carry(
     for remark in found.remarks:
         say(f"remark   {remark}", quiet=quiet)
     with wrong_options():
-        written, refusal = _written(model, form, options)
-    losses = (*found.losses, *written.losses)
-    if losses and not allow_loss:
+        written, refusal = _written(model, form, options, allow_loss=allow_loss)
+    if refusal or (found.losses and not allow_loss):
         _refuse(found, refusal)
         if as_json and output != "-":
-            more = {"losses": written.losses, "remarks": written.remarks}
-            answer_json({**facts, "file": None, **more})
+            losses = export(model, form.name, allow_loss=True, **options).losses
+            answer_json({**facts, "file": None, "losses": losses})
         return 1
     proof = proved(model, form, written, dtype=options.get("dtype"))
     if output == "-":
         answer_bytes(written.content)
     else:
         write_atomically(output, written.content)
-    for loss in losses:
+    for loss in (*found.losses, *written.losses):
         say(f"lost     {loss_text(loss)}", quiet=quiet)
     for remark in written.remarks:
         say(f"remark   {remark}", quiet=quiet)
@@ -256,16 +255,21 @@ def carry(
 
 
 def _written(
-    model: Document, form: Format, options: Mapping[str, Option]
+    model: Document, form: Format, options: Mapping[str, Option], *, allow_loss: bool
 ) -> tuple[Written, str]:
-    """Write a model; if something is lost, return also how the writer refuses that."""
+    """Write a model; if something is lost and not allowed, return how it is refused.
+
+    Raises:
+        LossError: If it cannot be written at all.
+    """
     from fuzzytree.converting import export
 
     try:
-        return export(model, form.name, allow_loss=False, **options), ""
+        return export(model, form.name, allow_loss=allow_loss, **options), ""
     except LossError as error:
-        written = export(model, form.name, allow_loss=True, **options)
-        return written, str(error).replace("allow_loss=True", "--allow-loss")
+        if "allow_loss=True" not in str(error):
+            raise
+        return Written(b""), str(error).replace("allow_loss=True", "--allow-loss")
 
 
 def _refuse(found: Reading, refusal: str) -> None:

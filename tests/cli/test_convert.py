@@ -159,8 +159,8 @@ def test_streams_name_their_formats(call: Call) -> None:
         ),
         (
             ("tipper.fll", "a.py"),
-            "cannot write tipper as python: its outputs are numbers, "
-            "and rules decide for a class\n",
+            "cannot write tipper as python: it carries tree or rules, "
+            "and this is a fuzzy system whose outputs are numbers\n",
         ),
         (
             ("tipper.fll", "a.yaml", "--as", "tree"),
