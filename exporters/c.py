@@ -179,8 +179,7 @@ def _system_text(
     yield fill(SYSTEM_TYPES + _DEFINE, prefix)
     yield fill(_checks(DOUBLE, is_arithmetic=True), prefix)
     yield from system_code(system, prefix, activations=activations)
-    if not activations:
-        yield from system_selftest(system, prefix)
+    yield from system_selftest(system, prefix, activations=activations)
     yield "\n#endif\n"
 
 

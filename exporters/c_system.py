@@ -10,7 +10,7 @@ import numpy as np
 
 from fuzzytree.exporters.c_steps import HELPERS, Steps
 from fuzzytree.exporters.c_text import fill, remark
-from fuzzytree.inference import Inference, infer
+from fuzzytree.inference import infer
 from fuzzytree.probing import Row, system_probes
 from fuzzytree.programs.bounds import error_bounds
 from fuzzytree.programs.steps import Program
@@ -141,13 +141,15 @@ def _ends(program: Program, steps: Steps) -> Iterator[str]:
     yield f"    return (int)({steps.value(status)});\n"
 
 
-def system_selftest(system: FuzzySystem, prefix: str) -> Iterator[str]:
+def system_selftest(
+    system: FuzzySystem, prefix: str, *, activations: bool
+) -> Iterator[str]:
     """Yield the self-test of a system, behind a macro.
 
     Outputs must be equal, or as near as functions of different libraries allow.
     """
-    examples = _examples(system)
-    inputs, outputs = max(len(system.columns), 1), len(system.outputs)
+    examples = _examples(system, activations=activations)
+    inputs, outputs = max(len(system.columns), 1), len(examples[0][1])
     yield fill("\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n", prefix)
     yield "\n/* Bits of the inputs, the outputs and their largest errors; the status.\n"
     yield " * Errors are allowed only where a mathematical library is called. */\n"
@@ -155,44 +157,49 @@ def system_selftest(system: FuzzySystem, prefix: str) -> Iterator[str]:
     yield f"    uint64_t x[{inputs}];\n    uint64_t outputs[{outputs}];\n"
     yield f"    uint64_t most[{outputs}];\n    int status;\n"
     yield fill(f"}} name_example[{len(examples)}] = {{\n", prefix)
-    for given, found, bound in examples:
+    for given, found, bound, status in examples:
         shown = ", ".join(map(repr, given)) or "no inputs"
-        numbers = ", ".join(map(repr, found.outputs))
-        yield f"    /* {shown}: {numbers} */\n"
-        parts = ", ".join(map(_bits, (given, found.outputs, bound)))
-        yield f"    {{{parts}, {int(found.status)}}},\n"
+        yield f"    /* {shown}: {', '.join(map(repr, found))} */\n"
+        parts = ", ".join(map(_bits, (given, found, bound)))
+        yield f"    {{{parts}, {status}}},\n"
     yield "};\n"
     yield fill(_MAIN, prefix)
 
 
-def _examples(
-    system: FuzzySystem,
-) -> list[tuple[list[float], Inference, list[float]]]:
-    """Return inputs, answers and their largest errors, those of small errors first.
+Example = tuple[Sequence[float], Sequence[float], Sequence[float], int]
+
+
+def _examples(system: FuzzySystem, *, activations: bool) -> list[Example]:
+    """Return inputs, numbers, their largest errors and a status; small errors first.
 
     Where no bound of an error is known, a share of the number stands in its place.
     """
     rows = system_probes(system, limit=_PROBES)
-    every: list[tuple[list[float], Inference, list[float]]] = []
-    for row, bounds in zip(rows, _bounds(system, rows), strict=True):
-        found = infer(system, row)
+    every: list[Example] = []
+    bounds = _bounds(system, rows, activations=activations)
+    for row, bound in zip(rows, bounds, strict=True):
+        answer = infer(system, row)
+        found = answer.outputs + (answer.activations if activations else ())
         most = [
-            min(bound, _SHARE * max(abs(number), 1.0)) if number == number else 0.0
-            for bound, number in zip(bounds, found.outputs, strict=True)
+            0.0 if math.isnan(number) else min(one, _SHARE * max(abs(number), 1.0))
+            for one, number in zip(bound, found, strict=True)
         ]
-        every.append(([row[name] for name in system.columns], found, most))
+        given = [row[name] for name in system.columns]
+        every.append((given, found, most, int(answer.status)))
     every.sort(key=lambda one: max(one[2]))
     step = max(len(every) // (2 * _ROWS), 1)
     return every[: _ROWS * step : step]
 
 
-def _bounds(system: FuzzySystem, rows: Sequence[Row]) -> list[list[float]]:
-    """Return how far each output may be off, for each row."""
-    program = from_system(system)
+def _bounds(
+    system: FuzzySystem, rows: Sequence[Row], *, activations: bool
+) -> list[list[float]]:
+    """Return how far each number may be off, for each row."""
+    program = from_system(system, activations=activations)
     table = np.array([[row[name] for row in rows] for name in program.inputs])
     values = table.reshape(len(program.inputs), len(rows)).astype(np.float64)
-    found: list[list[float]] = error_bounds(program, values).T.tolist()
-    return [bounds[: len(system.outputs)] for bounds in found]
+    found: list[list[float]] = error_bounds(program, values)[:-1].T.tolist()
+    return found
 
 
 def _bits(values: Sequence[float]) -> str:

@@ -17,7 +17,7 @@ from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.files import read_bounded
 from fuzzytree.outputs import Outputs, joined_outputs
 from fuzzytree.rulebase import RuleBase
-from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.runtimes import find_runtime, is_installed, needed_by
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tables import Batch, batches
@@ -272,6 +272,9 @@ def _runtime(name: str, model: Document) -> Runtime:
             f"{' or '.join(runtime.runs)}, not a {CALLED[carrier]}"
         )
     if not is_installed(runtime):
+        if runtime.programs:
+            text = f"the runtime {name!r} needs {needed_by(runtime)}"
+            raise MissingExtraError(text)
         raise MissingExtraError(
             f"the runtime {name!r} needs the extra {runtime.extra!r}: "
             f"pip install 'fuzzytree-toolkit[{runtime.extra}]'"
