@@ -210,17 +210,18 @@ def read_block(block: Block, scope: Scope) -> ReadBlock:
     """Return a block of rules; mistakes are noted."""
     rules: list[SystemRule] = []
     tokens: list[Token] = []
-    labels: list[str] = []
+    last: str | None = None
     for text in block.rules:
         rule = _read(text, len(rules) + 1, scope)
         label = raw(text.label)
-        if scope.dialect == "portable" and labels and label == labels[-1]:
+        is_portable = scope.dialect == "portable"
+        if is_portable and label == last and _is_same_but_then(rules[-1], rule):
             # One conclusion per rule: one rule was written as several.
             rules[-1] = replace(rules[-1], then=(*rules[-1].then, *rule.then))
             continue
         rules.append(rule)
         tokens.append(text.keyword)
-        labels.append(label)
+        last = label
     conjunction, disjunction = _norms(block, rules, scope)
     made = RuleBlock(
         rules=tuple(rules),
@@ -230,6 +231,10 @@ def read_block(block: Block, scope: Scope) -> ReadBlock:
         name=raw(block.head.words),
     )
     return ReadBlock(made, tuple(tokens), norm_of(block, "ACCU", scope.notes))
+
+
+def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:
+    return one.when == other.when and one.weight == other.weight
 
 
 def _implication(

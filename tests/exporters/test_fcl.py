@@ -289,6 +289,13 @@ def test_a_question_for_any_has_no_place_but_in_fuzzylite() -> None:
         write(made, dialect="jfuzzylogic", allow_loss=True)
 
 
+def test_rules_of_one_number_are_one_only_if_they_ask_the_same() -> None:
+    text = _text(_with_default(_sample("Sugeno, numbers")))
+    again = read(text.replace("RULE 2 :", "RULE 1 :").encode(), "x.fcl").model
+    assert isinstance(again, FuzzySystem)
+    assert len(again.rules) == 2
+
+
 def test_several_accus_in_one_block_are_a_loss() -> None:
     system = _with_default(_sample("several outputs"))
     first, second = system.outputs
