@@ -27,6 +27,7 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "fll": (".fll",),
         "fcl": (".fcl",),
         "pmml": (".pmml",),
+        "javascript": (".mjs", ".js"),
     }
 )
 """Each format's name and its suffixes, the usual one first.

@@ -64,6 +64,7 @@ SPECIAL = (
 )
 """Values that number types and runtimes treat differently."""
 
+_RANDOM_ROWS = 100
 _ROUNDS = 12  # of moving a row towards what a path asks of its combinations
 _TRIES = 48  # of meeting one value of a combination to the last bit
 
@@ -89,7 +90,7 @@ def probes(
     rules = model if isinstance(model, RuleBase) else rules_from_tree(model)
     chance = random.Random(seed)
     maker = _Maker(rules, chance)
-    tail = [maker.draw() for _ in range(100)]
+    tail = [maker.draw() for _ in range(_RANDOM_ROWS)]
     for name in rules.inputs:
         tail += [{**maker.draw(), name: value} for value in SPECIAL]
     tail = tail[:limit]
@@ -97,6 +98,36 @@ def probes(
     if len(targets) > limit - len(tail):
         targets = chance.sample(targets, max(limit - len(tail), 0))
     return [maker.meet(*target) for target in targets] + tail
+
+
+def few_probes(model: FuzzyTree | RuleBase, limit: int) -> list[Row]:
+    """Return a few rows of every kind that `probes` returns, for tests within files.
+
+    Args:
+        model: A rule base or a tree.
+        limit: The most rows: half of them on landmarks, an eighth random ones, the
+            rest with special values. `probes` itself keeps its random rows first.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> len(few_probes(random_tree(1), 64))
+        64
+    """
+    special = len(SPECIAL) * len(model.inputs)
+    made = probes(model, limit=_RANDOM_ROWS + special + 10 * limit)
+    last = len(made) - special
+    first = max(last - _RANDOM_ROWS, 0)
+    return [
+        *_spread(made[:first], limit // 2),
+        *_spread(made[first:last], limit // 8),
+        *_spread(made[last:], limit - limit // 2 - limit // 8),
+    ]
+
+
+def _spread(rows: Sequence[Row], count: int) -> list[Row]:
+    """Return some rows that stand equally far from each other."""
+    step = max((len(rows) - 1) / max(count - 1, 1), 1.0)
+    return [rows[round(k * step)] for k in range(min(count, len(rows)))]
 
 
 def probe_values(

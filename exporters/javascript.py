@@ -1,0 +1,273 @@
+"""JavaScript: a model as one file that needs nothing but JavaScript.
+
+A tree or rule base is written as tables of numbers, and the functions of the reference,
+which read them; a fuzzy system as its program, step by step. Numbers of JavaScript are
+IEEE doubles, and `smaller` and `larger` stand where `Math.min` and `Math.max` would see
+-0 and NaN otherwise than the reference: so answers have the reference's bits. Text of
+the model enters only as ASCII string literals without `<` and `>`, also in comments, so
+that nothing in it can be mistaken for code, in a file or in a page of HTML.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterator, Sequence
+from typing import Literal, assert_never
+
+from fuzzytree.contracts import Document, Format, Model, Written
+from fuzzytree.exporters.js_functions import (
+    AS_MODULE,
+    AS_SCRIPT,
+    AXES,
+    DIGEST,
+    MAIN,
+    ROWS,
+    RULES,
+    START,
+    TEST,
+    TREE,
+)
+from fuzzytree.exporters.js_system import system_parts
+from fuzzytree.exporters.js_text import filled, literal, table, text_of
+from fuzzytree.probing import few_probes
+from fuzzytree.reference import descend, evaluate
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Variable,
+    fingerprint,
+    sentence,
+    shapes_of,
+)
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree, Node, intervals
+
+_MOST_EXAMPLES = 64
+_FEWEST_EXAMPLES = 8
+_STRENGTHS = 20_000  # of all examples together
+
+
+def write(
+    model: Document,
+    /,
+    *,
+    allow_loss: bool = False,
+    module: Literal["es", "script"] = "es",
+) -> Written:
+    """Return a model as the text of a JavaScript file, in ASCII.
+
+    For a tree or rule base the file offers `decide(row)`, which takes an object with
+    each input by its name and returns `label` (a class or null), `rule` (its number, 0
+    for none) and `status`; `answer(values)` for the inputs in order; and for a rule
+    base `strengths(row)`. For a fuzzy system it offers `infer(row)` and
+    `answer(values)`, which return `outputs`, `status` and `activations`. Run by node it
+    tests itself; so does `selfTest()`.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system.
+        allow_loss: Of no effect: nothing is lost.
+        module: As an ES module (`es`), or (`script`) for a plain script element, where
+            it becomes `fuzzytree[name of the model]`, and for `require`.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> print(write(random_tree(0)).content.decode("ascii").splitlines()[0])
+        /* A fuzzy tree, named "random 7". Written by fuzzytree. */
+    """
+    del allow_loss
+    body = "".join(_body(model))
+    ending = AS_MODULE if module == "es" else AS_SCRIPT
+    ending = filled(ending, doors=", ".join(_doors(model)), name=text_of(model.name))
+    if module == "script":
+        body = f'(() => {{\n"use strict";\n{body}{ending}{MAIN}}})();\n'
+    else:
+        body += ending + MAIN
+    return Written(f"{_heading(model)}{body}".encode("ascii"))
+
+
+def _heading(model: Document) -> str:
+    match model:
+        case FuzzyTree():
+            kind = "tree"
+        case RuleBase():
+            kind = "rule base"
+        case FuzzySystem():
+            kind = "system"
+        case _:
+            assert_never(model)
+    return (
+        f"/* A fuzzy {kind}, named {text_of(model.name)}. Written by fuzzytree. */\n"
+        f"/* Fingerprint: {fingerprint(model)} */\n"
+    )
+
+
+def _doors(model: Document) -> tuple[str, ...]:
+    match model:
+        case FuzzyTree():
+            return ("INPUTS", "CLASSES", "decide", "answer", "selfTest")
+        case RuleBase():
+            return ("INPUTS", "CLASSES", "decide", "strengths", "answer", "selfTest")
+        case FuzzySystem():
+            return ("INPUTS", "OUTPUTS", "infer", "answer", "selfTest")
+
+
+def _body(model: Document) -> Iterator[str]:
+    yield START
+    if isinstance(model, FuzzySystem):
+        yield from system_parts(model, ROWS)
+        return
+    inputs = [variable for variable in model.variables if not variable.parts]
+    mixed = [variable for variable in model.variables if variable.parts]
+    line = {v.name: place for place, v in enumerate([*inputs, *mixed])}
+    yield from table("INPUTS", (f"{text_of(v.name)},{_unit(v)}" for v in inputs))
+    yield from table("CLASSES", (f"{text_of(label)}," for label in model.classes))
+    yield f"const WHEN_MISSING = {literal(model.semantics.missing)};\n"
+    yield "\n/* Place of an input, weight and centre of each part. */"
+    yield from table("COMBINATIONS", (_combination(v, line) for v in mixed))
+    if isinstance(model, RuleBase):
+        yield from _rule_tables(model, line)
+    else:
+        yield from _tree_tables(model, line)
+    yield ROWS
+    yield AXES
+    yield RULES if isinstance(model, RuleBase) else TREE
+    what = "class, rule and status"
+    if isinstance(model, RuleBase):
+        what += ", and a digest of the strengths,"
+        yield DIGEST
+    yield f"\n/* Inputs, and the {what} that they lead to. */"
+    yield from table("EXAMPLES", _examples(model))
+    yield TEST
+
+
+def _unit(variable: Variable) -> str:
+    return f" // {text_of(variable.unit)}" if variable.unit else ""
+
+
+def _combination(variable: Variable, line: dict[str, int]) -> str:
+    parts = [(line[p.input], p.weight, p.centre) for p in variable.parts]
+    return f"{literal(parts)}, // {text_of(variable.name)}"
+
+
+def _tree_tables(tree: FuzzyTree, line: dict[str, int]) -> Iterator[str]:
+    yield "\n/* Line of the variable, cuts, and for each interval the next node's place"
+    yield "\n * or -k for leaf k. A value on a cut belongs to the interval below it. */"
+    yield from table("NODES", (_node(tree, node, line) for node in tree.nodes))
+    yield "\n/* Places of the leaves' classes. */"
+    yield from table("LEAVES", (f"{tree.classes.index(x.label)}," for x in tree.leaves))
+
+
+def _node(tree: FuzzyTree, node: Node, line: dict[str, int]) -> str:
+    ends = [
+        -branch.leaf if branch.leaf is not None else (branch.node or 0) - 1
+        for branch in node.branches
+    ]
+    targets = [ends[owner] for owner in node.owners]
+    counts = [0] * len(node.branches)
+    names: list[str] = []
+    for owner, _ in zip(node.owners, intervals(node), strict=True):
+        names.append(node.branches[owner].terms[counts[owner]])
+        counts[owner] += 1
+    comment = f"{text_of(node.variable)}: {', '.join(map(text_of, names))}"
+    return f"{literal((line[node.variable], node.cuts, targets))}, // {comment}"
+
+
+def _rule_tables(rules: RuleBase, line: dict[str, int]) -> Iterator[str]:
+    shapes = shapes_of(rules.variables)
+    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
+    keys = list(dict.fromkeys((c.variable, term) for c in clauses for term in c.terms))
+    term = {key: number for number, key in enumerate(keys)}
+    number = {clause: place for place, clause in enumerate(clauses)}
+    label = {name: place for place, name in enumerate(rules.classes)}
+    yield "\n/* Line of the variable, places of terms in TERMS, if it is negated. */"
+    yield from table("CLAUSES", (_clause(c, line, term) for c in clauses))
+    yield "\n/* Places of the clauses in CLAUSES, and of the class. */"
+    yield from table(
+        "RULES",
+        (
+            f"{literal(([number[c] for c in rule.when], label[rule.then]))},"
+            f" // {place}. {text_of(sentence(rule))}"
+            for place, rule in enumerate(rules.rules, 1)
+        ),
+    )
+    yield f"const WHEN_UNCOVERED = {literal(rules.semantics.uncovered)};\n"
+    yield f"const IS_PRODUCT = {literal(rules.semantics.conjunction == 'product')};\n"
+    yield "\n/* The kind of each term, and its numbers. */"
+    yield from table(
+        "TERMS",
+        (
+            f"{_shape(shapes[variable, name])},"
+            f" // {text_of(variable)} is {text_of(name)}"
+            for variable, name in keys
+        ),
+    )
+
+
+def _clause(
+    clause: Clause, line: dict[str, int], term: dict[tuple[str, str], int]
+) -> str:
+    terms = [term[clause.variable, name] for name in clause.terms]
+    return f"{literal((line[clause.variable], terms, clause.negated))},"
+
+
+def _shape(shape: Shape) -> str:
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            return literal(("band", low, high, _flank(left), _flank(right)))
+        case LR(mean=mean, left=below, right=above):
+            return literal(("lr", mean, _side(below), _side(above)))
+        case Points(values=values, degrees=degrees):
+            return literal(("points", values, degrees))
+
+
+def _flank(flank: Flank | None) -> Sequence[object] | None:
+    return None if flank is None else (flank.start, flank.end, flank.curve)
+
+
+def _side(side: Side) -> Sequence[object]:
+    return side.spread, side.reach, side.curve
+
+
+def _examples(model: Model) -> Iterator[str]:
+    """Yield rows, and the reference's answers to them."""
+    rules = len(model.rules) if isinstance(model, RuleBase) else 1
+    most = min(_MOST_EXAMPLES, _STRENGTHS // rules)
+    for row in few_probes(model, max(most, _FEWEST_EXAMPLES)):
+        values = [row[name] for name in model.inputs]
+        if isinstance(model, RuleBase):
+            given = evaluate(model, row)
+            more = [digest_of(given.strengths)]
+        else:
+            given = descend(model, row)
+            more = []
+        expected = [given.label, given.rule, int(given.status), *more]
+        yield f"{literal([values, *expected])},"
+
+
+def digest_of(strengths: Sequence[float]) -> int:
+    """Return 32 bits that change if any bit of any strength does; NaN counts as -1."""
+    numbers = [-1.0 if math.isnan(value) else value for value in strengths]
+    digest = 2166136261
+    for word in struct.unpack(f"<{2 * len(numbers)}I", _doubles(numbers)):
+        digest = (digest ^ word) * 16777619 & 0xFFFFFFFF
+    return digest
+
+
+def _doubles(numbers: Sequence[float]) -> bytes:
+    return struct.pack(f"<{len(numbers)}d", *numbers)
+
+
+FORMAT = Format(
+    name="javascript",
+    suffixes=(".mjs", ".js"),
+    carries=("tree", "rules", "system"),
+    write=write,
+    dtype="float64",
+)
