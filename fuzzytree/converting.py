@@ -35,6 +35,7 @@ from fuzzytree.tree import FuzzyTree
 if TYPE_CHECKING:
     from fuzzytree.numerics.bounds import Certificate
 
+_FEW = 200  # probes of a file that is run
 _TRIED = 1000  # probes of what a loss does to decisions
 
 CALLED: dict[Carrier, str] = {
@@ -51,7 +52,7 @@ class Proof(msgspec.Struct, frozen=True):
     Attributes:
         verdict: `equal`: read back, it is that model in every number and name.
             `alike`: read back, it is that model but for names and notes, of which the
-            writer told.
+            writer told; or run, it answers like that model.
             `certified`: it computes, within the bound of the certificate.
             `as listed`: it differs by the losses that were allowed.
             `unproved`: the file is not read back.
@@ -349,6 +350,8 @@ def proved(
             and the reader told of nothing.
     """
     if form.read is None:
+        if isinstance(model, FuzzySystem):
+            return _run(model, form, written)
         if form.dtype is not None:
             return _certified(model, form, dtype)
         return Proof("unproved", f"files in the format {form.name} are not read back")
@@ -398,15 +401,31 @@ def _decided(model: Document, other: Document) -> str:
     return f"; the same rule wins in all of {len(rows)} probes{proof}"
 
 
-def _certified(model: Document, form: Format, dtype: object) -> Proof:
-    if isinstance(model, FuzzySystem):
-        return Proof("unproved", "the file computes; `fuzzytree check` compares it")
+def _certified(model: Model, form: Format, dtype: object) -> Proof:
     from fuzzytree.numerics.bounds import certify
 
     asked = [name for name in get_args(Dtype) if name == dtype]
     known = asked or [name for name in get_args(Dtype) if name == form.dtype]
     certificate = certify(model, known[0], None)
     return Proof("certified", certificate.sentence, certificate)
+
+
+def _run(system: FuzzySystem, form: Format, written: Written) -> Proof:
+    """Run the file of a system where that can be done, and compare its numbers.
+
+    Raises:
+        DisagreementError: If it answers other numbers, though no loss was told.
+    """
+    if form.name != "onnx" or written.losses:
+        return Proof("unproved", f"files in the format {form.name} are run by others")
+    from fuzzytree.checking_systems import check_system
+    from fuzzytree.runtimes.onnxruntime import open_onnx
+
+    model = open_onnx(written.content, "the file")
+    found = check_system(system, model, runtimes=[], limit=_FEW)
+    found.raise_if_not_ok()
+    text = f"run by onnxruntime, it answers {found.probes} probes like the system"
+    return Proof("alike", text)
 
 
 def _exact(model: Document, origin: str) -> Certificate | None:

@@ -287,7 +287,8 @@ def _refuse(found: Reading, refusal: str) -> None:
 def _proof_row(proof: Proof) -> tuple[str, str, str]:
     if proof.verdict == "certified" and proof.certificate:
         return "bound", proof.certificate.dtype or "exact", proof.sentence
-    return "proved", proof.verdict, proof.sentence
+    verdict = "not here" if proof.verdict == "unproved" else proof.verdict
+    return "proved", verdict, proof.sentence
 
 
 def _certificate_facts(found: Certificate | None) -> dict[str, object] | None:

@@ -42,7 +42,7 @@ def document_text(model: Document) -> str:
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> document_text(random_tree(1, leaves=2))
-        'tree, 1 node, 2 leaves, depth 1, 4 inputs, 3 classes'
+        'tree, 1 node, 2 leaves, depth 1, 1 input, 3 classes'
     """
     match model:
         case FuzzyTree():

@@ -202,6 +202,15 @@ def test_options_reach_the_writer(call: Call) -> None:
     )
 
 
+def test_an_onnx_file_of_a_system_is_run_before_it_is_believed(call: Call) -> None:
+    code, _, err = call("convert", "tipper.fll", "tipper.onnx")
+    assert code == 0
+    proof = "run by onnxruntime, it answers 200 probes like the system"
+    assert f"proved   alike       {proof}\n" in err
+    code, _, err = call("convert", "tipper.fll", "tipper.c")
+    assert "proved   not here files in the format c are run by others\n" in err
+
+
 def test_every_format_that_reads_a_system_writes_it_again(call: Call) -> None:
     for name in ("fll", "yaml"):
         suffix = TABLE[name][0]
