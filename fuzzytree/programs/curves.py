@@ -12,6 +12,7 @@ from typing import assert_never
 
 from fuzzytree.programs.formulas import as_number, value_of
 from fuzzytree.programs.shapes import degree as shape_degree
+from fuzzytree.programs.shapes import smaller_slope
 from fuzzytree.programs.steps import Maker
 from fuzzytree.rulebase import LR, Band, Points
 from fuzzytree.system import (
@@ -179,10 +180,7 @@ def _one_by_one_plus(make: Maker, a: int) -> int:
 
 
 def _trapezoid(make: Maker, curve: Trapezoid, x: int) -> int:
-    """Return the smaller slope, held in [0, 1]; an upright side is cut off last.
-
-    Rounding keeps order, so a slope is at least 1 wherever the other one counts.
-    """
+    """Return the smaller slope, held in [0, 1]; an upright side is cut off last."""
     a, b, c, d = curve.a, curve.b, curve.c, curve.d
     slopes: list[int] = []
     if a is not None and a < b:
@@ -193,10 +191,8 @@ def _trapezoid(make: Maker, curve: Trapezoid, x: int) -> int:
     zero, one = make.constant(0.0), make.constant(1.0)
     found = one
     if slopes:
-        found = make.chain("minimum", slopes)
-        if not (len(slopes) == 2 and b == c):  # else one of them is at most 1
-            found = make("minimum", found, one)
-        found = make("maximum", found, zero)
+        is_peak = len(slopes) == 2 and b == c
+        found = smaller_slope(make, slopes, is_peak=is_peak)
     if a is not None and a == b:
         found = make("where", make("less", x, make.constant(a)), zero, found)
     if d is not None and c == d:

@@ -7,6 +7,7 @@ no bit, such as a multiplication by 1, and nothing else.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 
 from fuzzytree.programs.steps import Maker
@@ -91,19 +92,77 @@ def _side(make: Maker, side: Side, distance: int) -> int:
     return make("multiply", body, make("multiply", square, square))
 
 
+def smaller_slope(make: Maker, slopes: Sequence[int], *, is_peak: bool) -> int:
+    """Return the smaller of some slopes, held in [0, 1].
+
+    Rounding keeps order, so a slope is at least 1 wherever the other one counts.
+
+    Args:
+        make: Where the steps go.
+        slopes: One or two.
+        is_peak: Whether they meet at 1, so that one of them is at most 1 anywhere.
+    """
+    found = make.chain("minimum", slopes)
+    if not is_peak:
+        found = make("minimum", found, make.constant(1.0))
+    return make("maximum", found, make.constant(0.0))
+
+
 def _points(make: Maker, points: Points, x: int) -> int:
     if len(points.values) > FEW_POINTS:
         return _looked_up(make, points, x)
+    slopes = _slopes(make, points, x)
+    if slopes:
+        return smaller_slope(make, slopes, is_peak=len(points.values) == 3)
     found = make.constant(points.degrees[-1])
     pairs = list(zip(points.values, points.degrees, strict=True))
     for (left, below), (right, above) in reversed(list(itertools.pairwise(pairs))):
         if left < right:
-            ends = _ends(left, below, right, above)
-            line = _line(make, [make.constant(number) for number in ends], x)
+            line = _piece(make, left, below, right, above, x)
             inside = make("at_most", x, make.constant(right))
             found = make("where", inside, line, found)
     first = make("at_most", x, make.constant(points.values[0]))
     return make("where", first, make.constant(points.degrees[0]), found)
+
+
+def _piece(
+    make: Maker, left: float, below: float, right: float, above: float, x: int
+) -> int:
+    """Return the degree between two points; elsewhere it may be anything.
+
+    Level, it is one number. From 0, the quotient's part of the other degree needs no
+    hold: the quotient lies in [0, 1].
+    """
+    if below == above:
+        return make.constant(below)
+    places = [make.constant(end) for end in _ends(left, below, right, above)]
+    anchor, other, near, far = places
+    if make.number(near) != 0.0:
+        return _line(make, places, x)
+    width = make("subtract", other, anchor)
+    share = make("divide", make("subtract", x, anchor), width)
+    return make("multiply", share, far)
+
+
+def _slopes(make: Maker, points: Points, x: int) -> list[int]:
+    """Return the slopes of ramps, triangles and trapezoids; none of other points."""
+    values = points.values
+    widths = [right - left for left, right in itertools.pairwise(values)]
+    if not all(0.0 < width < math.inf for width in widths):
+        return []
+    match points.degrees:
+        case (0.0, 1.0) | (0.0, 1.0, 0.0) | (0.0, 1.0, 1.0, 0.0) | (1.0, 0.0):
+            pass
+        case _:
+            return []
+    slopes: list[int] = []
+    if points.degrees[0] == 0.0:
+        offset = make("subtract", x, make.constant(values[0]))
+        slopes.append(make("divide", offset, make.constant(values[1] - values[0])))
+    if points.degrees[-1] == 0.0:
+        offset = make("subtract", x, make.constant(values[-1]))
+        slopes.append(make("divide", offset, make.constant(values[-2] - values[-1])))
+    return slopes
 
 
 def _looked_up(make: Maker, points: Points, x: int) -> int:

@@ -1,6 +1,7 @@
 """Programs of rule bases: their bits are those of the reference."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from msgspec.structs import replace
@@ -9,7 +10,15 @@ from fuzzytree.lowering import rules_from_tree
 from fuzzytree.programs.evaluate import evaluate
 from fuzzytree.programs.rules import from_rules
 from fuzzytree.reference import evaluate as refer
-from fuzzytree.rulebase import Rule, RuleBase, Semantics
+from fuzzytree.rulebase import (
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
 from fuzzytree.testing import probes, random_tree, with_points
 
 
@@ -46,3 +55,34 @@ def test_a_rule_without_a_clause_always_holds() -> None:
     found = evaluate(from_rules(rules), {})
     assert found.of("strength") == (1.0, 1.0)
     assert (found.of("rule"), found.of("status")) == ((1.0,), (1.0,))
+
+
+@pytest.mark.parametrize(
+    ("values", "degrees"),
+    [
+        ((0.1, 0.7), (0.0, 1.0)),
+        ((0.1, 0.7), (1.0, 0.0)),
+        ((0.1, 0.3, 0.7), (0.0, 1.0, 0.0)),
+        ((0.1, 0.3, 0.7, 1.1), (0.0, 1.0, 1.0, 0.0)),
+        ((0.1, 0.3, 0.7, 1.1), (0.0, 1.0, 1.0, 0.3)),
+        ((0.1, 0.3, 0.7, 1.1), (0.2, 0.2, 0.9, 0.0)),
+        ((0.1, 0.1, 0.7), (0.0, 1.0, 0.0)),
+        ((0.1, 0.7, 0.7), (0.0, 1.0, 0.0)),
+        ((0.0, 5e-324, 1e-310), (0.0, 1.0, 0.0)),
+        ((0.1, 0.3), (0.3, 0.9)),
+        ((0.5,), (0.7,)),
+        (tuple(k * 0.1 for k in range(12)), tuple((k % 4) / 3 for k in range(12))),
+    ],
+)
+def test_points_have_the_bits_of_the_reference(
+    values: tuple[float, ...], degrees: tuple[float, ...]
+) -> None:
+    rules = RuleBase(
+        "points",
+        ("a",),
+        (Variable("x", (Term("in", Points(values, degrees)),)),),
+        (Rule((Clause("x", ("in",)),), "a"),),
+    )
+    assert_equal(rules, probes(rules, limit=400))
+    inner = [a + (b - a) * k / 97 for a, b in pairwise(values) for k in range(98)]
+    assert_equal(rules, [{"x": value} for value in inner if math.isfinite(value)])
