@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator
 from importlib import resources
 from typing import Any, Literal
 
@@ -148,10 +149,13 @@ class _Statements(Transformer[Token, Any]):
         return "points", tuple(itertools.chain.from_iterable(children))
 
     def point(self, children: list[Token]) -> tuple[Token, ...]:
+        if children[0].type == "POINT":
+            return _words(_parts(children[0]))
         return _words(children)
 
     def shape(self, children: list[Token]) -> tuple[str, tuple[Token, ...]]:
-        return "shape", tuple(children)
+        parts = (_parts(one) if one.type == "POINT" else (one,) for one in children)
+        return "shape", tuple(itertools.chain.from_iterable(parts))
 
     def term(self, children: list[Any]) -> TermText:
         kind, tokens = children[-1]
@@ -217,6 +221,21 @@ class _Statements(Transformer[Token, Any]):
             is_grouped=is_grouped,
             has_comma=has_comma,
         )
+
+
+_PART = re.compile(r"[(),]|[^(),\s]+")
+_KINDS = {"(": "LPAR", ")": "RPAR", ",": "COMMA"}
+
+
+def _parts(point: Token) -> Iterator[Token]:
+    """Yield the words of a point, each with its place."""
+    line, column = place(point)
+    for found in _PART.finditer(point):
+        before = point[: found.start()]
+        breaks = before.count("\n")
+        start = len(before) - before.rfind("\n") if breaks else column + len(before)
+        text = found.group()
+        yield Token(_KINDS.get(text, "NUMBER"), text, line=line + breaks, column=start)
 
 
 def _words(children: Iterable[Token]) -> tuple[Token, ...]:

@@ -23,7 +23,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.readers.fcl_statements import Statement, grammar, place
 from fuzzytree.readers.nodes import Found, report
 
-MOST_BYTES: Final = 4 * 2**20
+MOST_BYTES: Final = 16 * 2**20
 MOST_TOKENS: Final = 300_000
 MOST_LEVELS: Final = 50
 """How deep parentheses and `not` can be nested in one rule."""
@@ -279,6 +279,7 @@ _SHOWN: Final = {
     "WORD": "a name",
     "NUMBER": "a number",
     "SIGN": "",
+    "POINT": "",
     "LPAR": "'('",
     "RPAR": "')'",
     "COMMA": "','",

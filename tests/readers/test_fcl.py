@@ -338,6 +338,11 @@ def test_a_file_of_pyit2fls_is_read_with_its_hundred_values() -> None:
         ("DSIGM 2 1 2 5", SigmoidDifference(Sigmoid(1.0, 2.0), Sigmoid(5.0, 2.0))),
         ("COSINE 2 5", Cosine(5.0, 4.0)),
         ("Cosine 5 2", Cosine(5.0, 2.0)),
+        (
+            "Function min(1, 0.5)",
+            Formula(Call("min", (Number(1.0), Number(0.5)))),
+        ),
+        ("Discrete (0, 1) (2, 0)", Points((0.0, 2.0), (1.0, 0.0))),
         ("7.5", Singleton(7.5)),
         ("(.5, 0) (5., 1)", Points((0.5, 5.0), (0.0, 1.0))),
         ("(-1e-5, 0)\n(1E3,1.0)", Points((-1e-05, 1000.0), (0.0, 1.0))),
@@ -412,7 +417,7 @@ END_RULEBLOCK
     assert _mistakes(text) == [
         "file.fcl:5:3: found 'TREM', with which no statement begins "
         "(did you mean 'TERM'?)",
-        "file.fcl:7:13: found '('; expected ':='",
+        "file.fcl:7:13: found '(0, 0)'; expected ':='",
         "file.fcl:8:15: no shape 'TRIANGEL'; there is FUNCTION, TRIAN, TRAPE, GAUSS, "
         "GAUSS2, GBELL, SIGM, DSIGM, COSINE, Constant, Discrete, Function, ... "
         "(did you mean 'TRIAN'?)",
@@ -488,6 +493,7 @@ def test_an_output_that_is_asked_for_is_a_loss_outside_of_fuzzylite() -> None:
         b"FUNCTION_BLOCK f\nFUZZIFY x\nTERM a := " + b"(0, 1) " * 40_000,
         b"9" * 1_000_000,
         b"x" * 5_000_000,
+        b"x " * 9_000_000,
         b"//" * 1_000_000,
         b"\n" * 1_000_000,
         b" " * 4_000_000,
@@ -496,7 +502,7 @@ def test_an_output_that_is_asked_for_is_a_loss_outside_of_fuzzylite() -> None:
         + b"END_VAR\nRULEBLOCK r\n"
         + b"RULE 1 : IF xx9 IS b THEN c IS d;\n" * 15_000,
     ],
-    ids=range(17),
+    ids=range(18),
 )
 def test_a_hostile_file_ends_in_a_short_error_soon(content: bytes) -> None:
     start = time.process_time()
