@@ -138,6 +138,6 @@ def test_a_file_without_status_is_compared_by_its_numbers() -> None:
 def test_a_slow_runtime_gets_a_share_of_the_rows(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(checking_systems, "_SLOW_STEPS", 1000)
+    monkeypatch.setattr(checking_systems, "_SLOW_STEPS", 100)
     found = check_system(washer(), limit=400, runtimes=["native"])
     assert found.comparisons[0].rows < 50

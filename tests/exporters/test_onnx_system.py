@@ -6,7 +6,7 @@ import numpy as np
 import onnx
 import pytest
 
-from fuzzytree.errors import DisagreementError, ReadError
+from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import onnx_steps
 from fuzzytree.exporters.onnx import OPSETS, write
 from fuzzytree.exporters.onnx_compare import graph_difference
@@ -114,3 +114,32 @@ def test_a_wrong_graph_is_not_returned(
     )
     with pytest.raises(DisagreementError, match=r"gives other .* than the model where"):
         write(SYSTEM, outputs=("outputs", "activations"))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("names", '["y1"]', "gives answers without meaning"),
+        ("rules", "3", "gives answers without meaning"),
+        ("names", "[]", "metadata contradicts itself"),
+        ("carrier", "rules", "metadata contradicts itself"),
+        ("chunk", '"x"', "metadata is broken"),
+    ],
+)
+def test_a_file_that_lies_about_itself_is_refused(
+    key: str, value: str, text: str
+) -> None:
+    made = onnx.load_model_from_string(
+        write(SYSTEM, outputs=("outputs", "activations")).content
+    )
+    for entry in made.metadata_props:
+        if entry.key == f"fuzzytree.{key}":
+            entry.value = value
+    with pytest.raises((ReadError, LossError), match=text):
+        _run(made.SerializeToString())
+
+
+def _run(content: bytes) -> None:
+    opened = open_onnx(content, "s.onnx")
+    assert opened.run_system is not None
+    opened.run_system(np.zeros((3, 2)))
