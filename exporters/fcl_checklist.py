@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fuzzytree.casting import as_system
+from fuzzytree.exporters.fcl_rules import uses
 from fuzzytree.rulebase import Points, RuleBase
 from fuzzytree.system import And, Condition, FuzzySystem, Label, Not, Or, SystemOutput
 
@@ -91,18 +92,21 @@ def _count(condition: Condition | None) -> int:
 
 
 def _operators(system: FuzzySystem) -> Iterator[str]:
+    """Yield the operators that rules use, each once."""
     found: list[str] = []
+    is_curved = any(not output.defuzzifier.is_weighted for output in system.outputs)
     for block in system.blocks:
-        for word, norm in (
-            ("AND", block.conjunction),
-            ("OR", block.disjunction),
-            ("ACT", block.implication),
-        ):
-            if norm is not None:
-                found.append(f"{word} {norm}")
-    for output in system.outputs:
-        if output.aggregation is not None:
-            found.append(f"ACCU {output.aggregation}")
+        if any(uses(rule.when, And) for rule in block.rules):
+            found.append(f"AND {block.conjunction}")
+        if any(uses(rule.when, Or) for rule in block.rules):
+            found.append(f"OR {block.disjunction}")
+        if is_curved:
+            found.append(f"ACT {block.implication}")
+    found += [
+        f"ACCU {output.aggregation}"
+        for output in system.outputs
+        if output.aggregation is not None
+    ]
     yield from dict.fromkeys(found)
 
 

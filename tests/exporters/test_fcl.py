@@ -388,6 +388,7 @@ def test_the_check_list_tells_the_class_of_conformance() -> None:
     basic = replace(basic, inputs=inputs, outputs=outputs)
     assert check_list(basic).splitlines()[0] == "data check list (IEC 61131-7)"
     assert "class: Basic" in check_list(basic)
+    assert "operators: AND minimum, ACCU maximum\n" in check_list(basic)
     rules = with_points(rules_from_tree(random_tree(1)), 0, share=1.0)
     assert "points of degrees between 0 and 1" in check_list(rules)
     mamdani = _sample("Mamdani, centroid")
