@@ -20,6 +20,8 @@ from fuzzytree.system import FuzzySystem, SystemInput, SystemOutput
 
 _ROWS = 100
 _PROBES = 400
+_FEWEST = 20
+_RULES = 20_000  # rules of all rows that are tried, together
 _SHARE = 1e-6  # of a number: its error where no bound is known
 
 SYSTEM_TYPES = """
@@ -174,7 +176,8 @@ def _examples(system: FuzzySystem, *, activations: bool) -> list[Example]:
 
     Where no bound of an error is known, a share of the number stands in its place.
     """
-    rows = system_probes(system, limit=_PROBES)
+    limit = max(_FEWEST, min(_PROBES, _RULES // max(len(system.rules), 1)))
+    rows = system_probes(system, limit=limit)
     every: list[Example] = []
     bounds = _bounds(system, rows, activations=activations)
     for row, bound in zip(rows, bounds, strict=True):

@@ -42,7 +42,8 @@ Dtype = Literal["float64", "float32"]
 COMPILERS = ("gcc", "cc", "clang")
 """The programs of which one is needed; the first that is found compiles."""
 
-_OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-x", "c", "-")
+_OPTIONS = ("-std=c99", "-ffp-contract=off", "-shared", "-fPIC", "-x", "c", "-")
+_LONG = 1 << 19  # bytes of straight code, on which more than -O1 takes minutes
 _LONGEST_WAIT = 600.0  # seconds
 
 _LOOP = """
@@ -157,7 +158,8 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
         FuzzyTreeError: If the compiler fails.
     """
     made = write(system, name="model", activations=activations)
-    infer = _compiled(made.content, _INFER_LOOP, 2)
+    speed = "-O1" if len(made.content) > _LONG else "-O2"
+    infer = _compiled(made.content, _INFER_LOOP, 2, speed)
     outputs = len(system.outputs)
     count = outputs + activations * len(system.rules)
 
@@ -177,7 +179,7 @@ def _at(array: npt.NDArray[np.generic] | None) -> int | None:
 
 
 @lru_cache(maxsize=64)
-def _compiled(content: bytes, loop: str, pointers: int) -> Decide:
+def _compiled(content: bytes, loop: str, pointers: int, speed: str = "-O2") -> Decide:
     """Return the function `model_many` of a file and a loop behind it."""
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
     if compiler is None:
@@ -185,7 +187,7 @@ def _compiled(content: bytes, loop: str, pointers: int) -> Decide:
     with tempfile.TemporaryDirectory(prefix="fuzzytree-") as folder:
         path = Path(folder, "model.so")
         done = subprocess.run(
-            [compiler, *_OPTIONS, "-o", str(path), "-lm"],
+            [compiler, speed, *_OPTIONS, "-o", str(path), "-lm"],
             input=content + loop.encode("ascii"),
             capture_output=True,
             check=False,

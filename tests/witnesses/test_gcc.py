@@ -139,6 +139,23 @@ def test_every_model_compiles_without_a_warning_and_tests_itself(
             assert all_right(said), (name, command)
 
 
+def test_a_processor_of_32_bits_gives_the_same_bits(
+    tmp_path: Path, program: Need
+) -> None:
+    compiler, empty = program("gcc"), tmp_path / "empty.c"
+    empty.write_text("#include <stdio.h>\nint main(void) { return 0; }\n")
+    words = [compiler, "-m32", str(empty), "-o", str(tmp_path / "empty")]
+    if subprocess.run(words, capture_output=True, check=False).returncode:
+        pytest.skip("gcc makes no programs for 32 bits here")
+    for name in ("combined tree", "relative", "wide raw", "points", "system 2"):
+        source = tmp_path / "model.c"
+        source.write_bytes(write(MODELS[name], name="m").content)
+        command = "gcc -m32 -msse2 -mfpmath=sse -O2"
+        code, said = said_by(compiled(source, command, *STRICT, "-DM_SELFTEST"))
+        assert code == 0, said
+        assert all_right(said)
+
+
 @pytest.mark.parametrize("name", ["tree", "relative", "raw product", "system tipper"])
 def test_a_number_that_was_changed_fails_the_self_test(
     tmp_path: Path, program: Need, name: str
