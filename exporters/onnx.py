@@ -46,9 +46,9 @@ OLDEST: Mapping[str, str] = {
     "system": "1.15.0",
     "tree": "1.21.0",
 }
-"""The oldest onnxruntime that was seen to give equal answers, or for systems answers
-within their bounds; 1.15 is the oldest there
-is for Python 3.11, and `TreeEnsemble` came with 1.21."""
+"""The oldest onnxruntime that was seen to give equal answers, for systems answers
+within their bounds; 1.15 is the oldest there is for Python 3.11, and `TreeEnsemble`
+came with 1.21."""
 
 _MOST_ROWS_TO_VERIFY = 24
 
