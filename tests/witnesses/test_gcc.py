@@ -41,8 +41,8 @@ STRICT = [
     *("-Wmissing-prototypes", "-Wstrict-prototypes"),
 ]
 COMPILERS = {
-    "gcc": ["gcc -O0", "gcc -O1", "gcc -O2", "gcc -O3", "gcc -Os"],
-    "clang": ["clang -O0", "clang -O3"],
+    "gcc": ["gcc -O0", "gcc -O2", "gcc -O3 -march=native", "gcc -Os"],
+    "clang": ["clang -O0", "clang -O3 -march=native"],
     "tcc": ["tcc"],
 }
 Dtype = Literal["float64", "float32"]
