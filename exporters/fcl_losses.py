@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from fuzzytree.contracts import Loss
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fcl_rules import rule_losses, uses
+from fuzzytree.readers.engines import fuzzylite_losses
 from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, PAIRS
-from fuzzytree.readers.fcl_variables import deviations
 from fuzzytree.system import And, FuzzySystem, Or, SNorm, SystemOutput, questions
 
 
@@ -38,7 +38,7 @@ def losses_of(system: FuzzySystem, words: Words) -> Iterator[Loss]:
         ):
             yield Loss(where, "NaN where no rule fires: engines keep the value before")
         if words.name == "fuzzylite":
-            yield from deviations(output)
+            yield from fuzzylite_losses(output)
         yield from _accu_losses(output, system, words)
     yield from rule_losses(system, words)
     for k, block in enumerate(system.blocks, 1):

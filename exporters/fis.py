@@ -28,6 +28,7 @@ from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
 from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.losses import refusal
 from fuzzytree.naming import Names
+from fuzzytree.readers.engines import fuzzylite_losses
 from fuzzytree.readers.fis import DEFAULTS, DIALECT, FACTS, reading
 from fuzzytree.readers.fis_words import (
     DIALECTS,
@@ -258,6 +259,8 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             yield Loss(
                 where, f"FIS has no default, {output.default!r}, where no rule fires"
             )
+        if dialect == "fuzzylite":
+            yield from fuzzylite_losses(output)
     for variable in system.variables:
         if variable.clips and dialect != "fuzzylite":
             what = "values are not moved into the range"

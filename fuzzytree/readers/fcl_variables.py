@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import msgspec
 from lark import Token
@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from fuzzytree.contracts import Loss
 from fuzzytree.readers import fcl_terms
+from fuzzytree.readers.engines import fuzzylite_losses
 from fuzzytree.readers.fcl_blocks import Block
 from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS, METHOD_WORDS, Dialect
 from fuzzytree.readers.fcl_statements import Declaration, Range, TermText, place
@@ -19,11 +20,8 @@ from fuzzytree.readers.fll_words import Notes
 from fuzzytree.readers.lines import number_of
 from fuzzytree.rulebase import name_choice
 from fuzzytree.system import (
-    Arc,
-    Concave,
     Defuzzifier,
     Label,
-    SCurve,
     Singleton,
     SystemInput,
     SystemOutput,
@@ -196,26 +194,8 @@ def read_output(name: str, known: Known) -> SystemOutput:
         clips=_clips(name, block, known),
     )
     if known.dialect == "fuzzylite":
-        known.notes.losses.extend(deviations(found))
+        known.notes.losses.extend(fuzzylite_losses(found))
     return found
-
-
-def deviations(output: SystemOutput) -> Iterator[Loss]:
-    """Yield where fuzzylite 6, which alone reads its dialect, finds other numbers."""
-    where = f"output {output.name!r}"
-    if output.defuzzifier.method == "mean of maximum":
-        yield Loss(
-            where,
-            "the mean of all values of the largest degree answers; fuzzylite 6 takes "
-            "the first stretch of such values, and degrees within 1e-6 as equal",
-        )
-    curves = {type(label.curve) for label in output.labels}
-    if output.defuzzifier.is_weighted and curves & {SCurve, Concave, Arc}:
-        yield Loss(
-            where,
-            "where a term has a degree is computed exactly; fuzzylite 6 finds other "
-            "values for SShape, ZShape and Concave",
-        )
 
 
 def _check_kinds(

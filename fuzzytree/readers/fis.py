@@ -18,9 +18,10 @@ import msgspec
 from fuzzytree.casting import as_rules
 from fuzzytree.contracts import Document, Loss, Reading
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.naming import unlike
+from fuzzytree.naming import numbered
 from fuzzytree.readers import fis_text as text
 from fuzzytree.readers import fis_words as words
+from fuzzytree.readers.engines import fuzzylite_losses
 from fuzzytree.readers.fis_rules import rules_of
 from fuzzytree.readers.fis_terms import labels_of
 from fuzzytree.readers.fis_text import Entry, Notes, Section
@@ -176,7 +177,7 @@ def _system(
         notes.found.append((1, 1, f"the file has no section {missing}"))
         return None
     methods = _methods(single["system"], name, dialect, notes)
-    taken: list[str] = []
+    taken: dict[str, int] = {}
     inputs = tuple(_input(one, dialect, taken, notes) for one in parts["input"])
     outputs = tuple(
         _output(one, methods, dialect, (inputs, taken), notes)
@@ -195,6 +196,9 @@ def _system(
         None if is_weighted else methods.implication,
     )
     _compare(outputs, block, methods, dialect, notes)
+    if dialect == "fuzzylite":
+        for output in outputs:
+            notes.losses.extend(fuzzylite_losses(output))
     try:
         return FuzzySystem(methods.name, inputs, outputs, (block,))
     except InvalidModelError as error:
@@ -306,23 +310,22 @@ def _range(
 
 
 def _name(
-    section: Section, entries: Mapping[str, Entry], taken: list[str], notes: Notes
+    section: Section, entries: Mapping[str, Entry], taken: dict[str, int], notes: Notes
 ) -> str:
     entry = entries.get("Name")
     name = text.unquoted(entry, notes.found) if entry else ""
     if not name:
         name = f"{section.kind} {section.number}"
         notes.remarks.append(f"{name} has no name of its own")
-    found = unlike(name, taken)
+    found = numbered(name, taken)
     if found != name:
         what = f"{section.kind} {section.number} is called {name!r} like another"
         notes.remarks.append(f"{what}; here it is {found!r}")
-    taken.append(found)
     return found
 
 
 def _input(
-    section: Section, dialect: Dialect, taken: list[str], notes: Notes
+    section: Section, dialect: Dialect, taken: dict[str, int], notes: Notes
 ) -> SystemInput:
     entries, terms = _keyed(section, _VARIABLE_KEYS, notes)
     name = _name(section, entries, taken, notes)
@@ -336,7 +339,7 @@ def _output(
     section: Section,
     methods: _Methods,
     dialect: Dialect,
-    known: tuple[tuple[SystemInput, ...], list[str]],
+    known: tuple[tuple[SystemInput, ...], dict[str, int]],
     notes: Notes,
 ) -> SystemOutput:
     inputs, taken = known
@@ -345,7 +348,7 @@ def _output(
     low, high = _range(entries, notes)
     _note_enabled(entries, name, notes)
     how = methods.defuzzifier
-    about = (name, dialect, (how.is_weighted, len(inputs), tuple(taken)))
+    about = (name, dialect, (how.is_weighted, len(inputs)))
     labels = labels_of(terms, entries.get("NumMFs"), about, notes)
     if _is_set(entries, "LockPrevious"):
         what = "where no rule fires, fuzzylite answers as for the row before"

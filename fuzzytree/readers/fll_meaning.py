@@ -163,7 +163,13 @@ def _area_remarks(outputs: Sequence[SystemOutput]) -> Iterator[str]:
             "Bisector is one of the values that are looked at, as in pyfuzzylite; "
             "fuzzylite 6 takes one between them"
         )
-    if any(method.endswith("maximum") for method in methods):
+    if "mean of maximum" in methods:
+        yield (
+            "the mean of all values of the largest degree answers, as in pyfuzzylite; "
+            "fuzzylite 6 takes the first stretch of such values, and degrees within "
+            "1e-6 as equal"
+        )
+    if methods & {"smallest of maximum", "largest of maximum"}:
         yield "fuzzylite 6 counts degrees within 1e-6 of the maximum to the maxima"
     if any(one.default is not None for one in looked_at):
         yield (
@@ -218,8 +224,8 @@ def _inverse_remarks(output: SystemOutput, concluded: Sequence[Label]) -> Iterat
     ):
         yield (
             f"output {output.name!r}: where a term has a degree is what pyfuzzylite "
-            "says; fuzzylite 6 differs for Concave terms and for heights, and near 0 "
-            "and 1 for others"
+            "says; fuzzylite 6 finds other values for SShape, ZShape, Concave and "
+            "terms with a height, and within 1e-6 of 0 and 1"
         )
 
 

@@ -221,6 +221,38 @@ def test_samples_are_the_dialects() -> None:
     assert read(text).outputs[0].aggregation == "sum"
 
 
+@pytest.mark.parametrize("dialect", ["matlab", "octave", "fuzzylite"])
+def test_where_fuzzylite_computes_other_numbers_is_a_loss_of_its_files(
+    dialect: Dialect,
+) -> None:
+    text = SUGENO.replace("sugeno", "mamdani").replace("wtaver", "mom")
+    text = text.replace("'constant',[5]", "'trimf',[0 5 9]").replace(
+        "'linear',[1 0.5 2]", "'trimf',[5 9 30]"
+    )
+    found = [
+        loss.what for loss in reading(text.encode(), "tip.fis", dialect=dialect).losses
+    ]
+    assert found == (
+        [
+            "the mean of all values of the largest degree answers; fuzzylite 6 takes "
+            "the first stretch of such values, and degrees within 1e-6 as equal"
+        ]
+        if dialect == "fuzzylite"
+        else []
+    )
+
+
+def test_where_fuzzylite_inverts_curves_otherwise_is_a_loss_of_its_files() -> None:
+    text = SUGENO.replace("'constant',[5]", "'smf',[0 5]").replace(
+        "'linear',[1 0.5 2]", "'smf',[5 9]"
+    )
+    (loss,) = reading(text.encode(), "tip.fis", dialect="fuzzylite").losses
+    assert loss.what == (
+        "where a term has a degree is computed exactly; fuzzylite 6 finds other "
+        "values for SShape, ZShape and Concave"
+    )
+
+
 def test_a_rule_that_asks_nothing_is_always_true_or_told_to_be_left_out() -> None:
     text = SUGENO.replace("1 1, 1 (1) : 1", "0 0, 1 (1) : 1")
     assert read(text).rules[0].when is None
