@@ -130,6 +130,27 @@ def unlike(name: str, taken: Collection[str]) -> str:
     return found
 
 
+def numbered(name: str, taken: dict[str, int]) -> str:
+    """Return a name like `unlike`, and remember it: quick for any number of names.
+
+    Args:
+        name: The name.
+        taken: The names so far, each with how often it was asked for.
+
+    Example:
+        >>> taken = {}
+        >>> [numbered("low", taken) for _ in range(3)]
+        ['low', 'low 2', 'low 3']
+    """
+    found, count = name, taken.get(name, 0)
+    while found in taken:
+        count += 1
+        found = f"{name} {count}"
+    taken[name] = max(count, 1)
+    taken.setdefault(found, 1)
+    return found
+
+
 class _Allowed(msgspec.Struct, frozen=True):
     """What a name may be."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fuzzytree.naming import unlike
+from fuzzytree.naming import numbered
 from fuzzytree.readers import fis_text as text
 from fuzzytree.readers import fis_words as words
 from fuzzytree.readers.fis_text import Entry, Notes
@@ -22,9 +22,9 @@ from fuzzytree.system import (
     curve_mistakes,
 )
 
-About = tuple[str, Dialect, tuple[bool, int, tuple[str, ...]] | None]
-"""The variable's name and the dialect; of an output also whether numbers are weighted,
-how many inputs there are, and the names of the variables up to it."""
+About = tuple[str, Dialect, tuple[bool, int] | None]
+"""The variable's name and the dialect; of an output also whether numbers are weighted
+and how many inputs there are."""
 
 
 _WRONG = Formula(Number(0.0))
@@ -58,18 +58,18 @@ def labels_of(
         else:
             notes.found.append((count.line, count.column, what))
     labels: list[Label] = []
+    taken: dict[str, int] = {}
     for number in sorted(numbered):
-        taken = [one.name for one in labels]
         labels.append(_label(numbered[number], about, taken, notes))
     return tuple(labels)
 
 
-def _label(entry: Entry, about: About, taken: Sequence[str], notes: Notes) -> Label:
+def _label(entry: Entry, about: About, taken: dict[str, int], notes: Notes) -> Label:
     written = text.term_of(entry, notes.found)
     if written is None:
         return Label(entry.key, _WRONG)
     name = written.name or entry.key
-    found = unlike(name, taken)
+    found = numbered(name, taken)
     if found != written.name:
         what = f"term {entry.key} of {about[0]!r} is called {written.name!r}"
         notes.remarks.append(f"{what}; here it is {found!r}")

@@ -12,6 +12,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.readers.nodes import Found
 
 MOST_BYTES: Final = 4 * 2**20
+MOST_LINES: Final = 60_000
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
@@ -76,7 +77,14 @@ def read_page(content: bytes, name: str, found: list[Found]) -> Page:
     text, remarks = _decoded(content, name)
     sections: list[Section] = []
     comments: list[str] = []
-    for number, line in enumerate(_LINE_END.split(text), 1):
+    seen: dict[tuple[str, int], int] = {}
+    lines = _LINE_END.split(text)
+    if len(lines) > MOST_LINES:
+        raise ReadError(
+            f"{name}: {len(lines):,} lines are more than the {MOST_LINES:,} "
+            "that are read"
+        )
+    for number, line in enumerate(lines, 1):
         wrong = _FORBIDDEN.search(line)
         if wrong:
             what = f"character U+{ord(wrong.group()):04X} may not stand in a FIS file"
@@ -86,7 +94,7 @@ def read_page(content: bytes, name: str, found: list[Found]) -> Page:
         if plain.startswith(("#", "%", "//")):
             comments.append(plain.lstrip("#%/").strip())
         elif plain.startswith("["):
-            _start_section(sections, plain, number, line.index("[") + 1, found)
+            _start_section((sections, seen), plain, number, line.index("[") + 1, found)
         elif plain and not sections:
             what = f"{plain[:40]!r} stands before the first section, [System]"
             found.append((number, 1, what))
@@ -113,8 +121,13 @@ def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _start_section(
-    sections: list[Section], plain: str, line: int, column: int, found: list[Found]
+    so_far: tuple[list[Section], dict[tuple[str, int], int]],
+    plain: str,
+    line: int,
+    column: int,
+    found: list[Found],
 ) -> None:
+    sections, seen = so_far
     inside = plain[1:].partition("]")[0].strip().lower()
     numbered = _NUMBERED.fullmatch(inside)
     kind, number = inside, 0
@@ -123,11 +136,10 @@ def _start_section(
     elif kind not in ("system", "rules"):
         what = f"no section [{inside[:40]}]; there is System, Input1, Output1, Rules"
         found.append((line, column, what))
-    for other in sections:
-        if (other.kind, other.number) == (kind, number):
-            what = f"section [{inside[:40]}] stands twice; the first is in line"
-            found.append((line, column, f"{what} {other.line}"))
-            break
+    first = seen.setdefault((kind, number), line)
+    if first != line:
+        what = f"section [{inside[:40]}] stands twice; the first is in line {first}"
+        found.append((line, column, what))
     sections.append(Section(kind, number, line, []))
 
 

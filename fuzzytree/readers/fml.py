@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 from fuzzytree.casting import as_rules
 from fuzzytree.contracts import Document, Reading
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.naming import unlike
+from fuzzytree.naming import numbered
 from fuzzytree.readers import fml_words as words
 from fuzzytree.readers import xml
 from fuzzytree.readers.fml_rules import Variables, blocks_of
@@ -147,15 +147,16 @@ def _terms(
             notes.wrong(other, f"<{other.name[:40]}> stands where <{kind}> does")
     given = [term.attributes.get("name", "") for term in terms]
     is_ours = all(one.startswith(start) and len(one) > len(start) for one in given)
-    taken: list[str] = []
+    taken: dict[str, int] = {}
+    called: list[str] = []
     for term, one in zip(terms, given, strict=True):
         plain = one.removeprefix(start) if is_ours else one
         if not one or plain in taken:
             what = "stands twice" if one else "has no name"
             notes.wrong(term, f"term {one!r} of {variable!r} {what}")
-        taken.append(unlike(plain, taken))
-    variables.labels[variable] = dict(zip(given, taken, strict=True))
-    return [*zip(taken, terms, strict=True)]
+        called.append(numbered(plain, taken))
+    variables.labels[variable] = dict(zip(given, called, strict=True))
+    return [*zip(called, terms, strict=True)]
 
 
 def _is_complement(term: Element) -> bool:

@@ -365,3 +365,14 @@ def test_a_system_without_inputs_and_with_a_singleton_is_read() -> None:
     system = read(text)
     assert system.outputs[0].labels[0].curve == Singleton(1.0)
     assert infer(system, {}).outputs == (1.0,)
+
+
+def test_thousands_of_terms_of_one_name_are_read_quickly() -> None:
+    many = "".join(f"MF{k}='a':'trimf',[0 1 2]\n" for k in range(1, 20_001))
+    start, _, rest = SUGENO.partition("MF1='slow'")
+    text = start.replace("NumMFs=1\n", "") + many + rest.partition("\n")[2]
+    began = time.monotonic()
+    assert len(read(text).inputs[1].labels) == 20_000
+    assert time.monotonic() - began < 5.0
+    with pytest.raises(ReadError, match="lines are more than the 60,000 that are read"):
+        read(text + "1 1, 1 (1) : 1\n" * 60_000)
