@@ -436,7 +436,8 @@ FORMAT = Format(
     write=write,
     read=reading,
     cannot=(
-        "a rule that mixes and and or over several inputs, or asks an output",
+        "a rule that mixes and and or over several inputs, unless rules are joined by "
+        "maximum; a rule that asks an output",
         "several blocks of rules, defuzzifiers or aggregations",
         "combinations of inputs: each becomes an input",
         "an answer where no rule fires",

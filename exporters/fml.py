@@ -443,7 +443,8 @@ FORMAT = Format(
     write=write,
     read=reading,
     cannot=(
-        "a rule that mixes and and or over several inputs",
+        "a rule that mixes and and or over several inputs, unless rules are joined by "
+        "maximum; a rule that asks an output",
         "hedges of conclusions, and two hedges in a row other than not behind one",
         "other ways to activate rules than all, weighted sums, numbers of samples",
         "combinations of inputs: each becomes an input",
