@@ -14,13 +14,14 @@ from fuzzytree.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c_axes import axes_code, lines_of, taking
 from fuzzytree.exporters.c_examples import examples_of, number_of, selftest_code
-from fuzzytree.exporters.c_rules import Tables, rules_code, tables_of
+from fuzzytree.exporters.c_rules import rules_code
 from fuzzytree.exporters.c_system import (
     SYSTEM_TYPES,
     system_code,
     system_heading,
     system_selftest,
 )
+from fuzzytree.exporters.c_tables import Tables, tables_of
 from fuzzytree.exporters.c_text import (
     DOUBLE,
     SINGLE,

@@ -10,7 +10,7 @@ import numpy as np
 
 from fuzzytree.contracts import Model
 from fuzzytree.exporters.c_expected import axis_values, leaf, strengths
-from fuzzytree.exporters.c_rules import Tables
+from fuzzytree.exporters.c_tables import Tables
 from fuzzytree.exporters.c_text import Numbers, fill
 from fuzzytree.exporters.c_tree import Question
 from fuzzytree.probing import SPECIAL, Row, probes

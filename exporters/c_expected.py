@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fuzzytree.exporters.c_rules import (
+from fuzzytree.exporters.c_tables import (
     HIGH_END,
     LOW_END,
     POINTS,

@@ -12,8 +12,8 @@ from fuzzytree.exporters.c import FORMAT, write
 from fuzzytree.exporters.c_axes import lines_of
 from fuzzytree.exporters.c_examples import digest_of
 from fuzzytree.exporters.c_expected import axis_values, leaf, strengths
-from fuzzytree.exporters.c_rules import tables_of
 from fuzzytree.exporters.c_steps import number_text
+from fuzzytree.exporters.c_tables import tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
 from fuzzytree.exporters.c_tree import questions_of
 from fuzzytree.lowering import rules_from_tree

@@ -1,0 +1,203 @@
+"""A rule base as lists of numbers, which generated C and Python read alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from fuzzytree.exporters.c_text import Numbers
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    shapes_of,
+)
+
+LOW_END, HIGH_END, LEFT_SIDE, RIGHT_SIDE, POINTS = range(5)
+
+
+@dataclass(slots=True)
+class Places:
+    """The beginnings of all rules, each once, in the order of a walk.
+
+    Attributes:
+        clause: The last clause of each.
+        skip: The place behind all that begin with it.
+        rule: The rule that it is the whole of, from 1, or 0.
+        depth: How many clauses it has.
+    """
+
+    clause: list[int] = field(default_factory=list[int])
+    skip: list[int] = field(default_factory=list[int])
+    rule: list[int] = field(default_factory=list[int])
+    depth: list[int] = field(default_factory=list[int])
+
+
+@dataclass(slots=True)
+class Tables:
+    """A rule base as lists of numbers, which C and Python read alike.
+
+    An atom is one end of a band, one side of an LR set, or points; the degree of a term
+    is the smallest of its atoms, of a clause the largest of its terms.
+
+    Attributes:
+        number: The numbers of all atoms.
+        kind: The kind of each atom.
+        count: How many coefficients or points it has.
+        first: Where its numbers begin.
+        term_first: Where the atoms of each term begin; one more entry than terms.
+        clause_line: The value that each clause asks about.
+        clause_first: Where the terms of each clause begin; one more entry.
+        clause_term: The terms of all clauses.
+        negated: 1 where a clause is negated.
+        places: The rules.
+        label: The class of each rule.
+    """
+
+    number: list[float]
+    kind: list[int]
+    count: list[int]
+    first: list[int]
+    term_first: list[int]
+    clause_line: list[int]
+    clause_first: list[int]
+    clause_term: list[int]
+    negated: list[int]
+    places: Places
+    label: list[int]
+
+
+_ALWAYS = Clause("", ())
+
+
+def tables_of(rules: RuleBase, line: Mapping[str, int], numbers: Numbers) -> Tables:
+    """Return a rule base as lists of numbers of a type."""
+    shapes = shapes_of(rules.variables)
+    places, clauses = _places(rules)
+    keys = dict.fromkeys((c.variable, term) for c in clauses for term in c.terms)
+    at = {key: place for place, key in enumerate(keys)}
+    labels = {label: place for place, label in enumerate(rules.classes)}
+    found = Tables([], [], [], [], [0], [], [0], [], [], places, [])
+    for key in keys:
+        _add_term(found, shapes[key], numbers)
+    for clause in clauses:
+        found.clause_line.append(line.get(clause.variable, 0))
+        found.clause_term += [at[clause.variable, term] for term in clause.terms]
+        found.clause_first.append(len(found.clause_term))
+        found.negated.append(int(clause.negated))
+    found.label = [labels[rule.then] for rule in rules.rules]
+    return found
+
+
+def _places(rules: RuleBase) -> tuple[Places, list[Clause]]:
+    """Return the tree of the rules' beginnings, and the distinct clauses.
+
+    A rule whose clauses are another's beginning gets a place of its own below, whose
+    clause always holds.
+    """
+    children: list[dict[Clause, int]] = [{}]
+    ending: list[list[int]] = [[]]
+    for number, one in enumerate(rules.rules, 1):
+        here = 0
+        for clause in one.when:
+            if clause not in children[here]:
+                children[here][clause] = len(children)
+                children.append({})
+                ending.append([])
+            here = children[here][clause]
+        ending[here].append(number)
+    clauses: dict[Clause, int] = {}
+    found = Places()
+    todo: list[tuple[Clause, int, int, int]] = []  # clause, fork or -1, rule, depth
+
+    def expand(fork: int, depth: int) -> None:
+        own = ending[fork] if fork == 0 or children[fork] else ending[fork][1:]
+        below = [(_ALWAYS, -1, rule, depth) for rule in own]
+        for clause, child in children[fork].items():
+            is_whole = not children[child]
+            below.append((clause, child, ending[child][0] if is_whole else 0, depth))
+        todo.extend(reversed(below))
+
+    expand(0, 1)
+    while todo:
+        clause, fork, rule, depth = todo.pop()
+        found.clause.append(clauses.setdefault(clause, len(clauses)))
+        found.rule.append(rule)
+        found.depth.append(depth)
+        if fork >= 0:
+            expand(fork, depth + 1)
+    _add_skips(found)
+    return found, list(clauses)
+
+
+def _add_skips(places: Places) -> None:
+    places.skip = [len(places.depth)] * len(places.depth)
+    open_ones: list[int] = []
+    for place, depth in enumerate(places.depth):
+        while open_ones and places.depth[open_ones[-1]] >= depth:
+            places.skip[open_ones.pop()] = place
+        open_ones.append(place)
+
+
+def _add_term(found: Tables, shape: Shape, numbers: Numbers) -> None:
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            ends = ((LOW_END, low, left), (HIGH_END, high, right))
+            for kind, bound, flank in ends:
+                if bound is not None:
+                    curve = flank.curve if flank else ()
+                    _add(found, kind, len(curve), _edge(bound, flank, numbers))
+        case LR(mean=mean, left=below, right=above):
+            for kind, sign, side in (
+                (LEFT_SIDE, -1.0, below),
+                (RIGHT_SIDE, 1.0, above),
+            ):
+                _add(found, kind, len(side.curve), _side(mean, sign, side, numbers))
+        case Points(values=values):
+            _add(found, POINTS, len(values), _points(shape, numbers))
+    found.term_first.append(len(found.kind))
+
+
+def _add(found: Tables, kind: int, count: int, own: list[float]) -> None:
+    found.kind.append(kind)
+    found.count.append(count)
+    found.first.append(len(found.number))
+    found.number += own
+
+
+def _edge(bound: float, flank: Flank | None, numbers: Numbers) -> list[float]:
+    """Return the bound; with a flank also its end, its width and its curve."""
+    if flank is None:
+        return numbers.nearest([bound])
+    return [
+        *numbers.nearest([bound, flank.end]),
+        *numbers.nearest([flank.start - flank.end], is_divisor=True),
+        *numbers.nearest(flank.curve),
+    ]
+
+
+def _side(mean: float, sign: float, side: Side, numbers: Numbers) -> list[float]:
+    """Return mean, signed spread, reach, length of the tail, and the curve."""
+    return [
+        *numbers.nearest([mean]),
+        *numbers.nearest([sign * side.spread], is_divisor=True),
+        *numbers.nearest([side.reach]),
+        *numbers.nearest([side.reach - 1.0], is_divisor=True),
+        *numbers.nearest(side.curve),
+    ]
+
+
+def _points(points: Points, numbers: Numbers) -> list[float]:
+    """Return the values of points, then their degrees; below 1 they stay below 1."""
+    degrees = [
+        min(near, numbers.below_one) if exact < 1.0 else near
+        for exact, near in zip(
+            points.degrees, numbers.nearest(points.degrees), strict=True
+        )
+    ]
+    return [*numbers.nearest(points.values), *degrees]
