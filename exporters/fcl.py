@@ -41,6 +41,7 @@ from fuzzytree.exporters.fcl_terms import (
     unspeakable,
 )
 from fuzzytree.exporters.fll_rules import speakable
+from fuzzytree.losses import refusal
 from fuzzytree.naming import Names
 from fuzzytree.readers.fcl import FACTS, read
 from fuzzytree.readers.fcl_dialects import MARK
@@ -120,11 +121,7 @@ def write(
     losses += [*more, *losses_of(system, words)]
     system = _refused(system, words)
     if losses and not allow_loss:
-        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
-        raise LossError(
-            f"cannot write {model.name} as fcl ({dialect}) without loss:\n{listed}\n"
-            "  pass allow_loss=True to write it so"
-        )
+        raise refusal(model.name, f"fcl ({dialect})", losses)
     names = _naming(system, words)
     comments = [one for one in (MARK + dialect, facts) if one]
     if checklist:
@@ -139,8 +136,8 @@ def write(
 def _check_scores(scores: Scores) -> None:
     if scores == "winner":
         raise LossError(
-            "FCL activates all rules, and not the strongest alone; pass scores=rule "
-            "or scores=class"
+            "FCL activates all rules, and not the strongest alone; "
+            "pass scores=rule or scores=class"
         )
 
 

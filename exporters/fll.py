@@ -32,6 +32,7 @@ from fuzzytree.exporters.fll_terms import (
     number_text,
     weighted_type,
 )
+from fuzzytree.losses import refusal
 from fuzzytree.naming import Names
 from fuzzytree.readers.fll import FACTS, read
 from fuzzytree.readers.fll_meaning import differences
@@ -109,10 +110,7 @@ def write(
         remarks.append("NOT is written as the hedge 'not', with the same numbers")
     system = replace(system, blocks=_speakable(system))
     if losses and not allow_loss:
-        listed = "\n".join(f"  {loss.where}: {loss.what}" for loss in losses)
-        head = f"cannot write {model.name} as fll without loss:"
-        hint = "pass allow_loss=True to write it so"
-        raise LossError(f"{head}\n{listed}\n  {hint}")
+        raise refusal(model.name, "fll", losses)
     names = _naming(system)
     comments = [f"# {one}" for one in (_TITLE, facts) if one]
     text = "\n".join([*comments, *_text(system, names)]) + "\n"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import msgspec
 
+from fuzzytree.casting import check_tolerance
 from fuzzytree.contracts import (
     Carrier,
     Document,
@@ -20,7 +21,7 @@ from fuzzytree.contracts import (
     Written,
 )
 from fuzzytree.errors import DisagreementError, LossError, ReadError
-from fuzzytree.exporters import find_format
+from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded
 from fuzzytree.likeness import likeness
 from fuzzytree.losses import loss_text
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 _FEW = 200  # probes of a file that is run
 _TRIED = 1000  # probes of what a loss does to decisions
+
+_NOT_READ = "the file is not read back here; other programs run it"
 
 CALLED: dict[Carrier, str] = {
     "tree": "tree",
@@ -246,22 +249,54 @@ def formed(
         from fuzzytree.casting import as_system
 
         return as_system(model, scores="winner")
+    return _formed_system(model, form, carrier, kind, conjunction)
+
+
+def _formed_system(
+    system: FuzzySystem,
+    form: Format,
+    carrier: Carrier | None,
+    kind: Kind | None,
+    conjunction: Conjunction | None,
+) -> FuzzySystem | RuleBase:
+    """Return a system as it is, or as the rules that it stands for.
+
+    Raises:
+        LossError: If the format carries rules alone, and it is none.
+        ValueError: If it cannot be had in the form that was asked for.
+    """
     if carrier == "tree":
         raise ValueError(
-            f"as tree: {model.name} is a fuzzy system, and no tree can be made of it"
+            f"as tree: {system.name} is a fuzzy system, and no tree can be made of it"
         )
+    for option, wanted in (("terms", kind), ("conjunction", conjunction)):
+        if wanted is not None:
+            raise ValueError(
+                f"{option} {wanted}: {system.name} is a fuzzy system; "
+                "such rules are made from a tree"
+            )
     if (carrier or _nearest("system", form)) == "system":
-        return model
+        return system
     from fuzzytree.casting import as_rules
 
-    found = as_rules(model, None)
-    if found is None:
-        raise LossError(
-            f"cannot write {model.name} as {form.name}: it carries "
-            f"{' or '.join(form.carries)}, and this is a fuzzy system whose outputs "
-            "are numbers"
+    found = as_rules(system, None)
+    if found is not None:
+        return found
+    if carrier == "rules":
+        raise ValueError(
+            f"as rules: {system.name} is a fuzzy system whose outputs are numbers, "
+            "and no rules that decide for a class can be made of it"
         )
-    return found
+    raise LossError(
+        f"cannot write {system.name} as {form.name}: it carries "
+        f"{' or '.join(form.carries)}, and this is a fuzzy system whose outputs "
+        f"are numbers; {', '.join(_carriers('system'))} carry one"
+    )
+
+
+def _carriers(carrier: Carrier) -> list[str]:
+    """Return the names of the formats that carry a kind of model."""
+    return [form.name for form in all_formats() if carrier in form.carries]
 
 
 _FORMS: dict[Carrier, tuple[Carrier, ...]] = {
@@ -329,6 +364,8 @@ def export(
             f"and this is a {CALLED[carrier]}"
         )
     check_names(form, options)
+    if isinstance(tolerance := options.get("tolerance"), int | float):
+        check_tolerance(tolerance)
     # Each writer checks its own options; the protocol knows the common one alone.
     write = cast("Callable[..., Written]", form.write)
     return write(model, allow_loss=allow_loss, **options)
@@ -354,7 +391,7 @@ def proved(
             return _run(model, form, written)
         if form.dtype is not None:
             return _certified(model, form, dtype)
-        return Proof("unproved", f"files in the format {form.name} are not read back")
+        return Proof("unproved", _NOT_READ)
     try:
         again = form.read(written.content, form.name)
     except ReadError as error:
@@ -417,7 +454,7 @@ def _run(system: FuzzySystem, form: Format, written: Written) -> Proof:
         DisagreementError: If it answers other numbers, though no loss was told.
     """
     if form.name != "onnx" or written.losses:
-        return Proof("unproved", f"files in the format {form.name} are run by others")
+        return Proof("unproved", _NOT_READ)
     from fuzzytree.checking_systems import check_system
     from fuzzytree.runtimes.onnxruntime import open_onnx
 

@@ -222,9 +222,10 @@ def save(
         LossError: As `export`.
         ValueError: As `export`.
     """
-    written = export(
-        model, to or Path(path).suffix or "yaml", allow_loss=allow_loss, **options
-    )
+    form = to or Path(path).suffix
+    if not form:
+        raise ValueError(f"{os.fspath(path)}: has no suffix; pass to='yaml', say")
+    written = export(model, form, allow_loss=allow_loss, **options)
     write_atomically(path, written.content)
     return written
 

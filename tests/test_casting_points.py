@@ -116,7 +116,7 @@ def test_curves_that_end_are_exactly_0_beyond() -> None:
 def test_a_tail_without_end_is_named_and_stays_above_0() -> None:
     found = points_for(Gaussian(0.0, 1.0), 0.01)
     assert 0.0 < degree(found.points, 1e9) <= 0.01
-    assert found.tail == "its ends stay at 9.9e-03 and 9.9e-03 for ever"
+    assert found.tail == "before them it stays at 0.0099, after them at 0.0099"
 
 
 def test_a_curve_that_is_narrower_than_doubles_is_refused() -> None:
@@ -194,7 +194,7 @@ def test_terms_of_inputs_and_of_looked_at_outputs_become_points() -> None:
     assert loss.where == "term 'high' of 'dirt'"
     assert loss.what == (
         "it becomes 47 points joined by lines; "
-        "its ends stay at 9.9e-04 and 9.9e-04 for ever"
+        "before them it stays at 0.00099, after them at 0.00099"
     )
     assert loss.bound is not None
     assert 9e-4 < loss.bound <= 1e-3
@@ -224,10 +224,12 @@ def test_what_cannot_become_points_is_listed() -> None:
     )
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan, math.inf])
-def test_a_tolerance_must_be_above_0(tolerance: float) -> None:
-    with pytest.raises(ValueError, match="the tolerance must be above 0"):
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1.0, math.nan, math.inf])
+def test_a_tolerance_must_be_above_0_and_below_1(tolerance: float) -> None:
+    with pytest.raises(ValueError, match="tolerance: must be above 0"):
         pointed(washer(Singleton(0.0), Singleton(0.0), "weighted sum"), tolerance)
+    with pytest.raises(ValueError, match="tolerance: must be above 0 and below 1"):
+        points_for(Gaussian(0.0, 1.0), tolerance)
 
 
 @pytest.mark.parametrize("kind", ["relative", "raw"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fuzzytree.casting.facts import as_rules, facts_of
 from fuzzytree.casting.joining import joined_outputs
-from fuzzytree.casting.points import pointed
+from fuzzytree.casting.points import check_tolerance, pointed
 from fuzzytree.casting.scores import (
     Always,
     Scores,
@@ -22,6 +22,7 @@ __all__ = [
     "as_system",
     "cast_losses",
     "cast_remarks",
+    "check_tolerance",
     "facts_of",
     "flattened",
     "joined_outputs",

@@ -59,7 +59,8 @@ def pointed(
 
     Args:
         document: A rule base or a system.
-        tolerance: The largest difference of a degree that is allowed; above 0.
+        tolerance: The largest difference of a degree that is allowed; above 0 and
+            below 1.
         allowed: Classes of curves that stay as they are, beside `Points`.
 
     Returns:
@@ -67,7 +68,7 @@ def pointed(
         2^-52.
 
     Raises:
-        ValueError: If the tolerance is not above 0.
+        ValueError: If the tolerance is not above 0 and below 1.
         LossError: If a curve would need more than 4096 points, doubles around it are
             too coarse, or it is a formula.
 
@@ -78,9 +79,8 @@ def pointed(
         >>> all(0.0 < loss.bound <= 1e-3 for loss in losses)
         True
     """
-    if not (math.isfinite(tolerance) and tolerance > 0):
-        raise ValueError(f"the tolerance must be above 0, not {tolerance!r}")
-    change: _Change = _Change(min(tolerance, 0.5), (Points, *allowed))
+    check_tolerance(tolerance)
+    change: _Change = _Change(tolerance, (Points, *allowed))
     found: D = (
         _pointed_rules(document, change)
         if isinstance(document, RuleBase)
@@ -90,6 +90,18 @@ def pointed(
         head = f"cannot write the curves of {document.name} as points:"
         raise LossError("\n  ".join([head, *change.reasons]))
     return found, tuple(change.losses)
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Refuse a tolerance that no degree can be held to, or that allows every degree.
+
+    Raises:
+        ValueError: If it is not above 0 and below 1.
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise ValueError(
+            f"tolerance: must be above 0 and below 1, such as 1e-3, not {tolerance!r}"
+        )
 
 
 def _pointed_rules(rules: RuleBase, change: _Change) -> RuleBase:
@@ -166,9 +178,10 @@ def points_for(curve: Curve, tolerance: float) -> Found:
 
     Args:
         curve: The curve.
-        tolerance: The largest difference of a degree; above 0, at most 1/2.
+        tolerance: The largest difference of a degree; above 0 and below 1.
 
     Raises:
+        ValueError: If the tolerance is not above 0 and below 1.
         LossError: If no points are that close, or a curve has no degrees of its own.
 
     Example:
@@ -177,6 +190,8 @@ def points_for(curve: Curve, tolerance: float) -> Found:
         >>> len(found.points.values), found.bound <= 0.01
         (15, True)
     """
+    check_tolerance(tolerance)
+    tolerance = min(tolerance, 0.5)  # half of all degrees: no plan needs more
     shape = shape_of(curve)
     if isinstance(shape, Points):
         return Found(shape, 0.0)
@@ -262,7 +277,7 @@ def _placed(curve: Curve, plan: Plan, tolerance: float) -> Found:
 def _tail_text(degrees: Sequence[float], plan: Plan) -> str:
     if plan.tail == 0.0:
         return ""
-    return f"its ends stay at {degrees[0]:.1e} and {degrees[-1]:.1e} for ever"
+    return f"before them it stays at {degrees[0]:.2g}, after them at {degrees[-1]:.2g}"
 
 
 def _march(piece: Piece, room: float, most: int) -> Iterator[tuple[float, float]]:

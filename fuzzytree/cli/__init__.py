@@ -143,10 +143,12 @@ def _interruptible() -> Generator[None]:
 
 def _error_text(error: FuzzyTreeError, verb: str) -> str:
     """Return a message with what it asks for in the words of the command line."""
+    text = str(error).replace("pass dialect=", "pass --dialect ")
+    text = text.replace("pass scores=", "pass --set scores=")
     offer = "pass allow_loss=True"
     if verb in ("run", "check", "convert", "export"):
-        return str(error).replace(offer, "pass --allow-loss")
-    return str(error).replace(offer, "use `fuzzytree convert --allow-loss`")
+        return text.replace(offer, "pass --allow-loss")
+    return text.replace(offer, "use `fuzzytree convert --allow-loss`")
 
 
 def _usage_text(error: click.ClickException) -> str:

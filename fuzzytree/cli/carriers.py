@@ -33,10 +33,14 @@ conjunction_option = click.option(
 def wanted_format(output: str, to: str | None) -> Format:
     """Return the format of an output file: the one asked for, or of its suffix.
 
+    Standard output has none: it gets YAML.
+
     Raises:
         click.UsageError: If there is none.
     """
     suffix = Path(output).suffix
+    if not to and not suffix and output != "-":
+        raise click.UsageError(f"{output}: has no suffix; name the format with --to")
     try:
         return find_format(to or suffix or "yaml")
     except ValueError as error:

@@ -231,10 +231,11 @@ def carry(
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
     after = _next(source, output, form, has_loss=bool(found.losses))
+    shows = " (shows what the losses change)" if written.losses else ""
     say_rows(
         ("wrote", output, f"{form.name}, {size} bytes, sha256 {digest}"),
         _proof_row(proof),
-        *([("next", after, "")] if after else []),
+        *([("next", f"{after}{shows}", "")] if after else []),
         quiet=quiet,
     )
     if as_json and output != "-":
@@ -287,8 +288,9 @@ def _refuse(found: Reading, refusal: str) -> None:
 def _proof_row(proof: Proof) -> tuple[str, str, str]:
     if proof.verdict == "certified" and proof.certificate:
         return "bound", proof.certificate.dtype or "exact", proof.sentence
-    verdict = "not here" if proof.verdict == "unproved" else proof.verdict
-    return "proved", verdict, proof.sentence
+    if proof.verdict == "unproved":
+        return "unproved", "", proof.sentence
+    return "proved", proof.verdict, proof.sentence
 
 
 def _certificate_facts(found: Certificate | None) -> dict[str, object] | None:

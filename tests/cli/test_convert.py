@@ -14,7 +14,7 @@ import fuzzytree as ft
 from fuzzytree.cli import main
 from fuzzytree.contracts import Document, Loss, Reading, Written
 from fuzzytree.errors import LossError
-from fuzzytree.exporters import TABLE, yaml
+from fuzzytree.exporters import TABLE, all_formats, yaml
 from fuzzytree.random_systems import random_system
 from fuzzytree.readers.yaml import reading
 from fuzzytree.rulebase import RuleBase
@@ -23,6 +23,7 @@ from fuzzytree.system import FuzzySystem
 from tests.cli.conftest import Call, grip
 
 HELP = "\n  fuzzytree convert --help tells more\n"
+SYSTEMS = [form.name for form in all_formats() if "system" in form.carries]
 TIPPER = Path(__file__).resolve().parent.parent.parent / "examples" / "tipper.fll"
 
 
@@ -157,10 +158,35 @@ def test_streams_name_their_formats(call: Call) -> None:
             ("grip.yaml", "a.onnx", "--set", "ir=8", "--set", "ir=9"),
             "the option 'ir' is given twice" + HELP,
         ),
+        (("grip.yaml", "a"), "a: has no suffix; name the format with --to" + HELP),
+        *(
+            (
+                ("tipper.fll", "a.fcl", "--tolerance", text),
+                f"tolerance: must be above 0 and below 1, such as 1e-3, not {text}"
+                + HELP,
+            )
+            for text in ("0.0", "-1.0", "2.0", "nan", "inf")
+        ),
         (
             ("tipper.fll", "a.py"),
             "cannot write tipper as python: it carries tree or rules, "
-            "and this is a fuzzy system whose outputs are numbers\n",
+            "and this is a fuzzy system whose outputs are numbers; "
+            f"{', '.join(SYSTEMS)} carry one\n",
+        ),
+        (
+            ("tipper.fll", "a.yaml", "--as", "rules"),
+            "--as rules: tipper is a fuzzy system whose outputs are numbers, "
+            "and no rules that decide for a class can be made of it" + HELP,
+        ),
+        (
+            ("tipper.fll", "a.yaml", "--terms", "raw"),
+            "--terms raw: tipper is a fuzzy system; such rules are made from a tree"
+            + HELP,
+        ),
+        (
+            ("tipper.fll", "a.yaml", "--conjunction", "min"),
+            "--conjunction min: tipper is a fuzzy system; such rules are made from a "
+            "tree" + HELP,
         ),
         (
             ("tipper.fll", "a.yaml", "--as", "tree"),
@@ -178,6 +204,29 @@ def test_what_cannot_be_had_is_one_sentence(
     err = "".join(x for x in err.splitlines(keepends=True) if not x.startswith("read "))
     assert (code, out, err) == (2, "", message)
     assert not list(Path.cwd().glob("a.*"))
+    assert not Path("a").exists()
+
+
+def test_a_refusal_names_options_of_the_command_line(call: Call) -> None:
+    Path("fan.fll").write_bytes(
+        TIPPER.read_bytes()
+        .replace(b"WeightedAverage TakagiSugeno", b"Centroid 100")
+        .replace(b"aggregation: none", b"aggregation: Maximum")
+        .replace(b"implication: none", b"implication: Minimum")
+        .replace(b"Constant", b"Triangle 0.0 1.0")
+    )
+    err = call("convert", "fan.fll", "a.fcl")[2]
+    assert "; pass --dialect fuzzylite, jfuzzylogic or iec\n" in err
+    err = call("convert", "grip.yaml", "a.fcl", "--set", "scores=winner")[2]
+    assert err.endswith("; pass --set scores=rule or scores=class\n")
+
+
+def test_the_next_command_says_that_it_shows_what_losses_change(call: Call) -> None:
+    words = ("convert", "tipper.fll", "a.fcl", "--allow-loss", "--tolerance", "0.01")
+    code, out, err = call(*words, "--json")
+    hint = "fuzzytree check tipper.fll a.fcl"
+    assert (code, json.loads(out)["next"]) == (0, hint)
+    assert err.endswith(f"next     {hint} (shows what the losses change)\n")
 
 
 def test_a_terminal_is_no_input(
@@ -208,7 +257,8 @@ def test_an_onnx_file_of_a_system_is_run_before_it_is_believed(call: Call) -> No
     proof = "run by onnxruntime, it answers 200 probes like the system"
     assert f"proved   alike       {proof}\n" in err
     code, _, err = call("convert", "tipper.fll", "tipper.c")
-    assert "proved   not here files in the format c are run by others\n" in err
+    said = "the file is not read back here; other programs run it"
+    assert f"unproved          {said}\n" in err
 
 
 def test_every_format_that_reads_a_system_writes_it_again(call: Call) -> None:

@@ -254,12 +254,13 @@ def test_what_is_lost_is_listed_and_refused() -> None:
     head, curve, *rest = str(error.value).splitlines()
     assert head == "cannot write tank as fll without loss:"
     assert curve.startswith("  term 'low' of 'a': it becomes ")
+    assert curve.endswith(" (largest error 0.0054)")
     assert rest == [
         "  combination 'b': it is an input, to be given as 2.0 * ('a' - 0.5)",
         "  output 'y': its curve is looked at in the middle of 101 pieces of the "
         "range, and not at 101 values with the ends",
         "  rule 1: FLL has no 'cubed': left out",
-        "  pass allow_loss=True to write it so",
+        "  pass allow_loss=True to write it as stated",
     ]
     written = write(system, tolerance=0.01, allow_loss=True)
     assert len(written.losses) == 4
