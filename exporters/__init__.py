@@ -28,6 +28,7 @@ TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "fcl": (".fcl",),
         "pmml": (".pmml",),
         "javascript": (".mjs", ".js"),
+        "structured-text": (".st",),
     }
 )
 """Each format's name and its suffixes, the usual one first.

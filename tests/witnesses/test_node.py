@@ -41,7 +41,7 @@ from fuzzytree.testing import exporter_models, random_system, random_tree, with_
 from fuzzytree.tree import FuzzyTree, Leaf
 
 if TYPE_CHECKING:
-    from conftest import Need
+    from tests.witnesses.conftest import Need
 
 WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
 HOSTILE = (

@@ -1,0 +1,150 @@
+"""Pieces of Structured Text: names, numbers, comments, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fuzzytree.naming import Names
+from fuzzytree.numerics.narrowing import rounded
+
+_WIDTH = 88
+_LONGEST_NAME = 30
+
+_WORDS = """
+ABS ABSTRACT ACOS ACTION ADD AND AND_THEN ANY ARRAY ASIN AT ATAN ATAN2 BOOL BY
+BYTE CASE CHAR CLASS CONCAT CONFIGURATION CONSTANT CONTINUE COS CTD CTU CTUD DATE
+DATE_AND_TIME DELETE DINT DIV DO DT DWORD ELSE ELSIF END_ACTION END_CASE
+END_CLASS END_CONFIGURATION END_FOR END_FUNCTION END_FUNCTION_BLOCK END_IF
+END_INTERFACE END_METHOD END_NAMESPACE END_PROGRAM END_PROPERTY END_REPEAT
+END_RESOURCE END_STEP END_STRUCT END_TRANSITION END_TYPE END_UNION END_VAR
+END_WHILE EN ENO EQ EXIT EXP EXPT EXTENDS F_EDGE F_TRIG FALSE FINAL FIND FOR FROM
+FUNCTION FUNCTION_BLOCK GE GOTO GT IF IMPLEMENTS INI INITIAL_STEP INSERT INT
+INTERFACE INTERNAL INTERVAL JMP LABEL LDATE LDT LE LEFT LEN LIMIT LINT LN LOG
+LREAL LT LTIME LTOD LWORD MAX METHOD MID MIN MOD MOVE MUL MUX NAMESPACE NE NIL
+NON_RETAIN NOT NULL OF ON OR OR_ELSE OVERLAP OVERRIDE PERSISTENT POINTER PRIORITY
+PRIVATE PROGRAM PROPERTY PROTECTED PUBLIC R_EDGE R_TRIG READ_ONLY READ_WRITE REAL
+REF REF_TO REFERENCE REPEAT REPLACE RESOURCE RET RETAIN RETURN RIGHT ROL ROR RS
+SEL SEMA SHL SHR SIN SINGLE SINT SIZEOF SQRT SR STEP STRING STRUCT SUB SUPER TAN
+TASK THEN THIS TIME TIME_OF_DAY TO TOD TOF TON TP TRANSITION TRUE TRUNC TYPE
+UDINT UINT ULINT UNION UNTIL USES USING USINT VAR VAR_ACCESS VAR_CONFIG
+VAR_EXTERNAL VAR_GLOBAL VAR_IN_OUT VAR_INPUT VAR_OUTPUT VAR_STAT VAR_TEMP WCHAR
+WHILE WITH WORD WSTRING XOR A B C D I L M N P Q R S V W X Y Z
+"""
+
+RESERVED = tuple(_WORDS.split())
+"""Words of the standard, and of some dialects, that are no names; single letters are
+instructions and addresses in old ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """A number type of Structured Text.
+
+    Attributes:
+        name: In the language.
+        kind: In numpy.
+        below_one: The largest number below 1.
+        largest: The largest number.
+    """
+
+    name: str
+    kind: type[np.float64] | type[np.float32]
+    below_one: float
+    largest: float
+
+    def nearest(self, value: float) -> float:
+        """Return the nearest number of the type: finite, and 0 only for 0."""
+        (found,) = rounded([value], self.kind, is_divisor=value != 0.0).tolist()
+        return float(found)
+
+    def at_most(self, value: float) -> float:
+        """Return the largest finite number of the type up to a value.
+
+        Example:
+            >>> SINGLE.at_most(0.1) <= 0.1 < SINGLE.at_most(0.1) * 1.0000002
+            True
+        """
+        found = self.kind(self.nearest(value))
+        if float(found) > value and float(found) > -self.largest:
+            found = np.nextafter(found, self.kind(-np.inf))
+        return float(found)
+
+    def digits(self, value: float) -> str:
+        """Return a number of the type with the fewest digits that give it back.
+
+        Example:
+            >>> LONG.digits(1e-05), LONG.digits(-0.0), SINGLE.digits(float(0.1))
+            ('1.0E-5', '-0.0', '0.1')
+        """
+        mantissa, _, exponent = str(self.kind(value)).partition("e")
+        if "." not in mantissa:
+            mantissa += ".0"
+        return f"{mantissa}E{int(exponent)}" if exponent else mantissa
+
+    def literal(self, value: float) -> str:
+        """Return a number for an expression, with its type.
+
+        Example:
+            >>> LONG.literal(0.5), LONG.literal(-2.0)
+            ('LREAL#0.5', '(-LREAL#2.0)')
+        """
+        text = self.digits(value)
+        if text.startswith("-"):
+            return f"(-{self.name}#{text[1:]})"
+        return f"{self.name}#{text}"
+
+
+LONG = Numbers("LREAL", np.float64, 1.0 - 2.0**-53, float(np.finfo("d").max))
+SINGLE = Numbers("REAL", np.float32, 1.0 - 2.0**-24, float(np.finfo("f").max))
+
+
+def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> Names:
+    """Return names that the standard takes: ASCII, unlike in any case, no keywords.
+
+    Example:
+        >>> names = identifiers(["grip force", "IF", "v1", "x__y"], ["V1"])
+        >>> list(names.accepted.values())
+        ['grip_force', 'IF_2', 'v1_2', 'x_y']
+    """
+    given = list(names)
+    odd = [
+        name for name in given if "__" in name or name[:1] == "_" or name[-1:] == "_"
+    ]
+    return Names.of(
+        given,
+        first="abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ",
+        longest=_LONGEST_NAME,
+        taken=[*RESERVED, *taken, *odd],
+        ignores_case=True,
+    )
+
+
+def remark(text: str) -> str:
+    r"""Return text that may stand in a comment: one line of ASCII that cannot end it.
+
+    Example:
+        >>> print(remark("a *) (* é\n"))
+        a * ) ( * \xe9\n
+    """
+    plain = text.encode("unicode_escape").decode("ascii")
+    for pair in ("(*", "*)", "/*", "*/"):
+        while pair in plain:
+            plain = plain.replace(pair, f"{pair[0]} {pair[1]}")
+    return plain
+
+
+def table(name: str, kind: str, entries: Sequence[str], about: str) -> Iterator[str]:
+    """Yield the declaration of a table, from place 0, with a comment."""
+    last = len(entries) - 1
+    yield f"    {name} : ARRAY [0..{last}] OF {kind} := [ (* {about} *)\n"
+    line = "       "
+    for place, entry in enumerate(entries):
+        piece = f" {entry}{',' if place < last else ''}"
+        if len(line) + len(piece) > _WIDTH:
+            yield f"{line}\n"
+            line = "       "
+        line += piece
+    yield f"{line}\n    ];\n"

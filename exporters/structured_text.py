@@ -1,0 +1,274 @@
+"""Structured Text: a tree or rule base as a function block of IEC 61131-3.
+
+Nothing in it depends on a library: comparisons, `+ - * /`, `ABS`, loops with a fixed
+number of turns, arrays of fixed length. What is compared and computed, and in which
+order, is the reference's. Controllers may stop where a number is NaN or a division is
+by zero: so what is given is looked at first, and nothing is computed with what is
+missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+from fuzzytree.contracts import Format, Model, Written
+from fuzzytree.exporters.st_rules import RuleSteps, decision
+from fuzzytree.exporters.st_text import (
+    LONG,
+    SINGLE,
+    Numbers,
+    identifiers,
+    remark,
+    table,
+)
+from fuzzytree.naming import Names
+from fuzzytree.rulebase import RuleBase, Variable, fingerprint
+from fuzzytree.tree import FuzzyTree
+
+_OUTPUTS = ("class_number", "rule", "status", "strengths")
+_LOCALS = (
+    *("is_known", "k", "level", "node", "place", "asked", "axis"),
+    *("rule_class", "leaf_class", "node_axis", "node_first", "node_last"),
+    *("cut", "target"),
+)
+
+
+def write(
+    model: Model,
+    /,
+    *,
+    allow_loss: bool = False,
+    dtype: Literal["float64", "float32"] = "float64",
+    name: str = "",
+) -> Written:
+    """Return a model as a function block of Structured Text, in ASCII.
+
+    Its inputs are those of the model, its outputs `class_number` (the place among the
+    classes, from 0; -1 for none), `rule` (number of the rule or leaf, 0 for none),
+    `status` (0 decided, 1 tie, 2 no rule fires, 3 missing), and of a rule base the
+    `strengths` of all rules, which are 0 where a value is missing.
+
+    Args:
+        model: A tree or a rule base.
+        allow_loss: Of no effect: nothing is lost.
+        dtype: LREAL (`float64`), or REAL (`float32`), which rounds all numbers.
+        name: Of the function block; made from the model's unless given.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> print(write(random_tree(0)).content.decode("ascii").splitlines()[2])
+        FUNCTION_BLOCK random_7
+    """
+    del allow_loss
+    numbers = LONG if dtype == "float64" else SINGLE
+    mixed = [variable for variable in model.variables if variable.parts]
+    combined = {variable.name: f"mix_{k}" for k, variable in enumerate(mixed, 1)}
+    taken = _taken(model, combined)
+    given = name or model.name
+    block = identifiers([given], taken)[given]
+    names = identifiers(model.inputs, [*taken, block])
+    values = {**names.accepted, **combined}
+    if isinstance(model, RuleBase):
+        constants, local, body = _rules(model, values, numbers)
+    else:
+        constants, local, body = _tree(model, values, numbers)
+    text = "".join(
+        [
+            f"(* Written by fuzzytree: {remark(model.name)} *)\n",
+            f"(* Fingerprint: {fingerprint(model)} *)\n",
+            f"FUNCTION_BLOCK {block}\n",
+            *_interface(model, names, numbers),
+            *_block("VAR CONSTANT", constants),
+            *_block("VAR", [*_mixed_lines(mixed, combined, numbers), *local]),
+            "\n",
+            *_guard(model, names, mixed, combined, numbers),
+            *body,
+            "END_IF;\n",
+            "END_FUNCTION_BLOCK\n",
+        ]
+    )
+    changed = [f"{old!r} is called {new}" for old, new in names.changed.items()]
+    if block != given:
+        changed.insert(0, f"{given!r} is called {block}")
+    return Written(text.encode("ascii"), (), tuple(changed))
+
+
+def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
+    """Return the names that neither an input nor the function block may have."""
+    count = 0
+    if isinstance(model, RuleBase):
+        count = len(RuleSteps(model, {}, LONG).program.steps)
+    steps = [f"{letter}{k}" for letter in "vbnt" for k in range(count)]
+    return [*_OUTPUTS, *_LOCALS, *combined.values(), *steps]
+
+
+def _interface(model: Model, names: Names, numbers: Numbers) -> Iterator[str]:
+    inputs = [variable for variable in model.variables if not variable.parts]
+    lines = [
+        f"    {names[v.name]} : {numbers.name}; (* {remark(_described(v))} *)\n"
+        for v in inputs
+    ]
+    yield from _block("VAR_INPUT", lines)
+    yield "VAR_OUTPUT\n"
+    yield "    class_number : INT; (* -1: no class *)\n"
+    for place, label in enumerate(model.classes):
+        yield f"        (* {place}: {remark(label)} *)\n"
+    what = "rule" if isinstance(model, RuleBase) else "leaf"
+    yield f"    rule : DINT; (* number of the {what}, 0: none *)\n"
+    yield "    status : INT; (* 0: decided, 1: tie, 2: no rule fires, 3: missing *)\n"
+    if isinstance(model, RuleBase):
+        yield f"    strengths : ARRAY [1..{len(model.rules)}] OF {numbers.name};\n"
+    yield "END_VAR\n"
+
+
+def _described(variable: Variable) -> str:
+    return f"{variable.name} ({variable.unit})" if variable.unit else variable.name
+
+
+def _block(opening: str, lines: list[str]) -> Iterator[str]:
+    """Yield declarations; nothing if there are none."""
+    if lines:
+        yield f"{opening}\n"
+        yield from lines
+        yield "END_VAR\n"
+
+
+def _mixed_lines(
+    mixed: list[Variable], combined: Mapping[str, str], numbers: Numbers
+) -> Iterator[str]:
+    yield "    is_known : BOOL;\n"
+    yield "    k : DINT;\n"
+    for variable in mixed:
+        about = remark(variable.name)
+        yield f"    {combined[variable.name]} : {numbers.name}; (* {about} *)\n"
+
+
+def _guard(
+    model: Model,
+    names: Names,
+    mixed: list[Variable],
+    combined: Mapping[str, str],
+    numbers: Numbers,
+) -> Iterator[str]:
+    """Yield statements that find out what is missing, and answer where something is."""
+    largest = numbers.literal(numbers.largest)
+    given = list(names.accepted.values())
+    yield "is_known := TRUE;\n"
+    for one in given:  # only a number that is NaN is not equal to itself
+        yield f"IF NOT ({one} = {one}) THEN is_known := FALSE; END_IF;\n"
+    if given:
+        yield "IF is_known THEN\n"
+        for one in given:
+            test = f"ABS({one}) > {largest}"
+            yield f"    IF {test} THEN is_known := FALSE; END_IF;\n"
+        yield "END_IF;\n"
+    if mixed:
+        yield "IF is_known THEN\n"
+        for variable in mixed:
+            total = combined[variable.name]
+            for place, part in enumerate(variable.parts):
+                weight = numbers.literal(numbers.nearest(part.weight))
+                centre = numbers.literal(numbers.nearest(part.centre))
+                term = f"{weight} * ({names[part.input]} - {centre})"
+                term = f"{total} + {term}" if place else term
+                yield f"    {total} := {term};\n"
+            test = f"NOT (ABS({total}) <= {largest})"
+            yield f"    IF {test} THEN is_known := FALSE; END_IF;\n"
+        yield "END_IF;\n"
+    missing = model.semantics.missing
+    label = -1 if missing is None else model.classes.index(missing)
+    yield "IF NOT is_known THEN\n"
+    yield f"    class_number := {label};\n    rule := 0;\n    status := 3;\n"
+    if isinstance(model, RuleBase):
+        zero = numbers.literal(0.0)
+        yield f"    FOR k := 1 TO {len(model.rules)} DO\n"
+        yield f"        strengths[k] := {zero};\n    END_FOR;\n"
+    yield "ELSE\n"
+
+
+Parts = tuple[list[str], list[str], list[str]]
+"""Lines of constants, of variables, and of statements."""
+
+
+def _rules(rules: RuleBase, values: Mapping[str, str], numbers: Numbers) -> Parts:
+    steps = RuleSteps(rules, values, numbers)
+    body = [*steps.statements(), *decision(rules, numbers)]
+    labels = [str(rules.classes.index(rule.then)) for rule in rules.rules]
+    about = "places of the rules' classes"
+    constants = [*table("rule_class", "INT", labels, about), *steps.tables]
+    local = [f"    {name} : {kind};\n" for name, kind in steps.declared.items()]
+    return constants, local, body
+
+
+def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: Numbers) -> Parts:
+    labels = [str(tree.classes.index(leaf.label)) for leaf in tree.leaves]
+    constants = [*table("leaf_class", "INT", labels, "places of the leaves' classes")]
+    if not tree.nodes:
+        body = ["    rule := 1;\n    status := 0;\n"]
+        return constants, [], [*body, "    class_number := leaf_class[0];\n"]
+    asked = list(dict.fromkeys(node.variable for node in tree.nodes))
+    line = {name: place for place, name in enumerate(asked)}
+    firsts: list[str] = []
+    lasts: list[str] = []
+    cuts: list[str] = []
+    targets: list[str] = []
+    for node in tree.nodes:
+        firsts.append(str(len(targets)))
+        ends = [
+            -branch.leaf if branch.leaf is not None else (branch.node or 0) - 1
+            for branch in node.branches
+        ]
+        targets += [str(ends[owner]) for owner in node.owners]
+        lasts.append(str(len(targets) - 2))
+        cuts += [numbers.digits(numbers.at_most(cut)) for cut in node.cuts]
+        cuts.append("0.0")  # so that a cut and the target below it share a place
+    axes = [str(line[node.variable]) for node in tree.nodes]
+    constants += [
+        *table("node_axis", "INT", axes, "which value each node asks"),
+        *table("node_first", "DINT", firsts, "place of its first cut"),
+        *table("node_last", "DINT", lasts, "place of its last cut"),
+        *table("cut", numbers.name, cuts, "0.0 ends the cuts of a node"),
+        *table("target", "DINT", targets, "below each cut: a node, or -1 for leaf 1"),
+    ]
+    local = [
+        "    node : DINT;\n    place : DINT;\n    level : DINT;\n",
+        f"    asked : {numbers.name};\n",
+        f"    axis : ARRAY [0..{len(asked) - 1}] OF {numbers.name};\n",
+    ]
+    given = [f"    axis[{line[name]}] := {values[name]};\n" for name in asked]
+    return constants, local, [*given, *_walk(_depth(tree))]
+
+
+def _walk(depth: int) -> Iterator[str]:
+    yield "    node := 0;\n"
+    yield f"    FOR level := 1 TO {depth} DO\n"
+    yield "        IF node >= 0 THEN\n"
+    yield "            asked := axis[node_axis[node]];\n"
+    yield "            place := node_first[node];\n"
+    yield "            FOR k := node_first[node] TO node_last[node] DO\n"
+    yield "                IF asked > cut[k] THEN place := k + 1; END_IF;\n"
+    yield "            END_FOR;\n"
+    yield "            node := target[place];\n"
+    yield "        END_IF;\n"
+    yield "    END_FOR;\n"
+    yield "    rule := -node;\n    status := 0;\n"
+    yield "    class_number := leaf_class[rule - 1];\n"
+
+
+def _depth(tree: FuzzyTree) -> int:
+    """Return how many nodes the longest path asks."""
+    depths = [1] * len(tree.nodes)
+    for place in range(len(tree.nodes) - 1, -1, -1):
+        below = [b.node for b in tree.nodes[place].branches if b.node is not None]
+        depths[place] += max((depths[number - 1] for number in below), default=0)
+    return depths[0]
+
+
+FORMAT = Format(
+    name="structured-text",
+    suffixes=(".st",),
+    carries=("tree", "rules"),
+    write=write,
+    dtype="float64",
+)
