@@ -354,6 +354,10 @@ def _shipped_onnx(
     title: str, other: OnnxModel, model: Model, rows: Rows
 ) -> Iterator[Finding]:
     """Compare an ONNX file: what it says of itself, its graph, and its answers."""
+    if other.run_system is not None:
+        fault = "it answers the numbers of a fuzzy system, and the model a class"
+        yield _counted("file", title, "the model's facts", 1, (fault,))
+        return
     if other.inputs != model.inputs or other.classes != model.classes:
         fault = (
             f"it decides for {', '.join(other.classes)} "

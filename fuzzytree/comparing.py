@@ -246,9 +246,27 @@ def _compared(
 def _row_text(found: Answers, expected: Answers, rows: Rows, row: int) -> str:
     values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
     shown = ", ".join(f"{name} {value!r}" for name, value in values)
+    wanted, got = _answer_text(expected, row), _answer_text(found, row)
+    if wanted == got:
+        gap = _apart(found, expected, row)
+        return f"{rows.name(row)}: {shown}: both answer {got}{gap}"
     return (
-        f"{rows.name(row)}: {shown}: {expected.title} answers "
-        f"{_answer_text(expected, row)}, {found.title} {_answer_text(found, row)}"
+        f"{rows.name(row)}: {shown}: {expected.title} answers {wanted}, "
+        f"{found.title} {got}"
+    )
+
+
+def _apart(found: Answers, expected: Answers, row: int) -> str:
+    """Return where the strengths of a row are furthest apart, in words."""
+    one, two = found.outcome.strengths, expected.outcome.strengths
+    if one is None or two is None or one.shape != two.shape:
+        return ""
+    gap = np.abs(one[:, row] - two[:, row])
+    rule = int(np.argmax(np.where(np.isnan(gap), np.inf, gap)))
+    right, other = float(two[rule, row]), float(one[rule, row])
+    return (
+        f"; the strength of rule {rule + 1} is {right!r} in {expected.title}, "
+        f"{other!r} in {found.title}"
     )
 
 

@@ -142,7 +142,7 @@ def refuse_unreadable(form: Format, name: str) -> None:
     if form.read is None:
         raise ReadError(
             f"{name}: a file in the format {form.name} is not read back as a model; "
-            "keep the YAML file beside it"
+            "keep the file that it was made of"
         )
 
 
@@ -195,7 +195,7 @@ def deciding(model: Document, verb: str) -> Model:
     if isinstance(model, FuzzySystem):
         raise ReadError(
             f"{model.name} is a fuzzy system, which decides for no class; "
-            f"{verb} needs a tree or a rule base"
+            f"{verb} takes a tree or a rule base"
         )
     return model
 

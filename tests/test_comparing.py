@@ -56,6 +56,17 @@ BASE = answers(
 )
 
 
+def test_equal_answers_of_other_strengths_are_told_with_the_rule_that_differs() -> None:
+    assert BASE.outcome.strengths is not None
+    strengths = BASE.outcome.strengths.tolist()
+    strengths[2][1] = 0.125
+    moved = answers("moved", [1, 2, 0], [0, 0, 2], strengths)
+    assert compare_bits(moved, BASE, ROWS).detail == (
+        "row 1: x 2.0: both answer b (rule 2) with 0.4; the strength of rule 3 is "
+        "0.1 in base, 0.125 in moved",
+    )
+
+
 def test_equal_answers_agree() -> None:
     found = compare_bits(BASE, BASE, ROWS)
     assert (found.verdict, found.differing, found.flips) == ("agrees", 0, 0)

@@ -7,6 +7,7 @@ what they run on only inside `load`, so the table can be read without it.
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import importlib.util
 import shutil
@@ -40,8 +41,10 @@ def find_runtime(name: str) -> Runtime:
         for runtime in _runtimes_of(module):
             if runtime.name == name:
                 return runtime
-    known = ", ".join(runtime.name for runtime in all_runtimes())
-    raise ValueError(f"no runtime {name!r}; there is {known}")
+    known = [runtime.name for runtime in all_runtimes()]
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    raise ValueError(f"no runtime {name!r}; there is {', '.join(known)}{hint}")
 
 
 def chosen_runtimes(names: Sequence[str] | None) -> tuple[Runtime, ...]:

@@ -66,7 +66,7 @@ def test_every_verb_refuses_it_alike(
     more = {"run": ["grasps.csv"], "export": ["-o", "new.yaml"]}.get(verb, [])
     if path.endswith(".onnx") and verb in ("check", "export"):
         stem = "a file in the format onnx is not read back as a model"
-        start = f"{path}: {stem}; keep the YAML file beside it\n"
+        start = f"{path}: {stem}; keep the file that it was made of\n"
     code, out, err = call(verb, path, *more)
     assert (code, out) == (2, "")
     assert err.startswith(start)

@@ -259,4 +259,4 @@ def test_a_missing_extra_for_pictures_is_named(
 def test_a_model_that_is_no_yaml_is_one_sentence(call: Call) -> None:
     code, out, err = call("bench", "grip.onnx", *FAST)
     assert (code, out) == (2, "")
-    assert "is not read back as a model; keep the YAML file" in err
+    assert "is not read back as a model; keep the file" in err

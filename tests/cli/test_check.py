@@ -70,6 +70,7 @@ def test_an_unknown_runtime_is_one_sentence(call: Call) -> None:
     code, out, err = call("check", "grip.yaml", "--runtime", "nativ")
     assert (code, out) == (2, "")
     assert err.startswith("no runtime 'nativ'")
+    assert "(did you mean 'native'?)" in err
 
 
 def test_rows_that_do_not_fit_are_one_sentence(call: Call) -> None:
@@ -105,6 +106,12 @@ def test_a_disagreement_is_told_with_its_worst_row() -> None:
         "x.onnx against tree:",
         "  probe 1: force 2.0: tree answers soft, x.onnx firm",
     ]
+
+
+def test_a_disagreement_that_changes_no_class_says_so() -> None:
+    wrong = Comparison("x.fll", "tree", "rows", 9, "DISAGREES", 2, 0.25, 0.0, "bits")
+    found = Agreement("grip", "0" * 64, (wrong,), probes=9)
+    assert list(agreement_lines(found))[2].endswith("  DISAGREES in 2, in no class")
 
 
 def test_certificates_stand_behind_all_the_rest() -> None:

@@ -131,7 +131,7 @@ def test_streams_name_their_formats(call: Call) -> None:
         (
             ("grip.onnx", "a.yaml"),
             "grip.onnx: a file in the format onnx is not read back as a model; "
-            "keep the YAML file beside it\n",
+            "keep the file that it was made of\n",
         ),
         (
             ("grip.yaml", "a.onnx", "--set", "opset"),
@@ -227,6 +227,15 @@ def test_the_next_command_says_that_it_shows_what_losses_change(call: Call) -> N
     hint = "fuzzytree check tipper.fll a.fcl"
     assert (code, json.loads(out)["next"]) == (0, hint)
     assert err.endswith(f"next     {hint} (shows what the losses change)\n")
+
+
+def test_no_command_comes_next_that_compares_numbers_with_classes(call: Call) -> None:
+    code, _, err = call("convert", "grip.yaml", "a.onnx", "--as", "system")
+    assert code == 0
+    assert "next" not in err
+    code, out, _ = call("check", "grip.yaml", "a.onnx", "--runtime", "native")
+    assert code == 1
+    assert "  it answers the numbers of a fuzzy system, and the model a class\n" in out
 
 
 def test_a_terminal_is_no_input(
@@ -436,7 +445,7 @@ def test_verbs_for_classes_refuse_a_system_in_one_sentence(call: Call) -> None:
         assert (code, out) == (2, "")
         assert err == (
             "tipper is a fuzzy system, which decides for no class; "
-            f"{verb} needs a tree or a rule base\n"
+            f"{verb} takes a tree or a rule base\n"
         )
 
 

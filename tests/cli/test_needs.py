@@ -136,7 +136,7 @@ def test_a_pruned_model_that_differs_is_not_written(
         (
             ("needs", "grip.onnx"),
             "grip.onnx: a file in the format onnx is not read back as a model; "
-            "keep the YAML file beside it\n",
+            "keep the file that it was made of\n",
         ),
         (
             ("needs", "grip.yaml", "--data", "no.csv"),

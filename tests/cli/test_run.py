@@ -207,7 +207,7 @@ def test_a_missing_column_is_named(call: Call) -> None:
         (
             "grip.py",
             "grip.py: a file in the format python is not read back as a model; "
-            "keep the YAML file beside it\n",
+            "keep the file that it was made of\n",
         ),
         ("broken.onnx", "broken.onnx: this is no ONNX file, or only a part of one\n"),
     ],
