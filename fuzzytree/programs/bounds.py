@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.programs.copies import marks_of, same
 from fuzzytree.programs.evaluate import still_results
 from fuzzytree.programs.operations import INEXACT
 from fuzzytree.programs.steps import Program, Step
@@ -39,6 +40,9 @@ against exact values: at most 1.5 (exp, log, pow), 6.4 (tanh), of the C library,
 and onnxruntime. Of sines and cosines the units are those of 1: at most 1.3 and 7.3, as
 graphs compute a cosine from a sine."""
 
+_SURELY_0 = -750.0
+"""Below it e to a power is 0 in every library: half the least double is at -745.1."""
+
 _MONOTONE: Mapping[str, Callable[..., Array]] = {
     "floor": np.floor,
     "ceiling": np.ceil,
@@ -57,7 +61,15 @@ _MONOTONE: Mapping[str, Callable[..., Array]] = {
     "area_cosine": np.arccosh,
     "area_tangent": np.arctanh,
 }
+_COMPARISONS: Mapping[str, Callable[[Array, Array], Array]] = {
+    "less": np.less,
+    "at_most": np.less_equal,
+    "equal": np.equal,
+}
 _WAVES: Mapping[str, Callable[..., Array]] = {"sine": np.sin, "cosine": np.cos}
+_UNROUNDED = frozenset(
+    ("where", "minimum", "maximum", "negate", "absolute", "floor", "ceiling", "round")
+) | {"below", "pick", "last", "highest", "lowest"}
 _ROUGH: Mapping[str, Callable[..., Array]] = {
     "tangent": np.tan,
     "hyperbolic_cosine": np.cosh,
@@ -101,8 +113,11 @@ def error_bounds(
 
 def _bounds(program: Program, values: npt.NDArray[np.float64]) -> list[Array]:
     found: list[Pair] = []
-    for step, still in zip(program.steps, still_results(program), strict=True):
-        given = [found[place] for place in step.arguments]
+    marks: list[Array] = []
+    stills = still_results(program)
+    for place, (step, still) in enumerate(zip(program.steps, stills, strict=True)):
+        given = [found[one] for one in step.arguments]
+        given_marks = [marks[one] for one in step.arguments]
         if still is not None:  # computed once, by the same functions
             value = np.array(still)
             value = value.reshape(-1, 1) if isinstance(still, list) else value
@@ -110,8 +125,12 @@ def _bounds(program: Program, values: npt.NDArray[np.float64]) -> list[Array]:
         elif step.operation == "input":
             line = values[program.inputs.index(step.name)]
             found.append((line, np.zeros(line.shape)))
+        elif step.operation in _COMPARISONS:
+            (one, two), copied = given, same(*given_marks)
+            found.append(_compared(step.operation, one, two, copied))
         else:
             found.append(_pair(step, given))
+        marks.append(marks_of(step, place, found[-1], given, given_marks))
     return [found[one.step][1] for one in program.results]
 
 
@@ -124,13 +143,33 @@ def _pair(step: Step, given: Sequence[Pair]) -> Pair:
         if not (step.operation == "where" and place == 0):
             is_exact = is_exact & _all_exact(step, other, value)
     error = np.where(np.isnan(error), np.inf, error)
-    if step.operation == "where":
+    if step.operation in _UNROUNDED:
         return value, error
+    is_exact = is_exact | _is_certain(step.operation, given)
     own = _own_error(step.operation, value, [one for one, _ in given])
     rounding = np.where(np.isfinite(value), np.spacing(np.abs(value) + error), 0.0)
     moved = error + rounding
     moved = np.where(np.isnan(moved), np.inf, moved)
     return value, np.where(is_exact, 0.0, moved) + own
+
+
+def _is_certain(operation: str, given: Sequence[Pair]) -> Array:
+    """Return where a sure 0, infinity or NaN decides for the result, error or not."""
+    certain: Array = np.zeros(1, np.bool_)
+    if operation not in ("add", "subtract", "multiply", "divide"):
+        return certain
+    (a, error_a), (b, error_b) = given
+    for one, error in given:
+        certain = certain | (np.isnan(one) & (error == 0.0))
+    if operation == "multiply":
+        for (one, error), (other, unsure) in (given, given[::-1]):
+            is_sure = error == 0.0
+            certain = certain | (is_sure & (one == 0.0) & np.isfinite(other + unsure))
+            certain = certain | (is_sure & np.isinf(one) & (np.abs(other) > unsure))
+    if operation == "divide":
+        is_sure = (error_a == 0.0) & (np.abs(b) > error_b)
+        certain = certain | (is_sure & (a == 0.0))
+    return certain
 
 
 def _all_exact(step: Step, error: Array, value: Array) -> Array:
@@ -147,6 +186,8 @@ def _own_error(operation: str, value: Array, given: Sequence[Array]) -> Array:
     size = np.ones(value.shape) if operation in _WAVES else np.abs(value)
     units: Array = np.array(PAIR_ULPS.get(operation, 8.0) * np.spacing(size))
     is_one: Array = ~np.isfinite(value)  # what all libraries agree on
+    if operation == "exponential":
+        is_one = is_one | (given[0] < _SURELY_0)
     if operation == "power":
         base, exponent = given
         is_one = is_one | (base == 0.0) | (base == 1.0)
@@ -167,14 +208,18 @@ def _truth(operation: str, given: Sequence[Pair]) -> Pair:
     if operation == "and":
         unsure = (unsure_a & (b | unsure_b)) | (unsure_b & (a | unsure_a))
         return a & b, unsure
-    if operation == "or":
-        unsure = (unsure_a & (~b | unsure_b)) | (unsure_b & (~a | unsure_a))
-        return a | b, unsure
-    both = unsure_a + unsure_b
-    unsure = (both > 0.0) & ~(np.abs(a - b) > both)
-    if operation == "less":
-        return a < b, unsure
-    return (a <= b if operation == "at_most" else a == b), unsure
+    unsure = (unsure_a & (~b | unsure_b)) | (unsure_b & (~a | unsure_a))
+    return a | b, unsure
+
+
+def _compared(operation: str, one: Pair, two: Pair, is_same: Array) -> Pair:
+    """Compare; a number and its copy are equal, unless either may be NaN."""
+    (a, error_a), (b, error_b) = one, two
+    both = error_a + error_b
+    is_near = (both > 0.0) & ~(np.abs(a - b) > both)
+    is_nan = (np.isnan(a) & (error_a == 0.0)) | (np.isnan(b) & (error_b == 0.0))
+    unsure = is_near & ~is_nan & (~is_same | np.isinf(both))
+    return _COMPARISONS[operation](a, b), unsure
 
 
 def _number(step: Step, given: Sequence[Pair]) -> Pair:
@@ -201,9 +246,10 @@ def _number(step: Step, given: Sequence[Pair]) -> Pair:
 
 
 def _monotone(function: Callable[..., Array], a: Array, error: Array) -> Pair:
-    low, high = function(a - error), function(a + error)
-    gap = np.where(low == high, 0.0, np.abs(high - low))
-    return function(a), gap
+    value, low, high = function(a), function(a - error), function(a + error)
+    is_none = np.isnan(value) & np.isnan(low) & np.isnan(high) & (error < 1.0)
+    gap = np.where((low == high) | is_none, 0.0, np.abs(high - low))
+    return value, gap
 
 
 def _looked_up(step: Step, a: Array, error: Array) -> Pair:
@@ -228,9 +274,16 @@ def _over_samples(operation: str, a: Array, error: Array) -> Pair:
         case "last":
             return a[-1], error[-1]
         case "highest":
-            return a.max(axis=0), error.max(axis=0)
+            return a.max(axis=0), _end_error(a, error)
         case _:
-            return a.min(axis=0), error.max(axis=0)
+            return a.min(axis=0), _end_error(-a, error)
+
+
+def _end_error(a: Array, error: Array) -> Array:
+    """Return the largest error of those that may be the highest."""
+    may_be = ~(a + error < (a - error).max(axis=0))
+    kept: Array = np.where(may_be, error, 0.0).max(axis=0)
+    return kept
 
 
 def _halved(samples: Array) -> Array:
@@ -263,16 +316,23 @@ def _of_two(operation: str, a: Array, error_a: Array, b: Array, error_b: Array) 
             return a * b, _times(size_a, error_b) + _times(size_b, error_a)
         case "divide":
             least = np.abs(b) - error_b
-            turned = _times(size_b, error_a) + _times(size_a, error_b)
-            error = np.where(least > 0.0, turned / (least * least), np.inf)
+            turned = error_a + _times(np.abs(a / b), error_b)
+            error = np.where(least > 0.0, turned / least, np.inf)
             fixed = np.where(error_a == 0.0, 0.0, error_a / np.abs(b))
             return a / b, np.where(error_b == 0.0, fixed, error)
         case "minimum":
-            return np.minimum(a, b), np.maximum(error_a, error_b)
+            return np.minimum(a, b), _smaller_error(a, error_a, b, error_b)
         case "maximum":
-            return np.maximum(a, b), np.maximum(error_a, error_b)
+            return np.maximum(a, b), _smaller_error(-a, error_a, -b, error_b)
         case _:
             return _power(a, error_a, b, error_b)
+
+
+def _smaller_error(a: Array, error_a: Array, b: Array, error_b: Array) -> Array:
+    """Return the error of the smaller number, the larger error where it is unsure."""
+    unsure = np.maximum(error_a, error_b)
+    second = np.where(b + error_b < a - error_a, error_b, unsure)
+    return np.where(a + error_a < b - error_b, error_a, second)
 
 
 def _times(size: Array, error: Array) -> Array:
