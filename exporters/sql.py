@@ -39,9 +39,9 @@ def write(
     /,
     *,
     allow_loss: bool = False,
-    dialect: str = "sqlite",
+    dialect: Dialect = "sqlite",
     table: str = "data",
-    keep: Sequence[str] = (),
+    keep: Sequence[str] | str = (),
     strengths: bool = False,
 ) -> Written:
     """Return a model as the text of one SQL query, in UTF-8.

@@ -225,6 +225,9 @@ def _compared(
     margin = margins(expected)
     told = np.flatnonzero(wrong)
     told = told[np.argsort(-gap[told], kind="stable")][:_TOLD]
+    detail = [_row_text(found, expected, rows, row) for row in told.tolist()]
+    if detail and gap.any() and not flips.any():
+        detail.insert(0, "only strengths differ: every row has the same class")
     return Comparison(
         found.title,
         expected.title,
@@ -239,7 +242,7 @@ def _compared(
         largest_flip_margin=(
             float(margin[flips].max()) if margin is not None and flips.any() else None
         ),
-        detail=tuple(_row_text(found, expected, rows, row) for row in told.tolist()),
+        detail=tuple(detail),
     )
 
 

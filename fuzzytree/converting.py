@@ -26,7 +26,7 @@ from fuzzytree.files import read_bounded
 from fuzzytree.likeness import likeness
 from fuzzytree.losses import loss_text
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.options import Option, check_names
+from fuzzytree.options import Option, check_options
 from fuzzytree.probing import probes
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase
@@ -294,6 +294,21 @@ def _formed_system(
     )
 
 
+def _way_out(carrier: Carrier, form: Format) -> str:
+    """Return what to do with a model that a format does not carry."""
+    nearest = _nearest(carrier, form)
+    if nearest != carrier:
+        return f"fuzzytree.convert makes {_FEW_OF[nearest]} of it"
+    return f"{', '.join(_carriers(carrier))} carry one"
+
+
+_FEW_OF: dict[Carrier, str] = {
+    "tree": "a tree",
+    "rules": "rules",
+    "system": "a fuzzy system",
+}
+
+
 def _carriers(carrier: Carrier) -> list[str]:
     """Return the names of the formats that carry a kind of model."""
     return [form.name for form in all_formats() if carrier in form.carries]
@@ -361,9 +376,9 @@ def export(
         carried = " or ".join(form.carries)
         raise LossError(
             f"cannot write {model.name} as {form.name}: it carries {carried}, "
-            f"and this is a {CALLED[carrier]}"
+            f"and this is a {CALLED[carrier]}; {_way_out(carrier, form)}"
         )
-    check_names(form, options)
+    check_options(form, options)
     if isinstance(tolerance := options.get("tolerance"), int | float):
         check_tolerance(tolerance)
     # Each writer checks its own options; the protocol knows the common one alone.

@@ -73,6 +73,26 @@ def check_names(form: Format, options: Mapping[str, object]) -> None:
             )
 
 
+def check_options(form: Format, options: Mapping[str, object]) -> None:
+    """Refuse an option that a writer does not have, and a value that one cannot have.
+
+    Raises:
+        ValueError: As `check_names`; or it names the values that there are.
+
+    Example:
+        >>> from fuzzytree.exporters import find_format
+        >>> check_options(find_format("javascript"), {"module": "est"})
+        Traceback (most recent call last):
+        ValueError: module: must be es, script (did you mean 'es'?), not 'est'
+    """
+    check_names(form, options)
+    for name, value in options.items():
+        kind = _kind(form, name)
+        faults = [_fault(value, part) for part in _parts(kind)]
+        if all(faults):
+            raise ValueError(f"{name}: must be {faults[0]}, not {value!r}")
+
+
 def option_value(form: Format, name: str, text: str) -> Option:
     """Return what a text means as an option: a number, a truth value, a list.
 
@@ -119,8 +139,35 @@ def _choices(kind: Any) -> tuple[object, ...]:
     return ()
 
 
+def _parts(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+
+
+def _fault(value: object, part: Any) -> str:
+    """Return what a value would have to be to be of a type; empty if it is."""
+    origin = get_origin(part) or part
+    if origin is Literal:
+        known = get_args(part)
+        return "" if value in known else _one_of(str(value), tuple(map(str, known)))
+    if part is bool:
+        return "" if isinstance(value, bool) else "True or False"
+    if part in (int, float):
+        wanted = int if part is int else (int, float)
+        is_number = isinstance(value, wanted) and not isinstance(value, bool)
+        what = "a whole number" if part is int else "a number"
+        return "" if is_number else what
+    if part is str:
+        return "" if isinstance(value, str) else "a text"
+    if _is_sequence(origin):
+        is_list = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+        return "" if is_list else "a list"
+    if part is type(None):
+        return "" if value is None else "None"
+    return ""
+
+
 def _meant(name: str, text: str, kind: Any) -> Option:
-    parts = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
+    parts = _parts(kind)
     if type(None) in parts and text.lower() == "none":
         return None
     wrong = "a value"

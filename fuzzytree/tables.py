@@ -186,7 +186,8 @@ def batches(
 
     Columns are found by name, in any order; columns that the model does not need are
     counted. An array without names that is as wide as the table that the model was
-    learnt from has that table's names.
+    learnt from has that table's names; for a model that was not learnt, it has the
+    names of the inputs.
 
     Args:
         source: The table; see the module.
@@ -430,12 +431,14 @@ def _needed_columns(
 ) -> list[int]:
     columns: Sequence[str] = piece.columns
     if not piece.is_named and not set(inputs) <= set(columns):
-        if len(columns) != len(trained):
+        wanted = trained or inputs
+        if len(columns) != len(wanted):
+            verb = "was learnt from" if trained else "asks for"
             raise TableError(
                 f"{piece.name} has {len(columns)} columns without names, and the "
-                f"model was learnt from {len(trained)}: {', '.join(trained)}"
+                f"model {verb} {len(wanted)}: {', '.join(wanted)}"
             )
-        columns = trained
+        columns = wanted
     else:
         _refuse_absent(piece, inputs, ", which the model needs")
     return [columns.index(name) for name in inputs]

@@ -62,6 +62,7 @@ def test_equal_answers_of_other_strengths_are_told_with_the_rule_that_differs() 
     strengths[2][1] = 0.125
     moved = answers("moved", [1, 2, 0], [0, 0, 2], strengths)
     assert compare_bits(moved, BASE, ROWS).detail == (
+        "only strengths differ: every row has the same class",
         "row 1: x 2.0: both answer b (rule 2) with 0.4; the strength of rule 3 is "
         "0.1 in base, 0.125 in moved",
     )
@@ -83,6 +84,7 @@ def test_one_ulp_of_a_strength_disagrees_with_equal_bits() -> None:
     assert (found.verdict, found.differing) == ("DISAGREES", 1)
     assert found.largest_difference == math.nextafter(0.9, 1) - 0.9
     assert found.detail == (
+        "only strengths differ: every row has the same class",
         "probe 1: x 1.0: base answers a (rule 1) with 0.9, "
         "moved a (rule 1) with 0.9000000000000001",
     )

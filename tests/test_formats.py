@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from fuzzytree.abilities import MEANINGS, abilities, dialects_of
 from fuzzytree.contracts import Document, Loss, Written
-from fuzzytree.converting import formed
+from fuzzytree.converting import export, formed
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, find_format
 from fuzzytree.report.formats import SIGNS, ability_table
@@ -142,9 +142,20 @@ def test_a_tree_goes_as_rules_and_rules_as_a_system() -> None:
 def test_a_system_whose_outputs_are_numbers_is_no_rule_base() -> None:
     with pytest.raises(LossError) as caught:
         formed(samples()["Mamdani, centroid"], replace(YAML, carries=("rules",)))
+    carriers = [form.name for form in all_formats() if "system" in form.carries]
     assert str(caught.value) == (
         "cannot write fan as yaml: it carries rules, "
-        "and this is a fuzzy system whose outputs are numbers"
+        "and this is a fuzzy system whose outputs are numbers; "
+        f"{', '.join(carriers)} carry one"
+    )
+
+
+def test_a_tree_is_refused_with_what_to_do() -> None:
+    with pytest.raises(LossError) as caught:
+        export(samples()["tree"], "fll")
+    assert str(caught.value) == (
+        "cannot write grip as fll: it carries rules or system, and this is a tree; "
+        "fuzzytree.convert makes rules of it"
     )
 
 

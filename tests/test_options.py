@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from fuzzytree.contracts import Model, Written
 from fuzzytree.exporters import all_formats, find_format
-from fuzzytree.options import check_names, option_value, options_of
+from fuzzytree.options import check_options, option_value, options_of
 
 
 def _write(
@@ -105,10 +105,36 @@ def test_a_text_that_means_nothing_is_one_sentence(
     assert str(caught.value) == message
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("dialect", "soth", "must be north, south (did you mean 'south'?), not 'soth'"),
+        ("tolerance", "1e-3", "must be a number, not '1e-3'"),
+        ("tolerance", None, "must be a number, not None"),
+        ("tolerance", True, "must be a number, not True"),
+        ("count", 1.5, "must be a whole number, not 1.5"),
+        ("names", "one", "must be a list, not 'one'"),
+        ("verbose", "yes", "must be True or False, not 'yes'"),
+        ("title", 3, "must be a text, not 3"),
+    ],
+)
+def test_a_value_that_no_option_can_have_is_one_sentence(
+    name: str, value: object, message: str
+) -> None:
+    with pytest.raises(ValueError, match="must be") as caught:
+        check_options(FORM, {name: value})
+    assert str(caught.value) == f"{name}: {message}"
+
+
+def test_values_of_the_right_type_are_taken() -> None:
+    check_options(FORM, {"dialect": "south", "tolerance": 1, "count": None})
+    check_options(FORM, {"names": ["a"], "verbose": True, "title": "a"})
+
+
 def test_every_option_of_every_format_has_help_and_takes_its_default() -> None:
     for form in all_formats():
         for one in options_of(form):
             assert one.help, (form.name, one.name)
-            check_names(form, {one.name: one.default})
+            check_options(form, {one.name: one.default})
             for choice in one.choices:
                 assert str(option_value(form, one.name, choice)) == choice

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ FOUND = Outputs(
     np.array([Status.DECIDED, Status.UNCOVERED, Status.MISSING]),
     np.array([[0.5, 0.0, math.nan]]),
 )
+TIPPER = Path(__file__).resolve().parent.parent / "examples" / "tipper.fll"
 SYSTEMS = [one for one in samples().values() if isinstance(one, FuzzySystem)]
 
 
@@ -100,3 +102,19 @@ def test_reasons_tell_what_fired_and_what_did_not() -> None:
     assert told[1].startswith("0.25 2. IF heat is high")
     assert told[2] == "a value is missing or not finite"
     assert told[3] == "no rule fires"
+
+
+def test_an_array_as_wide_as_a_system_has_its_columns() -> None:
+    tipper = ft.load(TIPPER)
+    found = ft.run(tipper, np.array([[3.0, 8.0], [9.0, 2.0]]))
+    named = ft.run(
+        tipper, np.array([[8.0, 3.0], [2.0, 9.0]]), columns=["food", "service"]
+    )
+    assert isinstance(found, ft.Outputs)
+    assert isinstance(named, ft.Outputs)
+    assert found.values.tolist() == named.values.tolist()
+    with pytest.raises(ft.FuzzyTreeError) as caught:
+        ft.run(tipper, np.zeros((1, 3)))
+    assert str(caught.value) == (
+        "the array has 3 columns without names, and the model asks for 2: service, food"
+    )

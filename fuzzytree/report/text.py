@@ -348,8 +348,6 @@ def _comparison_row(one: Comparison) -> tuple[str, ...]:
     verdict: str = one.verdict
     if one.differing:
         verdict += f" in {one.differing}"
-    if one.differing and one.largest_difference and not one.flips:
-        verdict += ", in no class"
     if one.flips and not one.differing:
         verdict += f", {counted(one.flips, 'class', 'classes')} differ as allowed"
     if one.largest_flip_margin:

@@ -108,12 +108,6 @@ def test_a_disagreement_is_told_with_its_worst_row() -> None:
     ]
 
 
-def test_a_disagreement_that_changes_no_class_says_so() -> None:
-    wrong = Comparison("x.fll", "tree", "rows", 9, "DISAGREES", 2, 0.25, 0.0, "bits")
-    found = Agreement("grip", "0" * 64, (wrong,), probes=9)
-    assert list(agreement_lines(found))[2].endswith("  DISAGREES in 2, in no class")
-
-
 def test_certificates_stand_behind_all_the_rest() -> None:
     sentence = "no decision can differ where the margin exceeds 2 x 1.3e-06"
     mixed = Certified(
