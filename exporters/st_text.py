@@ -57,7 +57,8 @@ class Numbers:
 
     def nearest(self, value: float) -> float:
         """Return the nearest number of the type: finite, and 0 only for 0."""
-        (found,) = rounded([value], self.kind, is_divisor=value != 0.0).tolist()
+        held = max(-self.largest, min(value, self.largest))
+        (found,) = rounded([held], self.kind, is_divisor=value != 0.0).tolist()
         return float(found)
 
     def at_most(self, value: float) -> float:
@@ -148,3 +149,25 @@ def table(name: str, kind: str, entries: Sequence[str], about: str) -> Iterator[
             line = "       "
         line += piece
     yield f"{line}\n    ];\n"
+
+
+def block_of(opening: str, lines: Sequence[str]) -> Iterator[str]:
+    """Yield a section of declarations; nothing if there are none."""
+    if lines:
+        yield f"{opening}\n"
+        yield from lines
+        yield "END_VAR\n"
+
+
+def known_inputs(names: Sequence[str], numbers: Numbers) -> Iterator[str]:
+    """Yield statements that say in `is_known` whether all inputs are finite."""
+    largest = numbers.literal(numbers.largest)
+    yield "is_known := TRUE;\n"
+    for name in names:  # only a number that is NaN is not equal to itself
+        yield f"IF NOT ({name} = {name}) THEN is_known := FALSE; END_IF;\n"
+    if names:
+        yield "IF is_known THEN\n"
+        for name in names:
+            test = f"ABS({name}) > {largest}"
+            yield f"    IF {test} THEN is_known := FALSE; END_IF;\n"
+        yield "END_IF;\n"

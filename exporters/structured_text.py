@@ -1,6 +1,6 @@
-"""Structured Text: a tree or rule base as a function block of IEC 61131-3.
+"""Structured Text: a model as a function block of IEC 61131-3.
 
-Nothing in it depends on a library: comparisons, `+ - * /`, `ABS`, loops with a fixed
+Trees and rules depend on no library: comparisons, `+ - * /`, `ABS`, loops with a fixed
 number of turns, arrays of fixed length. What is compared and computed, and in which
 order, is the reference's. Controllers may stop where a number is NaN or a division is
 by zero: so what is given is looked at first, and nothing is computed with what is
@@ -12,18 +12,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
-from fuzzytree.contracts import Format, Model, Written
+from fuzzytree.contracts import Document, Format, Model, Written
 from fuzzytree.exporters.st_rules import RuleSteps, decision
+from fuzzytree.exporters.st_system import written_system
 from fuzzytree.exporters.st_text import (
     LONG,
     SINGLE,
     Numbers,
+    block_of,
     identifiers,
+    known_inputs,
     remark,
     table,
 )
 from fuzzytree.naming import Names
 from fuzzytree.rulebase import RuleBase, Variable, fingerprint
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 _OUTPUTS = ("class_number", "rule", "status", "strengths")
@@ -35,7 +39,7 @@ _LOCALS = (
 
 
 def write(
-    model: Model,
+    model: Document,
     /,
     *,
     allow_loss: bool = False,
@@ -47,27 +51,33 @@ def write(
     Its inputs are those of the model, its outputs `class_number` (the place among the
     classes, from 0; -1 for none), `rule` (number of the rule or leaf, 0 for none),
     `status` (0 decided, 1 tie, 2 no rule fires, 3 missing), and of a rule base the
-    `strengths` of all rules, which are 0 where a value is missing.
+    `strengths` of all rules, which are 0 where a value is missing. A fuzzy system has
+    its own outputs, `status` (0, 2 or 3), and `is_number`: whether each output has a
+    number; where it has none it is 0.
 
     Args:
-        model: A tree or a rule base.
-        allow_loss: Of no effect: nothing is lost.
+        model: A tree, a rule base or a fuzzy system.
+        allow_loss: Of no effect: nothing is lost, or it cannot be written.
         dtype: LREAL (`float64`), or REAL (`float32`), which rounds all numbers.
         name: Of the function block; made from the model's unless given.
+
+    Raises:
+        LossError: If a system needs what the language has not.
 
     Example:
         >>> from fuzzytree.testing import random_tree
         >>> print(write(random_tree(0)).content.decode("ascii").splitlines()[2])
         FUNCTION_BLOCK random_7
     """
-    del allow_loss
     numbers = LONG if dtype == "float64" else SINGLE
+    if isinstance(model, FuzzySystem):
+        return written_system(model, numbers, name, allow_loss=allow_loss)
     mixed = [variable for variable in model.variables if variable.parts]
     combined = {variable.name: f"mix_{k}" for k, variable in enumerate(mixed, 1)}
     taken = _taken(model, combined)
     given = name or model.name
-    block = identifiers([given], taken)[given]
-    names = identifiers(model.inputs, [*taken, block])
+    names = identifiers(model.inputs, taken)
+    block = identifiers([given], [*taken, *names.accepted.values()])[given]
     values = {**names.accepted, **combined}
     if isinstance(model, RuleBase):
         constants, local, body = _rules(model, values, numbers)
@@ -79,8 +89,8 @@ def write(
             f"(* Fingerprint: {fingerprint(model)} *)\n",
             f"FUNCTION_BLOCK {block}\n",
             *_interface(model, names, numbers),
-            *_block("VAR CONSTANT", constants),
-            *_block("VAR", [*_mixed_lines(mixed, combined, numbers), *local]),
+            *block_of("VAR CONSTANT", constants),
+            *block_of("VAR", [*_mixed_lines(mixed, combined, numbers), *local]),
             "\n",
             *_guard(model, names, mixed, combined, numbers),
             *body,
@@ -109,7 +119,7 @@ def _interface(model: Model, names: Names, numbers: Numbers) -> Iterator[str]:
         f"    {names[v.name]} : {numbers.name}; (* {remark(_described(v))} *)\n"
         for v in inputs
     ]
-    yield from _block("VAR_INPUT", lines)
+    yield from block_of("VAR_INPUT", lines)
     yield "VAR_OUTPUT\n"
     yield "    class_number : INT; (* -1: no class *)\n"
     for place, label in enumerate(model.classes):
@@ -124,14 +134,6 @@ def _interface(model: Model, names: Names, numbers: Numbers) -> Iterator[str]:
 
 def _described(variable: Variable) -> str:
     return f"{variable.name} ({variable.unit})" if variable.unit else variable.name
-
-
-def _block(opening: str, lines: list[str]) -> Iterator[str]:
-    """Yield declarations; nothing if there are none."""
-    if lines:
-        yield f"{opening}\n"
-        yield from lines
-        yield "END_VAR\n"
 
 
 def _mixed_lines(
@@ -152,18 +154,9 @@ def _guard(
     numbers: Numbers,
 ) -> Iterator[str]:
     """Yield statements that find out what is missing, and answer where something is."""
-    largest = numbers.literal(numbers.largest)
-    given = list(names.accepted.values())
-    yield "is_known := TRUE;\n"
-    for one in given:  # only a number that is NaN is not equal to itself
-        yield f"IF NOT ({one} = {one}) THEN is_known := FALSE; END_IF;\n"
-    if given:
-        yield "IF is_known THEN\n"
-        for one in given:
-            test = f"ABS({one}) > {largest}"
-            yield f"    IF {test} THEN is_known := FALSE; END_IF;\n"
-        yield "END_IF;\n"
+    yield from known_inputs(list(names.accepted.values()), numbers)
     if mixed:
+        largest = numbers.literal(numbers.largest)
         yield "IF is_known THEN\n"
         for variable in mixed:
             total = combined[variable.name]
@@ -268,7 +261,8 @@ def _depth(tree: FuzzyTree) -> int:
 FORMAT = Format(
     name="structured-text",
     suffixes=(".st",),
-    carries=("tree", "rules"),
+    carries=("tree", "rules", "system"),
     write=write,
+    cannot=("formulas with a division or a power", "functions such as tanh or log"),
     dtype="float64",
 )

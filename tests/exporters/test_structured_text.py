@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from fuzzytree.errors import LossError
 from fuzzytree.exporters.st_text import LONG, RESERVED, SINGLE, identifiers, remark
 from fuzzytree.exporters.structured_text import write
 from fuzzytree.lowering import rules_from_tree
@@ -22,6 +23,7 @@ from fuzzytree.rulebase import (
     Variable,
     fingerprint,
 )
+from fuzzytree.samples import samples
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
@@ -187,3 +189,31 @@ def test_nothing_is_lost_and_the_same_model_gives_the_same_bytes() -> None:
     assert write(rules).losses == ()
     assert write(rules) == write(rules_from_tree(random_tree(3)))
     assert b"LREAL" not in write(rules, dtype="float32").content
+
+
+def test_a_system_has_its_outputs_and_tells_whether_they_are_numbers() -> None:
+    system = samples()["Sugeno, numbers"]
+    written = write(system)
+    text = written.content.decode("ascii")
+    outputs = text[text.index("VAR_OUTPUT") : text.index("\nVAR\n")]
+    assert outputs == (
+        "VAR_OUTPUT\n"
+        "    fan : LREAL; (* fan *)\n"
+        "    is_number : ARRAY [1..1] OF BOOL;\n"
+        "    status : INT; (* 0: decided, 2: an output has no number of its own, "
+        "3: missing *)\n"
+        "END_VAR"
+    )
+    assert written.remarks[0] == "'fan' is called fan_2"
+    assert written.remarks[-1] == (
+        "an output that has no number is 0, and `is_number` tells it"
+    )
+
+
+def test_a_system_that_needs_what_the_language_has_not_is_refused() -> None:
+    with pytest.raises(LossError) as caught:
+        write(samples()["Sugeno, formulas"], allow_loss=True)
+    assert str(caught.value) == (
+        "cannot write fan as structured-text: "
+        "it needs a division or a power ('slow' of 'fan')"
+    )

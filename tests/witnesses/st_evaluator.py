@@ -25,12 +25,37 @@ KINDS: dict[str, type] = {
     "DINT": int,
     "BOOL": bool,
 }
+TRUTHS = {"TRUE": True, "FALSE": False}
 LIMITS: dict[str, float] = {"INT": 1 << 15, "DINT": 1 << 31}
 ARITHMETIC = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
     "/": operator.truediv,
+}
+
+
+def unbounded(function: Callable[..., float]) -> Callable[..., float]:
+    """Return a function that is infinite where Python raises."""
+
+    def quiet(*given: float) -> float:
+        try:
+            return function(*given)
+        except OverflowError:
+            return math.inf
+
+    return quiet
+
+
+FUNCTIONS: dict[str, Callable[..., float]] = {
+    "ABS": abs,
+    "EXP": unbounded(math.exp),
+    "SQRT": math.sqrt,
+    "SIN": math.sin,
+    "COS": math.cos,
+    "TAN": math.tan,
+    "ATAN": math.atan,
+    "EXPT": unbounded(math.pow),
 }
 COMPARISONS = {
     "<": operator.lt,
@@ -103,16 +128,13 @@ class Block:
                 )
                 element = text(kind.child_by_field_name("element_type"))
                 self.types[name] = (element, lower, upper)
-                made = KINDS[element]
-                assert not given or len(given) == upper - lower + 1, name
-                values = (
-                    map(made, given)
-                    if given
-                    else (made(0) for _ in range(lower, upper + 1))
-                )
-                self.start[name] = dict(
-                    zip(range(lower, upper + 1), values, strict=True)
-                )
+                places = range(lower, upper + 1)
+                assert not given or len(given) == len(places), name
+                made: Callable[[Any], Any] = KINDS[element]
+                if element == "BOOL":
+                    made = TRUTHS.__getitem__
+                values = given or ["FALSE" if element == "BOOL" else "0"] * len(places)
+                self.start[name] = dict(zip(places, map(made, values), strict=True))
             else:
                 self.types[name] = text(kind)
                 self.start[name] = KINDS[text(kind)](0)
@@ -140,7 +162,7 @@ class Block:
 
         else:
             name, index = self._indexed(target)
-            element = self.types[name][0]
+            element = str(self.types[name][0])
 
             def assign(scope: Scope) -> None:
                 place = index(scope)
@@ -228,10 +250,16 @@ class Block:
                 name, index = self._indexed(node)
                 return lambda scope: scope[name][index(scope)]
             case "call_expression":
-                assert text(node.child_by_field_name("function")) == "ABS"
-                (argument,) = node.child_by_field_name("arguments").named_children
-                value = self._expression(argument)
-                return lambda scope: abs(value(scope))
+                function = FUNCTIONS[text(node.child_by_field_name("function"))]
+                given = node.child_by_field_name("arguments").named_children
+                values = [self._expression(one) for one in given]
+
+                def call(scope: Scope) -> Any:
+                    numbers = [value(scope) for value in values]
+                    (found,) = {type(number) for number in numbers}
+                    return found(function(*numbers))
+
+                return call
             case "unary_expression":
                 return self._unary(node)
             case "binary_expression":

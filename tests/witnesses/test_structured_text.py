@@ -17,10 +17,14 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.contracts import Model
+from fuzzytree.errors import LossError
 from fuzzytree.exporters.st_text import identifiers
 from fuzzytree.exporters.structured_text import write
+from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.probing import Row, probes
+from fuzzytree.probing import Row, probes, system_probes
+from fuzzytree.programs.bounds import error_bounds
+from fuzzytree.programs.systems import from_system
 from fuzzytree.reference import descend, evaluate
 from fuzzytree.rulebase import (
     Band,
@@ -33,7 +37,14 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.testing import exporter_models, random_tree, with_points
+from fuzzytree.samples import samples
+from fuzzytree.system import FuzzySystem
+from fuzzytree.testing import (
+    exporter_models,
+    random_system,
+    random_tree,
+    with_points,
+)
 from fuzzytree.tree import FuzzyTree, Leaf
 
 if TYPE_CHECKING:
@@ -134,6 +145,80 @@ def test_our_evaluator_answers_the_wine_table_as_the_reference(
     assert compared(tree, table) == 178
     assert compared(rules_from_tree(tree), table) == 178
     assert compared(rules_from_tree(tree, "raw"), table) == 178
+
+
+def system_gaps(system: FuzzySystem, rows: Sequence[Row]) -> tuple[int, int]:
+    """Return how many numbers were compared, and how many of them to the bit."""
+    from tests.witnesses.st_evaluator import Block
+
+    block = Block(write(system).content)
+    inputs = block.sections.get("VAR_INPUT", [])
+    *outputs, _, _ = block.sections["VAR_OUTPUT"]
+    program = from_system(system)
+    values = np.array([[row[name] for row in rows] for name in system.columns])
+    bounds = error_bounds(program, values.reshape(len(system.columns), len(rows))).T
+    count = exact = 0
+    for row, allowed in zip(rows, bounds.tolist(), strict=True):
+        given = dict(zip(inputs, (row[n] for n in system.columns), strict=True))
+        found, right = block(**given), infer(system, row)
+        assert found["status"] == int(right.status) or max(allowed) > 0.0, row
+        for number, (name, meant) in enumerate(
+            zip(outputs, right.outputs, strict=True), 1
+        ):
+            most = allowed[number - 1]
+            if not found["is_number"][number]:
+                assert math.isnan(meant) or most == math.inf, (row, name, meant)
+                assert found[name] == 0.0
+            else:
+                assert found[name] == meant or abs(found[name] - meant) <= most, row
+            count += 1
+            exact += most == 0.0
+    return count, exact
+
+
+@pytest.mark.parametrize(
+    ("kind", "fewest"),
+    [("samples", 500), pytest.param("random", 100, marks=pytest.mark.heavy)],
+)
+def test_our_evaluator_has_the_numbers_of_systems_within_derived_bounds(
+    library: Need, kind: str, fewest: int
+) -> None:
+    library(GRAMMAR)
+    systems = {n: m for n, m in samples().items() if isinstance(m, FuzzySystem)}
+    if kind == "random":
+        systems = {f"random {seed}": random_system(seed) for seed in range(60)}
+    compared = exact = refused = 0
+    for system in systems.values():
+        try:
+            write(system)
+        except LossError:
+            refused += 1
+            continue
+        found = system_gaps(system, system_probes(system, limit=40))
+        compared, exact = compared + found[0], exact + found[1]
+    assert compared > exact > fewest
+    assert refused < len(systems) / (10 if kind == "samples" else 1)
+
+
+def test_systems_in_real_are_near_those_in_double(library: Need) -> None:
+    library(GRAMMAR)
+    from tests.witnesses.st_evaluator import Block
+
+    for name in ("Mamdani, centroid", "Sugeno, linear", "gaussian curves", "S curves"):
+        system = samples()[name]
+        assert isinstance(system, FuzzySystem)
+        block = Block(write(system, dtype="float32").content)
+        inputs, worst = block.sections["VAR_INPUT"], 0.0
+        for number in range(40):
+            row = dict.fromkeys(system.columns, number / 4.0)
+            found = block(**dict(zip(inputs, row.values(), strict=True)))
+            right = infer(system, row)
+            assert found["status"] == right.status
+            (meant,) = right.outputs
+            if not math.isnan(meant):
+                output = found[block.sections["VAR_OUTPUT"][0]]
+                worst = max(worst, abs(float(output) - meant))
+        assert worst < 1e-5, name
 
 
 def as_single(value: float) -> float:

@@ -1,0 +1,322 @@
+"""The steps of a fuzzy system as statements, with loops over samples.
+
+Controllers may stop where a number is NaN, so none is ever made. A step that can be NaN
+has a truth beside it (`o` and its number): whether it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from fuzzytree.exporters.st_text import Numbers, table
+from fuzzytree.programs.evaluate import still_results
+from fuzzytree.programs.steps import Program, Step
+
+_SIGNS: Mapping[str, str] = {
+    "add": "+",
+    "subtract": "-",
+    "multiply": "*",
+    "less": "<",
+    "at_most": "<=",
+    "equal": "=",
+    "and": "AND",
+    "or": "OR",
+}
+_COMPARED = {"minimum": "<", "maximum": ">", "lowest": "<", "highest": ">"}
+_FUNCTIONS: Mapping[str, str] = {
+    "absolute": "ABS",
+    "exponential": "EXP",
+    "sine": "SIN",
+    "cosine": "COS",
+    "tangent": "TAN",
+    "arc_tangent": "ATAN",
+    "power": "EXPT",
+}
+_REDUCED = ("total", "last", "highest", "lowest")
+KNOWN = frozenset(
+    {*_SIGNS, *_COMPARED, *_FUNCTIONS, *_REDUCED, "input", "divide", "where", "not"}
+    | {"negate", "square_root", "running", "is_finite"}
+)
+"""Operations that have statements."""
+
+
+class SystemSteps:
+    """Statements of a program, where all inputs are finite.
+
+    Attributes:
+        declared: The type of each variable that they set, by name.
+        tables: The lines of the tables that they look into.
+    """
+
+    def __init__(
+        self, program: Program, inputs: Mapping[str, str], numbers: Numbers
+    ) -> None:
+        """Prepare the statements.
+
+        Args:
+            program: The program.
+            inputs: The name of each input.
+            numbers: The number type.
+        """
+        self.program = program
+        self.inputs = inputs
+        self.numbers = numbers
+        self.still = still_results(program)
+        self.odd = self._odd_steps()
+        self.declared: dict[str, str] = {}
+        self.tables: list[str] = []
+        self._tables: dict[str, str] = {}
+
+    def lacking(self) -> list[str]:
+        """Return what the program needs and the language has not."""
+        moving = [
+            step
+            for step, found in zip(self.program.steps, self.still, strict=True)
+            if found is None
+        ]
+        missing = sorted({step.operation for step in moving} - KNOWN)
+        for place, found in enumerate(self.still):
+            numbers = found if isinstance(found, list) else [found]
+            is_infinite = any(one is not None and math.isinf(one) for one in numbers)
+            if is_infinite and not self._is_outside(place):
+                return [*missing, "infinite numbers"]
+        return missing
+
+    def _is_outside(self, place: int) -> bool:
+        """Return whether a number only stands for samples that are not chosen.
+
+        Then the lowest or highest of the chosen is asked for, and the largest number
+        of the type does as well as an infinite one.
+        """
+        choices = self._users(place)
+        asked = [user for choice in choices for user in self._users(choice)]
+        steps = self.program.steps
+        return all(
+            steps[choice].operation == "where" and steps[choice].samples
+            for choice in choices
+        ) and all(steps[user].operation in ("lowest", "highest") for user in asked)
+
+    def _users(self, place: int) -> list[int]:
+        """Return the steps that use a step and that are computed when it runs."""
+        return [
+            user
+            for user, step in enumerate(self.program.steps)
+            if place in step.arguments and self.still[user] is None
+        ]
+
+    def statements(self) -> Iterator[str]:
+        """Yield the statements of all steps."""
+        for place, step in enumerate(self.program.steps):
+            if self.still[place] is None and step.operation != "input":
+                for line in self._statement(place, step):
+                    yield f"    {line}\n"
+
+    def value(self, place: int) -> str:
+        """Return a step's result; of samples, the one of number k."""
+        found = self.still[place]
+        if isinstance(found, list):
+            return f"{self._table(found)}[k]"
+        if isinstance(found, bool):
+            return "TRUE" if found else "FALSE"
+        if found is not None:
+            number = 0.0 if math.isnan(found) else self.numbers.nearest(found)
+            return self.numbers.literal(number)
+        step = self.program.steps[place]
+        if step.operation == "input":
+            return self.inputs[step.name]
+        letter = "b" if step.kind == "truth" else "v"
+        return f"{letter}{place}[k]" if step.samples else f"{letter}{place}"
+
+    def is_odd(self, place: int) -> str:
+        """Return whether a step's result is NaN, as an expression."""
+        found = self.still[place]
+        if isinstance(found, float):
+            return "TRUE" if math.isnan(found) else "FALSE"
+        if place not in self.odd:
+            return "FALSE"
+        return f"o{place}[k]" if self.program.steps[place].samples else f"o{place}"
+
+    def _odd_steps(self) -> set[int]:
+        """Return the steps that can be NaN where every input is a number."""
+        found: set[int] = set()
+        for place, step in enumerate(self.program.steps):
+            still = self.still[place]
+            if still is not None:
+                numbers = still if isinstance(still, list) else [still]
+                is_odd = any(map(math.isnan, numbers))
+            elif step.kind == "truth":
+                is_odd = False
+            else:
+                is_odd = any(argument in found for argument in step.arguments)
+                is_odd = is_odd or step.operation == "square_root"
+                is_odd = is_odd or (
+                    step.operation == "divide" and not self._is_safe(step.arguments[1])
+                )
+            if is_odd:
+                found.add(place)
+        return found
+
+    def _is_safe(self, divisor: int) -> bool:
+        """Return whether a divisor is a constant, and not 0."""
+        still = self.still[divisor]
+        if still is None:
+            return False
+        numbers = still if isinstance(still, list) else [still]
+        return all(numbers)
+
+    def _statement(self, place: int, step: Step) -> Iterator[str]:
+        name, odd = self.value(place), self.is_odd(place)
+        self._declare(name, step)
+        if place in self.odd:
+            self._declare(odd, step)
+        if step.operation in _REDUCED or step.operation == "running":
+            yield from self._over_samples(place, step)
+            return
+        lines = self._one(place, step)
+        if not step.samples:
+            yield from lines
+            return
+        yield f"FOR k := 0 TO {step.samples - 1} DO"
+        for line in lines:
+            yield f"    {line}"
+        yield "END_FOR;"
+
+    def _declare(self, name: str, step: Step) -> None:
+        kind = self.numbers.name if name.startswith("v") else "BOOL"
+        plain = name.removesuffix("[k]")
+        if plain != name:
+            kind = f"ARRAY [0..{step.samples - 1}] OF {kind}"
+        self.declared[plain] = kind
+
+    def _one(self, place: int, step: Step) -> Iterator[str]:
+        """Yield what sets one result."""
+        name, operation = self.value(place), step.operation
+        given = [self.value(argument) for argument in step.arguments]
+        odd = self.is_odd(place)
+        if operation == "where":
+            test, one, two = given
+            yield f"IF {test} THEN {name} := {one}; ELSE {name} := {two}; END_IF;"
+            if place in self.odd:
+                one, two = map(self.is_odd, step.arguments[1:])
+                yield f"IF {test} THEN {odd} := {one}; ELSE {odd} := {two}; END_IF;"
+            return
+        asked = [self.is_odd(a) for a in step.arguments if a in self.odd]
+        odds = list(dict.fromkeys(asked))
+        if step.kind == "truth":
+            yield f"{name} := {self._truth(step, given)};"
+            for one in odds:  # NaN is neither less than a number nor equal to one
+                yield f"IF {one} THEN {name} := FALSE; END_IF;"
+            return
+        if place not in self.odd:
+            yield from self._number(name, operation, given)
+            return
+        tests = list(odds)
+        if operation == "divide" and not self._is_safe(step.arguments[1]):
+            tests.append(f"({given[1]} = {self.numbers.literal(0.0)})")
+        elif operation == "square_root":
+            tests.append(f"({given[0]} < {self.numbers.literal(0.0)})")
+        yield f"{odd} := {' OR '.join(tests)};"
+        yield f"IF {odd} THEN"
+        yield f"    {name} := {self.numbers.literal(0.0)};"
+        yield "ELSE"
+        for line in self._number(name, operation, given):
+            yield f"    {line}"
+        yield "END_IF;"
+
+    def _truth(self, step: Step, given: list[str]) -> str:
+        if step.operation == "not":
+            return f"NOT {given[0]}"
+        if step.operation == "is_finite":
+            return f"ABS({given[0]}) <= {self.numbers.literal(self.numbers.largest)}"
+        return f"{given[0]} {_SIGNS[step.operation]} {given[1]}"
+
+    def _number(self, name: str, operation: str, given: list[str]) -> Iterator[str]:
+        """Yield what computes a number of numbers."""
+        if operation in _COMPARED:
+            a, b = given
+            test = f"{a} {_COMPARED[operation]} {b}"
+            yield f"IF {test} THEN {name} := {a}; ELSE {name} := {b}; END_IF;"
+        elif operation in _FUNCTIONS:
+            yield f"{name} := {_FUNCTIONS[operation]}({', '.join(given)});"
+        elif operation == "square_root":
+            yield f"{name} := SQRT({given[0]});"
+        elif operation == "negate":
+            yield f"{name} := -{given[0]};"
+        else:
+            sign = "/" if operation == "divide" else _SIGNS[operation]
+            yield f"{name} := {given[0]} {sign} {given[1]};"
+
+    def _over_samples(self, place: int, step: Step) -> Iterator[str]:
+        """Yield what makes one number of many samples, or sums up to each."""
+        (argument,) = step.arguments
+        count = self.program.steps[argument].samples
+        given, name = self.value(argument), self.value(place)
+        first, plain = given.replace("[k]", "[0]"), name.removesuffix("[k]")
+        if argument in self.odd:
+            odd, one = self.is_odd(place), self.is_odd(argument)
+            yield from self._any_odd(odd, one, count, is_running=step.samples > 0)
+        if step.operation == "last":
+            yield f"{plain} := {given.replace('[k]', f'[{count - 1}]')};"
+        elif step.operation == "total":
+            yield from self._total(plain, given, count)
+        elif step.operation == "running":
+            yield f"{plain}[0] := {first};"
+            yield f"FOR k := 1 TO {count - 1} DO"
+            yield f"    {name} := {plain}[k - 1] + {given};"
+            yield "END_FOR;"
+        else:
+            sign = _COMPARED[step.operation]
+            yield f"{plain} := {first};"
+            yield f"FOR k := 1 TO {count - 1} DO"
+            test = f"NOT ({plain} {sign} {given})"
+            yield f"    IF {test} THEN {plain} := {given}; END_IF;"
+            yield "END_FOR;"
+
+    def _any_odd(
+        self, odd: str, one: str, count: int, *, is_running: bool
+    ) -> Iterator[str]:
+        """Yield whether any sample is NaN, or any up to each."""
+        if is_running:
+            yield f"{odd.replace('[k]', '[0]')} := {one.replace('[k]', '[0]')};"
+            yield f"FOR k := 1 TO {count - 1} DO"
+            yield f"    {odd} := {odd.replace('[k]', '[k - 1]')} OR {one};"
+        else:
+            yield f"{odd} := FALSE;"
+            yield f"FOR k := 0 TO {count - 1} DO"
+            yield f"    {odd} := {odd} OR {one};"
+        yield "END_FOR;"
+
+    def _total(self, plain: str, given: str, count: int) -> Iterator[str]:
+        """Yield the sum by halves: the second half is added to the first."""
+        size = 1 << (count - 1).bit_length()
+        known = self.declared.get("halves", "[0..0]")
+        widest = max(size, int(known[known.index("..") + 2 : known.index("]")]) + 1)
+        self.declared["halves"] = f"ARRAY [0..{widest - 1}] OF {self.numbers.name}"
+        yield f"FOR k := 0 TO {count - 1} DO"
+        yield f"    halves[k] := {given};"
+        yield "END_FOR;"
+        if size > count:
+            yield f"FOR k := {count} TO {size - 1} DO"
+            yield f"    halves[k] := {self.numbers.literal(0.0)};"
+            yield "END_FOR;"
+        while size > 1:
+            size //= 2
+            yield f"FOR k := 0 TO {size - 1} DO"
+            yield f"    halves[k] := halves[k] + halves[k + {size}];"
+            yield "END_FOR;"
+        yield f"{plain} := halves[0];"
+
+    def _table(self, values: list[float] | list[bool]) -> str:
+        """Return the name of a table."""
+        kind, entries = "BOOL", ["TRUE" if one else "FALSE" for one in values]
+        if not isinstance(values[0], bool):
+            kind = self.numbers.name
+            nearest = map(self.numbers.nearest, values)
+            entries = [self.numbers.digits(value) for value in nearest]
+        key = f"{kind} {' '.join(entries)}"
+        if key not in self._tables:
+            self._tables[key] = f"t{len(self._tables)}"
+            about = "a value for each sample"
+            self.tables += table(self._tables[key], kind, entries, about)
+        return self._tables[key]
