@@ -1,4 +1,4 @@
-"""Fuzzylite 6 and PyIT2FLS run our FCL files, and we run fuzzylite's."""
+"""Fuzzylite 6 and PyIT2FLS run our FCL files."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from fuzzytree.testing import (
     with_points,
 )
 from tests.exporters.fcl_systems import tamed
-from tests.witnesses.corpus_fcl import EXACT, corpus, corpus_table
+from tests.witnesses.corpus_rows import EXACT
 from tests.witnesses.fuzzylite_engine import largest_difference, run_program
 
 WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
@@ -265,19 +265,6 @@ def test_a_mamdani_file_of_the_standard_answers_alike_in_pyit2fls(
 def _is_within(variable: object, value: float) -> bool:
     low, high = getattr(variable, "low", None), getattr(variable, "high", None)
     return (low is None or low <= value) and (high is None or value <= high)
-
-
-@pytest.mark.heavy
-def test_every_file_that_fuzzylite_ships_is_read_and_run_alike(
-    program: Need, tmp_path: Path
-) -> None:
-    path = program("fuzzylite")
-    assert len(corpus()) == 18
-    for row in corpus_table(path, tmp_path):
-        assert row.rules == row.loaded > 0, row
-        assert row.onnx is not None
-        assert row.onnx <= EXACT, row
-        assert row.program <= EXACT or row.reason, row
 
 
 def test_a_file_that_fuzzylite_wrote_of_ours_is_ours(

@@ -1,4 +1,4 @@
-"""Fuzzylite 6 and pyfuzzylite 8 run our FLL files, and we run theirs."""
+"""Fuzzylite 6 and pyfuzzylite 8 run our FLL files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,6 @@ from fuzzytree.rulebase import (
 from fuzzytree.system import FuzzySystem
 from fuzzytree.testing import random_rows, random_tree
 from tests.exporters.fll_systems import plain_system
-from tests.witnesses.corpus_fll import EXACT, corpus, corpus_table
 from tests.witnesses.fuzzylite_engine import (
     Answers,
     largest_difference,
@@ -366,30 +365,3 @@ def test_random_systems_answer_alike_or_a_remark_says_why(
             others += not is_alike
     assert compared >= (600 if is_library else 150)
     assert others <= 0.02 * compared
-
-
-def test_every_shipped_file_is_written_and_comes_back_equal(library: Need) -> None:
-    library("fuzzylite")
-    for name, path in corpus():
-        model = read(path.read_bytes(), name).model
-        assert isinstance(model, FuzzySystem)
-        assert read(write(model).content, name).model == model, name
-
-
-@pytest.mark.heavy
-def test_every_file_that_fuzzylite_and_pyfuzzylite_ship_is_read_and_run_alike(
-    program: Need, library: Need, tmp_path: Path
-) -> None:
-    path = program("fuzzylite")
-    library("fuzzylite")
-    names = [name for name, _ in corpus()]
-    assert sum(name.startswith("Debian") for name in names) == 31
-    assert sum(name.startswith("pyfuzzylite") for name in names) == 61
-    for row in corpus_table(path, tmp_path):
-        assert row.rules > 0, row.reason
-        assert set(row.loaded) == {row.rules}, row.file
-        assert row.library is not None
-        assert row.library <= EXACT, row
-        assert row.onnx is not None
-        assert row.onnx <= EXACT, row
-        assert row.is_alike or row.reason, row

@@ -10,13 +10,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.contracts import Document
+from fuzzytree.contracts import Document, Model
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c import write
+from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.probing import system_probes
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import (
     Band,
@@ -29,6 +32,11 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.c import load_system
+from fuzzytree.samples import samples
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tables import read_table
 from fuzzytree.testing import random_system, random_tree, with_points
 from fuzzytree.tree import FuzzyTree
 
@@ -299,3 +307,52 @@ def test_compiled_c_answers_the_wine_table_as_native(
     assert found.ok
     carriers = {one.carrier.partition(":")[0] for one in found.comparisons}
     assert {"c", "c best-first"} <= carriers
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("entry", [25.0, 1e9])
+def test_compiled_c_has_the_strengths_of_every_rule_on_every_wine(
+    program: Need, entry: float
+) -> None:
+    program("gcc")
+    tree = ft.learn(WINE, target="cultivar", entry=entry)
+    assert any(v.parts for v in tree.variables) == (entry == 25.0)
+    relative, raw = rules_from_tree(tree), rules_from_tree(tree, "raw")
+    product = rules_from_tree(tree, "raw", conjunction="product")
+    models: list[Model] = [tree, relative, raw, product]
+    for model in models:
+        table = read_table(WINE, target="cultivar")
+        columns = [table.columns.index(name) for name in model.inputs]
+        values = np.asarray(table.values[columns], np.float64)
+        assert values.shape[1] == 178
+        found = find_runtime("c").load(model)(values)
+        right = find_runtime("reference").load(model)(values)
+        np.testing.assert_array_equal(found.rule, right.rule)
+        np.testing.assert_array_equal(found.status, right.status)
+        if isinstance(model, RuleBase):
+            assert found.strengths is not None
+            assert len(found.strengths) == len(model.rules)
+            np.testing.assert_array_equal(found.strengths, right.strengths)
+
+
+SYSTEMS = {n: m for n, m in samples().items() if isinstance(m, FuzzySystem)}
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_compiled_systems_have_the_references_numbers(program: Need, name: str) -> None:
+    program("gcc")
+    system = SYSTEMS[name]
+    rows = system_probes(system, limit=200)
+    assert len(rows) >= 20
+    values = np.array([[row[column] for row in rows] for column in system.columns])
+    values = values.reshape(len(system.columns), len(rows))
+    found = load_system(system, activations=True)(values)
+    assert found.activations is not None
+    assert len(found.activations) == len(system.rules)
+    for row, numbers in zip(rows, found.outputs.T, strict=True):
+        expected = infer(system, row).outputs
+        for ours, theirs in zip(expected, numbers.tolist(), strict=True):
+            # the mathematical library's own exp and pow
+            is_near = ours == pytest.approx(theirs, rel=1e-12, abs=1e-12, nan_ok=True)
+            assert is_near, (name, row)

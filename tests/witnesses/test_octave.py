@@ -1,4 +1,4 @@
-"""Octave's fuzzy-logic-toolkit and fuzzylite 6 run our FIS files, and we run theirs."""
+"""Octave's fuzzy-logic-toolkit and fuzzylite 6 run our FIS files."""
 
 from __future__ import annotations
 
@@ -20,12 +20,15 @@ from fuzzytree.rulebase import Kind, RuleBase
 from fuzzytree.system import FuzzySystem
 from fuzzytree.testing import random_rows
 from tests.exporters.test_fis import random_fis
-from tests.witnesses.corpus_fis import EXACT, NEAR, corpus, corpus_table
+from tests.witnesses.corpus_rows import EXACT
 from tests.witnesses.fuzzylite_engine import largest_difference, run_program
 from tests.witnesses.octave_engine import DISCRETEMF, answers
 
 ROOT = Path(__file__).parents[2]
 WINE = ROOT / "examples" / "wine" / "wine.csv"
+
+NEAR = 1e-6
+"""As far as fuzzylite 6 moves answers by taking values within 1e-6 for equal."""
 
 Need = Callable[[str], str]
 
@@ -84,11 +87,15 @@ def test_the_wine_rules_have_the_same_scores_in_octave_and_decide_alike(
 
 
 @pytest.mark.heavy
+@pytest.mark.parametrize(("entry", "is_mixed"), [(25.0, True), (1e9, False)])
+@pytest.mark.parametrize("kind", ["relative", "raw"])
 def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
-    program: Need, tmp_path: Path
+    program: Need, tmp_path: Path, kind: Kind, entry: float, is_mixed: bool
 ) -> None:
     fuzzylite = program("fuzzylite")
-    rules = rules_from_tree(learn(WINE, target="cultivar"))
+    tree = learn(WINE, target="cultivar", entry=entry)
+    assert any(v.parts for v in tree.variables) == is_mixed
+    rules = rules_from_tree(tree, kind)
     with WINE.open(newline="", encoding="utf-8") as file:
         rows = [
             {name: float(row[name]) for name in rules.inputs}
@@ -99,9 +106,13 @@ def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
     content = write(rules, allow_loss=True, dialect="fuzzylite", tolerance=1e-4).content
     run = run_program(fuzzylite, content, given, tmp_path, kind="fis")
     assert run.rules == len(rules.rules) + 1
-    for row, scores in zip(rows, run.outputs, strict=True):
-        assert winner(rules, scores) == evaluate(rules, row).label
-    assert largest_difference(ours(content, given), run.outputs) <= NEAR
+    assert len(run.outputs) == 178
+    found = ours(content, given)
+    assert largest_difference(found, run.outputs) <= NEAR
+    for row, mine, scores in zip(rows, found, run.outputs, strict=True):
+        assert winner(rules, scores) == winner(rules, mine)
+        if kind == "relative":
+            assert winner(rules, scores) == evaluate(rules, row).label
 
 
 @pytest.mark.heavy
@@ -131,23 +142,6 @@ def test_random_systems_answer_alike_in_octave(program: Need, tmp_path: Path) ->
             ), name
             compared += 1
     assert compared >= 200
-
-
-@pytest.mark.heavy
-def test_every_file_that_octave_and_fuzzylite_ship_is_read_and_run_alike(
-    program: Need, tmp_path: Path
-) -> None:
-    octave, fuzzylite = program("octave"), program("fuzzylite")
-    names = [name for name, _ in corpus()]
-    assert sum(name.startswith("Octave") for name in names) == 6
-    assert sum(name.startswith("fuzzylite") for name in names) == 29
-    for row in corpus_table(octave, fuzzylite, tmp_path):
-        # Octave's hedges act on each conclusion alone: there a rule can become several.
-        assert row.rules >= row.loaded > 0, row
-        assert row.engine == "octave" or row.rules == row.loaded, row
-        assert row.onnx is not None
-        assert row.onnx <= EXACT, row
-        assert row.is_alike or row.reason, row
 
 
 def test_the_page_shows_the_function_for_points_that_is_tested() -> None:

@@ -48,7 +48,8 @@ def _rows(model: Model) -> FloatArray:
     """Return the wine table, and the rows that matter for the model."""
     table = read_table(WINE, target="cultivar")
     columns = [table.columns.index(name) for name in model.inputs]
-    data = np.asarray(table.values.T[columns], np.float64)
+    data = np.asarray(table.values[columns], np.float64)
+    assert data.shape[1] == 178
     return np.hstack([data, probe_values(model, 300)])
 
 
