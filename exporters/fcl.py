@@ -82,6 +82,7 @@ def write(
     Raises:
         LossError: If something would be lost, unless allowed; and always if rules,
             terms or methods have no place in the dialect.
+        ValueError: If scores are asked for, and the model is a system.
 
     Example:
         >>> from fuzzytree.lowering import rules_from_tree
@@ -109,6 +110,8 @@ def write(
             )
         facts = FACTS + facts_of(rules, scores, always=always)
     else:
+        if scores != "rule":
+            raise ValueError("scores: are of rules; a system has outputs of its own")
         system = plain_linear(model) if dialect == "jfuzzylogic" else model
         system = with_conditions(system, words)
         if system != model:

@@ -79,6 +79,7 @@ def write(
     Raises:
         LossError: If something would be lost, unless allowed; and always if rules or
             terms have no place in FLL.
+        ValueError: If scores are asked for, and the model is a system.
 
     Example:
         >>> from fuzzytree.lowering import rules_from_tree
@@ -100,6 +101,8 @@ def write(
             remarks.append("fuzzylite 6 takes a strength below 1e-6 for 0")
         facts = FACTS + facts_of(rules, scores)
     else:
+        if scores != "winner":
+            raise ValueError("scores: are of rules; a system has outputs of its own")
         system, lost = pointed(model, tolerance, allowed=KNOWN)
         losses += lost
         system, lost = _with_pointed_numbers(system, tolerance)

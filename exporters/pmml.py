@@ -19,7 +19,6 @@ from typing import Literal, NamedTuple
 
 from fuzzytree.casting import pointed
 from fuzzytree.contracts import Document, Format, Loss, Model, Written
-from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml_shapes import Functions, norm_continuous
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
 from fuzzytree.exporters.pmml_xml import (
@@ -34,6 +33,7 @@ from fuzzytree.exporters.pmml_xml import (
     ref,
     text_of,
 )
+from fuzzytree.losses import refusal
 from fuzzytree.naming import unlike
 from fuzzytree.rulebase import (
     Clause,
@@ -69,7 +69,7 @@ def write(
     Raises:
         LossError: If curves would become points and `allow_loss` is False; if a system
             needs too many fields, or functions that PMML does not have.
-        ValueError: If `curves` is neither of the two.
+        ValueError: If `curves` is neither of the two, or `points` for other than rules.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -79,17 +79,13 @@ def write(
     """
     if curves not in ("exact", "points"):
         raise ValueError(f"curves are exact or points, not {curves!r}")
+    if curves == "points" and not isinstance(model, RuleBase):
+        raise ValueError("curves: points are for rules; a tree or a system is none")
     losses: tuple[Loss, ...] = ()
     if isinstance(model, RuleBase) and curves == "points":
         model, losses = pointed(model, tolerance)
         if losses and not allow_loss:
-            listed = "\n  ".join(
-                f"{loss.where}: {loss.what} (largest error {loss.bound:.1e})"
-                for loss in losses
-            )
-            raise LossError(
-                f"cannot write {model.name} as pmml with curves as points:\n  {listed}"
-            )
+            raise refusal(model.name, "pmml", losses)
     if isinstance(model, FuzzySystem):
         return _written_system(model)
     names = _Names.of(model)

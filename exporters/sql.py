@@ -61,7 +61,7 @@ def write(
 
     Raises:
         LossError: If the model is beyond what engines hold.
-        ValueError: If there is no such dialect.
+        ValueError: If there is no such dialect, or the table has no name.
 
     Example:
         >>> from fuzzytree.testing import random_tree
@@ -73,6 +73,8 @@ def write(
     known = get_args(Dialect)
     if dialect not in known:
         raise ValueError(f"sql has no dialect {dialect!r}; there is {', '.join(known)}")
+    if not table:
+        raise ValueError("table: must name a table or a view, not ''")
     names = (keep,) if isinstance(keep, str) else tuple(keep)
     query = Query(dialect, table, names or model.inputs)
     if isinstance(model, RuleBase):

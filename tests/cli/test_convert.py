@@ -20,6 +20,7 @@ from fuzzytree.readers.yaml import reading
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.samples import samples
 from fuzzytree.system import FuzzySystem
+from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 
 HELP = "\n  fuzzytree convert --help tells more\n"
@@ -528,3 +529,33 @@ def test_an_old_file_survives_a_conversion_that_fails(call: Call) -> None:
     assert call("convert", "tipper.fll", "a.py")[0] == 2
     assert Path("a.py").read_text("utf-8") == "old"
     assert not list(Path.cwd().glob(".*.part"))
+
+
+@pytest.mark.parametrize(
+    ("output", "option", "message"),
+    [
+        ("a.fll", "scores=rule", "scores: are of rules; a system has outputs of its "),
+        ("a.fcl", "scores=class", "scores: are of rules; a system has outputs of its "),
+        (
+            "a.pmml",
+            "curves=points",
+            "curves: points are for rules; a tree or a system ",
+        ),
+    ],
+)
+def test_an_option_that_does_nothing_is_refused(
+    call: Call, output: str, option: str, message: str
+) -> None:
+    code, _, err = call("convert", "tipper.fll", output, "--set", option)
+    assert code == 2
+    assert err.splitlines()[1].startswith(message)
+    assert not Path(output).exists()
+
+
+def test_points_in_pmml_are_refused_like_other_losses(call: Call) -> None:
+    ft.save(ft.rules_from_tree(random_tree(2), "raw"), "r.yaml")
+    words = ("convert", "r.yaml", "a.pmml", "--set", "curves=points")
+    code, _, err = call(*words)
+    assert code == 1
+    assert err.endswith("\n  pass --allow-loss to write it as stated\n")
+    assert call(*words, "--allow-loss")[0] == 0

@@ -242,7 +242,7 @@ def test_rules_have_the_references_bits(seed: int, kind: Kind) -> None:
 def test_rules_written_as_points_are_as_near_as_they_say(kind: Kind) -> None:
     rules = rules_from_tree(random_tree(2), kind)
     options: dict[str, Any] = {"curves": "points", "tolerance": 1e-2}
-    with pytest.raises(LossError, match="with curves as points:\n  term"):
+    with pytest.raises(LossError, match="as pmml without loss:\n  term"):
         write(rules, **options)
     written = write(rules, allow_loss=True, **options)
     assert b"<NormContinuous" in written.content
@@ -388,3 +388,5 @@ def test_a_way_to_write_curves_that_does_not_exist_is_refused() -> None:
     wrong: Literal["exact"] = "sampled"  # type: ignore[assignment]
     with pytest.raises(ValueError, match="curves are exact or points, not 'sampled'"):
         write(random_tree(0), curves=wrong)
+    with pytest.raises(ValueError, match="curves: points are for rules"):
+        write(random_tree(0), curves="points")

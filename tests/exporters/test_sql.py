@@ -153,5 +153,7 @@ def test_what_engines_do_not_hold_is_refused() -> None:
 def test_a_wrong_option_is_a_sentence() -> None:
     with pytest.raises(ValueError, match="no dialect 'oracle'; there is sqlite, "):
         write(random_tree(0), dialect="oracle")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="table: must name a table or a view, not ''"):
+        write(random_tree(0), table="")
     with pytest.raises(ValueError, match="a tree has no strengths"):
         write(random_tree(0), strengths=True)
