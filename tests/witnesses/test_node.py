@@ -223,7 +223,7 @@ Kind = Literal["es", "script"]
 
 
 @pytest.mark.parametrize(("module", "suffix"), [("es", ".mjs"), ("script", ".js")])
-@pytest.mark.parametrize("name", ["tree", "raw product", "points", "hostile", "system"])
+@pytest.mark.parametrize("name", ["raw product", "tree", "system"])
 def test_a_file_tests_itself_and_tells_changed_numbers(
     tmp_path: Path, program: Need, name: str, module: Kind, suffix: str
 ) -> None:
@@ -247,7 +247,7 @@ def test_a_file_tests_itself_and_tells_changed_numbers(
         if table < found.start() < body
     ]
     failed = 0
-    for place in places[:: max(len(places) // 6, 1)]:
+    for place in places[:: max(len(places) // 4, 1)]:
         digit = "7" if text[place] != "7" else "2"
         file.write_text(text[:place] + digit + text[place + 1 :])
         code, said = run_alone(node, file)
