@@ -98,8 +98,8 @@ def test_reasons_tell_what_fired_and_what_did_not() -> None:
     table = np.array([[1.0, 1.0], [5.0, 9.9], [math.nan, 1.0], [3.0, 20.0]])
     found = ft.run(system, table, columns=system.columns)
     told = system_reasons(system, found)
-    assert told[0] == "1 1. IF heat is low and damp is dry THEN fan is slow"
-    assert told[1].startswith("0.25 2. IF heat is high")
+    assert told[0] == ("rule 1 (1): IF heat is low and damp is dry THEN fan is slow")
+    assert told[1].startswith("rule 2 (0.25): IF heat is high")
     assert told[2] == "a value is missing or not finite"
     assert told[3] == "no rule fires"
 

@@ -134,7 +134,7 @@ def _reason(texts: Sequence[str], degrees: Sequence[float], status: int) -> str:
     if status == Status.MISSING:
         return "a value is missing or not finite"
     fired = [
-        f"{number(degree)} {k}. {text}"
+        f"rule {k} ({number(degree)}): {text}"
         for k, (text, degree) in enumerate(zip(texts, degrees, strict=True), 1)
         if degree > 0.0
     ]
