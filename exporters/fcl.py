@@ -42,7 +42,7 @@ from fuzzytree.exporters.fcl_terms import (
 )
 from fuzzytree.exporters.fll_rules import speakable
 from fuzzytree.losses import refusal
-from fuzzytree.naming import Names
+from fuzzytree.naming import Names, changes_text
 from fuzzytree.readers.fcl import FACTS, read
 from fuzzytree.readers.fcl_dialects import MARK
 from fuzzytree.rulebase import RuleBase
@@ -304,10 +304,8 @@ def _defuzzify(output: SystemOutput, names: _Names, words: Words) -> Iterator[st
 
 def _remarks(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
-    pairs = [f"{name!r} is {found}" for name, found in names.changed().items()]
-    if pairs:
-        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
-        yield f"names were changed: {shown}"
+    if text := changes_text(names.changed()):
+        yield text
     if any(one.unit for one in system.variables) or system.note:
         yield "units and the note of the system have no place"
     if names_of_rules(system.rules):

@@ -27,7 +27,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
 from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.losses import refusal
-from fuzzytree.naming import Names
+from fuzzytree.naming import Names, changes_text
 from fuzzytree.readers.engines import fuzzylite_losses
 from fuzzytree.readers.fis import DEFAULTS, DIALECT, FACTS, reading
 from fuzzytree.readers.fis_words import (
@@ -143,9 +143,7 @@ class _Naming:
                 k: v for names in self.labels.values() for k, v in names.changed.items()
             },
         }
-        pairs = [f"{name!r} is {found}" for name, found in changed.items()]
-        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
-        self.remarks = [f"names were changed: {shown}"] if pairs else []
+        self.remarks = [text] if (text := changes_text(changed)) else []
 
 
 def _all_labels(system: FuzzySystem, terms: Terms) -> dict[str, Sequence[Label]]:

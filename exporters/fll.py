@@ -33,7 +33,7 @@ from fuzzytree.exporters.fll_terms import (
     weighted_type,
 )
 from fuzzytree.losses import refusal
-from fuzzytree.naming import Names
+from fuzzytree.naming import Names, changes_text
 from fuzzytree.readers.fll import FACTS, read
 from fuzzytree.readers.fll_meaning import differences
 from fuzzytree.readers.fll_rules import RULE_WORDS
@@ -306,10 +306,8 @@ def _line(text: str) -> str:
 
 def _remarks(system: FuzzySystem, names: _Names) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
-    pairs = [f"{name!r} is {found}" for name, found in names.changed().items()]
-    if pairs:
-        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
-        yield f"names were changed: {shown}"
+    if text := changes_text(names.changed()):
+        yield text
     texts = [system.name, system.note, *(block.name for block in system.blocks)]
     if any(_line(text) != text for text in texts):
         yield "names of the system and of blocks, and its note, became single lines"

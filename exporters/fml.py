@@ -28,7 +28,7 @@ from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
 from fuzzytree.losses import refusal
-from fuzzytree.naming import DIGITS, LETTERS, Names
+from fuzzytree.naming import DIGITS, LETTERS, Names, changes_text
 from fuzzytree.readers.fml import FACTS, reading
 from fuzzytree.readers.fml_words import FAR, METHODS, NAMESPACE, SNORMS, TNORMS, USUAL
 from fuzzytree.rulebase import Points, RuleBase
@@ -128,9 +128,7 @@ class _Naming:
             changed[system.name] = self.system
         for names in self.labels.values():
             changed |= names.changed
-        pairs = [f"{name!r} is {found}" for name, found in changed.items()]
-        shown = ", ".join(pairs[:5]) + (", ..." if len(pairs) > 5 else "")
-        self.remarks = [f"names were changed: {shown}"] if pairs else []
+        self.remarks = [text] if (text := changes_text(changed)) else []
 
     def term(self, variable: str, label: str) -> str:
         """Return the ID of a term."""

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import string
 import unicodedata
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import msgspec
 
 LETTERS = string.ascii_letters
 DIGITS = string.digits
+
+_MOST_TOLD = 12  # names in a remark; the first are those of variables
 
 _SPELT = {
     "ß": "ss",
@@ -149,6 +151,24 @@ def numbered(name: str, taken: dict[str, int]) -> str:
     taken[name] = max(count, 1)
     taken.setdefault(found, 1)
     return found
+
+
+def changes_text(changed: Mapping[str, str]) -> str:
+    """Return the names that are others in a file, in words; empty if there are none.
+
+    Args:
+        changed: The names in the file, by those of the model; variables first, for
+            who runs the file has to give them.
+
+    Example:
+        >>> changes_text({"tip %": "tip"})
+        "names were changed: 'tip %' is tip"
+    """
+    pairs = [f"{name!r} is {found}" for name, found in changed.items()]
+    if not pairs:
+        return ""
+    more = f", and {len(pairs) - _MOST_TOLD} more" if len(pairs) > _MOST_TOLD else ""
+    return f"names were changed: {', '.join(pairs[:_MOST_TOLD])}{more}"
 
 
 class _Allowed(msgspec.Struct, frozen=True):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzytree.naming import DIGITS, LETTERS, Names, unlike
+from fuzzytree.naming import DIGITS, LETTERS, Names, changes_text, unlike
 
 
 def made(*names: str, **options: object) -> list[str]:
@@ -112,3 +112,10 @@ def test_many_names_that_become_alike_are_told_apart_at_once() -> None:
     found = Names.of("%" * count for count in range(1, 3000))
     assert len(set(found.accepted.values())) == 2999
     assert time.process_time() - start < 2.0
+
+
+def test_changed_names_are_told_and_the_rest_is_counted() -> None:
+    assert changes_text({}) == ""
+    told = changes_text({f"x {k}": f"x_{k}" for k in range(14)})
+    assert told.startswith("names were changed: 'x 0' is x_0, 'x 1' is x_1, ")
+    assert told.endswith(", 'x 11' is x_11, and 2 more")
