@@ -88,7 +88,9 @@ class Terms:
         hundredths = _hundredths(HEDGES[self.dialect], hedges[is_negated:])
         if hundredths is None:
             return None
-        place = 0 if asked.label is None else self.place(asked.variable, asked.label)
+        # Fuzzylite loads no rule with `any` before a term.
+        has_label = asked.label is not None and hedges[-1:] != ("any",)
+        place = self.place(asked.variable, asked.label or "") if has_label else 0
         return _code(place, hundredths, is_negated=is_negated)
 
     def joined(self, parts: Sequence[Condition], *, is_or: bool) -> str:

@@ -125,6 +125,10 @@ def _rules(
     if not conclusions:
         notes.losses.append(Loss(f"rule {number}", "it concludes nothing; left out"))
         return
+    if any(one.label and one.hedges[-1:] == ("any",) for one in questions):
+        what = "it asks 'any' (.99) of a term, and fuzzylite does not load it; left out"
+        notes.losses.append(Loss(f"rule {number}", what))
+        return
     is_or = line.connection == 2.0
     if not questions and (is_or or dialect == "fuzzylite"):
         why = (
@@ -154,15 +158,15 @@ def _code(
 ) -> _Code | None:
     """Return what a number means; None if there is no such term."""
     size = abs(code)
-    place = int(size)
-    if place > len(variable.labels):
+    if not size < len(variable.labels) + 1:  # NaN too
         number, entry = where
         what = (
             f"rule {number}: {variable.name!r} has {len(variable.labels)} terms, "
-            f"and no term {place}"
+            f"and no term {size:g}"
         )
         notes.found.append((entry.line, 1, what))
         return None
+    place = int(size)
     return _Code(place, round(100.0 * (size - place)), code < 0.0)
 
 

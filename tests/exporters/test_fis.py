@@ -130,11 +130,14 @@ def _random_rule(
         return (*chance.choice(first), *chance.choice(known))
 
     asked = [*HEDGES[dialect].values()]
-    parts = [
-        Is(f"x{k}", f"t{chance.randrange(3)}", hedges(asked))
-        for k in range(3)
-        if chance.random() < 0.7
-    ] or [Is("x0", "t0")]
+
+    def question(name: str) -> Is:
+        found = hedges(asked)
+        is_any = found[-1:] == ("any",)  # which asks no term
+        return Is(name, None if is_any else f"t{chance.randrange(3)}", found)
+
+    parts = [question(f"x{k}") for k in range(3) if chance.random() < 0.7]
+    parts = parts or [Is("x0", "t0")]
     kind = chance.choice((And, Or))
     when: Condition = kind(tuple(parts)) if len(parts) > 1 else parts[0]
     concluded: Sequence[tuple[Hedge, ...]] = [()]
@@ -150,6 +153,22 @@ def _random_rule(
         ),
     )
     return SystemRule(when, then, chance.choice((1.0, 0.3)))
+
+
+def test_any_asks_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
+    system = random_fis(2, "fuzzylite")
+    question = Is("x0", "t1", ("not", "any"))
+    then = (Conclusion("y0", "t0"),)
+    block = replace(system.blocks[0], rules=(SystemRule(question, then),))
+    text = write(replace(system, blocks=(block,)), dialect="fuzzylite").content.decode()
+    assert text.partition("[Rules]\n")[2].startswith("-0.99 0 0, 1 0 (1.0) : 1\n")
+    found = reading(text.replace("-0.99", "-2.99").encode(), "s.fis")
+    assert [(loss.where, loss.what) for loss in found.losses] == [
+        (
+            "rule 1",
+            "it asks 'any' (.99) of a term, and fuzzylite does not load it; left out",
+        )
+    ]
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)

@@ -11,6 +11,7 @@ import pytest
 
 from fuzzytree import learn
 from fuzzytree.casting import as_system, flattened, winner
+from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis import write
 from fuzzytree.inference import infer, input_values
 from fuzzytree.lowering import rules_from_tree
@@ -22,6 +23,7 @@ from fuzzytree.testing import random_rows
 from tests.exporters.test_fis import random_fis
 from tests.witnesses.corpus_rows import EXACT
 from tests.witnesses.fuzzylite_engine import largest_difference, run_program
+from tests.witnesses.fuzzylite_exact import compiled, exact_answers
 from tests.witnesses.octave_engine import DISCRETEMF, answers
 
 ROOT = Path(__file__).parents[2]
@@ -29,6 +31,9 @@ WINE = ROOT / "examples" / "wine" / "wine.csv"
 
 NEAR = 1e-6
 """As far as fuzzylite 6 moves answers by taking values within 1e-6 for equal."""
+
+WEAK = 1e-5
+"""A rule of fuzzylite 6 that is weaker than 1e-6 does not fire."""
 
 Need = Callable[[str], str]
 
@@ -113,6 +118,40 @@ def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
         assert winner(rules, scores) == winner(rules, mine)
         if kind == "relative":
             assert winner(rules, scores) == evaluate(rules, row).label
+
+
+@pytest.mark.heavy
+def test_random_systems_answer_alike_in_fuzzylite(
+    program: Need, tmp_path: Path
+) -> None:
+    fuzzylite = program("fuzzylite")
+    kinds: set[bool] = set()
+    compared = close = 0
+    exact = compiled(program("g++"), tmp_path)
+    for seed in range(30):
+        system = random_fis(seed, "fuzzylite")
+        try:
+            content = write(system, dialect="fuzzylite").content
+        except LossError:
+            continue
+        rows = [[*row.values()] for row in random_rows(system, seed, 25)]
+        run = run_program(fuzzylite, content, rows, tmp_path, kind="fis")
+        nearly = exact_answers(exact, content, rows, "fis")
+        assert run.rules == len(system.rules)
+        kinds.add(system.outputs[0].defuzzifier.is_weighted)
+        for row, usual, theirs in zip(rows, run.outputs, nearly, strict=True):
+            inference = infer(system, dict(zip(system.columns, row, strict=True)))
+            if any(0.0 < one < WEAK for one in inference.activations):
+                continue
+            sizes = [1.0, *(x for x in map(abs, inference.outputs) if x == x)]
+            difference = largest_difference([inference.outputs], [theirs])
+            assert difference <= 1e-9 * max(sizes), (seed, row)
+            difference = largest_difference([inference.outputs], [usual])
+            close += difference > 1e-9 * max(sizes)  # it takes 1e-6 for nothing
+            compared += 1
+    assert kinds == {True, False}
+    assert compared >= 200
+    assert close <= 0.05 * compared
 
 
 @pytest.mark.heavy
