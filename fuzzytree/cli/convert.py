@@ -231,7 +231,7 @@ def carry(
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
     after = _next(source, output, form, has_loss=bool(found.losses))
-    if form.read is None and carrier_of(model) == "system" != carrier_of(found.model):
+    if carrier_of(model) == "system" != carrier_of(found.model):
         after = ""  # numbers are not compared with classes
     shows = " (shows what the losses change)" if written.losses else ""
     say_rows(
