@@ -473,8 +473,8 @@ def test_why_tells_the_rules_of_a_system_with_their_degrees(call: Call) -> None:
     Path("meals.csv").write_text("service,food\n5,0\n", "utf-8")
     code, out, _ = call("run", "tipper.fll", "meals.csv", "--why", "--quiet")
     assert code == 0
-    assert "1 1. IF service is poor or food is rancid THEN tip is cheap; " in out
-    assert "1 2. IF service is good THEN tip is average; " in out
+    assert "rule 1 (1): IF service is poor or food is rancid THEN tip is cheap; " in out
+    assert "rule 2 (1): IF service is good THEN tip is average; " in out
 
 
 def test_strengths_of_the_rules_of_a_system_are_columns(call: Call) -> None:
