@@ -66,7 +66,8 @@ def find_format(name: str) -> Format:
     every = [suffix for suffixes in TABLE.values() for suffix in suffixes]
     pool = every if name.startswith(".") else names
     cutoff = 0.7 if name.startswith(".") else 0.6
-    close = difflib.get_close_matches(wanted[:100], pool, n=1, cutoff=cutoff)
+    close = [known for known in TABLE if f".{wanted}" in TABLE[known]]
+    close = close or difflib.get_close_matches(wanted[:100], pool, n=1, cutoff=cutoff)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     raise ValueError(f"no format {name!r}; there is {', '.join(names)}{hint}")
 

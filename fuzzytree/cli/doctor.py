@@ -28,12 +28,15 @@ EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "parquet": {"pyarrow": "pyarrow"},
         "plots": {"matplotlib": "matplotlib"},
         "witnesses": {
+            "blark": "blark",
             "duckdb": "duckdb",
             "ferrifuzz": "ferrifuzz",
             "jpmml-evaluator": "jpmml_evaluator",
             "lxml": "lxml",
             "pyit2fls": "pyit2fls",
             "sqlglot": "sqlglot",
+            "tree-sitter": "tree_sitter",
+            "tree-sitter-iec61131-3-st": "tree_sitter_iec61131_3_st",
         },
         "peers": {
             "m2cgen": "m2cgen",

@@ -45,7 +45,11 @@ def test_a_suffix_loads_its_own_format_alone() -> None:
 
 @pytest.mark.parametrize(
     ("wanted", "hint"),
-    [("yml", " (did you mean 'yaml'?)"), (".yalm", " (did you mean '.yaml'?)")],
+    [
+        ("yml", " (did you mean 'yaml'?)"),
+        ("js", " (did you mean 'javascript'?)"),
+        (".yalm", " (did you mean '.yaml'?)"),
+    ],
 )
 def test_an_unknown_format_is_told_with_the_nearest(wanted: str, hint: str) -> None:
     with pytest.raises(ValueError, match="no format") as caught:
