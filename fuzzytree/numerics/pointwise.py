@@ -87,18 +87,23 @@ def product(one: Lines, other: Lines, tolerance: float) -> tuple[Lines, float]:
             rise = (here[1].at - before[1].above) * (here[2].at - before[2].above)
             count = math.isqrt(int(abs(rise) / Fraction(4.0 * tolerance))) + 1
             worst = max(worst, abs(rise) / (4 * count * count))
+            _refuse_many(len(knots) + count)
             for step in range(1, count):
                 x = before[0] + (here[0] - before[0]) * Fraction(step, count)
                 y = _degree(one, x) * _degree(other, x)
                 knots.append(_Knot(x, y, y))
         x, first, second = here
         knots.append(_Knot(x, first.at * second.at, first.above * second.above))
-        if len(knots) > MOST_POINTS:
-            raise LossError(
-                f"the product of two curves needs more than {MOST_POINTS} points; "
-                "allow a larger error"
-            )
+    _refuse_many(len(knots))
     return tuple(knots), _up(worst)
+
+
+def _refuse_many(points: int) -> None:
+    if points > MOST_POINTS:
+        raise LossError(
+            f"the product of two curves needs more than {MOST_POINTS} points; "
+            "allow a larger error"
+        )
 
 
 def rounded(lines: Lines) -> tuple[Points, float]:
