@@ -76,14 +76,15 @@ def open_atomically(path: PathLike) -> Generator[BinaryIO]:
     name = os.fspath(path)
     try:
         target = Path(os.path.realpath(path))
-        mode = _mode(target)
+        # Of the path itself: /dev/stdout leads to a pipe that has no name.
+        mode = _mode(Path(path))
         if mode is None or stat.S_ISREG(mode):
             with _replacing(target, mode) as file:
                 yield file
         elif stat.S_ISDIR(mode):
             raise IsADirectoryError(None, "it is a folder")
         else:
-            with target.open("wb") as device:
+            with Path(path).open("wb") as device:
                 yield device
     except WriteError:
         raise

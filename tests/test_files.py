@@ -92,6 +92,15 @@ def test_a_full_disk_leaves_the_old_file(
     assert _names(tmp_path) == ["grip.yaml"]
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="no /proc")
+def test_a_pipe_without_a_name_is_written_to() -> None:
+    reading, writing = os.pipe()
+    write_atomically(f"/proc/self/fd/{writing}", b"model")
+    os.close(writing)
+    with os.fdopen(reading, "rb") as file:
+        assert file.read() == b"model"
+
+
 def test_a_full_device_is_reported() -> None:
     with pytest.raises(WriteError) as caught:
         write_atomically("/dev/full", b"new")
