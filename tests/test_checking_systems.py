@@ -1,5 +1,7 @@
 """The check of systems: what it compares, and what it says of what is wrong."""
 
+import math
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -11,9 +13,11 @@ from fuzzytree.exporters.onnx import write
 from fuzzytree.rulebase import Points
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.system import (
+    Activation,
     Conclusion,
     Defuzzifier,
     FuzzySystem,
+    Gaussian,
     Is,
     Label,
     RuleBlock,
@@ -141,3 +145,45 @@ def test_a_slow_runtime_gets_a_share_of_the_rows(
     monkeypatch.setattr(checking_systems, "_SLOW_STEPS", 100)
     found = check_system(washer(), limit=400, runtimes=["native"])
     assert found.comparisons[0].rows < 50
+
+
+def shifted(system: FuzzySystem, by: float) -> FuzzySystem:
+    """Return a washer of which each answer is larger by a share."""
+    (output,) = system.outputs
+    (label,) = output.labels
+    assert isinstance(label.curve, Singleton)
+    moved = replace(label, curve=Singleton(label.curve.value * (1.0 + by)))
+    return replace(system, outputs=(replace(output, labels=(moved,)),))
+
+
+def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> None:
+    system = washer()
+    (soaked,) = system.inputs
+    bell = replace(soaked, labels=(Label("dirty", Gaussian(0.0, 1.5)),))
+    system = replace(system, inputs=(bell,))
+    data = np.array([[0.3, 1.0, 2.5]])
+    found = check_system(system, shifted(system, 1e-9), limit=50, data=data)
+    one = about(found, "file 1", "rows")
+    assert one.verdict == "DISAGREES"
+    assert one.differing >= 3
+    assert one.allowed < 1e-11 < one.largest_difference
+
+
+def test_rows_on_an_edge_are_told_apart_from_the_table() -> None:
+    # The rule passes from the very degree of dirt 1 on.
+    system = washer()
+    (soaked,) = system.inputs
+    bell = replace(soaked, labels=(Label("dirty", Gaussian(0.0, 1.5)),))
+    edge = math.exp(-0.5 * (1.0 / 1.5) ** 2)
+    only = Activation("threshold", threshold=edge)
+    (block,) = system.blocks
+    blocks = (replace(block, activation=only),)
+    system = replace(system, inputs=(bell,), blocks=blocks)
+    other = shifted(system, 1e-15)
+    found = check_system(
+        system, other, limit=1, data=np.array([[1.0, 0.5]]), runtimes=["native"]
+    )
+    (told,) = (text for text in found.skipped if text.startswith("file 1"))
+    assert "in 1 of 3 rows last bits decide" in told
+    rows = [c for c in found.comparisons if (c.carrier, c.basis) == ("file 1", "rows")]
+    assert [c.allowed < 1e-12 for c in rows] == [True]
