@@ -293,6 +293,14 @@ MISTAKES = [
         ("1 1, 1 (1)", "1 2, 1 (1)"),
         "36:1: rule 1: 'service' has 1 terms, and no term 2",
     ),
+    (
+        ("1 1, 1 (1)", "NaN 1, 1 (1)"),
+        "36:1: rule 1: 'food' has 2 terms, and no term nan",
+    ),
+    (
+        ("1 1, 1 (1)", "1 1, -Inf (1)"),
+        "36:1: rule 1: 'tip %' has 2 terms, and no term inf",
+    ),
     (("1 1, 1 (1)", "1 1, 1 (2)"), "36:9: the weight must lie in [0, 1], not 2.0"),
     (("(0.5) : 2", "(0.5) : 3"), "37:17: the last number is 1 (and) or 2 (or)"),
     (("1 1, 1 (1) : 1", "if food"), "36:1: 'if food' is no rule, such as 1 2, 1"),
