@@ -220,19 +220,18 @@ def _table(system: FuzzySystem, rounds: int, folder: Path) -> Iterator[str]:
         try:
             found[name] = make(system, folder)
         except (ImportError, OSError, ValueError, subprocess.SubprocessError) as error:
-            first = str(error).splitlines()[0]
-            absent.append(f"- {name}: {first}")
+            absent.append(f"- {name}: {str(error).splitlines()[0]}")
     errors = {
         name: _error(engine.many(values), right) for name, engine in found.items()
     }
     first = [float(x) for x in values[:, 0]]
     singles = {
-        name: (lambda one=engine.one: one(first))  # type: ignore[misc]
+        name: (lambda one=engine.one: one(first))
         for name, engine in found.items()
         if engine.one is not None
     }
     batches = {
-        name: (lambda many=engine.many: many(values))  # type: ignore[misc]
+        name: (lambda many=engine.many: many(values))
         for name, engine in found.items()
         if engine.loop is None
     }
@@ -254,12 +253,12 @@ def _table(system: FuzzySystem, rounds: int, folder: Path) -> Iterator[str]:
     yield "| --- | ---: | ---: | ---: | ---: |"
     for name in sorted(many, key=lambda n: many[n]):
         single = f"{one[name] / 1e3:.3g}" if name in one else ""
-        error = f"{errors[name]:.1e}" if name in errors else ""
+        gap = f"{errors[name]:.1e}" if name in errors else ""
         if errors.get(name) == 0.0:
-            error = "0"
+            gap = "0"
         yield (
             f"| {name} | {single} | {many[name] / 1e6:.3g} | {many[name] / best:.2f} "
-            f"| {error} |"
+            f"| {gap} |"
         )
     if "C, generated" in one and "fuzzylite, C++" in one:
         ratio = one["fuzzylite, C++"] / one["C, generated"]
@@ -286,7 +285,8 @@ def _runtime(name: str) -> Callable[[FuzzySystem, Path], Engine]:
         run = load(system)
 
         def many(values: Floats) -> Floats:
-            return run(values).outputs[0]
+            found: Floats = run(values).outputs[0]
+            return found
 
         return Engine(many, lambda row: many(np.array(row)[:, None]))
 
@@ -349,8 +349,8 @@ def _fuzzylite(system: FuzzySystem, folder: Path) -> Engine:
     def call(values: Floats, rounds: int) -> tuple[list[int], Floats]:
         rows, answers = folder / "rows.bin", folder / "answers.bin"
         rows.write_bytes(np.ascontiguousarray(values.T).tobytes())
-        width, count = values.shape
-        words = [program, model, rows, str(width), str(count), str(rounds), answers]
+        words = [str(program), str(model), str(rows), *map(str, values.shape)]
+        words += [str(rounds), str(answers)]
         printed = subprocess.run(words, check=True, capture_output=True).stdout
         return [int(line) for line in printed.split()], np.fromfile(answers)
 
@@ -371,7 +371,8 @@ def _pyfuzzylite(system: FuzzySystem, _: Path) -> Engine:
         for variable, column in zip(engine.input_variables, values, strict=True):
             variable.value = column
         engine.process()
-        return np.array(output.value, np.float64, ndmin=1)
+        found: Floats = np.array(output.value, np.float64, ndmin=1)
+        return found
 
     return Engine(many, lambda row: many(np.array(row)))
 
@@ -402,7 +403,8 @@ def _ferrifuzz(system: FuzzySystem, _: Path) -> Engine:
 
     def many(values: Floats) -> Floats:
         given = dict(zip(system.columns, values, strict=True))
-        return np.asarray(made.compute_batch(given)[output.name])
+        found: Floats = np.asarray(made.compute_batch(given)[output.name])
+        return found
 
     return Engine(many, made.evaluate, note="on all cores")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.contracts import Model
+from fuzzytree.contracts import Document
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters.yaml import write
 from fuzzytree.lowering import rules_from_tree
@@ -29,7 +29,7 @@ def error_of(content: str | bytes) -> str:
     return str(caught.value)
 
 
-def model_or_none(content: bytes) -> Model | None:
+def model_or_none(content: bytes) -> Document | None:
     """Return the model of a file, or None where it is refused as it should be."""
     try:
         return read(content, "x.yaml")

@@ -18,7 +18,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.contracts import Model, Outcome
-from fuzzytree.exporters.sql import write
+from fuzzytree.exporters.sql import Dialect, write
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime
@@ -62,7 +62,7 @@ def _assert_equal(found: list[list[float | None]], right: Outcome) -> None:
         np.testing.assert_array_equal(np.array(given).T, right.strengths)
 
 
-def _query(model: Model, dialect: str) -> str:
+def _query(model: Model, dialect: Dialect) -> str:
     is_rules = isinstance(model, RuleBase)
     return write(
         model, dialect=dialect, table="wine", keep=["row"], strengths=is_rules
@@ -156,7 +156,7 @@ def test_postgresql_answers_with_our_bits(name: str, postgresql: list[str]) -> N
 
 @pytest.mark.parametrize("dialect", ["sqlite", "duckdb", "postgresql", "spark"])
 def test_a_parser_of_each_dialect_takes_every_query(
-    dialect: str, library: Callable[[str], str]
+    dialect: Dialect, library: Callable[[str], str]
 ) -> None:
     sqlglot = importlib.import_module(library("sqlglot"))
     word = {"postgresql": "postgres"}.get(dialect, dialect)
