@@ -21,6 +21,7 @@ from lark.exceptions import UnexpectedInput
 
 from fuzzytree.errors import ReadError
 from fuzzytree.readers.fcl_statements import Statement, grammar, place
+from fuzzytree.readers.layout import LONGEST_NAME
 from fuzzytree.readers.nodes import Found, report
 
 MOST_BYTES: Final = 16 * 2**20
@@ -124,6 +125,9 @@ def _tokens(text: str, name: str) -> tuple[list[Token], list[Found]]:
         elif token.type == "OPEN_COMMENT":
             found.append((*place(token), f"the comment {token[:2]} is never closed"))
         else:
+            if len(token) > LONGEST_NAME:
+                sentence = f"a word of more than {LONGEST_NAME} characters"
+                found.append((*place(token), sentence))
             tokens.append(token)
     if len(tokens) > MOST_TOKENS:
         raise ReadError(f"{name}: more than the {MOST_TOKENS:,} words that are read")

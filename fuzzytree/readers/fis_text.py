@@ -9,6 +9,7 @@ import msgspec
 
 from fuzzytree.contracts import Loss
 from fuzzytree.errors import ReadError
+from fuzzytree.readers.layout import LONGEST_NAME
 from fuzzytree.readers.nodes import Found
 
 MOST_BYTES: Final = 4 * 2**20
@@ -187,6 +188,9 @@ def numbers_of(text: str, line: int, column: int, found: list[Found]) -> list[fl
 def unquoted(entry: Entry, found: list[Found]) -> str:
     """Return the text between the quotes of a value."""
     value = entry.value
+    if value.find("'", 1) > LONGEST_NAME + 1:
+        what = f"{entry.key} has more than {LONGEST_NAME} characters"
+        found.append((entry.line, entry.column, what))
     if len(value) >= 2 and value[0] == "'":
         end = value.find("'", 1)
         rest = value[end + 1 :].strip() if end > 0 else ""

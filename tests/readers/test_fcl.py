@@ -539,3 +539,9 @@ def test_a_damaged_file_is_read_or_refused_with_a_reason(text: str) -> None:
                     damaged.insert(place, chance.choice(words))
         error = _error(" ".join(damaged))
         assert error is None or error.startswith("file.fcl:")
+
+
+def test_a_word_that_is_longer_than_any_name_is_a_mistake() -> None:
+    text = f"FUNCTION_BLOCK {'n' * 1001}\nEND_FUNCTION_BLOCK\n".encode()
+    with pytest.raises(ReadError, match=r"fcl:1:16: a word of more than 1000"):
+        read(text, "x.fcl")

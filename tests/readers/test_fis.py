@@ -277,6 +277,7 @@ def test_names_that_stand_twice_are_told_apart_and_told() -> None:
 
 MISTAKES = [
     (("Type=", "Typo="), "4:1: no key 'Typo'; there is Name, Type, Version"),
+    (("Name='food'", f"Name='{'f' * 1001}'"), "16:6: Name has more than 1000 char"),
     (("'prod'\nOr", "'prodd'\nOr"), "9:11: no AndMethod 'prodd'; there is min, prod"),
     (("NumInputs=2", "NumInputs=3"), "6:11: NumInputs says 3, and there are 2"),
     (("NumRules=2", "NumRules=4"), "8:10: NumRules says 4, and there are 2"),
