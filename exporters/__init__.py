@@ -18,15 +18,15 @@ from fuzzytree.contracts import Format
 TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "yaml": (".yaml", ".yml"),
-        "onnx": (".onnx",),
-        "python": (".py",),
-        "sql": (".sql",),
-        "c": (".c",),
+        "fcl": (".fcl",),
+        "fll": (".fll",),
         "fis": (".fis",),
         "fml": (".fml", ".xml"),
-        "fll": (".fll",),
-        "fcl": (".fcl",),
+        "onnx": (".onnx",),
         "pmml": (".pmml",),
+        "c": (".c",),
+        "sql": (".sql",),
+        "python": (".py",),
         "javascript": (".mjs", ".js"),
         "structured-text": (".st",),
     }

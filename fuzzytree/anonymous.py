@@ -355,7 +355,8 @@ def _conclusion(one: Conclusion, names: Names, labels: Labels) -> Conclusion:
 
 def _hedges(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
     """Return hedges with `very very` as two: both are the square of the square."""
+    twice: tuple[Hedge, ...] = ("very", "very")
     found: list[Hedge] = []
     for hedge in hedges:
-        found += ["very", "very"] if hedge == "very very" else [hedge]
+        found.extend(twice if hedge == "very very" else (hedge,))
     return tuple(found)

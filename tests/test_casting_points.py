@@ -11,8 +11,8 @@ import pytest
 
 from fuzzytree.casting import pointed
 from fuzzytree.casting.points import points_for
-from fuzzytree.curves import curve_degree
 from fuzzytree.errors import LossError
+from fuzzytree.inference.curves import curve_degree
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.numerics.approximation import by_points
 from fuzzytree.reference import degree

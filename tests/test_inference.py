@@ -12,7 +12,6 @@ from typing import Any, get_args
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.formulas import value_of
 from fuzzytree.inference import (
     FUNCTIONS,
     curve_degree,
@@ -24,6 +23,7 @@ from fuzzytree.inference import (
     tree_sum,
     value_at,
 )
+from fuzzytree.inference.formulas import value_of
 from fuzzytree.readers.formulas import parse
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import Part, Points

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.formulas import BINARY, UNARY
+from fuzzytree.inference.formulas import BINARY, UNARY
 from fuzzytree.rulebase import Part, Points
 from fuzzytree.system import (
     FUNCTIONS,

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 
 from fuzzytree.casting.pieces import Function, Piece, Plan, bent
 from fuzzytree.casting.sigmoids import sigmoid_plan
-from fuzzytree.curves import curve_degree
 from fuzzytree.errors import LossError
-from fuzzytree.formulas import power as raised
-from fuzzytree.formulas import quotient
+from fuzzytree.inference.curves import curve_degree
+from fuzzytree.inference.formulas import power as raised
+from fuzzytree.inference.formulas import quotient
 from fuzzytree.system import (
     Arc,
     Bell,

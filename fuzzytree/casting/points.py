@@ -31,8 +31,8 @@ from fuzzytree.casting.bends import plan_of
 from fuzzytree.casting.pieces import Piece, Plan
 from fuzzytree.casting.shapes import shape_of
 from fuzzytree.contracts import Loss
-from fuzzytree.curves import curve_degree
 from fuzzytree.errors import LossError
+from fuzzytree.inference.curves import curve_degree
 from fuzzytree.numerics.curves import BELOW_ONE
 from fuzzytree.numerics.placing import points_of
 from fuzzytree.rulebase import MOST_POINTS, Band, Points, RuleBase, Term

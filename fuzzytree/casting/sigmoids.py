@@ -19,7 +19,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.casting.pieces import Error, Piece, Plan
-from fuzzytree.curves import curve_degree
+from fuzzytree.inference.curves import curve_degree
 from fuzzytree.system import Sigmoid, SigmoidDifference, SigmoidProduct
 
 _EXTREME = math.log(2.0 + math.sqrt(3.0))

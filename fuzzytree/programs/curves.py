@@ -1,4 +1,4 @@
-"""Curves of systems as steps: the operations of `fuzzytree.curves`, in its order.
+"""Curves of systems as steps: as `fuzzytree.inference.curves`, in its order.
 
 Where that module decides between formulas, all are computed here and `where` takes
 one, so that a formula may give NaN or an infinity where it is not taken.

@@ -1,4 +1,4 @@
-"""Formulas as steps: the operations of `fuzzytree.formulas`."""
+"""Formulas as steps: the operations of `fuzzytree.inference.formulas`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ANDs, ORs and hedges as steps: the operations of `fuzzytree.norms`."""
+"""ANDs, ORs and hedges as steps: the operations of `fuzzytree.inference.norms`."""
 
 from __future__ import annotations
 

@@ -402,7 +402,7 @@ def format_lines(formats: Sequence[Format], missing: set[str]) -> Iterator[str]:
     """
     rows = [("format", "suffix", "reads", "writes", "extra")]
     for one in formats:
-        carried = " and ".join(one.carries)
+        carried = ", ".join(one.carries)
         reads = carried if one.read else "-"
         suffixes = " ".join(one.suffixes)
         rows.append((one.name, suffixes, reads, carried, _extra(one.extra, missing)))
@@ -416,7 +416,7 @@ def runtime_lines(runtimes: Sequence[Runtime], missing: set[str]) -> Iterator[st
     rows = [("runtime", "runs", "numbers", "agreement", "extra")]
     for one in runtimes:
         promise = "equal bits" if one.bound is None else "within a derived bound"
-        runs = " and ".join(one.runs)
+        runs = ", ".join(one.runs)
         rows.append((one.name, runs, one.dtype, promise, _extra(one.extra, missing)))
     yield from aligned(rows)
     yield "cannot:"

@@ -14,8 +14,8 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml import write
-from fuzzytree.formulas import exponential, logarithm, power, quotient
 from fuzzytree.inference import infer
+from fuzzytree.inference.formulas import exponential, logarithm, power, quotient
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.probing import probes
 from fuzzytree.reference import descend, evaluate

@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from fuzzytree.curves import curve_degree
 from fuzzytree.errors import LossError
+from fuzzytree.inference.curves import curve_degree
 from fuzzytree.numerics.pointwise import (
     greatest,
     least,

@@ -2,7 +2,8 @@
 
 import math
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,8 +58,10 @@ def another_library(seed: int) -> dict[str, Callable[..., float]]:
     return {name: other(name) if name in INEXACT else NUMERIC[name] for name in NUMERIC}
 
 
-def answers(program: Program, row: dict[str, float], stills: Iterator) -> list[float]:
-    found: list = []
+def answers(
+    program: Program, row: dict[str, float], stills: Sequence[Any]
+) -> list[float]:
+    found: list[Any] = []
     for step, still in zip(program.steps, stills, strict=True):
         given = [found[place] for place in step.arguments]
         found.append(evaluate._result(step, given, row) if still is None else still)
@@ -87,7 +90,9 @@ def test_another_library_stays_within_the_bounds(
     assert is_within.all(), np.argwhere(~is_within)[:3]
 
 
-def tank(method: DefuzzifierMethod, curves: dict[str, Points | Singleton]):
+def tank(
+    method: DefuzzifierMethod, curves: dict[str, Points | Singleton]
+) -> FuzzySystem:
     low, high = Label("low", Gaussian(0.0, 1.5)), Label("high", Gaussian(10.0, 1.5))
     level = SystemInput("level", (low, high), 0.0, 10.0)
     labels = tuple(Label(name, curve) for name, curve in curves.items())
@@ -122,7 +127,9 @@ NUMBERS: dict[str, Points | Singleton] = {
         ("mean of maximum", 0.0),
     ],
 )
-def test_ordinary_rows_have_narrow_bounds(method: DefuzzifierMethod, most) -> None:
+def test_ordinary_rows_have_narrow_bounds(
+    method: DefuzzifierMethod, most: float
+) -> None:
     system = tank(method, NUMBERS if method == "weighted average" else TRIANGLES)
     program = from_system(system, activations=True)
     bounds = error_bounds(program, np.array([np.linspace(0.1, 4.8, 200)]))

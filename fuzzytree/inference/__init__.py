@@ -18,9 +18,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
-from fuzzytree.curves import curve_degree, value_at
-from fuzzytree.formulas import maximum, quotient, value_of
-from fuzzytree.norms import (
+from fuzzytree.inference.curves import curve_degree, value_at
+from fuzzytree.inference.formulas import maximum, quotient, value_of
+from fuzzytree.inference.norms import (
     RELATIONS,
     S_NORMS,
     T_NORMS,

@@ -26,7 +26,7 @@ from fuzzytree.rulebase import (
     part_mistakes,
     range_mistakes,
 )
-from fuzzytree.system_curves import (
+from fuzzytree.system.curves import (
     FUNCTIONS,
     MOST_LEVELS,
     Arc,
@@ -56,7 +56,7 @@ from fuzzytree.system_curves import (
     names_in,
     width_mistakes,
 )
-from fuzzytree.system_rules import (
+from fuzzytree.system.rules import (
     Activation,
     ActivationMethod,
     And,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from fuzzytree.formulas import maximum, minimum, power, quotient, square_root
+from fuzzytree.inference.formulas import maximum, minimum, power, quotient, square_root
 from fuzzytree.system import Hedge, SNorm, TNorm
 
 

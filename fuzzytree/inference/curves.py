@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Final, assert_never
 
-from fuzzytree.formulas import (
+from fuzzytree.inference.formulas import (
     exponential,
     logarithm,
     power,

@@ -1,6 +1,6 @@
 """The curves of a fuzzy system's terms as frozen values, and formulas among them.
 
-What they *mean* is computed in `fuzzytree.curves` and `fuzzytree.formulas`.
+What they *mean* is computed in `fuzzytree.inference`.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ class Name(Value, frozen=True, tag="name"):
 class Call(Value, frozen=True, tag="call"):
     """An operation or a function of a formula, such as `+`, `^`, `sqrt` or `max`.
 
-    `FUNCTIONS` lists them, and `fuzzytree.formulas` says what they do.
+    `FUNCTIONS` lists them, and `fuzzytree.inference.formulas` says what they do.
     """
 
     function: str

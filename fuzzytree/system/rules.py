@@ -1,6 +1,6 @@
 """The rules of a fuzzy system as frozen values: conditions, conclusions, blocks.
 
-What they *mean* is computed in `fuzzytree.inference` and `fuzzytree.norms`.
+What they *mean* is computed in `fuzzytree.inference` and `fuzzytree.inference.norms`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
 
 from fuzzytree.rulebase import Mistake, Path, Value, name_choice
-from fuzzytree.system_curves import MOST_LEVELS
+from fuzzytree.system.curves import MOST_LEVELS
 
 TNorm = Literal[
     "minimum",
