@@ -441,7 +441,7 @@ def bench(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> study = bench(random_tree(1), rows=[9], only=["native"], budget_s=1)
+        >>> study = bench(random_tree(1), rows=[9], only=["native"], budget_s=9)
         >>> [point.question for point in study.points]
         ['tree', 'relative rules', 'raw rules']
     """

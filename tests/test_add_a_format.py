@@ -129,6 +129,7 @@ def test_a_package_is_not_imported_for_formats_of_ours(package: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     ("name", "module", "fault"),
     [

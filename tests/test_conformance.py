@@ -38,7 +38,14 @@ for form in all_formats():
 """
 
 
-@pytest.mark.parametrize("name", TABLE)
+SLOW = ("fcl", "fis")
+"""Formats whose many curves of points take seconds."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.heavy) if n in SLOW else n for n in TABLE],
+)
 def test_every_format_of_the_table_keeps_its_promises(name: str) -> None:
     check_exporter(name, rounds=0)
 
