@@ -25,7 +25,7 @@ from fuzzytree.programs.bounds import ORIGIN, error_bounds
 from fuzzytree.programs.systems import from_system
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import fingerprint
-from fuzzytree.runtimes import chosen_runtimes, is_installed
+from fuzzytree.runtimes import chosen_runtimes, is_installed, needed_by
 from fuzzytree.runtimes.systems import infer_rows, run_system
 from fuzzytree.system import FuzzySystem
 
@@ -148,7 +148,7 @@ def _runtime(subject: _Subject, runtime: Runtime) -> Iterator[Finding]:
     if "system" not in runtime.runs or runtime.load_system is None:
         return
     if not is_installed(runtime):
-        yield f"{runtime.name} is not installed (extra {runtime.extra!r})"
+        yield f"{runtime.name} is not installed ({needed_by(runtime)})"
         return
     try:
         run = runtime.load_system(subject.system, activations=True)
