@@ -13,11 +13,10 @@ from fuzzytree.exporters.c_expected import axis_values, leaf, strengths
 from fuzzytree.exporters.c_tables import Tables
 from fuzzytree.exporters.c_text import Numbers, fill
 from fuzzytree.exporters.c_tree import Question
-from fuzzytree.probing import SPECIAL, Row, probes
+from fuzzytree.probing import Row, few_probes
 from fuzzytree.reference import Answer, Status, descend, evaluate
 from fuzzytree.tree import FuzzyTree
 
-_RANDOM_ROWS = 100  # that probes ends with, before the special values
 _MOST_ROWS = 160
 _FEWEST_ROWS = 8
 _STRENGTHS = 20_000  # of all rows together
@@ -125,22 +124,7 @@ def rows_of(model: Model, rules: int) -> list[Row]:
         rules: How many strengths a row has; the more, the fewer rows.
     """
     limit = max(_FEWEST_ROWS, min(_MOST_ROWS, _STRENGTHS // max(rules, 1)))
-    special = len(SPECIAL) * len(model.inputs)
-    made = probes(model, limit=_RANDOM_ROWS + special + 10 * limit)
-    cut = len(made) - special
-    chance, odd = made[cut - _RANDOM_ROWS : cut], made[cut:]
-    aimed = made[: cut - _RANDOM_ROWS]
-    return [
-        *_spread(aimed, limit // 2),
-        *_spread(chance, limit // 8),
-        *_spread(odd, limit - limit // 2 - limit // 8),
-    ]
-
-
-def _spread(rows: Sequence[Row], count: int) -> list[Row]:
-    """Return some rows that stand equally far from each other."""
-    places = np.linspace(0, len(rows) - 1, min(count, len(rows)))
-    return [rows[round(place)] for place in places.tolist()]
+    return few_probes(model, limit)
 
 
 def digest_of(strengths: Sequence[float], numbers: Numbers) -> int:

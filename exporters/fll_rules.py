@@ -10,7 +10,17 @@ from msgspec.structs import replace
 from fuzzytree.contracts import Loss
 from fuzzytree.errors import LossError
 from fuzzytree.readers.fll_rules import HEDGES
-from fuzzytree.system import And, Condition, Hedge, Is, Not, Or, RuleBlock, SystemRule
+from fuzzytree.system import (
+    And,
+    Condition,
+    Hedge,
+    Is,
+    Not,
+    Or,
+    RuleBlock,
+    SystemRule,
+    joints,
+)
 
 _WORDS: Mapping[Hedge, str] = MappingProxyType(
     {**{hedge: word for word, hedge in HEDGES.items()}, "very very": "very very"}
@@ -31,7 +41,7 @@ def speakable(block: RuleBlock) -> RuleBlock:
     """
     if not any(_has_joined_not(rule.when) for rule in block.rules):
         return block
-    kinds = {kind for rule in block.rules for kind in _kinds(rule.when)}
+    kinds = {kind for rule in block.rules for kind in joints(rule.when)}
     conjunction = block.conjunction if And in kinds else "minimum"
     disjunction = block.disjunction if Or in kinds else "maximum"
     is_exact = (conjunction, disjunction) == ("minimum", "maximum")
@@ -63,18 +73,6 @@ def has_not(condition: Condition | None, *, of: type = object) -> bool:
 
 def _has_joined_not(condition: Condition | None) -> bool:
     return any(has_not(condition, of=kind) for kind in (And, Or, Not))
-
-
-def _kinds(condition: Condition | None) -> Iterator[type]:
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            yield type(condition)
-            for part in parts:
-                yield from _kinds(part)
-        case Not(part=part):
-            yield from _kinds(part)
-        case _:
-            return
 
 
 def _pushed(condition: Condition, nots: int) -> Condition:

@@ -45,6 +45,7 @@ from fuzzytree.system import (
     SystemInput,
     SystemOutput,
     SystemRule,
+    joints,
 )
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets
 
@@ -273,7 +274,7 @@ def _block(
         )
         for rule in block.rules
     )
-    kinds = [one for rule in rules for one in _kinds(rule.when)]
+    kinds = [one for rule in rules for one in joints(rule.when)]
     looked_at = {o.name for o in system.outputs if not o.defuzzifier.is_weighted}
     concluded = {one.output for rule in block.rules for one in rule.then}
     return replace(
@@ -317,18 +318,6 @@ def _ordered(condition: Condition, block: RuleBlock) -> Condition:
             return found[0] if len(found) == 1 else kind(tuple(found))
         case _:
             return condition
-
-
-def _kinds(condition: Condition | None) -> Iterable[type]:
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            yield type(condition)
-            for part in parts:
-                yield from _kinds(part)
-        case Not(part=part):
-            yield from _kinds(part)
-        case _:
-            return
 
 
 def _condition(condition: Condition, names: Names, labels: Labels) -> Condition:

@@ -74,6 +74,7 @@ from fuzzytree.system.rules import (
     TNorm,
     activation_mistakes,
     condition_mistakes,
+    joints,
     questions,
     reference_mistakes,
 )
@@ -130,6 +131,7 @@ __all__ = [
     "Trapezoid",
     "TwoGaussians",
     "curve_mistakes",
+    "joints",
     "names_in",
     "questions",
 ]

@@ -186,6 +186,19 @@ def questions(condition: Condition | None) -> Iterator[Is]:
             return
 
 
+def joints(condition: Condition | None) -> Iterator[type[And] | type[Or]]:
+    """Yield how the parts of a condition are joined, from the outside in."""
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            yield type(condition)
+            for part in parts:
+                yield from joints(part)
+        case Not(part=part):
+            yield from joints(part)
+        case _:
+            return
+
+
 Terms = Mapping[str, Mapping[str, None]]
 
 
