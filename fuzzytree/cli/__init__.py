@@ -31,6 +31,7 @@ VERBS = (
     "bench",
     "needs",
     "stability",
+    "tactile",
     "formats",
     "doctor",
 )

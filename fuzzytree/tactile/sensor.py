@@ -1,0 +1,141 @@
+"""What a matrix of cells is like, and what presses on it.
+
+A frame is an array of whole numbers of shape (rows, columns), the first row at the
+top, the first column at the left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.errors import InvalidModelError, TableError
+from fuzzytree.rulebase import Mistake, Value
+
+Cells = npt.NDArray[np.integer]
+"""Whole numbers of shape (rows, columns) or (frames, rows, columns)."""
+
+LARGEST_SIDE = 256
+"""The most rows or columns that a sensor may have."""
+
+
+class Sensor(Value, frozen=True):
+    """A matrix of cells.
+
+    Attributes:
+        rows: From top to bottom.
+        columns: From left to right.
+        full: What a cell reads that takes no more; the unit of pressure is this.
+        threshold: A cell is pressed where it reads more than this over its baseline.
+        baseline: What each cell reads when nothing presses, row by row; empty for 0.
+        masked: The (row, column), from 0, of cells that are dead or hot: always 0.
+
+    Raises:
+        InvalidModelError: If the parts contradict each other; it lists everything.
+    """
+
+    rows: int
+    columns: int
+    full: int = 255
+    threshold: int = 0
+    baseline: tuple[int, ...] = ()
+    masked: tuple[tuple[int, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a sensor that contradicts itself."""
+        mistakes = [*_mistakes(self)]
+        if mistakes:
+            raise InvalidModelError(mistakes)
+
+    @property
+    def bits(self) -> Literal[8, 16]:
+        """How many bits hold what a cell reads."""
+        return 8 if self.full <= 255 else 16
+
+
+def _mistakes(sensor: Sensor) -> Iterator[Mistake]:
+    for side, size in (("rows", sensor.rows), ("columns", sensor.columns)):
+        if not 1 <= size <= LARGEST_SIDE:
+            yield (side,), f"a sensor has 1 to {LARGEST_SIDE} {side}, not {size}"
+            return
+    if not 1 <= sensor.full <= 65535:
+        yield ("full",), f"full lies in 1 to 65535, not {sensor.full}"
+    if not 0 <= sensor.threshold < max(sensor.full, 1):
+        text = f"the threshold lies in 0 to full - 1, not {sensor.threshold}"
+        yield ("threshold",), text
+    count = sensor.rows * sensor.columns
+    if sensor.baseline and len(sensor.baseline) != count:
+        text = f"a baseline has {count} numbers, not {len(sensor.baseline)}"
+        yield ("baseline",), text
+    if any(not 0 <= value <= sensor.full for value in sensor.baseline):
+        yield ("baseline",), f"a baseline lies in 0 to {sensor.full}"
+    for place, (row, column) in enumerate(sensor.masked):
+        if not (0 <= row < sensor.rows and 0 <= column < sensor.columns):
+            text = f"no cell ({row}, {column}) in {sensor.rows} x {sensor.columns}"
+            yield ("masked", place), text
+
+
+def check_frames(sensor: Sensor, frames: Cells) -> Cells:
+    """Return frames as an array of shape (frames, rows, columns).
+
+    Raises:
+        TableError: If they are of another size, or no whole numbers.
+    """
+    found = np.asarray(frames)
+    if not np.issubdtype(found.dtype, np.integer):
+        raise TableError(f"frames hold whole numbers, not {found.dtype}")
+    if found.ndim == 2:
+        found = found[np.newaxis]
+    if found.ndim != 3 or found.shape[1:] != (sensor.rows, sensor.columns):
+        shape = " x ".join(
+            map(str, found.shape[1:] if found.ndim == 3 else found.shape)
+        )
+        raise TableError(
+            f"a frame of {shape} cells does not fit a sensor of "
+            f"{sensor.rows} x {sensor.columns}"
+        )
+    return found
+
+
+def pressed(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
+    """Return what presses on each cell: 0 where nothing does.
+
+    That is the value over the baseline where it is above the threshold, and 0
+    elsewhere and in masked cells.
+
+    Args:
+        sensor: The sensor.
+        frames: Shape (frames, rows, columns), or one frame.
+
+    Returns:
+        Shape (frames, rows, columns), in 0 to `sensor.full`.
+
+    Raises:
+        TableError: If they are of another size, or no whole numbers.
+
+    Example:
+        >>> sensor = Sensor(1, 3, threshold=4, baseline=(9, 9, 9))
+        >>> pressed(sensor, np.array([[[9, 13, 14]]])).tolist()
+        [[[0, 0, 5]]]
+    """
+    values = check_frames(sensor, frames).astype(np.int64)
+    np.clip(values, 0, sensor.full, out=values)
+    if sensor.baseline:
+        baseline = np.array(sensor.baseline, np.int64)
+        values -= baseline.reshape(sensor.rows, sensor.columns)
+    values[values <= sensor.threshold] = 0
+    for row, column in sensor.masked:
+        values[:, row, column] = 0
+    return values
+
+
+def saturated(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
+    """Return how many cells of each frame that are not masked read `full` or more."""
+    full = check_frames(sensor, frames) >= sensor.full
+    for row, column in sensor.masked:
+        full[:, row, column] = False
+    count: npt.NDArray[np.int64] = full.sum(axis=(1, 2))
+    return count
