@@ -1,0 +1,321 @@
+"""From a frame to the features that a model asks for, and nothing besides.
+
+The features of a sensor's frames are a few exact sums over the pressed cells and a
+program on these sums (`FrameProgram`). Numpy, ONNX and C all run that program, so that
+a frame has the same features, bit for bit, wherever they are computed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.programs.steps import Maker, Program, Result
+from fuzzytree.rulebase import Value
+from fuzzytree.tactile.elementary import angle, signed_log
+from fuzzytree.tactile.moments import Centred, sum_name
+from fuzzytree.tactile.names import Feature, features_of_names
+from fuzzytree.tactile.noise import Noise, Noisy
+from fuzzytree.tactile.sensor import Sensor
+
+PRESSED = "pressed"
+"""The name of the last result of a frame's program: 1 where anything presses."""
+
+_LARGEST = 2.0**53  # whole numbers below it, and their sums, are exact in double
+
+
+class Sum(Value, frozen=True):
+    """A number that is made of all cells of a frame.
+
+    Attributes:
+        name: Of the input of the program.
+        of: `cells`: the sum of the pressed cells times the weights. `count`: how many
+            are pressed. `peak`: the largest.
+        weights: A whole number for each cell, row by row; empty for the others.
+    """
+
+    name: str
+    of: Literal["cells", "count", "peak"]
+    weights: tuple[int, ...] = ()
+
+
+class FrameProgram(Value, frozen=True):
+    """What is computed of a frame.
+
+    Attributes:
+        sensor: Whose frames they are.
+        features: The names, in order.
+        sums: What is taken from the cells, in the order of the program's inputs.
+        program: From the sums to a result for each feature and `PRESSED` at the end.
+    """
+
+    sensor: Sensor
+    features: tuple[str, ...]
+    sums: tuple[Sum, ...]
+    program: Program
+
+    @property
+    def cost(self) -> int:
+        """How many operations a frame takes, those on cells included."""
+        cells = self.sensor.rows * self.sensor.columns
+        each = {"cells": 2, "count": 1, "peak": 1}
+        return self.program.size + cells * sum(each[one.of] for one in self.sums)
+
+
+def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
+    """Return what computes some features of a sensor's frames.
+
+    Where nothing presses, every feature is 0. Values within the noise of their
+    rounding are exactly 0.
+
+    Args:
+        sensor: The sensor.
+        names: Of the features; see `fuzzytree.tactile.names`.
+
+    Raises:
+        TableError: If a name is no feature's.
+        InvalidModelError: If a block or cell lies outside the sensor, or if sums for
+            a feature are beyond what doubles hold exactly.
+
+    Example:
+        >>> made = frame_program(Sensor(16, 16), ["S1", "cell r0 c2"])
+        >>> [one.name for one in made.sums]
+        ['sum 00', 'sum 10', 'sum 01', 'sum 20', 'sum 02', 'cell r0 c2']
+    """
+    features = features_of_names(names)
+    for feature in features:
+        _check_place(sensor, feature)
+    make = _Maker(sensor)
+    pressed = make.steps("where", make.centred.is_pressed, make.one, make.zero)
+    results = [
+        Result("output", feature.name, make.feature(feature)) for feature in features
+    ]
+    results.append(Result("output", PRESSED, pressed))
+    every = tuple(_every_sum(sensor, features))
+    program = make.steps.program(
+        "features", tuple(one.name for one in every), tuple(results)
+    )
+    asked = {step.name for step in program.steps if step.operation == "input"}
+    sums = tuple(one for one in every if one.name in asked)
+    _check_exact(sensor, sums)
+    named = tuple(one.name for one in sums)
+    program = Program(program.name, named, program.steps, program.results)
+    return FrameProgram(sensor, tuple(names), sums, program)
+
+
+def costs(sensor: Sensor, names: Sequence[str]) -> Mapping[str, float]:
+    """Return how many operations each feature takes by itself, for `learn`'s costs.
+
+    Among equally powerful features the paper takes the one that needs the least time
+    (2.3, step 4).
+
+    Raises:
+        TableError: As `frame_program`.
+        InvalidModelError: As `frame_program`.
+
+    Example:
+        >>> found = costs(Sensor(16, 16), ["S1", "S7"])
+        >>> found["S1"] < found["S7"]
+        True
+    """
+    return {name: float(frame_program(sensor, [name]).cost) for name in names}
+
+
+class _Maker:
+    """Makes the steps of features, each part once."""
+
+    def __init__(self, sensor: Sensor) -> None:
+        self.sensor = sensor
+        self.steps = Maker()
+        self.zero, self.one = self.steps.constant(0.0), self.steps.constant(1.0)
+        self.centred = Centred(self.steps)
+        self.noise = Noise(self.steps)
+        self._parts: dict[tuple[int, int], tuple[Noisy, Noisy]] = {}
+
+    def feature(self, feature: Feature) -> int:
+        """Return the value of a feature, 0 where nothing presses."""
+        value = self._value(feature)
+        if feature.is_log:
+            value = signed_log(self.steps, value)
+        return self.steps("where", self.centred.is_pressed, value, self.zero)
+
+    def _value(self, feature: Feature) -> int:
+        make, base = self.steps, feature.base
+        if feature.kind != "moment":
+            count = math.prod(map(len, _cells_of(self.sensor, feature)))
+            found = make("divide", make.input(base), make.constant(float(count)))
+            return self._scaled(found, 1, feature)
+        match base:
+            case "force" | "peak":
+                name = sum_name(0, 0) if base == "force" else base
+                return self._scaled(make.input(name), 1, feature)
+            case "area":
+                return make.input(base)
+            case "x" | "y":
+                return self._centre(base)
+            case "angle" | "cos2" | "sin2":
+                return self._direction(base)
+            case _ if base[0] == "S":
+                value, degree = self._invariant(int(base[1:]))
+                return self._scaled(value, degree, feature)
+            case _:
+                part, name = base.split()
+                parts = self.parts(int(name[1]), int(name[2]))
+                value = self.noise.settled(parts[part == "Im"])
+                return self._scaled(value, 1, feature)
+
+    def parts(self, p: int, q: int) -> tuple[Noisy, Noisy]:
+        """Return the parts of C_pq, noise settled to 0."""
+        if (p, q) not in self._parts:
+            self._parts[p, q] = self.centred.complex_moment(p, q)
+        return self._parts[p, q]
+
+    def _scaled(self, value: int, degree: int, feature: Feature) -> int:
+        """Return a value of some degree in g, for g in [0, 1] or divided by its sum."""
+        make = self.steps
+        if feature.per_force:
+            unit = make.chain("multiply", [self.centred.total] * degree)
+        else:
+            unit = make.constant(float(self.sensor.full**degree))
+        return make("divide", value, unit)
+
+    def _centre(self, base: str) -> int:
+        x, y = self.centred.centre()
+        side = self.sensor.columns if base == "x" else self.sensor.rows
+        offset = 0.0 if side % 2 else 0.5
+        if base == "y":
+            offset = -offset
+        middle = self.steps.constant(offset)
+        return self.steps("add", x if base == "x" else y, middle)
+
+    def _direction(self, base: str) -> int:
+        make = self.steps
+        real, imaginary = (self.noise.settled(part) for part in self.parts(2, 0))
+        if base == "angle":
+            whole = angle(make, imaginary, real)
+            return make("multiply", whole, make.constant(0.5))
+        squares = [make("multiply", part, part) for part in (real, imaginary)]
+        length = make("square_root", make("add", *squares))
+        is_none = make("equal", length, self.zero)
+        length = make("where", is_none, self.one, length)
+        return make("divide", real if base == "cos2" else imaginary, length)
+
+    def _invariant(self, number: int) -> tuple[int, int]:
+        """Return S_number (paper, 2.1) without the unit, and its degree in g."""
+        noise, parts = self.noise, self.parts
+        match number:
+            case 1 | 9:
+                order = 1 if number == 1 else 2
+                return noise.settled(parts(order, order)[0]), 1
+            case 2 | 3 | 4 | 7 | 8:
+                p, q = {2: (2, 0), 3: (3, 0), 4: (2, 1), 7: (4, 0), 8: (3, 1)}[number]
+                real, imaginary = parts(p, q)
+                squares = (
+                    noise.product(real, real),
+                    noise.product(imaginary, imaginary),
+                )
+                return noise.settled(noise.sum(*squares)), 2
+            case 5:
+                square = self._times(parts(2, 1), parts(2, 1))
+                cube = self._times(square, parts(2, 1))
+                return self._twice_real(cube, parts(3, 0)), 4
+            case 6:
+                square = self._times(parts(2, 1), parts(2, 1))
+                return self._twice_real(square, parts(2, 0)), 3
+            case 10:
+                square = self._times(parts(3, 1), parts(3, 1))
+                return self._twice_real(square, parts(4, 0)), 3
+            case _:
+                return self._twice_real(parts(3, 1), parts(2, 0)), 2
+
+    def _times(
+        self, one: tuple[Noisy, Noisy], two: tuple[Noisy, Noisy]
+    ) -> tuple[Noisy, Noisy]:
+        product = self.noise.product
+        real = self.noise.difference(product(one[0], two[0]), product(one[1], two[1]))
+        imaginary = self.noise.sum(product(one[0], two[1]), product(one[1], two[0]))
+        return real, imaginary
+
+    def _twice_real(self, one: tuple[Noisy, Noisy], two: tuple[Noisy, Noisy]) -> int:
+        """Return 2 Re(one conj(two))."""
+        product = self.noise.product
+        real = self.noise.sum(product(one[0], two[0]), product(one[1], two[1]))
+        return self.noise.settled(self.noise.times(2.0, real))
+
+
+def _every_sum(sensor: Sensor, features: Sequence[Feature]) -> list[Sum]:
+    """Return all sums that features could ask for, moments first."""
+    found = [
+        Sum(sum_name(order - q, q), "cells", _weights(sensor, order - q, q))
+        for order in range(5)
+        for q in range(order + 1)
+    ]
+    found += [Sum("area", "count"), Sum("peak", "peak")]
+    blocks = {feature.base: feature for feature in features if feature.rows}
+    cells = {f.base: f for f in features if f.kind == "cell"}
+    for base, feature in (blocks | cells).items():
+        found.append(Sum(base, "cells", _inside(sensor, feature)))
+    return found
+
+
+def _weights(sensor: Sensor, p: int, q: int) -> tuple[int, ...]:
+    """Return x^p y^q of each cell, from the cell at rows // 2, columns // 2."""
+    return tuple(
+        (column - sensor.columns // 2) ** p * (sensor.rows // 2 - row) ** q
+        for row in range(sensor.rows)
+        for column in range(sensor.columns)
+    )
+
+
+def _cells_of(sensor: Sensor, feature: Feature) -> tuple[range, range]:
+    """Return the rows and columns of a cell or block."""
+    if feature.kind == "cell":
+        row, column = feature.row, feature.column
+        return range(row, row + 1), range(column, column + 1)
+    return (
+        _part(sensor.rows, feature.row, feature.rows),
+        _part(sensor.columns, feature.column, feature.columns),
+    )
+
+
+def _part(size: int, number: int, count: int) -> range:
+    return range(size * number // count, size * (number + 1) // count)
+
+
+def _inside(sensor: Sensor, feature: Feature) -> tuple[int, ...]:
+    rows, columns = _cells_of(sensor, feature)
+    return tuple(
+        int(row in rows and column in columns)
+        for row in range(sensor.rows)
+        for column in range(sensor.columns)
+    )
+
+
+def _check_place(sensor: Sensor, feature: Feature) -> None:
+    if feature.kind == "moment":
+        return
+    height = sensor.rows if feature.kind == "cell" else feature.rows
+    width = sensor.columns if feature.kind == "cell" else feature.columns
+    if not (
+        1 <= height <= sensor.rows
+        and 1 <= width <= sensor.columns
+        and feature.row < height
+        and feature.column < width
+    ):
+        text = f"{feature.base!r} lies outside a sensor of {sensor.rows} x "
+        raise InvalidModelError([((), f"{text}{sensor.columns} cells")])
+
+
+def _check_exact(sensor: Sensor, sums: Sequence[Sum]) -> None:
+    """Refuse sums that are not exact: moving one may double each of its lengths."""
+    for one in sums:
+        order = sum(map(int, one.name[4:])) if one.name.startswith("sum ") else 0
+        largest = sensor.full * sum(map(abs, one.weights)) * 2.0**order
+        if largest >= _LARGEST:
+            text = (
+                f"a sensor of {sensor.rows} x {sensor.columns} cells up to "
+                f"{sensor.full} is too large for exact moments of order {order}"
+            )
+            raise InvalidModelError([((), text)])

@@ -1,0 +1,190 @@
+"""Moments of a frame, as steps: from exact sums to complex moments with bounds.
+
+A frame of whole numbers has exact sums `sum of g x^p y^q` about a cell of its own;
+doubles hold them as long as they stay below 2^53, in any order of addition. They are
+moved to the cell next to the centre of pressure, exactly, and from there by less than
+a cell to the centre itself, which is where rounding begins (see `docs/moments.md`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from fuzzytree.programs.steps import Maker
+from fuzzytree.tactile.noise import UNIT, Noise, Noisy
+
+Power = tuple[int, int]
+"""p and q of the moment `sum of g x^p y^q`."""
+
+_PASCAL = ((1,), (1, 1), (1, 2, 1), (1, 3, 3, 1), (1, 4, 6, 4, 1))
+
+
+@dataclass
+class Centred:
+    """Moments about the centre of pressure, made when they are asked for.
+
+    Attributes:
+        make: Where the steps go.
+        total: The sum of the cells, 1 where nothing presses.
+        is_pressed: Whether anything presses: a truth.
+        near: The exact place of the cell next to the centre, x and y.
+        rest: What is left from there to the centre, at most about half a cell.
+    """
+
+    make: Maker
+    total: int = field(init=False)
+    is_pressed: int = field(init=False)
+    near: tuple[int, int] = field(init=False)
+    rest: tuple[int, int] = field(init=False)
+    _known: dict[tuple[str, int, int, int], Noisy | int] = field(
+        init=False, default_factory=dict
+    )
+
+    def __post_init__(self) -> None:
+        """Find the centre."""
+        make = self.make
+        self.noise = Noise(make)
+        zero, one = make.constant(0.0), make.constant(1.0)
+        force = self._raw(0, 0)
+        self.is_pressed = make("less", zero, force)
+        self.total = make("where", self.is_pressed, force, one)
+        at = [make("divide", self._raw(p, q), self.total) for p, q in ((1, 0), (0, 1))]
+        self.near = (make("round", at[0]), make("round", at[1]))
+        left = [make("divide", self._moved(p, q), self.total) for p, q in _FIRST]
+        self.rest = (left[0], left[1])
+
+    def centre(self) -> tuple[int, int]:
+        """Return x and y of the centre, from the cell that the sums are about."""
+        x, y = (
+            self.make("add", near, rest)
+            for near, rest in zip(self.near, self.rest, strict=True)
+        )
+        return x, y
+
+    def moment(self, p: int, q: int) -> Noisy:
+        """Return the moment about the centre; that of order 1 is 0."""
+        return self._across(p, q, q)
+
+    def complex_moment(self, p: int, q: int) -> tuple[Noisy, Noisy]:
+        """Return the real and the imaginary part of C_pq (paper, 2.1)."""
+        parts: tuple[list[Noisy], list[Noisy]] = ([], [])
+        for power, weight in _expansion(p, q).items():
+            is_imaginary = power[1] % 2
+            parts[is_imaginary].append(
+                self.noise.times(weight, self.moment(*power))
+                if weight != 1.0
+                else self.moment(*power)
+            )
+        nothing = Noisy(self.make.constant(0.0))
+        real, imaginary = (
+            self.noise.sum(*found) if found else nothing for found in parts
+        )
+        return real, imaginary
+
+    def _raw(self, p: int, q: int) -> int:
+        return self.make.input(sum_name(p, q))
+
+    def _moved(self, p: int, q: int) -> int:
+        """Return the exact sum about the cell next to the centre."""
+        return self._shifted(p, q, p, q)
+
+    def _shifted(self, p: int, q: int, by_x: int, by_y: int) -> int:
+        """Return a sum after some of its p moves in x and q moves in y.
+
+        One move takes the sum of `u x` to that of `u (x - near)`, exactly.
+        """
+        key = ("shift", p * 8 + q, by_x, by_y)
+        found = self._known.get(key)
+        if isinstance(found, int):
+            return found
+        if by_y:
+            one = self._shifted(p, q, by_x, by_y - 1)
+            other = self._shifted(p, q - 1, by_x, by_y - 1)
+            made = self._move(one, other, self.near[1])
+        elif by_x:
+            one = self._shifted(p, q, by_x - 1, 0)
+            other = self._shifted(p - 1, q, by_x - 1, 0)
+            made = self._move(one, other, self.near[0])
+        else:
+            made = self._raw(p, q)
+        self._known[key] = made
+        return made
+
+    def _move(self, one: int, other: int, by: int) -> int:
+        return self.make("subtract", one, self.make("multiply", by, other))
+
+    def _across(self, p: int, q: int, by_y: int) -> Noisy:
+        """Return a moment after all its moves in x by the rest and some in y."""
+        key = ("y", p, q, by_y)
+        found = self._known.get(key)
+        if isinstance(found, Noisy):
+            return found
+        if (p, q) == (0, 1) and by_y == 1:
+            made = Noisy(self.make.constant(0.0))
+        elif by_y:
+            one = self._across(p, q, by_y - 1)
+            other = self._across(p, q - 1, by_y - 1)
+            made = self._settle(one, other, self.rest[1])
+        else:
+            made = self._along(p, q, p)
+        self._known[key] = made
+        return made
+
+    def _along(self, p: int, q: int, by_x: int) -> Noisy:
+        key = ("x", p, q, by_x)
+        found = self._known.get(key)
+        if isinstance(found, Noisy):
+            return found
+        if (p, q) == (1, 0) and by_x == 1:
+            made = Noisy(self.make.constant(0.0))
+        elif by_x:
+            one = self._along(p, q, by_x - 1)
+            other = self._along(p - 1, q, by_x - 1)
+            made = self._settle(one, other, self.rest[0])
+        else:
+            made = Noisy(self._moved(p, q))
+        self._known[key] = made
+        return made
+
+    def _settle(self, one: Noisy, other: Noisy, rest: int) -> Noisy:
+        """Return one - rest * other; the rest itself is rounded once."""
+        make = self.make
+        if make.number(other.value) == 0.0 and other.error is None:
+            return one
+        value = make("subtract", one.value, make("multiply", rest, other.value))
+        size = make("multiply", make("absolute", other.value), make.constant(2 * UNIT))
+        if other.error is not None:
+            size = make("add", size, other.error)
+        errors = [make("multiply", make("absolute", rest), size)]
+        if one.error is not None:
+            errors.append(one.error)
+        own = make("multiply", make("absolute", value), make.constant(UNIT))
+        return Noisy(value, make.chain("add", [*errors, own]))
+
+
+_FIRST: tuple[Power, Power] = ((1, 0), (0, 1))
+
+
+def sum_name(p: int, q: int) -> str:
+    """Return the name of the input that is the sum of g x^p y^q."""
+    return f"sum {p}{q}"
+
+
+def _expansion(p: int, q: int) -> Mapping[Power, float]:
+    """Return the weights of x^a y^b in (x + iy)^p (x - iy)^q, those of i left out.
+
+    A weight belongs to the real part where b is even, and to the imaginary part where
+    it is odd.
+
+    Example:
+        >>> dict(_expansion(2, 0))
+        {(2, 0): 1.0, (1, 1): 2.0, (0, 2): -1.0}
+    """
+    weights: dict[Power, float] = {}
+    for j, one in enumerate(_PASCAL[p]):
+        for k, two in enumerate(_PASCAL[q]):
+            power = (p + q - j - k, j + k)
+            turn = (1, 1, -1, -1)[(j + 3 * k) % 4]  # of i^j (-i)^k, its sign
+            weights[power] = weights.get(power, 0.0) + turn * one * two
+    return {power: weight for power, weight in weights.items() if weight}

@@ -1,0 +1,155 @@
+"""The names of features: what a model asks of a frame, in its inputs' own names."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Literal
+
+from fuzzytree.errors import TableError
+from fuzzytree.rulebase import Value
+
+LOG = "log "
+PER_FORCE = " / force"
+
+FEATURES: Mapping[str, str] = MappingProxyType(
+    {
+        "S1": "C11",
+        "S2": "|C20|^2",
+        "S3": "|C30|^2",
+        "S4": "|C21|^2",
+        "S5": "2 Re(conj(C30) C21^3)",
+        "S6": "2 Re(C21^2 conj(C20))",
+        "S7": "|C40|^2",
+        "S8": "|C31|^2",
+        "S9": "C22",
+        "S10": "2 Re(conj(C40) C31^2)",
+        "S11": "2 Re(C31 conj(C20))",
+        "angle": "arg(C20) / 2 in degrees, above -90, up to 90; 0 if C20 is 0",
+        "cos2": "Re C20 / |C20|; 0 if C20 is 0",
+        "sin2": "Im C20 / |C20|; 0 if C20 is 0",
+        "Re C20": "the real part of C20: long along x",
+        "Im C20": "the imaginary part of C20: long along x = y",
+        "Re C21": "the real part of C21",
+        "Im C21": "the imaginary part of C21",
+        "Re C30": "the real part of C30",
+        "Im C30": "the imaginary part of C30",
+        "Re C31": "the real part of C31",
+        "Im C31": "the imaginary part of C31",
+        "Re C40": "the real part of C40",
+        "Im C40": "the imaginary part of C40",
+        "force": "the sum of all cells",
+        "area": "how many cells are pressed",
+        "peak": "the largest cell",
+        "x": "the centre of pressure, in cells to the right of the middle",
+        "y": "the centre of pressure, in cells above the middle",
+    }
+)
+"""What each named feature is. C_pq is the sum of (x + iy)^p (x - iy)^q g over the cells
+with x to the right and y up from the centre of pressure, in cells, and g in [0, 1]."""
+
+PAPER: tuple[str, ...] = tuple(f"S{number}" for number in range(1, 12))
+"""The paper's features (2.1)."""
+
+ORIENTATION: tuple[str, ...] = ("angle", "Re C30", "Re C21")
+"""What tells orientations apart, which invariants cannot."""
+
+_UNSCALED = frozenset(("angle", "cos2", "sin2", "area", "x", "y"))
+_CELL = re.compile(r"cell r(\d{1,3}) c(\d{1,3})")
+_BLOCK = re.compile(r"block r(\d{1,3}) c(\d{1,3}) of (\d{1,3})x(\d{1,3})")
+
+Kind = Literal["moment", "cell", "block"]
+
+
+class Feature(Value, frozen=True):
+    """A feature as its name tells it.
+
+    Attributes:
+        name: The whole name.
+        base: A key of `FEATURES`; for cells and blocks their part of the name.
+        kind: What the base is.
+        row: Of a cell or block, from 0 at the top.
+        column: From 0 at the left.
+        rows: How many blocks stand above one another.
+        columns: How many stand beside one another.
+        is_log: Whether it is the signed logarithm, sign(v) log(1 + |v|).
+        per_force: Whether the cells are divided by their sum first.
+    """
+
+    name: str
+    base: str
+    kind: Kind = "moment"
+    row: int = 0
+    column: int = 0
+    rows: int = 0
+    columns: int = 0
+    is_log: bool = False
+    per_force: bool = False
+
+
+def blocks(rows: int, columns: int) -> tuple[str, ...]:
+    """Return the names of all blocks of a division.
+
+    Example:
+        >>> blocks(1, 2)
+        ('block r0 c0 of 1x2', 'block r0 c1 of 1x2')
+    """
+    return tuple(
+        f"block r{row} c{column} of {rows}x{columns}"
+        for row in range(rows)
+        for column in range(columns)
+    )
+
+
+def feature_of(name: str) -> Feature:
+    """Return the feature of a name.
+
+    Raises:
+        TableError: If there is none of that name.
+
+    Example:
+        >>> feature_of("log S10 / force").base
+        'S10'
+    """
+    base = name.removeprefix(LOG).removesuffix(PER_FORCE)
+    is_log, per_force = name.startswith(LOG), name.endswith(PER_FORCE)
+    found: Feature | None = None
+    if base in FEATURES and not (per_force and base in (*_UNSCALED, "force")):
+        found = Feature(name, base, is_log=is_log, per_force=per_force)
+    cell, block = _CELL.fullmatch(base), _BLOCK.fullmatch(base)
+    if cell:
+        row, column = map(int, cell.groups())
+        found = Feature(
+            name, base, "cell", row, column, is_log=is_log, per_force=per_force
+        )
+    if block:
+        row, column, rows, columns = map(int, block.groups())
+        found = Feature(
+            name, base, "block", row, column, rows, columns, is_log, per_force
+        )
+    if found is None:
+        raise TableError(_unknown(name, base))
+    return found
+
+
+def features_of_names(names: Sequence[str]) -> tuple[Feature, ...]:
+    """Return the features of some names.
+
+    Raises:
+        TableError: If one is none; it says which.
+    """
+    return tuple(feature_of(name) for name in names)
+
+
+def _unknown(name: str, base: str) -> str:
+    if base in FEATURES:
+        return f"{name!r} is no feature of a frame: {base!r} is not divided by force"
+    close = difflib.get_close_matches(base, FEATURES, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return (
+        f"{name!r} is no feature of a frame{hint}; there is S1 to S11, angle, cos2, "
+        "sin2, Re C20 to Im C40, force, area, peak, x, y, cell r0 c0, "
+        "block r0 c0 of 4x4, each also behind 'log ' and before ' / force'"
+    )
