@@ -1,0 +1,209 @@
+"""Labelled frames in a numpy archive (`.npz`): read within bounds, written the same.
+
+The arrays: `frames`, whole numbers of shape (frames, rows, columns); `full`, what a
+cell reads that takes no more; and, where known, `label`, the place of each frame's
+class in `label_names`, and `subject`, a number for whoever or whatever was pressing.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import math
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fuzzytree.errors import ReadError
+from fuzzytree.files import PathLike, read_bounded, write_atomically
+from fuzzytree.tactile.sensor import LARGEST_SIDE, Cells
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+LIMIT = 2**30
+"""The most bytes of an archive, packed or not."""
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the first that a zip file can hold
+_MOST_MEMBERS = 64
+_LONGEST_HEADER = 4096
+_USED = ("frames", "full", "label", "label_names", "subject")
+
+
+@dataclass(frozen=True, slots=True)
+class Presses:
+    """Frames, and what is known of them.
+
+    Attributes:
+        frames: Shape (frames, rows, columns), whole numbers.
+        full: What a cell reads that takes no more.
+        label: Shape (frames,): the place of the class in `label_names`; empty if it
+            is not known.
+        label_names: The names of the classes.
+        subject: Shape (frames,): who was pressing; empty if it is not known.
+    """
+
+    frames: Cells
+    full: int
+    label: npt.NDArray[np.int64]
+    label_names: tuple[str, ...]
+    subject: npt.NDArray[np.int64]
+
+
+def read_presses(path: PathLike, *, label: str = "label") -> Presses:
+    """Return the frames of an archive.
+
+    Args:
+        path: The file.
+        label: The array of the classes; their names are in that of `LABEL_names`.
+
+    Raises:
+        ReadError: If it is no such archive, or larger than 1 GiB.
+    """
+    name = os.fspath(path)
+    arrays = _arrays(read_bounded(path, LIMIT), name, label)
+    frames = arrays.get("frames")
+    if frames is None:
+        raise ReadError(f"{name}: has no array 'frames'")
+    if frames.ndim != 3 or not np.issubdtype(frames.dtype, np.integer):
+        raise ReadError(
+            f"{name}: 'frames' must hold whole numbers of shape (frames, rows, "
+            f"columns), not {frames.dtype} of shape {frames.shape}"
+        )
+    if not all(1 <= side <= LARGEST_SIDE for side in frames.shape[1:]):
+        raise ReadError(
+            f"{name}: a frame has 1 to {LARGEST_SIDE} rows and columns, "
+            f"not {frames.shape[1]} x {frames.shape[2]}"
+        )
+    names = _texts(arrays.get(f"{label}_names"), name, f"{label}_names")
+    labels = _codes(arrays.get(label), len(frames), name, label)
+    if len(labels) and not (labels.min() >= 0 and labels.max() < len(names)):
+        raise ReadError(
+            f"{name}: {label!r} holds places in {label + '_names'!r}, from 0 to "
+            f"{len(names) - 1}, not {labels.min()} to {labels.max()}"
+        )
+    subject = _codes(arrays.get("subject"), len(frames), name, "subject")
+    return Presses(
+        frames, _full(arrays.get("full"), frames, name), labels, names, subject
+    )
+
+
+def presses_content(presses: Presses) -> bytes:
+    """Return an archive; the same frames give the same bytes."""
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "frames": presses.frames,
+        "full": np.array(presses.full, np.int64),
+    }
+    if len(presses.label):
+        arrays["label"] = presses.label
+        arrays["label_names"] = np.array(presses.label_names, np.str_)
+    if len(presses.subject):
+        arrays["subject"] = presses.subject
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, values in arrays.items():
+            member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+            member.compress_type = zipfile.ZIP_DEFLATED
+            member.create_system, member.external_attr = 3, 0o644 << 16
+            packed = io.BytesIO()
+            np.lib.format.write_array(packed, values, (1, 0), allow_pickle=False)
+            archive.writestr(member, packed.getvalue())
+    return file.getvalue()
+
+
+def write_presses(path: PathLike, presses: Presses) -> None:
+    """Write an archive whole, or leave what stood there.
+
+    Raises:
+        WriteError: If it cannot be written.
+    """
+    write_atomically(path, presses_content(presses))
+
+
+def _arrays(content: bytes, name: str, label: str) -> Mapping[str, npt.NDArray[Any]]:
+    """Return the arrays that are used, unpacked within the limit."""
+    wanted = {*_USED, label, f"{label}_names"}
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = archive.infolist()
+            if len(members) > _MOST_MEMBERS:
+                raise ReadError(f"{name}: has more than {_MOST_MEMBERS} arrays")
+            if sum(member.file_size for member in members) > LIMIT:
+                raise ReadError(f"{name}: unpacks to more than {LIMIT} bytes")
+            found: dict[str, npt.NDArray[Any]] = {}
+            for member in members:
+                title = member.filename.removesuffix(".npy")
+                if title in wanted:
+                    with archive.open(member) as file:
+                        found[title] = _array(file.read(LIMIT), name, title)
+            return found
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+        raise ReadError(f"{name}: is no numpy archive (.npz): {error}") from error
+    except zlib.error as error:
+        raise ReadError(f"{name}: is damaged: {error}") from error
+
+
+def _array(content: bytes, name: str, title: str) -> npt.NDArray[Any]:
+    """Return an array of whole numbers or text; anything else is refused unread."""
+    file = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(file)
+        size = 2 if version == (1, 0) else 4
+        length = int.from_bytes(file.read(size), "little")
+        if not 0 < length <= _LONGEST_HEADER:
+            raise ValueError("its header is too long")
+        header = ast.literal_eval(file.read(length).decode("latin-1").strip())
+        dtype, shape = np.dtype(header["descr"]), tuple(header["shape"])
+        order = "F" if header["fortran_order"] else "C"
+    except (ValueError, SyntaxError, KeyError, TypeError, MemoryError) as error:
+        raise ReadError(f"{name}: {title!r} is no numpy array: {error}") from error
+    if dtype.kind not in "iuU" or not all(type(side) is int for side in shape):
+        raise ReadError(f"{name}: {title!r} holds {dtype}, not whole numbers or text")
+    rest = len(content) - file.tell()
+    if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != rest:
+        raise ReadError(
+            f"{name}: {title!r} is cut or damaged: {rest} bytes do not make {shape}"
+        )
+    flat = np.frombuffer(content, dtype, offset=file.tell())
+    return flat.reshape(shape, order=order)  # type: ignore[call-overload] # C or F
+
+
+def _texts(found: npt.NDArray[Any] | None, name: str, title: str) -> tuple[str, ...]:
+    if found is None:
+        return ()
+    if found.ndim != 1 or found.dtype.kind != "U":
+        raise ReadError(f"{name}: {title!r} must be a list of texts")
+    texts = tuple(str(text) for text in found)
+    if len(set(texts)) != len(texts) or "" in texts:
+        raise ReadError(f"{name}: {title!r} must be different names, none empty")
+    return texts
+
+
+def _codes(
+    found: npt.NDArray[Any] | None, count: int, name: str, title: str
+) -> npt.NDArray[np.int64]:
+    if found is None:
+        return np.zeros(0, np.int64)
+    if found.shape != (count,) or found.dtype.kind not in "iu":
+        raise ReadError(
+            f"{name}: {title!r} must hold a whole number for each of {count} frames"
+        )
+    return found.astype(np.int64)
+
+
+def _full(found: npt.NDArray[Any] | None, frames: Cells, name: str) -> int:
+    """Return what a cell reads that takes no more: as told, or by the type."""
+    if found is None:
+        return 255 if frames.dtype.itemsize == 1 else 65535
+    if (
+        found.size != 1
+        or found.dtype.kind not in "iu"
+        or not 1 <= found.item() <= 65535
+    ):
+        raise ReadError(f"{name}: 'full' must be a whole number from 1 to 65535")
+    return int(found.item())
