@@ -23,7 +23,7 @@ from fuzzytree.tactile.sensor import Sensor
 PRESSED = "pressed"
 """The name of the last result of a frame's program: 1 where anything presses."""
 
-_LARGEST = 2.0**53  # whole numbers below it, and their sums, are exact in double
+_LARGEST = 2**53  # whole numbers below it, and their sums, are exact in double
 
 
 class Sum(Value, frozen=True):
@@ -309,13 +309,19 @@ def _check_place(sensor: Sensor, feature: Feature) -> None:
 
 
 def _check_exact(sensor: Sensor, sums: Sequence[Sum]) -> None:
-    """Refuse sums that are not exact: moving one may double each of its lengths."""
+    """Refuse sums that are not exact, before or after they are moved.
+
+    A move takes x to x - r, with r inside the sensor.
+    """
+    right, up = sensor.columns // 2, sensor.rows // 2
+    widths = [abs(column - right) + right for column in range(sensor.columns)]
+    heights = [abs(up - row) + up for row in range(sensor.rows)]
     for one in sums:
-        order = sum(map(int, one.name[4:])) if one.name.startswith("sum ") else 0
-        largest = sensor.full * sum(map(abs, one.weights)) * 2.0**order
-        if largest >= _LARGEST:
+        p, q = map(int, one.name[4:]) if one.name.startswith("sum ") else (0, 0)
+        most = sum(width**p for width in widths) * sum(h**q for h in heights)
+        if sensor.full * most >= _LARGEST:
             text = (
                 f"a sensor of {sensor.rows} x {sensor.columns} cells up to "
-                f"{sensor.full} is too large for exact moments of order {order}"
+                f"{sensor.full} is too large for exact moments of order {p + q}"
             )
             raise InvalidModelError([((), text)])

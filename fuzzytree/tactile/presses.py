@@ -75,6 +75,8 @@ def read_presses(path: PathLike, *, label: str = "label") -> Presses:
             f"{name}: 'frames' must hold whole numbers of shape (frames, rows, "
             f"columns), not {frames.dtype} of shape {frames.shape}"
         )
+    if not len(frames):
+        raise ReadError(f"{name}: holds no frame")
     if not all(1 <= side <= LARGEST_SIDE for side in frames.shape[1:]):
         raise ReadError(
             f"{name}: a frame has 1 to {LARGEST_SIDE} rows and columns, "
@@ -158,11 +160,22 @@ def _array(content: bytes, name: str, title: str) -> npt.NDArray[Any]:
         if not 0 < length <= _LONGEST_HEADER:
             raise ValueError("its header is too long")
         header = ast.literal_eval(file.read(length).decode("latin-1").strip())
-        dtype, shape = np.dtype(header["descr"]), tuple(header["shape"])
-        order = "F" if header["fortran_order"] else "C"
-    except (ValueError, SyntaxError, KeyError, TypeError, MemoryError) as error:
+        dtype, shape = np.dtype(str(header["descr"])), tuple(header["shape"])
+        is_turned = bool(header["fortran_order"])
+    except (
+        ValueError,
+        SyntaxError,
+        KeyError,
+        TypeError,
+        MemoryError,
+        RecursionError,
+    ) as error:
         raise ReadError(f"{name}: {title!r} is no numpy array: {error}") from error
-    if dtype.kind not in "iuU" or not all(type(side) is int for side in shape):
+    if (
+        dtype.kind not in "iuU"
+        or not dtype.itemsize
+        or not all(type(side) is int for side in shape)
+    ):
         raise ReadError(f"{name}: {title!r} holds {dtype}, not whole numbers or text")
     rest = len(content) - file.tell()
     if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != rest:
@@ -170,7 +183,9 @@ def _array(content: bytes, name: str, title: str) -> npt.NDArray[Any]:
             f"{name}: {title!r} is cut or damaged: {rest} bytes do not make {shape}"
         )
     flat = np.frombuffer(content, dtype, offset=file.tell())
-    return flat.reshape(shape, order=order)  # type: ignore[call-overload] # C or F
+    if is_turned:
+        return flat.reshape(shape[::-1]).T
+    return flat.reshape(shape)
 
 
 def _texts(found: npt.NDArray[Any] | None, name: str, title: str) -> tuple[str, ...]:

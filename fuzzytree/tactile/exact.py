@@ -1,0 +1,230 @@
+"""Features of a frame in fractions: what every computation of them is held against.
+
+Written from the definitions (paper, 2.1), sum by sum about the exact centre of
+pressure, and not from the steps of `fuzzytree.tactile.features`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import cached_property
+
+from fuzzytree.tactile.names import Feature, features_of_names
+from fuzzytree.tactile.sensor import Cells, Sensor, pressed
+
+BITS = 256
+"""Angles, roots and logarithms are within 2^-200 of their size, at least."""
+
+Point = tuple[Fraction, Fraction]
+"""A complex number."""
+
+
+def exact_features(
+    sensor: Sensor, frame: Cells, names: Sequence[str]
+) -> tuple[Fraction, ...]:
+    """Return features of one frame, rational ones exactly, the others to 60 digits.
+
+    Args:
+        sensor: The sensor.
+        frame: Shape (rows, columns).
+        names: Of the features.
+
+    Raises:
+        TableError: If a name is no feature's, or the frame does not fit the sensor.
+
+    Example:
+        >>> import numpy as np
+        >>> exact_features(Sensor(1, 3), np.array([[255, 0, 51]]), ["force", "S1"])
+        (Fraction(6, 5), Fraction(2, 3))
+    """
+    cells = pressed(sensor, frame)[0].tolist()
+    shown = _Frame(sensor, cells)
+    if not shown.force:
+        return (Fraction(0),) * len(names)
+    return tuple(shown.feature(feature) for feature in features_of_names(names))
+
+
+class _Frame:
+    """A frame with its sums in whole numbers."""
+
+    def __init__(self, sensor: Sensor, cells: list[list[int]]) -> None:
+        self.sensor = sensor
+        self.cells = [
+            (column, sensor.rows - 1 - row, value)
+            for row, line in enumerate(cells)
+            for column, value in enumerate(line)
+            if value
+        ]
+        self.lines = cells
+        self.force = sum(value for _, _, value in self.cells)
+
+    @cached_property
+    def centre(self) -> Point:
+        """The centre of pressure from the cell at the lower left."""
+        x = sum(x * value for x, _, value in self.cells)
+        y = sum(y * value for _, y, value in self.cells)
+        return Fraction(x, self.force), Fraction(y, self.force)
+
+    def moment(self, p: int, q: int) -> Point:
+        """Return C_pq with cells as they read: the sum of z^p conj(z)^q g."""
+        away = [
+            (x * self.force - self._scaled[0], y * self.force - self._scaled[1], value)
+            for x, y, value in self.cells
+        ]
+        real = imaginary = 0
+        for x, y, value in away:
+            one, two = 1, 0
+            for turn in [1] * p + [-1] * q:
+                one, two = one * x - turn * two * y, turn * one * y + two * x
+            real += value * one
+            imaginary += value * two
+        unit = self.force ** (p + q)
+        return Fraction(real, unit), Fraction(imaginary, unit)
+
+    @cached_property
+    def _scaled(self) -> tuple[int, int]:
+        x, y = self.centre
+        return int(x * self.force), int(y * self.force)
+
+    def feature(self, feature: Feature) -> Fraction:
+        """Return a feature of a frame on which something presses."""
+        value = self._value(feature)
+        if not feature.is_log:
+            return value
+        size = _logarithm(1 + abs(value))
+        return -size if value < 0 else size
+
+    def _value(self, feature: Feature) -> Fraction:
+        unit = self.force if feature.per_force else self.sensor.full
+        base = feature.base
+        if feature.kind == "cell":
+            return Fraction(self.lines[feature.row][feature.column], unit)
+        if feature.kind == "block":
+            return self._block(feature) / unit
+        x, y = self.centre
+        match base:
+            case "force":
+                return Fraction(self.force, unit)
+            case "peak":
+                return Fraction(max(value for _, _, value in self.cells), unit)
+            case "area":
+                return Fraction(len(self.cells))
+            case "x":
+                return x - Fraction(self.sensor.columns - 1, 2)
+            case "y":
+                return y - Fraction(self.sensor.rows - 1, 2)
+            case "angle":
+                real, imaginary = self.moment(2, 0)
+                return degrees(imaginary, real) / 2
+            case "cos2" | "sin2":
+                part = self.moment(2, 0)
+                length = _root(part[0] ** 2 + part[1] ** 2)
+                return part[base == "sin2"] / length if length else Fraction(0)
+            case _ if base[0] == "S":
+                value, degree = _invariant(self, int(base[1:]))
+                return value / Fraction(unit) ** degree
+            case _:
+                which, name = base.split()
+                return self.moment(int(name[1]), int(name[2]))[which == "Im"] / unit
+
+    def _block(self, feature: Feature) -> Fraction:
+        rows, columns = self.sensor.rows, self.sensor.columns
+        top = rows * feature.row // feature.rows
+        bottom = rows * (feature.row + 1) // feature.rows
+        left = columns * feature.column // feature.columns
+        right = columns * (feature.column + 1) // feature.columns
+        total = sum(sum(line[left:right]) for line in self.lines[top:bottom])
+        return Fraction(total, (bottom - top) * (right - left))
+
+
+def _times(*factors: Point) -> Point:
+    real, imaginary = factors[0]
+    for a, b in factors[1:]:
+        real, imaginary = real * a - imaginary * b, real * b + imaginary * a
+    return real, imaginary
+
+
+def _conj(one: Point) -> Point:
+    return one[0], -one[1]
+
+
+def _invariant(frame: _Frame, number: int) -> tuple[Fraction, int]:
+    """Return S_number (paper, 2.1, with the powers that S5 and S6 lack in print)."""
+    c = frame.moment
+    match number:
+        case 1:
+            return c(1, 1)[0], 1
+        case 9:
+            return c(2, 2)[0], 1
+        case 5:
+            return 2 * _times(_conj(c(3, 0)), *[c(2, 1)] * 3)[0], 4
+        case 6:
+            return 2 * _times(c(2, 1), c(2, 1), _conj(c(2, 0)))[0], 3
+        case 10:
+            return 2 * _times(_conj(c(4, 0)), c(3, 1), c(3, 1))[0], 3
+        case 11:
+            return 2 * _times(c(3, 1), _conj(c(2, 0)))[0], 2
+        case _:
+            p, q = {2: (2, 0), 3: (3, 0), 4: (2, 1), 7: (4, 0), 8: (3, 1)}[number]
+            return _times(c(p, q), _conj(c(p, q)))[0], 2
+
+
+def degrees(y: Fraction, x: Fraction) -> Fraction:
+    """Return the angle of the point (x, y) in degrees, above -180 and up to 180.
+
+    Example:
+        >>> degrees(Fraction(0), Fraction(-1)), float(degrees(Fraction(1), Fraction(1)))
+        (Fraction(180, 1), 45.0)
+    """
+    if not x and not y:
+        return Fraction(0)
+    low, high = sorted((abs(x), abs(y)))
+    found = _arc_tangent(_short(low / high)) * 45 / _arc_tangent(Fraction(1))
+    if low == high:
+        found = Fraction(45)
+    if abs(y) > abs(x):
+        found = 90 - found
+    if x < 0:
+        found = 180 - found
+    return -found if y < 0 else found
+
+
+def _short(value: Fraction) -> Fraction:
+    """Return a number with as many binary digits as are kept."""
+    if not value:
+        return value
+    size = value.numerator.bit_length() - value.denominator.bit_length()
+    places = BITS - size
+    scaled = value * Fraction(2) ** places
+    return Fraction(round(scaled)) / Fraction(2) ** places
+
+
+def _root(value: Fraction) -> Fraction:
+    if not value:
+        return value
+    size = (value.numerator.bit_length() - value.denominator.bit_length()) // 2
+    places = BITS - size
+    return Fraction(math.isqrt(math.floor(value * 4**places)), 2**places)
+
+
+def _arc_tangent(t: Fraction) -> Fraction:
+    for _ in range(6):
+        t = _short(t / (1 + _root(1 + t * t)))
+    square, power, total = _short(t * t), t, Fraction(0)
+    for k in range(32):
+        total += power / (2 * k + 1) * (-1) ** k
+        power = _short(power * square)
+    return total * 64
+
+
+def _logarithm(value: Fraction) -> Fraction:
+    for _ in range(16):
+        value = _root(value)
+    t = _short((value - 1) / (value + 1))
+    square, power, total = _short(t * t), t, Fraction(0)
+    for k in range(16):
+        total += power / (2 * k + 1)
+        power = _short(power * square)
+    return total * 2**17
