@@ -102,6 +102,9 @@ def in_board_order(board: Board, cells: Cells) -> npt.NDArray[np.int64]:
     if low < 0 or high > board.sensor.full:
         wrong = low if low < 0 else high
         raise TableError(f"a cell lies in 0 to {board.sensor.full}, not {wrong}")
+    if board.pressure == "falls":
+        values = board.sensor.full - values
+        high = int(values.max())
     protocol = board.protocol
     if isinstance(protocol, Sentinel):
         for value in {protocol.end, protocol.zero} - {0}:

@@ -36,6 +36,8 @@ class Counters:
         dropped: Frames that were whole, but came too fast to be taken.
         stalls: How often the board was silent for longer than it may be.
         reconnects: How often the port went away and came back.
+        doubtful: Frames that were given out at their last byte, and behind which
+            no other frame began: a byte of theirs may have been lost or added.
     """
 
     bytes: int = 0
@@ -46,6 +48,7 @@ class Counters:
     dropped: int = 0
     stalls: int = 0
     reconnects: int = 0
+    doubtful: int = 0
 
     def facts(self) -> dict[str, int]:
         """Return the counters by name."""
