@@ -15,9 +15,9 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.rulebase import Value
 from fuzzytree.tactile.elementary import angle, signed_log
-from fuzzytree.tactile.moments import Centred, sum_name
+from fuzzytree.tactile.moments import Centred, Moments, complex_moment, sum_name
 from fuzzytree.tactile.names import Feature, features_of_names
-from fuzzytree.tactile.noise import Noise, Noisy
+from fuzzytree.tactile.noise import Noisy
 from fuzzytree.tactile.sensor import Sensor
 
 PRESSED = "pressed"
@@ -87,8 +87,8 @@ def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
     features = features_of_names(names)
     for feature in features:
         _check_place(sensor, feature)
-    make = _Maker(sensor)
-    pressed = make.steps("where", make.centred.is_pressed, make.one, make.zero)
+    make = _Maker(sensor, Centred(Maker()))
+    pressed = make.steps("where", make.moments.is_pressed, make.one, make.zero)
     results = [
         Result("output", feature.name, make.feature(feature)) for feature in features
     ]
@@ -126,12 +126,10 @@ def costs(sensor: Sensor, names: Sequence[str]) -> Mapping[str, float]:
 class _Maker:
     """Makes the steps of features, each part once."""
 
-    def __init__(self, sensor: Sensor) -> None:
-        self.sensor = sensor
-        self.steps = Maker()
+    def __init__(self, sensor: Sensor, moments: Moments) -> None:
+        self.sensor, self.moments = sensor, moments
+        self.steps, self.noise = moments.make, moments.noise
         self.zero, self.one = self.steps.constant(0.0), self.steps.constant(1.0)
-        self.centred = Centred(self.steps)
-        self.noise = Noise(self.steps)
         self._parts: dict[tuple[int, int], tuple[Noisy, Noisy]] = {}
 
     def feature(self, feature: Feature) -> int:
@@ -139,7 +137,7 @@ class _Maker:
         value = self._value(feature)
         if feature.is_log:
             value = signed_log(self.steps, value)
-        return self.steps("where", self.centred.is_pressed, value, self.zero)
+        return self.steps("where", self.moments.is_pressed, value, self.zero)
 
     def _value(self, feature: Feature) -> int:
         make, base = self.steps, feature.base
@@ -169,20 +167,20 @@ class _Maker:
     def parts(self, p: int, q: int) -> tuple[Noisy, Noisy]:
         """Return the parts of C_pq, noise settled to 0."""
         if (p, q) not in self._parts:
-            self._parts[p, q] = self.centred.complex_moment(p, q)
+            self._parts[p, q] = complex_moment(self.moments, p, q)
         return self._parts[p, q]
 
     def _scaled(self, value: int, degree: int, feature: Feature) -> int:
         """Return a value of some degree in g, for g in [0, 1] or divided by its sum."""
         make = self.steps
         if feature.per_force:
-            unit = make.chain("multiply", [self.centred.total] * degree)
+            unit = make.chain("multiply", [self.moments.total] * degree)
         else:
             unit = make.constant(float(self.sensor.full**degree))
         return make("divide", value, unit)
 
     def _centre(self, base: str) -> int:
-        x, y = self.centred.centre()
+        x, y = self.moments.centre()
         side = self.sensor.columns if base == "x" else self.sensor.rows
         offset = 0.0 if side % 2 else 0.5
         if base == "y":

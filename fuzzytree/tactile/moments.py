@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from fuzzytree.programs.steps import Maker
 from fuzzytree.tactile.noise import UNIT, Noise, Noisy
@@ -20,12 +21,37 @@ Power = tuple[int, int]
 _PASCAL = ((1,), (1, 1), (1, 2, 1), (1, 3, 3, 1), (1, 4, 6, 4, 1))
 
 
-@dataclass
-class Centred:
-    """Moments about the centre of pressure, made when they are asked for.
+class Moments(Protocol):
+    """Moments about the centre of pressure, wherever they come from.
 
     Attributes:
         make: Where the steps go.
+        noise: Arithmetic that ends there.
+        total: The sum of the cells, 1 where nothing presses.
+        is_pressed: Whether anything presses: a truth.
+    """
+
+    make: Maker
+    noise: Noise
+    total: int
+    is_pressed: int
+
+    def centre(self) -> tuple[int, int]:
+        """Return x and y of the centre."""
+        ...
+
+    def moment(self, p: int, q: int) -> Noisy:
+        """Return the moment about the centre; that of order 1 is 0."""
+        ...
+
+
+@dataclass
+class Centred:
+    """Moments about the centre of pressure, from exact sums, made when asked for.
+
+    Attributes:
+        make: Where the steps go.
+        noise: Arithmetic that ends there.
         total: The sum of the cells, 1 where nothing presses.
         is_pressed: Whether anything presses: a truth.
         near: The exact place of the cell next to the centre, x and y.
@@ -33,6 +59,7 @@ class Centred:
     """
 
     make: Maker
+    noise: Noise = field(init=False)
     total: int = field(init=False)
     is_pressed: int = field(init=False)
     near: tuple[int, int] = field(init=False)
@@ -65,22 +92,6 @@ class Centred:
     def moment(self, p: int, q: int) -> Noisy:
         """Return the moment about the centre; that of order 1 is 0."""
         return self._across(p, q, q)
-
-    def complex_moment(self, p: int, q: int) -> tuple[Noisy, Noisy]:
-        """Return the real and the imaginary part of C_pq (paper, 2.1)."""
-        parts: tuple[list[Noisy], list[Noisy]] = ([], [])
-        for power, weight in _expansion(p, q).items():
-            is_imaginary = power[1] % 2
-            parts[is_imaginary].append(
-                self.noise.times(weight, self.moment(*power))
-                if weight != 1.0
-                else self.moment(*power)
-            )
-        nothing = Noisy(self.make.constant(0.0))
-        real, imaginary = (
-            self.noise.sum(*found) if found else nothing for found in parts
-        )
-        return real, imaginary
 
     def _raw(self, p: int, q: int) -> int:
         return self.make.input(sum_name(p, q))
@@ -161,6 +172,21 @@ class Centred:
             errors.append(one.error)
         own = make("multiply", make("absolute", value), make.constant(UNIT))
         return Noisy(value, make.chain("add", [*errors, own]))
+
+
+def complex_moment(moments: Moments, p: int, q: int) -> tuple[Noisy, Noisy]:
+    """Return the real and the imaginary part of C_pq (paper, 2.1)."""
+    noise = moments.noise
+    parts: tuple[list[Noisy], list[Noisy]] = ([], [])
+    for power, weight in _expansion(p, q).items():
+        found = moments.moment(*power)
+        is_imaginary = power[1] % 2
+        parts[is_imaginary].append(
+            found if weight == 1.0 else noise.times(weight, found)
+        )
+    nothing = Noisy(moments.make.constant(0.0))
+    real, imaginary = (noise.sum(*found) if found else nothing for found in parts)
+    return real, imaginary
 
 
 _FIRST: tuple[Power, Power] = ((1, 0), (0, 1))
