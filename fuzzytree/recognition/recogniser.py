@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,25 +16,13 @@ from fuzzytree.runtimes.frames import Features, FramePlan
 from fuzzytree.runtimes.native import load
 from fuzzytree.tactile.names import feature_of
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
+from fuzzytree.tactile.states import State as State
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.contracts import FloatArray, IntArray
-
-
-class State(IntEnum):
-    """What a frame shows."""
-
-    OBJECT = 0
-    """An object of one of the classes."""
-
-    NOTHING = 1
-    """Nothing presses: there is no centre of pressure, and no answer."""
-
-    UNKNOWN = 2
-    """Something that is none of the known objects."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,95 @@
+"""Frame to class in plain Python: whole numbers, one step and one rule after another.
+
+Graphs and C are held against this when they are written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fuzzytree.contracts import Model
+from fuzzytree.programs.evaluate import evaluate as run
+from fuzzytree.reference import Status, descend, evaluate
+from fuzzytree.rulebase import RuleBase, Value
+from fuzzytree.tactile.features import FrameProgram
+from fuzzytree.tactile.sensor import Cells, pressed
+from fuzzytree.tactile.states import State
+
+
+class Shown(Value, frozen=True):
+    """What a frame shows.
+
+    Attributes:
+        features: The values of the features, in order.
+        state: As a number.
+        code: The place of the class among the classes, -1 for none.
+        rule: The number of the rule or leaf that decides, from 1; 0 for none.
+        strengths: Of every rule of a rule base; empty for a tree.
+    """
+
+    features: tuple[float, ...]
+    state: State
+    code: int
+    rule: int
+    strengths: tuple[float, ...] = ()
+
+
+def plain_features(made: FrameProgram, frame: Cells) -> tuple[tuple[float, ...], bool]:
+    """Return the features of one frame, and whether anything presses.
+
+    Args:
+        made: The program of the features.
+        frame: Shape (rows, columns), whole numbers.
+
+    Raises:
+        TableError: If the frame is of another size, or holds no whole numbers.
+
+    Example:
+        >>> import numpy as np
+        >>> from fuzzytree.tactile.features import frame_program
+        >>> from fuzzytree.tactile.sensor import Sensor
+        >>> made = frame_program(Sensor(1, 3), ["area", "S1"])
+        >>> plain_features(made, np.array([[255, 0, 255]]))
+        ((2.0, 2.0), True)
+    """
+    cells: list[int] = pressed(made.sensor, frame)[0].reshape(-1).tolist()
+    sums: dict[str, float] = {}
+    for one in made.sums:
+        match one.of:
+            case "count":
+                found = sum(value > 0 for value in cells)
+            case "peak":
+                found = max(cells)
+            case _:
+                pairs = zip(cells, one.weights, strict=True)
+                found = sum(value * weight for value, weight in pairs if value)
+        sums[one.name] = float(found)
+    *features, is_pressed = run(made.program, sums).values
+    return tuple(features), is_pressed > 0.0
+
+
+def plain_answer(
+    model: Model, values: Sequence[float], *, is_pressed: bool, reject: float = 0.0
+) -> Shown:
+    """Return what a frame of some features shows.
+
+    Args:
+        model: A tree, or a rule base.
+        values: Of the model's inputs, in order.
+        is_pressed: Whether anything presses on the sensor.
+        reject: A class whose rule is weaker is none of the known objects.
+    """
+    given = tuple(values)
+    if not is_pressed:
+        fired = (0.0,) * len(model.rules) if isinstance(model, RuleBase) else ()
+        return Shown(given, State.NOTHING, -1, 0, fired)
+    row = dict(zip(model.inputs, given, strict=True))
+    is_rules = isinstance(model, RuleBase)
+    answer = evaluate(model, row) if is_rules else descend(model, row)
+    is_known = answer.label is not None and answer.status != Status.MISSING
+    if reject and answer.rule and is_rules:
+        is_known = is_known and answer.strengths[answer.rule - 1] >= reject
+    if not is_known or answer.label is None:
+        return Shown(given, State.UNKNOWN, -1, 0, answer.strengths)
+    code = model.classes.index(answer.label)
+    return Shown(given, State.OBJECT, code, answer.rule, answer.strengths)
