@@ -45,7 +45,7 @@ def axes(
     """Add the values of the variables of a model that matter, and the guard over them.
 
     Args:
-        sheet: Where the nodes go; `inputs` is its input, of shape (rows, columns).
+        sheet: Where the nodes go; its source is of shape (rows, columns).
         model: Whose variables.
         numbers: The types to compute in.
         columns: What the columns of the input are, in order.
@@ -53,7 +53,7 @@ def axes(
     """
     if not model.variables:
         return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=is_flat))
-    source = sheet.node("Transpose", "inputs", perm=[1, 0])
+    source = sheet.node("Transpose", sheet.source, perm=[1, 0])
     direct = _direct(model)
     derived = sorted(
         (v for v in model.variables if v.parts), key=lambda v: len(v.parts)
@@ -87,7 +87,7 @@ def flat_guard(
     """
     if not model.variables:
         return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=True))
-    source = "inputs"
+    source = sheet.source
     if model.inputs != tuple(columns):
         chosen = sheet.numbers([columns.index(name) for name in model.inputs], "rows")
         source = sheet.node("Gather", source, chosen, axis=1)
@@ -122,7 +122,7 @@ def column(sheet: Sheet, values: RealArray, hint: str) -> str:
 
 def _no_guard(sheet: Sheet, kind: type[Real], *, is_flat: bool) -> str:
     """Return 0 for each row, where no variable could be missing."""
-    size = sheet.take(sheet.node("Shape", "inputs"), [0])
+    size = sheet.take(sheet.node("Shape", sheet.source), [0])
     if not is_flat:
         size = sheet.node("Concat", sheet.numbers([1], "one"), size, axis=0)
     zero = numpy_helper.from_array(np.zeros(1, kind))

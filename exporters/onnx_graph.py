@@ -44,6 +44,7 @@ class Sheet:
 
     Attributes:
         opset: The version of the operators.
+        source: The name of the values that a model is asked with, (rows, columns).
         is_readable: Whether `block` makes functions or writes their nodes in place.
         nodes: The nodes so far.
         tensors: The constants so far, equal ones once.
@@ -54,6 +55,7 @@ class Sheet:
         self, opset: int, *, is_readable: bool = False, in_function: bool = False
     ) -> None:
         self.opset = opset
+        self.source = "inputs"
         self.is_readable = is_readable
         self.nodes: list[onnx.NodeProto] = []
         self.tensors: list[onnx.TensorProto] = []

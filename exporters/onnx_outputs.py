@@ -41,7 +41,7 @@ def add_rule_outputs(
     numbers: Numbers,
 ) -> None:
     """Add the outputs of a rule base, given the strengths of no rule and of all."""
-    winner = sheet.block("Winner", _winner, {"strengths": strengths}, named="rule")
+    winner = add_winner(sheet, strengths)
     if "label" in outputs:
         _add_label(sheet, rules, frame, winner, numbers)
     if "status" in outputs:
@@ -52,6 +52,11 @@ def add_rule_outputs(
         unknown = scalar(sheet, np.nan, numbers.degree)
         real = sheet.node("Where", is_known(sheet, frame, numbers), real, unknown)
         sheet.node("Transpose", real, perm=[1, 0], named="strengths")
+
+
+def add_winner(sheet: Sheet, strengths: str, named: str = "rule") -> str:
+    """Add the number of the first of the strongest rules, 0 where none fires."""
+    return sheet.block("Winner", _winner, {"strengths": strengths}, named=named)
 
 
 def _winner(sheet: Sheet, inputs: Sequence[str], named: str) -> str:

@@ -86,14 +86,14 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
     """Add the steps of a program to a sheet and return the names of its results.
 
     Args:
-        sheet: Where the nodes go; `inputs` is its input, of shape (rows, columns).
+        sheet: Where the nodes go; its source is of shape (rows, columns).
         program: The program; `missing_functions` must be empty.
-        columns: What the columns of the input are, in order.
+        columns: What the columns of the source are, in order.
 
     Returns:
         A block of shape (rows,) for each result.
     """
-    source = sheet.node("Transpose", "inputs", perm=[1, 0])
+    source = sheet.node("Transpose", sheet.source, perm=[1, 0])
     still = still_results(program)
     names: dict[int, str] = {}
     links = _links(program, still)

@@ -43,8 +43,9 @@ def tree_graph(
     columns: Sequence[str],
     *,
     is_plain: bool,
+    named: str = "rule",
 ) -> Axes:
-    """Add a tree up to `rule`: the leaf's number, or 0 where a value is missing.
+    """Add a tree up to the leaf's number, or 0 where a value is missing.
 
     Returns:
         The values of the variables, with a flat guard.
@@ -63,14 +64,14 @@ def tree_graph(
         leaf = _walk(sheet, questions, frame, numbers, start=_root(tree))
     else:
         place = {name: columns.index(name) for name in tree.inputs}
-        values = "inputs"
+        values = sheet.source
         if not is_direct:
             place = frame.order
             values = sheet.node("Transpose", frame.block, perm=[1, 0])
         leaf = _ensemble(sheet, questions, values, place, numbers, start=_root(tree))
     zero = sheet.constant(np.array(0, np.int64), "nothing")
     known = is_known(sheet, frame, numbers)
-    sheet.node("Where", known, leaf, zero, named="rule")
+    sheet.node("Where", known, leaf, zero, named=named)
     return frame
 
 
