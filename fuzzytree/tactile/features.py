@@ -11,11 +11,18 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from fuzzytree.errors import InvalidModelError
+from fuzzytree.errors import InvalidModelError, TableError
 from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.rulebase import Value
 from fuzzytree.tactile.elementary import angle, signed_log
-from fuzzytree.tactile.moments import Centred, Moments, complex_moment, sum_name
+from fuzzytree.tactile.moments import (
+    ORDER,
+    Centred,
+    Measured,
+    Moments,
+    complex_moment,
+    sum_name,
+)
 from fuzzytree.tactile.names import Feature, features_of_names
 from fuzzytree.tactile.noise import Noisy
 from fuzzytree.tactile.sensor import Sensor
@@ -87,21 +94,11 @@ def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
     features = features_of_names(names)
     for feature in features:
         _check_place(sensor, feature)
-    make = _Maker(sensor, Centred(Maker()))
-    pressed = make.steps("where", make.moments.is_pressed, make.one, make.zero)
-    results = [
-        Result("output", feature.name, make.feature(feature)) for feature in features
-    ]
-    results.append(Result("output", PRESSED, pressed))
     every = tuple(_every_sum(sensor, features))
-    program = make.steps.program(
-        "features", tuple(one.name for one in every), tuple(results)
-    )
-    asked = {step.name for step in program.steps if step.operation == "input"}
-    sums = tuple(one for one in every if one.name in asked)
+    make = _Maker(sensor, Centred(Maker()))
+    program = _program(make, features, [one.name for one in every])
+    sums = tuple(one for one in every if one.name in program.inputs)
     _check_exact(sensor, sums)
-    named = tuple(one.name for one in sums)
-    program = Program(program.name, named, program.steps, program.results)
     return FrameProgram(sensor, tuple(names), sums, program)
 
 
@@ -121,6 +118,43 @@ def costs(sensor: Sensor, names: Sequence[str]) -> Mapping[str, float]:
         True
     """
     return {name: float(frame_program(sensor, [name]).cost) for name in names}
+
+
+def image_program(names: Sequence[str]) -> Program:
+    """Return what computes features from moments that were measured.
+
+    For images whose cells are no whole numbers; see `fuzzytree.runtimes.images`.
+
+    Args:
+        names: Of the features; of cells and blocks there are none.
+
+    Raises:
+        TableError: If a name is no feature of an image.
+    """
+    features = features_of_names(names)
+    for feature in features:
+        if feature.kind != "moment":
+            raise TableError(f"{feature.name!r} is a feature of frames, not of images")
+    inputs = [sum_name(0, 0), "area", "peak", "x", "y"]
+    for order in range(2, ORDER + 1):
+        for q in range(order + 1):
+            inputs += [f"{what} {order - q}{q}" for what in ("moment", "error")]
+    return _program(_Maker(Sensor(1, 1, full=1), Measured(Maker())), features, inputs)
+
+
+def _program(
+    make: _Maker, features: Sequence[Feature], inputs: Sequence[str]
+) -> Program:
+    """Return the program of some features, with those of the inputs that it needs."""
+    pressed = make.steps("where", make.moments.is_pressed, make.one, make.zero)
+    results = [
+        Result("output", feature.name, make.feature(feature)) for feature in features
+    ]
+    results.append(Result("output", PRESSED, pressed))
+    whole = make.steps.program("features", tuple(inputs), tuple(results))
+    asked = {step.name for step in whole.steps if step.operation == "input"}
+    needed = tuple(name for name in inputs if name in asked)
+    return Program(whole.name, needed, whole.steps, whole.results)
 
 
 class _Maker:
@@ -247,7 +281,7 @@ def _every_sum(sensor: Sensor, features: Sequence[Feature]) -> list[Sum]:
     """Return all sums that features could ask for, moments first."""
     found = [
         Sum(sum_name(order - q, q), "cells", _weights(sensor, order - q, q))
-        for order in range(5)
+        for order in range(ORDER + 1)
         for q in range(order + 1)
     ]
     found += [Sum("area", "count"), Sum("peak", "peak")]

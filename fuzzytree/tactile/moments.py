@@ -18,6 +18,9 @@ from fuzzytree.tactile.noise import UNIT, Noise, Noisy
 Power = tuple[int, int]
 """p and q of the moment `sum of g x^p y^q`."""
 
+ORDER = 4
+"""The highest order p + q that features need."""
+
 _PASCAL = ((1,), (1, 1), (1, 2, 1), (1, 3, 3, 1), (1, 4, 6, 4, 1))
 
 
@@ -187,6 +190,30 @@ def complex_moment(moments: Moments, p: int, q: int) -> tuple[Noisy, Noisy]:
     nothing = Noisy(moments.make.constant(0.0))
     real, imaginary = (noise.sum(*found) if found else nothing for found in parts)
     return real, imaginary
+
+
+class Measured:
+    """Moments that were taken about the centre of pressure, with their bounds.
+
+    The inputs are `moment pq` and `error pq`, `sum 00`, `x` and `y`.
+    """
+
+    def __init__(self, make: Maker) -> None:
+        self.make, self.noise = make, Noise(make)
+        zero, force = make.constant(0.0), make.input(sum_name(0, 0))
+        self.is_pressed = make("less", zero, force)
+        self.total = make("where", self.is_pressed, force, make.constant(1.0))
+
+    def centre(self) -> tuple[int, int]:
+        """Return x and y of the centre."""
+        return self.make.input("x"), self.make.input("y")
+
+    def moment(self, p: int, q: int) -> Noisy:
+        """Return a moment and its bound; that of order 1 is 0."""
+        if p + q == 1:
+            return Noisy(self.make.constant(0.0))
+        make = self.make
+        return Noisy(make.input(f"moment {p}{q}"), make.input(f"error {p}{q}"))
 
 
 _FIRST: tuple[Power, Power] = ((1, 0), (0, 1))

@@ -57,8 +57,9 @@ ORIENTATION: tuple[str, ...] = ("angle", "Re C30", "Re C21")
 """What tells orientations apart, which invariants cannot."""
 
 _UNSCALED = frozenset(("angle", "cos2", "sin2", "area", "x", "y"))
-_CELL = re.compile(r"cell r(\d{1,3}) c(\d{1,3})")
-_BLOCK = re.compile(r"block r(\d{1,3}) c(\d{1,3}) of (\d{1,3})x(\d{1,3})")
+_PLACE = "(0|[1-9][0-9]{0,2})"
+_CELL = re.compile(f"cell r{_PLACE} c{_PLACE}")
+_BLOCK = re.compile(f"block r{_PLACE} c{_PLACE} of {_PLACE}x{_PLACE}")
 
 Kind = Literal["moment", "cell", "block"]
 

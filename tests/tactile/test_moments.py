@@ -177,6 +177,23 @@ def test_a_quarter_turn_changes_invariants_by_rounding_alone() -> None:
         assert (abs(a - b) <= 1e-11 * abs(a) + 1e-13 * sizes).all()
 
 
+def test_a_turn_that_keeps_to_the_grid_changes_no_exact_invariant() -> None:
+    """Points whose places are multiples of 5 turn by the angle of 3, 4 and 5."""
+    sensor = Sensor(48, 48)
+    draw = np.random.default_rng(8)
+    for _ in range(6):
+        one, two = np.zeros((2, 48, 48), np.int64)
+        for x, y in draw.integers(-3, 4, (9, 2)) * 5:
+            value = draw.integers(1, 256)
+            one[24 - y, 24 + x] = value
+            two[24 - (4 * x + 3 * y) // 5, 24 + (3 * x - 4 * y) // 5] = value
+        exact = exact_features(sensor, one, PAPER)
+        assert exact_features(sensor, two, PAPER) == exact
+        wanted = [float(value) for value in exact]
+        found = features_of(sensor, two, PAPER).values[:, 0]
+        assert found == pytest.approx(wanted, rel=1e-11)
+
+
 def test_a_quarter_turn_turns_the_angle() -> None:
     cells = np.zeros((8, 8), np.uint8)
     cells[3, 1:7] = 90
