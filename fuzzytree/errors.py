@@ -48,3 +48,7 @@ class DisagreementError(FuzzyTreeError, AssertionError):
 
 class MissingExtraError(FuzzyTreeError, ImportError):
     """A verb that needs an optional package which is not installed."""
+
+
+class PortError(FuzzyTreeError, OSError):
+    """A serial port that cannot be used, or that gives what its board does not send."""

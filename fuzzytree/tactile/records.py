@@ -8,13 +8,13 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, fields
-from typing import Final, NamedTuple, assert_never
+from typing import Final, NamedTuple
 
 import msgspec
 import numpy as np
 
 from fuzzytree.errors import ReadError, TableError, WriteError
-from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
+from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.sensor import check_frames
 
@@ -88,17 +88,8 @@ def fixed_part(
 
 
 def cell_type(board: Board) -> np.dtype[np.unsignedinteger]:
-    """Return a type that holds whatever the board can send."""
-    match board.protocol:
-        case Sentinel():
-            is_wide = False
-        case Text():
-            is_wide = True
-        case Marker(bits=bits) | Request(bits=bits):
-            is_wide = bits == 16
-        case _:
-            assert_never(board.protocol)
-    return np.dtype("<u2" if is_wide else "u1")
+    """Return the type of a cell, as a decoder gives it."""
+    return np.dtype("u1" if board.sensor.bits == 8 else "<u2")
 
 
 def layout_of(board: Board, *, counters: int = _COUNTERS) -> np.dtype[np.void]:
