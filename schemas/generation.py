@@ -18,6 +18,7 @@ from typing import Final
 import msgspec
 from msgspec import inspect
 
+from fuzzytree.readers.board_layout import BoardFile
 from fuzzytree.readers.layout import Record, RuleBaseFile, TreeFile
 from fuzzytree.readers.system_layout import SystemFile
 
@@ -26,6 +27,7 @@ FILES: Final[Mapping[str, type[Record]]] = MappingProxyType(
         "rulebase.schema.json": RuleBaseFile,
         "tree.schema.json": TreeFile,
         "system.schema.json": SystemFile,
+        "board.schema.json": BoardFile,
     }
 )
 """Each file's name and the record that it describes."""
@@ -163,14 +165,17 @@ def _schema(kind: inspect.Type, definitions: Definitions) -> Definitions:
                 **_given({"minimum": kind.ge, "maximum": kind.le}),
             }
         case inspect.FloatType():
-            return {"type": "number"}
+            return {
+                "type": "number",
+                **_given({"minimum": kind.ge, "maximum": kind.le}),
+            }
         case inspect.LiteralType():
             return {"enum": [*kind.values]}
         case _:
             raise TypeError(f"no rule for {kind}")
 
 
-def _given(limits: Mapping[str, int | None]) -> Definitions:
+def _given(limits: Mapping[str, float | None]) -> Definitions:
     return {key: limit for key, limit in limits.items() if limit is not None}
 
 

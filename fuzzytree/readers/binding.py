@@ -131,7 +131,7 @@ def _value(
         case inspect.IntType():
             return _integer(node, what, kind, found)
         case inspect.FloatType():
-            return _number(node, what, found)
+            return _number(node, what, kind, found)
         case inspect.LiteralType():
             return _literal(node, what, kind, found)
         case _:
@@ -214,7 +214,9 @@ def _integer(
     return value
 
 
-def _number(node: Node, what: str, found: list[Found]) -> float | None:
+def _number(
+    node: Node, what: str, kind: inspect.FloatType, found: list[Found]
+) -> float | None:
     is_number = isinstance(node, Scalar) and meaning(node) in (
         "a number",
         "an integer",
@@ -227,8 +229,17 @@ def _number(node: Node, what: str, found: list[Found]) -> float | None:
         if len(text) > _LONGEST_DIGITS:
             _add(found, node, f"{what} has more than {_LONGEST_DIGITS} digits")
             return None
-        return float(_read_integer(text))
-    return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+        value = float(_read_integer(text))
+    else:
+        value = float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+    # Not a number is neither.
+    if kind.ge is not None and not value >= kind.ge:
+        _add(found, node, f"{what} must be at least {kind.ge:g}, not {value:g}")
+        return None
+    if kind.le is not None and not value <= kind.le:
+        _add(found, node, f"{what} must be at most {kind.le:g}, not {value:g}")
+        return None
+    return value
 
 
 def _read_integer(text: str) -> int:

@@ -11,6 +11,7 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import Mistake, Value
 from fuzzytree.tactile.sensor import Sensor
 
+LONGEST_NAME: Final = 1000
 MOST_BYTES: Final = 64
 """The longest marker, tail or question."""
 MOST_SKIPPED: Final = 1024
@@ -181,6 +182,11 @@ class Board(Value, frozen=True):
 def _mistakes(board: Board) -> Iterator[Mistake]:
     if not board.name:
         yield ("name",), "a board needs a name"
+    if len(board.name) > LONGEST_NAME:
+        yield ("name",), f"a name has at most {LONGEST_NAME} characters"
+    if board.name != board.name.encode("utf-8", "ignore").decode():
+        text = f"the name {board.name[:40]!r} cannot be written as UTF-8"
+        yield ("name",), text
     if not 0 <= board.banner <= MOST_BANNER_LINES:
         text = f"a banner has 0 to {MOST_BANNER_LINES} lines, not {board.banner}"
         yield ("banner",), text
