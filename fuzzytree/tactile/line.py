@@ -134,10 +134,6 @@ class Line:
         with self._news:
             return Counters(*astuple(self._counted))
 
-    def now(self) -> float:
-        """Return the seconds since the line was opened, as frames' times count them."""
-        return time.monotonic() - self._begin
-
     def take(self, timeout_s: float | None = None) -> Frame | None:
         """Return the next frame, or None if none came in time, or none will come.
 
