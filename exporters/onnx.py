@@ -118,9 +118,9 @@ def write(
     outputs = _usual_outputs(model) if outputs is None else outputs
     _check_options(model, dtype, opset, ir, signature, outputs)
     _check_variants(model, opset, ir, readable=readable, plain=plain)
-    _require("onnx", "writing onnx needs")
+    require("onnx", "writing onnx needs")
     if verify:
-        _require("onnxruntime", "verifying a written onnx file needs")
+        require("onnxruntime", "verifying a written onnx file needs")
     if isinstance(model, FuzzySystem):
         from fuzzytree.exporters.onnx_system import write_system
 
@@ -218,7 +218,8 @@ def _range_text(what: str, known: range, value: int) -> str:
     return f"{what}: onnx files are written for {known[0]} to {known[-1]}, not {value}"
 
 
-def _require(package: str, purpose: str) -> None:
+def require(package: str, purpose: str) -> None:
+    """Refuse to go on without a package of the extra `onnx`."""
     if importlib.util.find_spec(package) is None:
         raise MissingExtraError(
             f"{purpose} the extra 'onnx': pip install 'fuzzytree-toolkit[onnx]'"

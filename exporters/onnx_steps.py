@@ -201,9 +201,9 @@ def _node(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> s
             count = program.steps[step.arguments[0]].samples
             return sheet.node("Gather", given[0], _whole(sheet, count - 1))
         case "highest":
-            return _reduced(sheet, "ReduceMax", given[0])
+            return reduced(sheet, "ReduceMax", given[0])
         case "lowest":
-            return _reduced(sheet, "ReduceMin", given[0])
+            return reduced(sheet, "ReduceMin", given[0])
         case _:
             raise ValueError(f"no operator computes {step.operation} in double")
 
@@ -253,11 +253,14 @@ def _total(sheet: Sheet, samples: str, count: int) -> str:
     return sheet.node("Reshape", samples, sheet.numbers([-1], "flat"))
 
 
-def _reduced(sheet: Sheet, operator: str, samples: str) -> str:
+def reduced(
+    sheet: Sheet, operator: str, source: str, *, axis: int = 0, keepdims: int = 0
+) -> str:
+    """Return the largest or smallest along an axis, in the form the opset knows."""
     if sheet.opset >= 18:
-        axes = sheet.numbers([0], "axes")
-        return sheet.node(operator, samples, axes, keepdims=0)
-    return sheet.node(operator, samples, axes=[0], keepdims=0)
+        axes = sheet.numbers([axis], "axes")
+        return sheet.node(operator, source, axes, keepdims=keepdims)
+    return sheet.node(operator, source, axes=[axis], keepdims=keepdims)
 
 
 def np_to_onnx(kind: npt.DTypeLike) -> int:

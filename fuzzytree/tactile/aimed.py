@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.contracts import Model
+from fuzzytree.probing import landmarks
 from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tree import FuzzyTree
 
 Features = Callable[[Cells], npt.NDArray[np.float64]]
 """Gives features of shape (features, frames)."""
 
-_HALVINGS = 20  # two frames differ by less than a unit in each cell after them
+Whole = npt.NDArray[np.int64]
+
+_HALVINGS = 20  # 16 bits are done after them
 
 
 def frame_type(sensor: Sensor) -> type[np.uint8] | type[np.uint16]:
@@ -49,9 +55,7 @@ def aimed_frames(sensor: Sensor, random: int = 24, seed: int = 0) -> Cells:
     return np.clip(frames, 0, np.iinfo(kind).max).astype(kind)
 
 
-def _plain(
-    sensor: Sensor, base: npt.NDArray[np.int64]
-) -> Iterator[npt.NDArray[np.int64]]:
+def _plain(sensor: Sensor, base: Whole) -> Iterator[Whole]:
     yield base + sensor.threshold
     yield base + sensor.threshold + 1
     yield np.full_like(base, sensor.full)
@@ -65,9 +69,7 @@ def _plain(
             yield one
 
 
-def _symmetric(
-    sensor: Sensor, base: npt.NDArray[np.int64]
-) -> Iterator[npt.NDArray[np.int64]]:
+def _symmetric(sensor: Sensor, base: Whole) -> Iterator[Whole]:
     """Yield a cross, a square, bars and a diagonal, alone and off the middle."""
     half = min(sensor.rows, sensor.columns) // 4
     force = sensor.full // 2 + 1
@@ -86,9 +88,7 @@ def _symmetric(
         yield from (cross, square, bar, diagonal)
 
 
-def _presses(
-    sensor: Sensor, base: npt.NDArray[np.int64], count: int, seed: int
-) -> Iterator[npt.NDArray[np.int64]]:
+def _presses(sensor: Sensor, base: Whole, count: int, seed: int) -> Iterator[Whole]:
     """Yield presses of an ellipse each, of any size and slant, with some noise."""
     chance = np.random.default_rng(seed)
     down, along = np.mgrid[0 : sensor.rows, 0 : sensor.columns]
@@ -112,8 +112,9 @@ def edge_frames(
 ) -> Cells:
     """Return pairs of frames that lie next to a cut on either side.
 
-    Between a frame below a cut and one above it, both given, the cells go over from
-    one to the other; halving finds where the feature passes the cut.
+    Between a frame below a cut and one above it, both given, all cells go over from
+    one to the other, and then one cell after another: halving finds where the feature
+    passes the cut. The two frames that are left differ by one in one cell.
 
     Args:
         frames: Shape (frames, rows, columns).
@@ -127,18 +128,65 @@ def edge_frames(
     found: list[Cells] = []
     for line, cut in dict.fromkeys(cuts):
         is_above = values[line] > cut
-        if is_above.all() or not is_above.any():
-            continue
-        below, above = _nearest(values[line], cut)
-        pair = frames[[below, above]].astype(np.float64)
-        for _ in range(_HALVINGS):
-            middle = np.rint((pair[0] + pair[1]) / 2).astype(frames.dtype)
-            value = features(middle[np.newaxis])[line, 0]
-            if any(np.array_equal(middle, one) for one in pair):
-                break
-            pair[int(value > cut)] = middle
-        found.append(pair.astype(frames.dtype))
-    return np.concatenate(found) if found else frames[:0]
+        if is_above.any() and not is_above.all():
+            below, above = _nearest(values[line], cut)
+            pair = frames[below].astype(np.int64), frames[above].astype(np.int64)
+            found += _parted(pair, cut, partial(_one, features, line))
+    if not found:
+        return frames[:0]
+    return np.array(found, np.int64).astype(frames.dtype)
+
+
+def _one(features: Features, line: int, frame: Whole) -> float:
+    return float(features(frame[np.newaxis])[line, 0])
+
+
+def _parted(
+    pair: tuple[Whole, Whole], cut: float, feature: Callable[[Whole], float]
+) -> tuple[Whole, Whole]:
+    """Bring a frame below a cut and one above it next to each other."""
+    below, above = pair
+    for _ in range(_HALVINGS):
+        middle = (below + above) // 2
+        if np.array_equal(middle, below) or np.array_equal(middle, above):
+            break
+        if feature(middle) > cut:
+            above = middle
+        else:
+            below = middle
+    changed = np.flatnonzero(below != above)
+    low, high = 0, len(changed)
+    while high - low > 1:
+        count = (low + high) // 2
+        if feature(_mixed(below, above, changed[:count])) > cut:
+            high = count
+        else:
+            low = count
+    ends = [_mixed(below, above, changed[:count]) for count in (low, high)]
+    return ends[0], ends[1]
+
+
+def _mixed(one: Whole, two: Whole, places: npt.NDArray[np.intp]) -> Whole:
+    """Return a frame whose cells at some places are another frame's."""
+    found = one.copy()
+    found.flat[places] = two.flat[places]
+    return found
+
+
+def cuts_of(model: Model) -> list[tuple[int, float]]:
+    """Return where a model changes its mind: the place of an input, and a value."""
+    place = {name: line for line, name in enumerate(model.inputs)}
+    if isinstance(model, FuzzyTree):
+        pairs = [(node.variable, cut) for node in model.nodes for cut in node.cuts]
+    else:
+        pairs = [
+            (variable.name, value)
+            for variable in model.variables
+            for term in variable.terms
+            for value in landmarks(term.shape)
+        ]
+    found = [(place[name], cut) for name, cut in pairs if name in place]
+    return list(dict.fromkeys(found))
 
 
 def _nearest(values: npt.NDArray[np.float64], cut: float) -> tuple[int, int]:

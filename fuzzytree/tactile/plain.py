@@ -68,6 +68,28 @@ def plain_features(made: FrameProgram, frame: Cells) -> tuple[tuple[float, ...],
     return tuple(features), is_pressed > 0.0
 
 
+def check_reject(model: Model, reject: float) -> None:
+    """Refuse a floor that a model has no strengths for.
+
+    Raises:
+        ValueError: If it is no number in 0 to 1, or the model is a tree, or its rules
+            are relative: one of them always has the strength 1.
+    """
+    if not 0.0 <= reject <= 1.0:
+        raise ValueError(f"reject lies in 0 to 1, not {reject!r}")
+    if not reject:
+        return
+    if not isinstance(model, RuleBase):
+        raise ValueError(
+            f"{model.name}: a tree has no strengths to reject by; give its raw rules"
+        )
+    if model.kind == "relative":
+        raise ValueError(
+            f"{model.name}: relative rules reject nothing, for one of them always has "
+            "the strength 1; give the raw rules"
+        )
+
+
 def plain_answer(
     model: Model, values: Sequence[float], *, is_pressed: bool, reject: float = 0.0
 ) -> Shown:
@@ -84,12 +106,14 @@ def plain_answer(
         fired = (0.0,) * len(model.rules) if isinstance(model, RuleBase) else ()
         return Shown(given, State.NOTHING, -1, 0, fired)
     row = dict(zip(model.inputs, given, strict=True))
-    is_rules = isinstance(model, RuleBase)
-    answer = evaluate(model, row) if is_rules else descend(model, row)
-    is_known = answer.label is not None and answer.status != Status.MISSING
-    if reject and answer.rule and is_rules:
-        is_known = is_known and answer.strengths[answer.rule - 1] >= reject
-    if not is_known or answer.label is None:
+    if isinstance(model, RuleBase):
+        answer = evaluate(model, row)
+    else:
+        answer = descend(model, row)
+    is_weak = bool(reject and answer.rule) and (
+        answer.strengths[answer.rule - 1] < reject
+    )
+    if is_weak or answer.label is None or answer.status == Status.MISSING:
         return Shown(given, State.UNKNOWN, -1, 0, answer.strengths)
     code = model.classes.index(answer.label)
     return Shown(given, State.OBJECT, code, answer.rule, answer.strengths)

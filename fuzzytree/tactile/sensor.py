@@ -132,6 +132,22 @@ def pressed(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
     return values
 
 
+def offsets(sensor: Sensor) -> tuple[int, ...]:
+    """Return what is taken from each cell, row by row; empty where that is nothing.
+
+    It is the baseline, and of a masked cell `full`, so that nothing is left of it.
+
+    Example:
+        >>> offsets(Sensor(1, 2, masked=((0, 1),))), offsets(Sensor(1, 2))
+        ((0, 255), ())
+    """
+    count = sensor.rows * sensor.columns
+    found = [*(sensor.baseline or (0,) * count)]
+    for row, column in sensor.masked:
+        found[row * sensor.columns + column] = sensor.full
+    return tuple(found) if any(found) else ()
+
+
 def saturated(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
     """Return how many cells of each frame that are not masked read `full` or more."""
     full = check_frames(sensor, frames) >= sensor.full

@@ -1,0 +1,42 @@
+"""Models of a sensor's frames, to write and to run."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes.frames import features_of
+from fuzzytree.tactile.aimed import aimed_frames
+from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tree import FuzzyTree
+from fuzzytree.verbs import learn
+
+PLAIN = Sensor(16, 16, threshold=4)
+WIDE = Sensor(
+    5,
+    7,
+    full=1000,
+    threshold=30,
+    baseline=tuple(place % 9 for place in range(35)),
+    masked=((1, 2), (4, 6)),
+)
+SMALL = Sensor(6, 4, full=100)
+
+
+@functools.cache
+def learnt_tree(sensor: Sensor, names: tuple[str, ...], classes: int = 5) -> FuzzyTree:
+    """Return a tree on features of made presses, that tells how hard they are."""
+    frames = aimed_frames(sensor, 120, seed=3)[-120:]
+    values = features_of(sensor, frames, names).values
+    force = frames.astype(np.int64).sum(axis=(1, 2))
+    ends = np.quantile(force, np.arange(1, classes) / classes)
+    target = [f"class {place}" for place in np.digitize(force, ends)]
+    return learn(values.T, target=target, columns=list(names))
+
+
+def raw_rules(tree: FuzzyTree) -> RuleBase:
+    """Return the raw rules of a tree."""
+    return rules_from_tree(tree, "raw")
