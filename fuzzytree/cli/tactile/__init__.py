@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 
 import click
 
-ACTIONS: tuple[str, ...] = ()
+_ORDER = (
+    "ports",
+    "record",
+    "replay",
+    "live",
+    "simulate",
+    "press",
+    "features",
+    "interpolate",
+    "export",
+    "bench",
+    "experiment",
+)
+ACTIONS = tuple(
+    name for name in _ORDER if importlib.util.find_spec(f"{__name__}.{name}")
+)
 """Each action is the `command` of the module `fuzzytree.cli.tactile.ACTION`."""
 
 
