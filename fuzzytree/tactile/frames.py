@@ -36,8 +36,8 @@ class Counters:
         dropped: Frames that were whole, but came too fast to be taken.
         stalls: How often the board was silent for longer than it may be.
         reconnects: How often the port went away and came back.
-        doubtful: Frames that were given out at their last byte, and behind which
-            no other frame began: a byte of theirs may have been lost or added.
+        doubtful: Frames that were given out at their last byte, and the next one did
+            not begin there: a byte of theirs may have been lost or added.
     """
 
     bytes: int = 0

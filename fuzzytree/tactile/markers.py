@@ -11,8 +11,9 @@ The marker can occur among the cells. So a beginning is believed only where
 
 Once a frame is found, the next ones are given out at their last byte. If no marker
 stands where the next one must begin, a byte of the last frame may have been lost or
-added: it is counted as doubtful unless two bytes of tail or checksum prove it, and the
-next beginning is looked for from its second byte on, for it may lie inside.
+added, unless two bytes of tail or checksum prove it: the next beginning is looked for
+from its second byte on, for it may lie inside. If that is not a whole number of frames
+further, the last frame is counted as doubtful.
 """
 
 from __future__ import annotations
@@ -52,6 +53,7 @@ class MarkerDecoder(Decoder):
         self._need = self._size
         self._is_locked = False
         self._last = b""  # the frame given out last, unless it is proven
+        self._is_doubted = False  # the frame given out last, for its end was no end
         self._given = 0  # bytes at the front of the buffer that were given out in it
         self._expected: int | None = None  # where a frame had to begin in the buffer
 
@@ -68,6 +70,7 @@ class MarkerDecoder(Decoder):
         expected = 0 if self._is_locked else self._expected
         if expected is not None:
             self._count_damaged(len(self._buffer) - expected)
+        self.counters.doubtful += self._is_doubted
         self._drop(len(self._buffer))
         self._restart()
         return frames
@@ -107,7 +110,7 @@ class MarkerDecoder(Decoder):
         self._need = 0
         self._expected = 0
         if self._last:
-            self.counters.doubtful += 1
+            self._is_doubted = True
             self._buffer[:0] = self._last
             self._given = self._expected = self._size
             self._last = b""
@@ -134,7 +137,11 @@ class MarkerDecoder(Decoder):
         self._given = 0
         if self._expected is not None:
             self._count_damaged(-self._expected)
+            self.counters.doubtful += (
+                self._is_doubted and self._expected % self._size != 0
+            )
         self._expected = None
+        self._is_doubted = False
         self._is_locked = True
         self._need = self._size
         return True
