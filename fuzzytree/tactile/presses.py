@@ -106,6 +106,11 @@ def presses_content(presses: Presses) -> bytes:
         arrays["label_names"] = np.array(presses.label_names, np.str_)
     if len(presses.subject):
         arrays["subject"] = presses.subject
+    return packed_arrays(arrays)
+
+
+def packed_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
+    """Return a numpy archive; the same arrays give the same bytes."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for name, values in arrays.items():
