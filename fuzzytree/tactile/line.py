@@ -6,21 +6,25 @@ The only module that knows pyserial.
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, Self
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self
+
+import numpy as np
 
 from fuzzytree.errors import MissingExtraError, PortError
-from fuzzytree.tactile.boards import Board, Request
+from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.decoding import decoder_of
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.watching import PATIENCE_S, Watch
+from fuzzytree.tactile.starting import measured, remarks
+from fuzzytree.tactile.watching import PATIENCE_S, Questions, Watch
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -32,7 +36,6 @@ MOST_WAITING: Final = 64
 """How many frames wait for a slow reader before the oldest are dropped."""
 _LOOK_S = 0.02  # how often the thread looks up while nothing comes
 _MOST_AT_ONCE = 65536  # bytes
-_REST_S = 0.05  # without a byte: a late answer is over
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 1.0  # before a port is tried again
 
 
@@ -91,6 +94,34 @@ def open_line(
     if most_waiting < 1:
         raise ValueError(f"at least 1 frame waits, not {most_waiting}")
     return Line(board, port, opened(board, port), wait=wait, most_waiting=most_waiting)
+
+
+class Started(NamedTuple):
+    """A board as it is at rest, and what is odd about it, in sentences."""
+
+    board: Board
+    remarks: list[str]
+
+
+def start(board: Board, frames: Iterable[Frame]) -> Started:
+    """Measure what a sensor reads at rest, from the first frames that come.
+
+    Args:
+        board: It says how many (`start.frames`); with 0 it stays as it is.
+        frames: Of a line, while nothing presses; the first ones are taken.
+
+    Raises:
+        PortError: If the line ended before.
+    """
+    count = board.start.frames
+    if not count:
+        return Started(board, [])
+    found = [frame.cells for frame in itertools.islice(frames, count)]
+    if len(found) < count:
+        text = f"the baseline needs {count} frames, and only {len(found)} came"
+        raise PortError(f"{board.name}: {text}")
+    cells = np.array(found)
+    return Started(measured(board, cells), remarks(board, cells))
 
 
 class Line:
@@ -192,7 +223,7 @@ class Line:
 
     def _listen(self) -> None:
         """Read and ask until told to stop, or until the port fails."""
-        port, questions = self._serial, _Questions(self.board)
+        port, questions = self._serial, Questions(self.board)
         while not self._stop.is_set():
             now = time.monotonic()
             if questions.is_overdue(now):
@@ -262,42 +293,6 @@ class Line:
             self.state = "open"
             return True
         return False
-
-
-class _Questions:
-    """When to ask a board for its next frame: never, if it speaks by itself.
-
-    A late answer must not be taken for that to the next question: after a time-out
-    the board is asked again once it is silent.
-    """
-
-    def __init__(self, board: Board) -> None:
-        request = board.protocol if isinstance(board.protocol, Request) else None
-        self._timeout_s = request.timeout_s if request else 0.0
-        self._is_needed = request is not None
-        self._is_open = False  # asked, and neither answered nor given up
-        self._asked_at = self._due = 0.0
-
-    def is_overdue(self, now: float) -> bool:
-        """Tell, once for each question, that its answer did not come in time."""
-        if not self._is_open or now - self._asked_at <= self._timeout_s:
-            return False
-        self._is_open, self._due = False, now + _REST_S
-        return True
-
-    def is_due(self, now: float) -> bool:
-        """Tell whether to ask now."""
-        return self._is_needed and not self._is_open and now >= self._due
-
-    def asked(self, now: float) -> None:
-        """Note that the board was asked."""
-        self._is_open, self._asked_at = True, now
-
-    def came(self, frames: int, now: float) -> None:
-        """Note that bytes came, and how many frames ended in them."""
-        if not self._is_open:
-            self._due = now + _REST_S
-        self._is_open = self._is_open and not frames
 
 
 def opened(board: Board, port: str) -> Serial:

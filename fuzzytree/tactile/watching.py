@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from fuzzytree.tactile.boards import Board
+from fuzzytree.tactile.boards import Board, Request
 from fuzzytree.tactile.seen import line_bytes, seen
 
 STALL_FRAMES: Final = 10
@@ -12,6 +12,7 @@ STALL_FRAMES: Final = 10
 PATIENCE_S: Final = 3.0
 """How long a board may take to begin, and how long bytes may come that are no frame."""
 
+_REST_S = 0.05  # without a byte: a late answer is over
 _SHORTEST_STALL_S = 0.25
 _KEPT_BYTES = 65536  # of those that are no frame, to tell what they look like
 
@@ -102,6 +103,42 @@ class Watch:
     def _forget(self) -> None:
         self._unread.clear()
         self._unread_since, self._asked = None, 0
+
+
+class Questions:
+    """When to ask a board for its next frame: never, if it speaks by itself.
+
+    A late answer must not be taken for that to the next question: after a time-out
+    the board is asked again once it is silent.
+    """
+
+    def __init__(self, board: Board) -> None:
+        request = board.protocol if isinstance(board.protocol, Request) else None
+        self._timeout_s = request.timeout_s if request else 0.0
+        self._is_needed = request is not None
+        self._is_open = False  # asked, and neither answered nor given up
+        self._asked_at = self._due = 0.0
+
+    def is_overdue(self, now: float) -> bool:
+        """Tell, once for each question, that its answer did not come in time."""
+        if not self._is_open or now - self._asked_at <= self._timeout_s:
+            return False
+        self._is_open, self._due = False, now + _REST_S
+        return True
+
+    def is_due(self, now: float) -> bool:
+        """Tell whether to ask now."""
+        return self._is_needed and not self._is_open and now >= self._due
+
+    def asked(self, now: float) -> None:
+        """Note that the board was asked."""
+        self._is_open, self._asked_at = True, now
+
+    def came(self, frames: int, now: float) -> None:
+        """Note that bytes came, and how many frames ended in them."""
+        if not self._is_open:
+            self._due = now + _REST_S
+        self._is_open = self._is_open and not frames
 
 
 def frame_time(board: Board) -> float:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -23,13 +24,14 @@ from fuzzytree.tactile.boards import (
     Protocol,
     Request,
     Sentinel,
+    Start,
     Text,
 )
 from fuzzytree.tactile.device import Device, blob
 from fuzzytree.tactile.encoding import encoded
 from fuzzytree.tactile.faults import Faults, Pause
 from fuzzytree.tactile.frames import Frame
-from fuzzytree.tactile.line import Line, open_line, opened, ports
+from fuzzytree.tactile.line import Line, open_line, opened, ports, start
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 BOARD = Board("mat", Sensor(8, 6), Marker("AA 55", checksum="crc16"))
@@ -335,3 +337,31 @@ def test_the_settings_of_the_port_are_those_of_the_board(terminal: Terminal) -> 
         assert flags[4] == flags[5] == termios.B19200
         assert flags[2] & termios.CSTOPB
         assert (serial.bytesize, serial.parity, serial.stopbits) == (7, "E", 2)
+
+
+def test_the_first_frames_of_a_line_are_the_baseline() -> None:
+    board = msgspec.structs.replace(BOARD, start=Start(frames=5))
+    cells = np.arange(48).reshape(8, 6)
+    with (
+        Device(board, itertools.repeat(cells, 9), rate=None) as device,
+        open_line(board, device.port) as line,
+    ):
+        found, remarks = start(board, line)
+        frame = line.take(5)
+    assert found.sensor.baseline == tuple(range(48))
+    assert remarks == []
+    assert frame is not None
+    assert frame.number == 5
+
+
+def test_a_board_can_do_without_a_baseline() -> None:
+    board = msgspec.structs.replace(BOARD, start=Start(frames=0))
+    assert start(board, ()).board == board
+
+
+def test_a_line_that_ends_too_early_has_no_baseline() -> None:
+    frames = [Frame(np.zeros((8, 6), int), 0.0, 0)]
+    with pytest.raises(PortError) as caught:
+        start(BOARD, frames)
+    text = "mat: the baseline needs 30 frames, and only 1 came"
+    assert str(caught.value) == text

@@ -1,0 +1,148 @@
+"""What a sensor reads while nothing lies on it: baseline, hot cells, dead cells."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.errors import TableError
+from fuzzytree.tactile.boards import Board
+from fuzzytree.tactile.sensor import Cells, check_frames
+
+Places = npt.NDArray[np.bool_]
+
+_MOST_NAMED = 8  # cells in a sentence
+
+
+def measured(board: Board, frames: Cells) -> Board:
+    """Return a board with the baseline that frames show, and its hot cells masked.
+
+    The baseline of a cell is the median of what it reads (the mean of the middle two,
+    rounded down, if their number is even). A cell whose baseline is above the share
+    `start.hot` of full is masked, beside those that are masked already.
+
+    Args:
+        board: What sent the frames; its own baseline is replaced.
+        frames: While nothing presses: shape (frames, rows, columns), 1 frame or more.
+
+    Raises:
+        TableError: If there is no frame, or they are of another size.
+
+    Example:
+        >>> from fuzzytree.tactile.boards import Marker
+        >>> from fuzzytree.tactile.sensor import Sensor
+        >>> frames = np.array([[[3, 200]], [[4, 201]]])
+        >>> found = measured(Board("mat", Sensor(1, 2), Marker("AA")), frames)
+        >>> found.sensor.baseline, found.sensor.masked
+        ((3, 200), ((0, 1),))
+    """
+    baseline = _baseline(board, frames)
+    known = board.sensor.masked
+    hot = [place for place in _places(_hot(board, baseline)) if place not in known]
+    sensor = msgspec.structs.replace(
+        board.sensor,
+        baseline=tuple(baseline.reshape(-1).tolist()),
+        masked=(*known, *hot),
+    )
+    return msgspec.structs.replace(board, sensor=sensor)
+
+
+def remarks(board: Board, frames: Cells) -> list[str]:
+    """Return what is odd about a sensor on which nothing should lie.
+
+    Hot cells, something that lies on it or touches it, and cells that never move
+    though most others do: these may be dead, and are not masked.
+
+    Args:
+        board: What sent the frames.
+        frames: As for `measured`.
+
+    Returns:
+        Sentences; none if all is well.
+
+    Raises:
+        TableError: If there is no frame, or they are of another size.
+    """
+    found = check_frames(board.sensor, frames)
+    baseline = _baseline(board, frames)
+    is_hot = _hot(board, baseline)
+    spread = found.max(axis=0).astype(np.int64) - found.min(axis=0)
+    spread[_masked(board)] = 0
+    is_touched = spread > board.sensor.full // 4
+    says: list[str] = []
+    if is_hot.any():
+        share = f"{board.start.hot:.0%} of full"
+        says.append(f"at rest above {share}, masked: {_named(is_hot)}")
+    if _has_neighbours(is_hot):
+        says.append("some of these lie side by side: does something lie on the sensor?")
+    if is_touched.any():
+        text = "moved by more than a quarter of full (was the sensor touched?)"
+        says.append(f"{text}: {_named(is_touched)}")
+    is_still = still(board, found)
+    if is_still.any():
+        text = "never moved though most others did (dead?), not masked"
+        says.append(f"{text}: {_named(is_still)}")
+    return says
+
+
+def still(board: Board, frames: Cells) -> Places:
+    """Return which cells never move though most others do, and are not masked.
+
+    Args:
+        board: What sent the frames.
+        frames: Shape (frames, rows, columns), 1 frame or more.
+
+    Returns:
+        Shape (rows, columns).
+    """
+    found = check_frames(board.sensor, frames)
+    is_still: Places = found.max(axis=0) == found.min(axis=0)
+    is_free = ~_masked(board)
+    if 2 * (is_still & is_free).sum() >= is_free.sum():
+        return np.zeros_like(is_still)
+    return is_still & is_free
+
+
+def _baseline(board: Board, frames: Cells) -> npt.NDArray[np.int64]:
+    found = check_frames(board.sensor, frames)
+    if not len(found):
+        raise TableError("a baseline needs 1 frame or more, not 0")
+    ordered = np.sort(found, axis=0).clip(0, board.sensor.full).astype(np.int64)
+    middle = len(ordered) // 2
+    lower = ordered[middle - 1] if len(ordered) % 2 == 0 else ordered[middle]
+    baseline: npt.NDArray[np.int64] = (lower + ordered[middle]) // 2
+    return baseline
+
+
+def _masked(board: Board) -> Places:
+    sensor = board.sensor
+    is_masked = np.zeros((sensor.rows, sensor.columns), np.bool_)
+    for row, column in sensor.masked:
+        is_masked[row, column] = True
+    return is_masked
+
+
+def _hot(board: Board, baseline: npt.NDArray[np.int64]) -> Places:
+    """Return which cells rest too high, of those that are not masked already."""
+    is_hot: Places = baseline > board.start.hot * board.sensor.full
+    return is_hot & ~_masked(board)
+
+
+def _has_neighbours(is_so: Places) -> bool:
+    """Tell whether two of the places lie side by side in a row or a column."""
+    in_rows = is_so[:, 1:] & is_so[:, :-1]
+    in_columns = is_so[1:] & is_so[:-1]
+    return bool(in_rows.any() or in_columns.any())
+
+
+def _places(is_so: Places) -> list[tuple[int, int]]:
+    return [(int(row), int(column)) for row, column in np.argwhere(is_so)]
+
+
+def _named(is_so: Places) -> str:
+    """Return the places by name, as features call them."""
+    places = _places(is_so)
+    names = [f"r{row} c{column}" for row, column in places[:_MOST_NAMED]]
+    more = len(places) - len(names)
+    return f"{', '.join(names)}{f' and {more} more' if more else ''}"

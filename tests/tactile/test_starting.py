@@ -1,0 +1,99 @@
+"""The baseline of a sensor, and what is said about its cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fuzzytree.errors import TableError
+from fuzzytree.tactile.boards import Board, Marker, Start
+from fuzzytree.tactile.sensor import Cells, Sensor, pressed
+from fuzzytree.tactile.starting import measured, remarks, still
+
+BOARD = Board("mat", Sensor(3, 4), Marker("AA 55"))
+
+
+def _resting(count: int = 9) -> Cells:
+    """Return frames in which each cell wavers around a value of its own."""
+    waver = np.arange(count)[:, None, None] % 3
+    return 10 + np.arange(12).reshape(3, 4) + waver
+
+
+def test_a_baseline_is_the_median_of_each_cell() -> None:
+    found = measured(BOARD, _resting())
+    assert found.sensor.baseline == tuple(range(11, 23))
+    assert found.sensor.masked == ()
+    assert remarks(BOARD, _resting()) == []
+    assert not pressed(found.sensor, _resting()[1]).any()
+
+
+@pytest.mark.parametrize(
+    ("values", "median"),
+    [([5], 5), ([5, 8], 6), ([9, 1, 4], 4), ([1, 2, 2, 9], 2), ([300, 300], 255)],
+)
+def test_a_median_is_rounded_down_and_lies_within_full(
+    values: list[int], median: int
+) -> None:
+    board = Board("mat", Sensor(1, 1), Marker("AA 55"), start=Start(hot=1.0))
+    frames = np.array(values).reshape(-1, 1, 1)
+    assert measured(board, frames).sensor.baseline == (median,)
+
+
+def test_a_hot_cell_is_masked_once_and_told() -> None:
+    frames = _resting()
+    frames[:, 1, 2] = 200
+    board = measured(BOARD, frames)
+    assert board.sensor.masked == ((1, 2),)
+    assert measured(board, frames).sensor.masked == ((1, 2),)
+    assert remarks(BOARD, frames) == [
+        "at rest above 50% of full, masked: r1 c2",
+        "never moved though most others did (dead?), not masked: r1 c2",
+    ]
+    assert remarks(board, frames) == []
+
+
+def test_something_that_lies_on_the_sensor_is_told() -> None:
+    frames = _resting()
+    frames[:, :, 1:] += 150
+    assert remarks(BOARD, frames) == [
+        "at rest above 50% of full, masked: r0 c1, r0 c2, r0 c3, r1 c1, r1 c2, r1 c3, "
+        "r2 c1, r2 c2 and 1 more",
+        "some of these lie side by side: does something lie on the sensor?",
+    ]
+
+
+def test_a_touch_while_the_baseline_is_taken_is_told() -> None:
+    frames = _resting()
+    frames[3, 0, 0] = 100
+    assert remarks(BOARD, frames) == [
+        "moved by more than a quarter of full (was the sensor touched?): r0 c0"
+    ]
+    assert measured(BOARD, frames).sensor.baseline[0] == 11
+
+
+def test_a_dead_cell_is_told_and_not_masked() -> None:
+    frames = _resting()
+    frames[:, 2, 3] = 0
+    assert remarks(BOARD, frames) == [
+        "never moved though most others did (dead?), not masked: r2 c3"
+    ]
+    assert measured(BOARD, frames).sensor.masked == ()
+
+
+def test_nothing_is_dead_where_hardly_anything_moves() -> None:
+    frames = np.zeros((9, 3, 4), int)
+    frames[1, 0, 0] = 1
+    assert not still(BOARD, frames).any()
+
+
+def test_bytes_as_a_board_sends_them_do_not_wrap_around() -> None:
+    frames = np.full((2, 3, 4), 255, np.uint8)
+    frames[1] = 254
+    board = Board("mat", Sensor(3, 4), Marker("AA 55"), start=Start(hot=1.0))
+    assert set(measured(board, frames).sensor.baseline) == {254}
+    assert remarks(board, frames) == []
+
+
+def test_a_baseline_of_nothing_is_refused() -> None:
+    with pytest.raises(TableError, match="a baseline needs 1 frame or more, not 0"):
+        measured(BOARD, np.zeros((0, 3, 4), int))
