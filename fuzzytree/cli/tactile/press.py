@@ -1,0 +1,206 @@
+"""`fuzzytree tactile press`: the paper's objects, pressed on a simulated sensor."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from fuzzytree.cli.talk import (
+    answer,
+    answer_bytes,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    say_rows,
+    wrong_options,
+)
+
+if TYPE_CHECKING:
+    from fuzzytree.recognition.table2 import Comparison
+    from fuzzytree.tactile.physics import Settings, Simulated
+
+
+@click.command("press", short_help="Press objects on a simulated sensor.")
+@click.argument("name", metavar="OBJECT")
+@click.option("--count", metavar="NUMBER", type=int, default=50, show_default=True)
+@click.option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
+@click.option("-o", "--output", metavar="FILE", help="`.npz`; `-` is stdout.")
+@click.option(
+    "--set",
+    "changes",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A number of the simulator (repeat); docs/simulator.md lists them.",
+)
+@click.option(
+    "--means", is_flag=True, help="Print mean invariants beside the paper's Table 2."
+)
+@json_option
+@quiet_option
+def command(
+    name: str,
+    count: int,
+    seed: int,
+    output: str | None,
+    changes: Sequence[str],
+    means: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Press OBJECT again and again on a sensor of 16 x 16 cells; `all` presses all.
+
+    OBJECT is rectangle-0, rectangle-27, rectangle-45, circle, square, hand-0 or
+    hand-45. FILE holds the frames, their labels and what a full cell reads.
+    """
+    if output is None and not means:
+        raise click.UsageError("name a file with -o, or ask for --means")
+    if output == "-" and (means or as_json):
+        raise click.UsageError("`-o -` leaves no room for --means or --json on stdout")
+    from fuzzytree.files import check_place, write_atomically
+    from fuzzytree.tactile.objects import OBJECTS
+    from fuzzytree.tactile.physics import press
+
+    if output not in (None, "-"):
+        check_place(output)
+    settings = _settings(changes)
+    names = tuple(OBJECTS) if name == "all" else (name,)
+    with wrong_options():
+        found = {one: press(one, count, seed, settings) for one in names}
+    say_rows(*(_row(one, made) for one, made in found.items()), quiet=quiet)
+    facts: dict[str, object] = {
+        "count": count,
+        "seed": seed,
+        "settings": msgspec.structs.asdict(settings),
+        "objects": [_facts(one, made) for one, made in found.items()],
+    }
+    if output is not None:
+        content = _content(found)
+        if output == "-":
+            answer_bytes(content)
+            return
+        write_atomically(output, content)
+        digest = hashlib.sha256(content).hexdigest()
+        size = f"{len(content)} bytes, sha256 {digest}"
+        say_rows(("wrote", output, size), quiet=quiet)
+        facts |= {"file": output, "bytes": len(content), "sha256": digest}
+    if means:
+        from fuzzytree.recognition.table2 import compare
+
+        comparison = compare(settings, seed, count=count, objects=names)
+        facts["means"] = _means_facts(comparison)
+        if not as_json:
+            _tell_means(comparison, quiet=quiet)
+    if as_json:
+        answer_json(facts)
+
+
+def _settings(changes: Sequence[str]) -> Settings:
+    """Return the simulator's settings with those that were given."""
+    from fuzzytree.tactile.physics import PAPER
+
+    before = msgspec.structs.asdict(PAPER)
+    given: dict[str, object] = {}
+    for change in changes:
+        title, mark, text = (part.strip() for part in change.partition("="))
+        if not mark or not title:
+            raise click.UsageError(f"--set {change}: must be NAME=VALUE")
+        name = title.replace("-", "_")
+        if name not in before:
+            close = difflib.get_close_matches(name, before, n=1)
+            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            raise click.UsageError(
+                f"the simulator has no setting {name!r}; "
+                f"it has {', '.join(before)}{hint}"
+            )
+        if name in given:
+            raise click.UsageError(f"the setting {name!r} is given twice")
+        given[name] = _value(name, text, type(before[name]))
+    with wrong_options():
+        try:
+            return msgspec.structs.replace(PAPER, **given)
+        except ValueError as error:
+            raise click.UsageError(str(error)) from error
+
+
+def _value(name: str, text: str, kind: type) -> object:
+    if kind is str:
+        return text
+    try:
+        return kind(text)
+    except ValueError as error:
+        what = "a whole number" if kind is int else "a number"
+        raise click.UsageError(f"{name}: must be {what}, not {text!r}") from error
+
+
+def _row(name: str, found: Simulated) -> tuple[str, str, str]:
+    clipped, outside = int(found.clipped.sum()), float(found.outside.max())
+    over = f", up to {100 * outside:.0f} % over the edge" if outside > 1e-9 else ""
+    facts = f"{len(found.frames)} times, {clipped} cells clipped at full{over}"
+    return "pressed", name, facts
+
+
+def _facts(name: str, found: Simulated) -> dict[str, object]:
+    truth = found.truth
+    return {
+        "name": name,
+        "clipped": found.clipped.tolist(),
+        "outside": found.outside.tolist(),
+        "x": truth.x.tolist(),
+        "y": truth.y.tolist(),
+        "angle_deg": truth.angle_deg.tolist(),
+        "force_n": truth.force_n.tolist(),
+    }
+
+
+def _content(found: dict[str, Simulated]) -> bytes:
+    import numpy as np
+
+    from fuzzytree.tactile.presses import Presses, presses_content
+
+    frames = np.concatenate([made.frames for made in found.values()])
+    sizes = [len(made.frames) for made in found.values()]
+    label = np.repeat(np.arange(len(found)), sizes)
+    full = next(iter(found.values())).sensor.full
+    nobody = np.zeros(0, np.int64)
+    return presses_content(Presses(frames, full, label, tuple(found), nobody))
+
+
+def _means_facts(found: Comparison) -> dict[str, object]:
+    from fuzzytree.recognition.table2 import FEATURES
+
+    return {
+        "features": FEATURES,
+        "objects": found.objects,
+        "means": found.means.tolist(),
+        "paper": found.paper.tolist(),
+        "within_2": found.within(2.0)[0],
+        "within_1.25": found.within(1.25)[0],
+        "of": found.within(2.0)[1],
+    }
+
+
+def _tell_means(found: Comparison, *, quiet: bool) -> None:
+    """Print a line for each feature: each object's mean and its ratio to Table 2."""
+    from fuzzytree.recognition.table2 import FEATURES, NO_ORACLE
+
+    rows = zip(FEATURES, found.means, found.ratios, strict=True)
+    answer(_line("feature", found.objects))
+    for feature, means, ratios in rows:
+        pairs = zip(means, ratios, strict=True)
+        answer(_line(feature, [f"{mean:.3g} x{ratio:.2f}" for mean, ratio in pairs]))
+    near, near_all = found.within(1.25)[0], found.within(2.0)
+    say(
+        f"x: times Table 2's mean; {near_all[0]} of {near_all[1]} lie within a factor "
+        f"of 2, {near} within 1.25; {NO_ORACLE} is not counted",
+        quiet=quiet,
+    )
+
+
+def _line(title: str, cells: Iterable[str]) -> str:
+    return " ".join([f"{title:7}", *(f"{cell:>17}" for cell in cells)])
