@@ -57,7 +57,7 @@ def seen(board: Board, content: bytes, *, asked: int = 0) -> str:
         case _:
             assert_never(board.protocol)
     if not isinstance(board.protocol, Text) and _is_text(content):
-        return f"{found}; nearly all of it is text"
+        return f"nearly all of it is text; {found}"
     return found
 
 
@@ -66,8 +66,8 @@ def _seen_markers(board: Board, protocol: Marker, content: bytes) -> str:
     shown = marker.hex(" ").upper()
     places = [found.start() for found in re.finditer(re.escape(marker), content)]
     if len(places) < 2:
-        how_often = ("never", "once")[len(places)]
-        return f"the marker {shown} came {how_often}: is the baud rate right?"
+        how_often = ("never came", "came only once")[len(places)]
+        return f"the marker {shown} {how_often}: is the baud rate right?"
     text = f"the marker {shown} came {len(places)} times"
     apart = _usual([after - before for before, after in pairwise(places)])
     if apart is None:
@@ -97,8 +97,8 @@ def _seen_answers(board: Board, protocol: Request, content: bytes, asked: int) -
 
 def _seen_lines(board: Board, protocol: Text, content: bytes) -> str:
     lines = [line.strip() for line in content.split(b"\n")[1:-1]]
-    if not lines or not _is_text(content):
-        return f"{len(lines)} lines of text came: is the baud rate right?"
+    if not _is_text(content):
+        return "it is no text: is the baud rate right?"
     split = _SPLIT[protocol.separator]
     counts = [
         len(words) - protocol.skip
@@ -107,7 +107,7 @@ def _seen_lines(board: Board, protocol: Text, content: bytes) -> str:
     ]
     text = f"{len(lines)} lines came"
     if not counts:
-        return f"{text}, none of them numbers with {protocol.separator} between"
+        return f"{text}, none of them only numbers with {protocol.separator} between"
     count = _usual(counts)
     if count is None:
         return f"{text}, not two of them with as many numbers"
