@@ -104,7 +104,7 @@ def test_a_picture_is_of_the_first_frame_that_something_presses_on(
         "nothing": 0,
         "saturated": 1,
     }
-    assert err.startswith("read     f.npz frame 1 of 3 frames, 4 x 5 cells\n")
+    assert err.startswith("read     f.npz   frame 1 of 3 frames, 4 x 5 cells\n")
 
 
 def test_an_empty_frame_is_a_picture_that_says_so(

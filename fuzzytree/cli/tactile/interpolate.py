@@ -229,7 +229,6 @@ def _picture(
         images,
         titles=[f"{sensor.rows} x {sensor.columns} cells", *map(_times_text, times)],
         title=title,
-        full=sensor.full,
         axes=[axis] * len(images),
         cells=[(sensor.rows, sensor.columns)] * len(images),
         unit="reading",
