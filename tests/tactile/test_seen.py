@@ -78,7 +78,8 @@ CASES: list[tuple[Protocol, Protocol, tuple[int, int], str]] = [
         Marker("AB BA"),
         Text(),
         (4, 6),
-        "nearly all of it is text; the marker AB BA never came: is the baud rate right?",
+        "nearly all of it is text; "
+        "the marker AB BA never came: is the baud rate right?",
     ),
     (
         Sentinel(),
