@@ -1,0 +1,286 @@
+"""`fuzzytree tactile live`: recognise what lies on a sensor while frames come in."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections import Counter
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from fuzzytree.cli.talk import quiet_option, say_rows, wrong_options
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import Model
+    from fuzzytree.recognition.live import Answer, Hold, Live, Source
+    from fuzzytree.tactile.boards import Board
+    from fuzzytree.tactile.line import Line
+    from fuzzytree.tactile.recording import Recorder
+    from fuzzytree.tactile.sensor import Cells
+
+SIMULATOR = "simulator"
+_PATIENCE_S = 2.0  # for a first frame
+_SWITCH_S = 2e-4  # how soon a thread that draws gives way to an answer
+
+
+@click.command("live", short_help="Recognise what lies on a sensor, on-line.")
+@click.argument("source", metavar="SOURCE")
+@click.option("--model", required=True, metavar="MODEL", help="A tree or rules.")
+@click.option("--board", metavar="BOARD.yaml", help="What is connected to the port.")
+@click.option(
+    "--reject",
+    type=click.FloatRange(0.0, 1.0),
+    default=0.0,
+    metavar="SHARE",
+    help="What is weaker is none of the known objects.",
+)
+@click.option(
+    "--hold",
+    type=click.IntRange(1),
+    default=3,
+    show_default=True,
+    metavar="N",
+    help="A line for what has not changed for N frames.",
+)
+@click.option("--lines", is_flag=True, help="Lines, also on a terminal.")
+@click.option("--json", "as_json", is_flag=True, help="Lines of JSON.")
+@click.option(
+    "--page",
+    is_flag=False,
+    flag_value=0,
+    type=click.IntRange(0, 65535),
+    metavar="[PORT]",
+    help="Serve a page for browsers of this computer; a free port if none.",
+)
+@click.option(
+    "--times",
+    type=click.IntRange(1, 9),
+    default=3,
+    show_default=True,
+    metavar="N",
+    help="Points for a cell in the picture, at most.",
+)
+@click.option("--record", metavar="FILE", help="Keep the frames in a recording.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.0),
+    default=1.0,
+    show_default=True,
+    metavar="X",
+    help="Of a recording or the simulator; 0 for no pauses.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, help="Of the simulator.")
+@click.option("--frames", type=click.IntRange(1), metavar="N", help="End after N.")
+@quiet_option
+def command(
+    source: str,
+    model: str,
+    board: str | None,
+    reject: float,
+    hold: int,
+    lines: bool,
+    as_json: bool,
+    page: int | None,
+    times: int,
+    record: str | None,
+    speed: float,
+    seed: int,
+    frames: int | None,
+    quiet: bool,
+) -> None:
+    """Recognise what SOURCE shows, frame by frame.
+
+    SOURCE is a serial port, a recording, or `simulator`: the paper's objects one after
+    another. A terminal shows a picture, the class and the strengths; elsewhere there
+    is a line for each object that is newly recognised. Ctrl-C ends.
+    """
+    from fuzzytree.recognition.live import Hold, Live
+    from fuzzytree.recognition.recogniser import Recogniser
+
+    known = _model(model)
+    with contextlib.ExitStack() as stack:
+        stack.callback(_switched(_SWITCH_S))
+        found, used = _opened(source, board, speed=speed, seed=seed, quiet=quiet)
+        stack.callback(found.close)
+        with wrong_options():
+            recogniser = Recogniser(known, used.sensor, reject)
+        live = Live(recogniser, found, source)
+        recorder = _recorder(record, used)
+        if recorder is not None:
+            stack.callback(recorder.close)
+        if page is not None:
+            url = _served(live, page, times, stack)
+            say_rows(("serves", url, ""), quiet=quiet)
+        tally = _Tally()
+        try:
+            with _display(live, times, is_wanted=not (lines or as_json)) as shows:
+                tell = None if shows else _teller(Hold(hold), as_json=as_json)
+                for answer in live.answers(frames):
+                    if tell is not None:
+                        tell(answer)
+                    tally.add(answer)
+                    if recorder is not None:
+                        recorder.write(answer.frame, found.counters)
+        except KeyboardInterrupt:
+            pass
+    tally.tell(live, record, quiet=quiet)
+
+
+def _model(path: str) -> Model:
+    """Return a model that frames can be asked of."""
+    from fuzzytree import verbs
+    from fuzzytree.errors import TableError
+    from fuzzytree.rulebase import RuleBase
+    from fuzzytree.tree import FuzzyTree
+
+    found = verbs.opened(path)
+    if not isinstance(found, FuzzyTree | RuleBase):
+        raise TableError(f"{path}: frames are asked of a tree or rules, not of this")
+    return found
+
+
+def _switched(seconds: float) -> Callable[[], None]:
+    """Let threads give way sooner; return what makes it as it was."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(seconds)
+    return lambda: sys.setswitchinterval(before)
+
+
+def _opened(
+    source: str, board: str | None, *, speed: float, seed: int, quiet: bool
+) -> tuple[Source, Board]:
+    """Return where frames come from, and the board that they fit."""
+    from fuzzytree.recognition import sources
+    from fuzzytree.tactile.recording import RecordingFile
+
+    is_file = Path(source).is_file()
+    if board is None and source != SIMULATOR and not is_file:
+        raise click.UsageError(
+            f"{source} is no recording; for a port, tell its board with --board"
+        )
+    if board is not None and (source == SIMULATOR or is_file):
+        raise click.UsageError(f"--board is for a port; {source} has its own")
+    if source == SIMULATOR:
+        return sources.Paced(sources.simulated(seed), speed), sources.PAPER_BOARD
+    if is_file:
+        file = RecordingFile(source)
+        return sources.Replayed(file, speed), file.board
+    assert board is not None  # refused above
+    return _line(source, board, quiet=quiet)
+
+
+def _line(port: str, board: str, *, quiet: bool) -> tuple[Source, Board]:
+    """Open a port, and measure what its board reads when nothing presses."""
+    from fuzzytree.readers.boards import load_board
+    from fuzzytree.recognition.sources import FromLine
+    from fuzzytree.tactile.line import open_line
+
+    known = load_board(board)
+    line = open_line(known, port)
+    try:
+        return FromLine(line), _rested(known, line, quiet=quiet)
+    except BaseException:
+        line.close()
+        raise
+
+
+def _rested(board: Board, line: Line, *, quiet: bool) -> Board:
+    """Return a board with the baseline that its first frames show."""
+    import numpy as np
+
+    from fuzzytree.tactile.starting import measured, remarks
+
+    count = board.start.frames
+    if not count:
+        return board
+    say_rows(
+        ("measures", f"{count} frames for the baseline", "nothing may lie on it"),
+        quiet=quiet,
+    )
+    found: list[Cells] = []
+    is_told = False
+    while len(found) < count:
+        frame = line.take(_PATIENCE_S)
+        if frame is not None:
+            found.append(frame.cells)
+        elif not is_told:
+            is_told = True
+            say_rows(("waits", "no frame comes", "Ctrl-C ends"), quiet=quiet)
+    frames = np.stack(found)
+    for remark in remarks(board, frames):
+        say_rows(("remark", remark, ""), quiet=quiet)
+    return measured(board, frames)
+
+
+def _served(live: Live, port: int, times: int, stack: contextlib.ExitStack) -> str:
+    from fuzzytree.report.page import Page
+
+    return stack.enter_context(Page(live, port, times=times)).url
+
+
+def _recorder(path: str | None, board: Board) -> Recorder | None:
+    from fuzzytree.tactile.recording import Recorder
+
+    return None if path is None else Recorder(path, board)
+
+
+@contextlib.contextmanager
+def _display(live: Live, times: int, *, is_wanted: bool) -> Generator[bool]:
+    """Show a picture if there is a terminal; tell whether there is."""
+    from fuzzytree.cli.tactile.screen import Screen, ended_by_signals, look_of
+
+    look = look_of(sys.stdout) if is_wanted else None
+    if look is None:
+        with ended_by_signals(None):
+            yield False
+        return
+    shown = Screen(live, sys.stdout, look, times)
+    with ended_by_signals(shown), shown:
+        yield True
+
+
+def _teller(hold: Hold, *, as_json: bool) -> Callable[[Answer], None]:
+    """Return what writes a line for an answer that is new and has held."""
+    from fuzzytree.report.live import line, line_facts
+
+    def tell(answer: Answer) -> None:
+        if answer.state is None or not hold((answer.state, answer.code)):
+            return
+        text = msgspec.json.encode(line_facts(answer)).decode() if as_json else ""
+        sys.stdout.write(f"{text or line(answer)}\n")
+        sys.stdout.flush()
+
+    return tell
+
+
+class _Tally:
+    """Counts the answers."""
+
+    def __init__(self) -> None:
+        self._labels: Counter[str] = Counter()
+
+    def add(self, answer: Answer) -> None:
+        """Take an answer."""
+        from fuzzytree.recognition.live import STATES
+
+        word = "refused" if answer.state is None else STATES[answer.state]
+        self._labels[answer.label or word] += 1
+
+    def tell(self, live: Live, record: str | None, *, quiet: bool) -> None:
+        """Say what was answered, how fast, and what was out of the ordinary."""
+        from fuzzytree.report.live import counts, timing, visible
+
+        view = live.view()
+        found = [f"{visible(label)} {n}" for label, n in sorted(self._labels.items())]
+        total = sum(self._labels.values())
+        say_rows(
+            ("answered", f"{total} frames", ", ".join(found)),
+            ("counted", counts(view), ""),
+            *([("took", timing(view), "")] if view.latency else []),
+            *([("wrote", record, "")] if record else []),
+            quiet=quiet,
+        )
