@@ -190,6 +190,7 @@ def test_no_further_seed_begins_when_the_time_is_over() -> None:
     assert all(one.relative_differs == 0 for one in found)
 
 
+@pytest.mark.heavy
 def test_an_interrupted_comparison_keeps_its_whole_seeds() -> None:
     def interrupt(text: str) -> None:
         if text == "iris, paper mode, seed 1":

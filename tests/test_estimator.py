@@ -28,6 +28,7 @@ IRIS, SPECIES = load_iris(return_X_y=True)
 WINE = load_wine(as_frame=True)
 
 
+@pytest.mark.heavy
 @parametrize_with_checks([FuzzyTreeClassifier(), FuzzyTreeClassifier(mode="paper")])  # type: ignore[untyped-decorator]
 def test_scikit_learn_finds_nothing_wrong(estimator: Any, check: Any) -> None:
     check(estimator)

@@ -61,6 +61,7 @@ def failures(found: Stability) -> list[str]:
     ]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("seed", range(2))
 def test_all_criteria_hold_for_generated_trees(seed: int) -> None:
     tree = random_tree(seed, leaves=2 + 2 * seed, inputs=2 + seed)

@@ -423,6 +423,7 @@ def test_accuracy_is_what_is_promised(
     assert least <= np.mean(found) <= most
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("mode", MODES)
 def test_a_thousand_classes_are_learnt(mode: Mode) -> None:
     rng = np.random.default_rng(6)

@@ -477,6 +477,7 @@ def test_an_output_that_is_asked_for_is_a_loss_outside_of_fuzzylite() -> None:
     assert [loss.where for loss in _read(text).losses] == ["output 'minutes'"]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "content",
     [

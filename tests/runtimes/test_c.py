@@ -19,6 +19,7 @@ needs_compiler = pytest.mark.skipif(
 )
 
 
+@pytest.mark.heavy
 @needs_compiler
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 @pytest.mark.parametrize("conjunction", ["min", "product"])

@@ -278,6 +278,7 @@ def test_what_others_are_compared_with_comes_first() -> None:
     assert fitting({}, {}, 1.0, 9) == set()
 
 
+@pytest.mark.heavy
 def test_two_threads_are_for_those_who_can_use_them() -> None:
     loads: dict[str, list[int]] = {"one": [], "both": []}
     plan = Plan(rows=(2, 3), threads=(1, 2), rounds=6, budget_s=5.0)
@@ -457,6 +458,7 @@ def test_values_that_do_not_fit_are_refused() -> None:
         bench(tree, values=np.zeros((width, 0)))
 
 
+@pytest.mark.heavy
 def test_a_study_of_a_real_model_agrees_with_itself() -> None:
     only = ["native", "native float32", "best-first", "python", "floor"]
     plan = Plan(rows=(1, 300), threads=(1,), rounds=6, budget_s=6.0)

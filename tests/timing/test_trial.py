@@ -76,6 +76,7 @@ def test_crashes_and_errors_are_told_and_the_others_go_on(maker: str) -> None:
     }
 
 
+@pytest.mark.heavy
 def test_what_hangs_is_ended(maker: str) -> None:
     found = tried(model(), ["hang", "well"], rows(), maker=maker, seconds=4.0)
     assert found == {"hang": "it did not answer within 4 s"}
