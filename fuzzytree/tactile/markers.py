@@ -21,6 +21,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.decoder import Decoder
@@ -34,6 +35,7 @@ from fuzzytree.tactile.fixed import (
 from fuzzytree.tactile.sensor import Cells
 
 _SURE: Final = 2  # bytes of proof; one of them fits by chance once in 256 times
+_MOST_AT_ONCE: Final = 64  # markers that are looked at together
 _MOST_PERIODS: Final = 8  # frames that are awaited to choose between beginnings
 
 
@@ -126,6 +128,11 @@ class MarkerDecoder(Decoder):
                 self._need = len(self._buffer) + 1
                 return False
             self._drop(place)
+            if len(self._buffer) < self._size:
+                self._need = self._size
+                return False
+            if not self._is_whole_soon():
+                continue
             chosen = self._chosen(is_final=is_final)
             if chosen is None:
                 return False
@@ -146,18 +153,30 @@ class MarkerDecoder(Decoder):
         self._need = self._size
         return True
 
+    def _is_whole_soon(self) -> bool:
+        """Bring the next whole frame to the front; tell whether one came soon.
+
+        Markers at which none stands are skipped, many at once: they may be frequent.
+        """
+        places: list[int] = []
+        place = 0
+        last = len(self._buffer) - self._size
+        while 0 <= place <= last and len(places) < _MOST_AT_ONCE:
+            places.append(place)
+            place = self._buffer.find(self._layout.head, place + 1)
+        data = np.frombuffer(bytes(self._buffer[: places[-1] + self._size]), np.uint8)
+        good = are_whole(self._layout, sliding_window_view(data, self._size)[places])
+        found = bool(good.any())
+        self._drop(places[int(good.argmax())] if found else places[-1] + 1)
+        return found
+
     def _chosen(self, *, is_final: bool) -> int | None:
-        """Judge the marker at the front.
+        """Judge the marker at the front, at which a whole frame stands.
 
         Returns:
             Where a frame begins that is believed; -1 if none begins at the front;
             None if more bytes are needed to tell.
         """
-        if len(self._buffer) < self._size:
-            self._need = self._size
-            return -1 if is_final else None
-        if not self._is_whole(0):
-            return -1
         if self._is_confirmed or self._expected in (0, -self._size):
             return 0
         size, head = self._size, self._layout.head
@@ -178,13 +197,9 @@ class MarkerDecoder(Decoder):
             return 0
         away = (places - self._expected) % size
         chosen = int(places[np.minimum(away, size - away).argmin()])
-        return chosen if self._is_whole(chosen) else -1
-
-    def _is_whole(self, place: int) -> bool:
-        block = np.frombuffer(
-            bytes(self._buffer[place : place + self._size]), np.uint8
-        )[np.newaxis]
-        return bool(are_whole(self._layout, block)[0])
+        block = self._buffer[chosen : chosen + self._size]
+        is_whole = are_whole(self._layout, blocks_of(self._layout, block, 1))[0]
+        return chosen if is_whole else -1
 
     def _marks(self, start: int) -> Truths:
         """Return where the marker stands within a frame's length, or may stand."""
