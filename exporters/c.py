@@ -149,11 +149,7 @@ def write(
     """
     if dtype not in _NUMBERS:
         raise ValueError(f"C has float64 and float32, not {dtype!r}")
-    prefix = prefix_of(model.name if name is None else name)
-    if name is not None and prefix != name:
-        raise ValueError(
-            f"the name {name!r} cannot begin the names of C; {prefix!r} can"
-        )
+    prefix = beginning(model.name, name)
     if isinstance(model, FuzzySystem):
         if dtype != "float64":
             raise ValueError("fuzzy systems are written in float64 only")
@@ -164,8 +160,22 @@ def write(
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise LossError(_loss_text(model, lost))
-    made = _Made(model, _NUMBERS[dtype], prefix)
+    made = Made(model, _NUMBERS[dtype], prefix)
     return Written("".join(made.text()).encode("ascii"), lost)
+
+
+def beginning(own: str, asked: str | None) -> str:
+    """Return the beginning of all names in a file.
+
+    Raises:
+        ValueError: If it is asked for and no beginning of names in C.
+    """
+    prefix = prefix_of(own if asked is None else asked)
+    if asked is not None and prefix != asked:
+        raise ValueError(
+            f"the name {asked!r} cannot begin the names of C; {prefix!r} can"
+        )
+    return prefix
 
 
 def _system_text(
@@ -207,7 +217,7 @@ def _checks(numbers: Numbers, *, is_arithmetic: bool) -> str:
     return text.replace("KIND", numbers.name).replace("FUSES", fuses)
 
 
-class _Made:
+class Made:
     """A file in the making: the model, and its tables, which several parts read."""
 
     def __init__(self, model: Model, numbers: Numbers, prefix: str) -> None:
@@ -222,17 +232,9 @@ class _Made:
 
     def text(self) -> Iterator[str]:
         """Yield the file."""
-        yield from _heading(self.model)
-        yield self._fill(_USE) + self._fill(_DECLARE)
-        yield from self._declarations()
-        yield self._fill(_DEFINE)
         mixed = any(variable.parts for variable in self.model.variables)
-        is_arithmetic = mixed or self.tables is not None
-        yield self._fill(_checks(self.numbers, is_arithmetic=is_arithmetic))
-        yield from self._defaults()
-        variables = self.model.variables
-        yield from axes_code(variables, self.line, self.numbers, self.prefix)
-        yield from self._code(taking(variables))
+        yield from self.declarations()
+        yield from self.definitions(is_arithmetic=mixed or self.tables is not None)
         yield from selftest_code(
             examples_of(self.model, self.asked, self.tables, self.line, self.numbers),
             self.numbers,
@@ -240,6 +242,25 @@ class _Made:
             has_strengths=self.tables is not None,
         )
         yield "\n#endif\n"
+
+    def declarations(self) -> Iterator[str]:
+        """Yield the heading and what users of the file see, open at the end."""
+        yield from _heading(self.model)
+        yield self._fill(_USE) + self._fill(_DECLARE)
+        yield from self._declarations()
+
+    def definitions(self, *, is_arithmetic: bool) -> Iterator[str]:
+        """Yield the tables and functions of the model.
+
+        Args:
+            is_arithmetic: Whether anything is computed, and not only compared.
+        """
+        yield self._fill(_DEFINE)
+        yield self._fill(_checks(self.numbers, is_arithmetic=is_arithmetic))
+        yield from self._defaults()
+        variables = self.model.variables
+        yield from axes_code(variables, self.line, self.numbers, self.prefix)
+        yield from self._code(taking(variables))
 
     def _fill(self, template: str) -> str:
         return fill(template, self.prefix)

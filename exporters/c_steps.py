@@ -71,6 +71,20 @@ static int name_is_finite(name_real value)
     return ~(uint32_t)(look.bits >> 32) << 1 >> 21 != 0;
 }
 """,
+    "absolute": """
+static name_real name_absolute(name_real a)
+{
+    return a < 0 ? -a : a + 0; /* the sum has no -0 */
+}
+""",
+    "round": """
+/* To the nearest whole number, ties to even; for less than 2^51. */
+static name_real name_round(name_real a)
+{
+    const name_real big = 6755399441055744.0;
+    return a < 0 ? -(big - a - big) : a + big - big;
+}
+""",
     "below": """
 /* How many numbers of a rising table are below a. */
 static name_real name_below(const name_real *table, unsigned long count, name_real a)
@@ -141,10 +155,15 @@ class Steps:
     What no input enters is computed here, once: single numbers stand in expressions,
     those of samples in tables. What has samples is computed in loops, together as far
     as no sum over all samples is needed in between.
+
+    Args:
+        program: The program.
+        library: By operation, which functions of math.h may be called; others are
+            helpers with the operation's name.
     """
 
-    def __init__(self, program: Program) -> None:
-        self.program = program
+    def __init__(self, program: Program, library: Mapping[str, str] = LIBRARY) -> None:
+        self.program, self.library = program, library
         self.still = still_results(program)
         self.needs: set[str] = set()
         self.tables: list[tuple[str, Sequence[float]]] = []
@@ -157,7 +176,9 @@ class Steps:
     def needs_library(self) -> bool:
         """Whether math.h is needed, for functions or for infinite numbers in tables."""
         numbers = (number for _, table in self.tables for number in table)
-        return not (self.needs.isdisjoint(LIBRARY) and all(map(math.isfinite, numbers)))
+        return not (
+            self.needs.isdisjoint(self.library) and all(map(math.isfinite, numbers))
+        )
 
     def table_text(self, prefix: str) -> Iterator[str]:
         """Yield the tables."""
@@ -318,8 +339,8 @@ class Steps:
         if operation in ("not", "negate"):
             return f"{'!' if operation == 'not' else '-'}{given[0]}"
         self.needs.add(operation)
-        if operation in LIBRARY:
-            return f"{LIBRARY[operation]}({', '.join(given)})"
+        if operation in self.library:
+            return f"{self.library[operation]}({', '.join(given)})"
         if step.table:
             table = self._table(step.table)
             return f"name_{operation}({table}, {len(step.table)}u, {given[0]})"

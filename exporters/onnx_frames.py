@@ -21,7 +21,7 @@ from fuzzytree.contracts import Model, Written
 from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters.onnx import FORMAT_VERSION, IRS, OPSETS, require, version
 from fuzzytree.rulebase import RuleBase, fingerprint
-from fuzzytree.tactile.aimed import aimed_frames, cuts_of, edge_frames, frame_type
+from fuzzytree.tactile.aimed import frame_type, proving_frames
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.plain import Shown, check_reject, plain_answer, plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor, offsets
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import onnx
 
-    from fuzzytree.contracts import FloatArray
     from fuzzytree.exporters.onnx_axes import Axes
     from fuzzytree.exporters.onnx_graph import Sheet
 
@@ -43,8 +42,6 @@ Output = Literal["label", "state", "rule", "features", "strengths"]
 USUAL: tuple[Output, ...] = ("label", "state", "rule")
 
 _NUMBERS_AT_ONCE = 2**16  # of the cells of frames that are best run together
-_AIMED = 12  # presses, when a file is proved
-_MOST_CUTS = 40
 
 
 def write_frames(
@@ -411,17 +408,6 @@ def _whole(sheet: Sheet, value: int) -> str:
 # --- the proof
 
 
-def proving_frames(made: FrameProgram, model: Model) -> Cells:
-    """Return aimed frames, and frames next to the model's own cuts."""
-    frames = aimed_frames(made.sensor, _AIMED)
-    cuts = cuts_of(model)[:_MOST_CUTS]
-
-    def features(some: Cells) -> FloatArray:
-        return np.array([plain_features(made, frame)[0] for frame in some]).T
-
-    return np.concatenate([frames, edge_frames(frames, cuts, features)])
-
-
 def differences(
     content: bytes,
     made: FrameProgram,
@@ -440,10 +426,11 @@ def differences(
         values, is_pressed = plain_features(made, frame)
         right = plain_answer(model, values, is_pressed=is_pressed, reject=reject)
         for name in outputs:
-            given, expected = found[name][number], _expected(model, right, name)
-            if not np.array_equal(np.asarray(given), np.asarray(expected)):
+            given = np.asarray(found[name][number]).tolist()
+            expected = np.asarray(_expected(model, right, name)).tolist()
+            if given != expected:
                 yield (
-                    f"the onnx file of {model.name} gives another {name} than plain "
+                    f"the onnx file of {model.name} gives other {name} than plain "
                     f"Python for aimed frame {number}: {given}, not {expected}"
                 )
 

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from fuzzytree.contracts import Model
 from fuzzytree.probing import landmarks
+from fuzzytree.tactile.features import FrameProgram
+from fuzzytree.tactile.plain import plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.tree import FuzzyTree
 
@@ -18,6 +20,7 @@ Features = Callable[[Cells], npt.NDArray[np.float64]]
 
 Whole = npt.NDArray[np.int64]
 
+_MOST_CUTS = 40
 _HALVINGS = 20  # 16 bits are done after them
 
 
@@ -171,6 +174,23 @@ def _mixed(one: Whole, two: Whole, places: npt.NDArray[np.intp]) -> Whole:
     found = one.copy()
     found.flat[places] = two.flat[places]
     return found
+
+
+def proving_frames(made: FrameProgram, model: Model, presses: int = 12) -> Cells:
+    """Return what a written file is tried with: aimed frames, and pairs at its cuts.
+
+    Args:
+        made: The program of the model's features.
+        model: The model.
+        presses: How many of the frames are drawn.
+    """
+    frames = aimed_frames(made.sensor, presses)
+
+    def features(some: Cells) -> npt.NDArray[np.float64]:
+        return np.array([plain_features(made, frame)[0] for frame in some]).T
+
+    pairs = edge_frames(frames, cuts_of(model)[:_MOST_CUTS], features)
+    return np.concatenate([frames, pairs])
 
 
 def cuts_of(model: Model) -> list[tuple[int, float]]:

@@ -13,14 +13,13 @@ from fuzzytree.errors import InvalidModelError, ReadError, TableError
 from fuzzytree.exporters.onnx_frames import (
     Output,
     differences,
-    proving_frames,
     write_frames,
 )
 from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.tactile.aimed import aimed_frames
+from fuzzytree.tactile.aimed import aimed_frames, proving_frames
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.plain import plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor
@@ -176,8 +175,9 @@ def test_the_proof_finds_a_file_of_another_model() -> None:
     frames = proving_frames(made, TREE)
     found = [*differences(content, made, TREE, frames, ("rule", "features"), 0.0)]
     assert found[0] == (
-        "the onnx file of tree gives another rule than plain Python for aimed frame "
-        "2: 1, not 4"
+        "the onnx file of tree gives other features than plain Python for aimed "
+        "frame 2: [12650.666666666666, 256.0], not "
+        "[213.33333333333334, 12650.666666666666]"
     )
 
 

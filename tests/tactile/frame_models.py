@@ -27,9 +27,9 @@ SMALL = Sensor(6, 4, full=100)
 
 
 @functools.cache
-def learnt_tree(sensor: Sensor, names: tuple[str, ...], classes: int = 5) -> FuzzyTree:
+def learnt_tree(sensor: Sensor, names: tuple[str, ...], classes: int = 3) -> FuzzyTree:
     """Return a tree on features of made presses, that tells how hard they are."""
-    frames = aimed_frames(sensor, 120, seed=3)[-120:]
+    frames = aimed_frames(sensor, 60, seed=3)[-60:]
     values = features_of(sensor, frames, names).values
     force = frames.astype(np.int64).sum(axis=(1, 2))
     ends = np.quantile(force, np.arange(1, classes) / classes)
