@@ -17,6 +17,7 @@ from fuzzytree.tactile.sensor import Cells
 _BYTES_OF_A_NUMBER: Final = 32  # with what separates it; what is longer is no line
 _BYTES_BESIDE: Final = 256
 _LONGEST_NUMBER: Final = 9
+_ODD_BLANKS: Final = bytes.maketrans(b"\v\f\r", b"???")  # blanks, but no separators
 _SEPARATORS: Final = {"space": None, "comma": b",", "semicolon": b";"}
 
 
@@ -163,6 +164,7 @@ class TextDecoder(Decoder):
         return numbers if max(numbers) <= self._largest else None
 
     def _words(self, line: bytes) -> list[bytes]:
+        line = line.rstrip(b"\r").translate(_ODD_BLANKS)
         if self._separator is None:
             return line.split()
         words = [word.strip() for word in line.split(self._separator)]

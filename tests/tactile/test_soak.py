@@ -1,0 +1,122 @@
+"""Frames with faults through every decoder, against the truth; and through a port."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+import soak
+
+from fuzzytree.tactile.boards import Board, Marker, Sentinel, Text
+from fuzzytree.tactile.decoding import decoder_of
+from fuzzytree.tactile.encoding import encoded
+from fuzzytree.tactile.faults import Faults
+from fuzzytree.tactile.sensor import Sensor
+
+# Where two bytes or more of a frame prove it, a wrong frame needs luck of 1 in 65536.
+PROVEN = "marker, sizes, crc16"
+
+
+@pytest.mark.parametrize("name", soak.CASES)
+def test_without_faults_every_frame_comes(name: str) -> None:
+    count = soak.soak(soak.CASES[name], 100, faults=Faults())
+    assert count.right == count.given == count.frames == 100
+    assert count.touched == count.damaged == 0
+
+
+@pytest.mark.parametrize("name", soak.CASES)
+def test_no_wrong_frame_comes_that_its_bytes_could_tell(name: str) -> None:
+    _check(name, soak.soak(soak.CASES[name], 500))
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", soak.CASES)
+def test_a_long_soak_keeps_the_laws(name: str) -> None:
+    count = soak.soak(soak.CASES[name], 5500, seed=1)
+    _check(name, count)
+    assert count.touched > 200
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", soak.CASES)
+def test_many_faults_keep_the_laws(name: str) -> None:
+    faults = Faults(flip=2e-3, lose=1e-3, double=1e-3, noise=0.3, marker=0.5)
+    count = soak.soak(soak.CASES[name], 3000, seed=2, faults=faults)
+    assert count.unexplained == 0
+    assert count.touched > 1000
+
+
+def _check(name: str, count: soak.Count) -> None:
+    """Hold a count against the laws; `soak` itself checks those of the bytes."""
+    assert (count.unexplained, count.missed) == (0, 0)
+    assert count.right >= count.frames - count.touched - count.alone
+    assert count.late <= count.doubtful + count.resyncs
+    if name == PROVEN:
+        assert count.right == count.given
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", soak.CASES)
+def test_the_memory_of_a_decoder_does_not_grow(name: str) -> None:
+    board = soak.CASES[name]
+    random = np.random.default_rng(0)
+    pool = soak.pool_of(board, soak.FAULTS, random)
+    decoder = decoder_of(board)
+    stream = b"".join(pool.sent[:60])
+    tracemalloc.start()
+    sizes: list[int] = []
+    for _ in range(30):
+        decoder.asked()
+        decoder.feed(stream[: int(random.integers(len(stream)))])
+        sizes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+    assert max(sizes[10:]) < max(sizes[:10]) + 20_000
+
+
+# What the judge itself can tell.
+
+
+def test_a_frame_that_stands_nowhere_is_unexplained() -> None:
+    board = Board("mat", Sensor(2, 2), Marker("AA", checksum="sum8"))
+    first, second = np.array([[1, 2], [3, 4]]), np.array([[5, 6], [7, 8]])
+    data = encoded(board, first) + encoded(board, second)
+    assert soak.explained(board, data, first) == "untold"
+    assert soak.explained(board, data, second) == "untold"
+    assert soak.explained(board, data, first + second) == "unexplained"
+    wrong = data.replace(b"\x0a", b"\x0b")  # a wrong checksum
+    assert soak.explained(board, wrong, first) == "unexplained"
+
+
+def test_a_frame_is_late_if_only_the_next_marker_could_tell() -> None:
+    board = Board("mat", Sensor(2, 2), Marker("AA"))
+    cells = np.array([[1, 2], [3, 4]])
+    lost = np.array([[1, 2], [4, 0xAA]])
+    sent = encoded(board, cells)
+    data = sent + sent.replace(b"\x03", b"") + sent
+    assert soak.explained(board, data, cells) == "untold"
+    assert soak.explained(board, data, lost) == "late"
+    # Out of step nobody may believe it.
+    assert soak.explained(board, b"\x00" + data[5:], lost) == "unexplained"
+
+
+def test_the_judge_unpacks_runs_and_lines_by_itself() -> None:
+    assert soak.unpacked(Sentinel(), b"\x05\x00\x02\x07") == [5, 0, 0, 7]
+    assert soak.unpacked(Sentinel(), b"\x05\x00") is None
+    assert soak.unpacked(Sentinel(), b"\x05\x00\x00") is None
+    lines = Text(separator="comma", prefix="F", skip=1)
+    assert soak.numbers(lines, b"F,9,1, 2\r") == [1, 2]
+    assert soak.numbers(lines, b"G,9,1,2\r") is None
+    assert soak.numbers(lines, b"F,9,1,x\r") is None
+
+
+def test_only_spaces_and_tabs_are_blanks_between_numbers() -> None:
+    board = Board("mat", Sensor(1, 3), Text())
+    decoder = decoder_of(board)
+    frames = decoder.feed(b"1 2 3\r\n4\t 5 6\r\n1 2\f3\r\n1 2 3\v\r\n7 8 9\n")
+    assert [cells.tolist() for cells in frames] == [
+        [[1, 2, 3]],
+        [[4, 5, 6]],
+        [[7, 8, 9]],
+    ]
+    assert decoder.counters.damaged == 2
