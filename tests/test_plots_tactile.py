@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import importlib.util
 import itertools
+import re
+import shlex
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import interpolation
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -25,6 +30,9 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+DRAWN_BY = "3.11.2"
 
 FRAME = np.array([[0, 4], [8, 2]])
 
@@ -318,3 +326,59 @@ def test_drawing_without_matplotlib_names_the_extra(
     for draw in draws:
         with pytest.raises(MissingExtraError, match="extra 'plots'"):
             draw()
+
+
+@pytest.mark.parametrize("name", ["weights", "a_hand"])
+def test_the_pictures_of_the_docs_are_those_of_their_script(
+    name: str, tmp_path: Path
+) -> None:
+    if importlib.metadata.version("matplotlib") != DRAWN_BY:
+        pytest.skip(f"drawn by matplotlib {DRAWN_BY}, and others place letters apart")
+    again = tmp_path / "again.svg"
+    plots.save(getattr(interpolation, f"picture_of_{name}")(), again)
+    file = DOCS / f"interpolation-{name.removeprefix('a_')}.svg"
+    assert again.read_bytes() == file.read_bytes(), (
+        "python benchmarks/interpolation.py --draw"
+    )
+
+
+def test_the_bilinear_values_of_the_script_are_those_of_a_tent() -> None:
+    cells = np.array([[0.0, 4.0], [8.0, 12.0]])
+    found = interpolation.bilinear(cells, 2)
+    assert found[1].tolist() == [2.0, 3.0, 5.0, 6.0]
+    assert found[:, 0].tolist() == [0.0, 2.0, 6.0, 8.0]
+
+
+def _page() -> str:
+    return (DOCS / "interpolation.md").read_text("utf-8")
+
+
+def test_the_example_of_the_page_gives_the_papers_cells() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", _page(), re.DOTALL)
+    found: dict[str, Any] = {}
+    exec(code.replace("print(", "shown = ("), found)  # our own page
+    assert found["shown"][0].tolist() == [100.0, 83.3, 66.7, 50.0]
+
+
+@pytest.mark.heavy
+def test_the_commands_of_the_page_write_what_they_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from fuzzytree.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
+    (block,) = re.findall(r"```sh\n(.*?)```", _page(), re.DOTALL)
+    for line in block.splitlines():
+        words = shlex.split(line)[1:]
+        assert main(words) == 0
+        assert Path(words[-1]).stat().st_size > 0
+
+
+@pytest.mark.heavy
+def test_the_errors_of_the_page_are_those_that_its_script_finds(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("scipy", reason="scipy is not installed")
+    interpolation.print_errors()
+    assert capsys.readouterr().out in _page()
