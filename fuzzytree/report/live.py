@@ -110,7 +110,8 @@ def picture(
         >>> picture(np.array([[0, 255]]), 255, 80, 9, look="plain", times=1)
         [' .@@']
     """
-    width, height = (columns // 2, lines) if look == "plain" else (columns, 2 * lines)
+    wide, high = (columns // 2, lines) if look == "plain" else (columns, 2 * lines)
+    width, height = max(wide, 1), max(high, 1)
     rows, across = cells.shape
     fits = min(width // across, height // rows, times)
     if fits < 1:
@@ -196,7 +197,7 @@ def timing(view: View) -> str:
         return ""
     parts = (found.median, found.most, found.largest)
     median, most, largest = (f"{1e3 * part:.2f}" for part in parts)
-    spread = f"median {median} ms, 99 % {most} ms, largest {largest} ms"
+    spread = f"{median} ms (99 %: {most}, largest: {largest})"
     return f"{view.rate:.1f} frames/s; answer after {spread}"
 
 
