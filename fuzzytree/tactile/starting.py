@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import msgspec
 import numpy as np
 import numpy.typing as npt
@@ -52,7 +54,7 @@ def remarks(board: Board, frames: Cells) -> list[str]:
     """Return what is odd about a sensor on which nothing should lie.
 
     Hot cells, something that lies on it or touches it, and cells that never move
-    though most others do: these may be dead, and are not masked.
+    though both neighbours do: these may be dead, and are not masked.
 
     Args:
         board: What sent the frames.
@@ -73,21 +75,24 @@ def remarks(board: Board, frames: Cells) -> list[str]:
     says: list[str] = []
     if is_hot.any():
         share = f"{board.start.hot:.0%} of full"
-        says.append(f"at rest above {share}, masked: {_named(is_hot)}")
+        says.append(f"at rest above {share}, masked: {named(_places(is_hot))}")
     if _has_neighbours(is_hot):
         says.append("some of these lie side by side: does something lie on the sensor?")
     if is_touched.any():
         text = "moved by more than a quarter of full (was the sensor touched?)"
-        says.append(f"{text}: {_named(is_touched)}")
+        says.append(f"{text}: {named(_places(is_touched))}")
     is_still = still(board, found)
     if is_still.any():
-        text = "never moved though most others did (dead?), not masked"
-        says.append(f"{text}: {_named(is_still)}")
+        text = "never moved though both neighbours did (dead?), not masked"
+        says.append(f"{text}: {named(_places(is_still))}")
     return says
 
 
 def still(board: Board, frames: Cells) -> Places:
-    """Return which cells never move though most others do, and are not masked.
+    """Return which cells never move though both neighbours in a line do.
+
+    The line is a row or a column, so a dead row is found, and a dead column. Cells
+    that are masked are left out.
 
     Args:
         board: What sent the frames.
@@ -97,11 +102,23 @@ def still(board: Board, frames: Cells) -> Places:
         Shape (rows, columns).
     """
     found = check_frames(board.sensor, frames)
-    is_still: Places = found.max(axis=0) == found.min(axis=0)
-    is_free = ~_masked(board)
-    if 2 * (is_still & is_free).sum() >= is_free.sum():
-        return np.zeros_like(is_still)
-    return is_still & is_free
+    is_moved: Places = found.max(axis=0) > found.min(axis=0)
+    is_between = np.zeros_like(is_moved)
+    is_between[1:-1] |= is_moved[2:] & is_moved[:-2]
+    is_between[:, 1:-1] |= is_moved[:, 2:] & is_moved[:, :-2]
+    return is_between & ~is_moved & ~_masked(board)
+
+
+def named(places: Sequence[tuple[int, int]]) -> str:
+    """Return places by name, as features call them, the first ones only.
+
+    Example:
+        >>> named([(0, 3), (1, 4)])
+        'r0 c3, r1 c4'
+    """
+    names = [f"r{row} c{column}" for row, column in places[:_MOST_NAMED]]
+    more = len(places) - len(names)
+    return f"{', '.join(names)}{f' and {more} more' if more else ''}"
 
 
 def _baseline(board: Board, frames: Cells) -> npt.NDArray[np.int64]:
@@ -138,11 +155,3 @@ def _has_neighbours(is_so: Places) -> bool:
 
 def _places(is_so: Places) -> list[tuple[int, int]]:
     return [(int(row), int(column)) for row, column in np.argwhere(is_so)]
-
-
-def _named(is_so: Places) -> str:
-    """Return the places by name, as features call them."""
-    places = _places(is_so)
-    names = [f"r{row} c{column}" for row, column in places[:_MOST_NAMED]]
-    more = len(places) - len(names)
-    return f"{', '.join(names)}{f' and {more} more' if more else ''}"

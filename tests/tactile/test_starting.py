@@ -47,7 +47,7 @@ def test_a_hot_cell_is_masked_once_and_told() -> None:
     assert measured(board, frames).sensor.masked == ((1, 2),)
     assert remarks(BOARD, frames) == [
         "at rest above 50% of full, masked: r1 c2",
-        "never moved though most others did (dead?), not masked: r1 c2",
+        "never moved though both neighbours did (dead?), not masked: r1 c2",
     ]
     assert remarks(board, frames) == []
 
@@ -73,16 +73,26 @@ def test_a_touch_while_the_baseline_is_taken_is_told() -> None:
 
 def test_a_dead_cell_is_told_and_not_masked() -> None:
     frames = _resting()
-    frames[:, 2, 3] = 0
+    frames[:, 2, 2] = 0
     assert remarks(BOARD, frames) == [
-        "never moved though most others did (dead?), not masked: r2 c3"
+        "never moved though both neighbours did (dead?), not masked: r2 c2"
     ]
     assert measured(BOARD, frames).sensor.masked == ()
 
 
-def test_nothing_is_dead_where_hardly_anything_moves() -> None:
+@pytest.mark.parametrize("place", [np.s_[1], np.s_[:, 2]])
+def test_a_dead_row_or_column_is_found(place: tuple[slice, int] | int) -> None:
+    frames = _resting()
+    index = (slice(None), *(place if isinstance(place, tuple) else (place,)))
+    frames[index] = 7
+    expected = np.zeros((3, 4), np.bool_)
+    expected[place] = True
+    assert (still(BOARD, frames) == expected).all()
+
+
+def test_nothing_is_dead_beside_what_moves() -> None:
     frames = np.zeros((9, 3, 4), int)
-    frames[1, 0, 0] = 1
+    frames[1, :2, :2] = 1
     assert not still(BOARD, frames).any()
 
 
