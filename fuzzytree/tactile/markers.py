@@ -3,11 +3,11 @@
 The marker can occur among the cells. So a beginning is believed only where
 
 - a frame stands that its checksum, tail or sizes confirm (two bytes or more of them),
+- or exactly where a frame was expected: behind the last one, or one frame further,
 - or the next frame begins at the right distance too, and no other place within the
-  frame could be its beginning as well. Are there several, as a picture that does not
-  change may show them, further frames decide; after eight it is the place nearest to
-  where a frame was expected, the first one at the start of a stream,
-- or exactly where a frame was expected: behind the last one, or one frame further.
+  frame could be its beginning as well. If there are several, as in a picture that does
+  not change, further frames decide; after eight it is the place nearest to where a
+  frame was expected, or the first one at the start of a stream.
 
 Once a frame is found, the next ones are given out at their last byte. If no marker
 stands where the next one must begin, a byte of the last frame may have been lost or
@@ -181,6 +181,9 @@ class MarkerDecoder(Decoder):
             return 0
         size, head = self._size, self._layout.head
         alive = self._marks(0)
+        if self._expected is not None and 0 < self._expected < size:
+            # The marker there is damaged; the ones behind it may not be.
+            alive[self._expected] = True
         for period in range(1, _MOST_PERIODS + 1):
             last = int(alive.nonzero()[0][-1]) if period > 1 else 0
             need = period * size + last + len(head)
@@ -197,9 +200,11 @@ class MarkerDecoder(Decoder):
             return 0
         away = (places - self._expected) % size
         chosen = int(places[np.minimum(away, size - away).argmin()])
-        block = self._buffer[chosen : chosen + self._size]
-        is_whole = are_whole(self._layout, blocks_of(self._layout, block, 1))[0]
-        return chosen if is_whole else -1
+        return chosen if self._is_whole(chosen) else chosen + size
+
+    def _is_whole(self, place: int) -> bool:
+        block = self._buffer[place : place + self._size]
+        return bool(are_whole(self._layout, blocks_of(self._layout, block, 1))[0])
 
     def _marks(self, start: int) -> Truths:
         """Return where the marker stands within a frame's length, or may stand."""

@@ -175,7 +175,7 @@ class TextDecoder(Decoder):
     def _is_attempt(self, line: bytes) -> bool:
         """Tell whether a line that is no frame was to be one, and no title.
 
-        It is if it begins like one, or has half as many numbers.
+        It is if it begins like one, or is mostly numbers, and half as many.
         """
         if len(line) > self._longest:
             return True
@@ -186,4 +186,5 @@ class TextDecoder(Decoder):
             begins = words[0] == self._prefix
         else:
             begins = words[0][:1] in (b"+", b"-", b".") or words[0][:1].isdigit()
-        return begins or 2 * sum(map(bytes.isdigit, words)) >= self._width
+        numbers = sum(map(bytes.isdigit, words))
+        return begins or (2 * numbers > len(words) and 2 * numbers >= self._width)
