@@ -26,6 +26,11 @@ if TYPE_CHECKING:
 End = Literal["frames", "seconds", "told", "port"]
 """Enough frames, or seconds; Ctrl-C or SIGTERM; or the port went away."""
 
+_SENTENCES: dict[State, str] = {
+    "open": "frames come again",
+    "silent": "no frame comes; waiting",
+    "away": "went away; waiting until it is back",
+}
 _LOOK_S = 0.1
 _WAITING_BYTES = 2**24  # of frames, while the disk is busy
 
@@ -128,6 +133,7 @@ class _Coming:
         self.first_s = self.last_s = 0.0
         self._line, self._told, self._quiet = line, told, quiet
         self._state: State = "open"
+        self._reconnects = 0
         self._any = False
         self._limit_s: float | None = None
         self._begun = self._said = time.monotonic()
@@ -179,22 +185,23 @@ class _Coming:
     def _tell(self) -> None:
         """Say when the line changes, and each second, on a terminal, how far it is."""
         state, before = self._line.state, self._state
-        if state != before and state != "ended":
-            self._state = state
-            sentences = {
-                "open": "frames come again",
-                "silent": "no frame comes; waiting",
-                "away": "went away; waiting until it is back",
-            }
-            say(f"{self._line.port}: {sentences[state]}", quiet=self._quiet)
+        self._state = state
+        counters = self._line.counters
+        if counters.reconnects != self._reconnects:
+            self._reconnects = counters.reconnects
+            self._say("went away, and is back")
+        elif state != before and state in _SENTENCES:
+            self._say(_SENTENCES[state])
         now = time.monotonic()
         if now - self._said >= 1 and self.count:
             self._said = now
             if sys.stderr.isatty():
-                counters = self._line.counters
                 text = f"{now - self._begun:.0f} s, {self.count} frames"
                 wrong = f"{counters.damaged} damaged, {counters.dropped} dropped"
                 say(f"{text}, {wrong}", quiet=self._quiet)
+
+    def _say(self, text: str) -> None:
+        say(f"{self._line.port}: {text}", quiet=self._quiet)
 
 
 def _waiting(board: Board) -> int:
@@ -250,15 +257,16 @@ def _tell(
 ) -> None:
     from fuzzytree.report.text import counted
 
-    rate = f", {(coming.count - 1) / coming.seconds:.1f} a second"
+    rate = ""
+    if coming.seconds:
+        rate = f", {(coming.count - 1) / coming.seconds:.1f} a second"
     facts = line.counters.facts().items()
     risk = counted(recorder.most_at_risk, "frame")
     say_rows(
         (
             "wrote",
             output,
-            f"{counted(coming.count, 'frame')}, {coming.seconds:.1f} s"
-            f"{rate if coming.seconds else ''}",
+            f"{counted(coming.count, 'frame')}, {coming.seconds:.1f} s{rate}",
         ),
         ("counted", ", ".join(f"{name} {count}" for name, count in facts), ""),
         ("at risk", f"{risk} at most, if the power had failed", ""),

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.review import Review
 
 _LOOK_S = 0.1
-_LAST_S = 0.5  # for the reader of a port to take the last bytes
+_LAST_S = 0.2  # for the reader of a port to take the last bytes
 
 
 @click.command("replay", short_help="Tell what is in a recording, or play it again.")
