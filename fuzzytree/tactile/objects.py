@@ -175,32 +175,32 @@ def radius_of(thing: Object) -> float:
 
 
 _FINGERS = (  # from the thumb: where it begins in x, where it points to, its length
-    (-1.8, 112.5, 7.24),
-    (-0.6, 97.5, 7.87),
-    (0.6, 82.5, 7.4),
-    (1.8, 67.5, 5.9),
+    (-2.19, 102.5, 7.24),
+    (-0.73, 94.2, 7.87),
+    (0.73, 85.8, 7.4),
+    (2.19, 77.5, 5.9),
 )
 
 
 def _hand(turned_deg: float) -> Object:
     """Return a right hand from its back: fitted once to Table 2 (docs/simulator.md)."""
-    palm = rectangle(4.79, 6.54)
-    low = -3.27
-    heel = Part(((-2.395, low - 1.4), (2.395, low - 1.4), (2.395, low), (-2.395, low)))
-    fingers = [finger((x, -low), angle, length, 0.85) for x, angle, length in _FINGERS]
-    thumb = finger((-2.395, -2.79), 160, 3.4, 1.4)
+    palm = rectangle(5.85, 6.99)
+    low = -3.495
+    heel = Part(((-2.925, low - 1.0), (2.925, low - 1.0), (2.925, low), (-2.925, low)))
+    fingers = [finger((x, -low), angle, length, 0.81) for x, angle, length in _FINGERS]
+    thumb = finger((-2.925, -2.31), 151, 3.1, 1.7)
     parts = [
         palm,
-        Part(heel.corners, 3.2),
-        *(Part(one.corners, 0.2) for one in fingers),
-        Part(thumb.corners, 0.64),
+        Part(heel.corners, 3.4),
+        *(Part(one.corners, 0.21) for one in fingers),
+        Part(thumb.corners, 1.1),
     ]
-    return Object(f"hand-{turned_deg:g}", _centred(parts), 286.0, turned_deg)
+    return Object(f"hand-{turned_deg:g}", _centred(parts), 217.0, turned_deg)
 
 
 def _bar(turned_deg: float) -> Object:
     return Object(
-        f"rectangle-{turned_deg:g}", (rectangle(5.55, 1.74),), 39.9, turned_deg
+        f"rectangle-{turned_deg:g}", (rectangle(5.55, 1.74),), 24.7, turned_deg
     )
 
 
@@ -211,8 +211,8 @@ OBJECTS: Mapping[str, Object] = MappingProxyType(
             _bar(0.0),
             _bar(27.0),
             _bar(45.0),
-            Object("circle", (disc(1.55),), 23.4),
-            Object("square", (rectangle(3.4, 3.4),), 20.9),
+            Object("circle", (disc(1.55),), 10.9),
+            Object("square", (rectangle(3.4, 3.4),), 24.3),
             _hand(0.0),
             _hand(45.0),
         )

@@ -76,24 +76,24 @@ class Settings(Value, frozen=True, kw_only=True):
     """
 
     force: float = 1.0
-    force_spread: float = 0.18
-    tilt: float = 0.056
+    force_spread: float = 0.24
+    tilt: float = 0.05
     roam: float = 1.0
     turn_deg: float = 1.0
-    aperture: float = 0.51
-    break_n: float = 0.031
-    slope_us: float = 200.0
-    bend_n: float = 2.5
+    aperture: float = 0.61
+    break_n: float = 0.024
+    slope_us: float = 400.0
+    bend_n: float = 1.2
     row_spread: float = 0.05
     column_spread: float = 0.05
     board: int = 0
     wiring: Wiring = "grounded"
-    drive_ohm: float = 1200.0
-    load_ohm: float = 30.0
+    drive_ohm: float = 1500.0
+    load_ohm: float = 0.0
     rest_us: float = 0.1
-    full_us: float = 155.0
+    full_us: float = 175.0
     noise: float = 0.5
-    threshold: int = 7
+    threshold: int = 6
 
     def __post_init__(self) -> None:
         """Refuse a number out of its range."""

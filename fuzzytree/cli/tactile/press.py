@@ -41,6 +41,12 @@ if TYPE_CHECKING:
 @click.option(
     "--means", is_flag=True, help="Print mean invariants beside the paper's Table 2."
 )
+@click.option(
+    "--effects",
+    "is_each",
+    is_flag=True,
+    help="Print what is recognised without each effect of the sensor.",
+)
 @json_option
 @quiet_option
 def command(
@@ -50,6 +56,7 @@ def command(
     output: str | None,
     changes: Sequence[str],
     means: bool,
+    is_each: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -58,10 +65,14 @@ def command(
     OBJECT is rectangle-0, rectangle-27, rectangle-45, circle, square, hand-0 or
     hand-45. FILE holds the frames, their labels and what a full cell reads.
     """
-    if output is None and not means:
-        raise click.UsageError("name a file with -o, or ask for --means")
-    if output == "-" and (means or as_json):
-        raise click.UsageError("`-o -` leaves no room for --means or --json on stdout")
+    if output is None and not (means or is_each):
+        raise click.UsageError("name a file with -o, or ask for --means or --effects")
+    if output == "-" and (means or is_each or as_json):
+        raise click.UsageError(
+            "`-o -` leaves no room for --means, --effects or --json on stdout"
+        )
+    if is_each and name != "all":
+        raise click.UsageError("--effects needs all objects: press all --effects")
     from fuzzytree.files import check_place, write_atomically
     from fuzzytree.tactile.objects import OBJECTS
     from fuzzytree.tactile.physics import press
@@ -96,6 +107,8 @@ def command(
         facts["means"] = _means_facts(comparison)
         if not as_json:
             _tell_means(comparison, quiet=quiet)
+    if is_each:
+        facts["effects"] = _tell_effects(settings, seed, count, is_silent=as_json)
     if as_json:
         answer_json(facts)
 
@@ -200,6 +213,35 @@ def _tell_means(found: Comparison, *, quiet: bool) -> None:
         f"of 2, {near} within 1.25; {NO_ORACLE} is not counted",
         quiet=quiet,
     )
+
+
+def _tell_effects(
+    settings: Settings, seed: int, count: int, *, is_silent: bool
+) -> list[dict[str, object]]:
+    """Print a line for each effect that is switched off, and return the facts."""
+    from fuzzytree.recognition.effects import effects
+    from fuzzytree.tactile.objects import OBJECTS
+
+    facts: list[dict[str, object]] = []
+    if not is_silent:
+        heads = ["all", *OBJECTS, "within 2"]
+        answer(" ".join([f"{'without':18}", *(f"{head:>12}" for head in heads)]))
+    with wrong_options():
+        for one in effects(settings, seed, count=count):
+            shares = [one.all, *one.objects.values()]
+            cells = [*(f"{100 * share:.0f} %" for share in shares), str(one.near)]
+            if not is_silent:
+                row = (f"{cell:>12}" for cell in cells)
+                answer(" ".join([f"{one.name:18}", *row]))
+            facts.append(
+                {
+                    "name": one.name,
+                    "all": one.all,
+                    "objects": one.objects,
+                    "within_2": one.near,
+                }
+            )
+    return facts
 
 
 def _line(title: str, cells: Iterable[str]) -> str:
