@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
@@ -45,6 +45,7 @@ class Trial(Value, frozen=True):
         left_out: Frames to learn from on which nothing pressed.
         tested: Frames that were tested, all of them counted.
         right: How many got their class.
+        accuracy: Their share.
         leaves: Of the tree.
         features: How many features the tree asks for.
         settings: The settings that were chosen, if they were.
@@ -55,14 +56,10 @@ class Trial(Value, frozen=True):
     left_out: int
     tested: int
     right: int
+    accuracy: float
     leaves: int
     features: int
     settings: str = ""
-
-    @property
-    def accuracy(self) -> float:
-        """The share that got their class."""
-        return self.right / self.tested
 
 
 class Peer(Value, frozen=True):
@@ -88,6 +85,7 @@ class Study(Value, frozen=True):
         task: A word or two.
         about: What the frames are.
         split: How they were divided.
+        sensor: What they come from.
         unit: What pairs are made of: `subject` or `press`.
         frames: How many there are.
         clipped: Readings above what a cell can take, that were read as that.
@@ -96,6 +94,8 @@ class Study(Value, frozen=True):
         names: The features.
         settings: How it was learnt, in words.
         classes: Their names.
+        accuracy: The mean over the divisions of the share that got their class.
+        spread: The standard deviation over the divisions; 0 for one.
         trials: One for each division.
         confusion: For each class how many of its frames got each class, nothing, or
             none of the known; of the first division, or of all together.
@@ -105,7 +105,8 @@ class Study(Value, frozen=True):
     task: str
     about: str
     split: str
-    unit: str
+    sensor: str
+    unit: Literal["subject", "press"]
     frames: int
     clipped: int
     negative: int
@@ -113,20 +114,15 @@ class Study(Value, frozen=True):
     names: tuple[str, ...]
     settings: str
     classes: tuple[str, ...]
+    accuracy: float
+    spread: float
     trials: tuple[Trial, ...]
     confusion: tuple[tuple[int, ...], ...]
     peers: tuple[Peer, ...]
 
-    @property
-    def accuracy(self) -> float:
-        """The mean over the divisions of the share that got their class."""
-        return float(np.mean([trial.accuracy for trial in self.trials]))
-
-    @property
-    def spread(self) -> float:
-        """The standard deviation over the divisions; 0 for one."""
-        shares = [trial.accuracy for trial in self.trials]
-        return float(np.std(shares, ddof=1)) if len(shares) > 1 else 0.0
+    def to_json(self) -> str:
+        """Return the same facts for programs, as indented JSON."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=2).decode()
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +196,7 @@ def experiment(
                 len(split.train) - len(rows),
                 len(split.test),
                 int(np.count_nonzero(is_right[0, split.test])),
+                float(is_right[0, split.test].mean()),
                 len(learnt.tree.leaves),
                 len(learnt.tree.inputs),
                 picked.text if picked else "",
@@ -218,10 +215,12 @@ def experiment(
     if task.is_whole or kept is None:
         tell("learning from all", 1.0)
         kept = school.learn(np.arange(len(task.frames)))[0].tree
+    shares = [trial.accuracy for trial in trials]
     study = Study(
         task.name,
         task.about,
         task.split,
+        _sensor_text(task),
         "subject" if len(task.subject) else "press",
         len(task.frames),
         int(np.count_nonzero(task.frames > task.sensor.full)),
@@ -230,6 +229,8 @@ def experiment(
         names,
         "chosen in each division" if choose else settings_text(base),
         task.classes,
+        float(np.mean(shares)),
+        float(np.std(shares, ddof=1)) if len(shares) > 1 else 0.0,
         tuple(trials),
         tuple(tuple(line) for line in table.tolist()),
         tuple(
@@ -319,6 +320,13 @@ def _peer(
         pairs = [*zip(ours[test].tolist(), theirs[test].tolist(), strict=True)]
     first, second = zip(*pairs, strict=True)
     return Peer(name, float(np.mean(shares)), paired(first, second), unanswered)
+
+
+def _sensor_text(task: Task) -> str:
+    sensor = task.sensor
+    text = f"{sensor.rows} x {sensor.columns} cells, full {sensor.full}"
+    text += f", threshold {sensor.threshold}"
+    return f"{text}; {task.conditions}" if task.conditions else text
 
 
 def settings_text(settings: Settings) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import msgspec
 import numpy as np
 
 from fuzzytree.learning import Settings
@@ -16,6 +18,24 @@ from fuzzytree.tactile.physics import Settings as Physics
 
 PRESSES = 50
 """Presses of each object to learn from, and as many others to test on (4.1, 3)."""
+
+IDEAL = Physics(
+    tilt=0.0,
+    aperture=1.0,
+    break_n=0.0,
+    bend_n=math.inf,
+    row_spread=0.0,
+    column_spread=0.0,
+    wiring="diodes",
+    drive_ohm=0.0,
+    load_ohm=0.0,
+    rest_us=1e-3,
+    full_us=1600.0,
+    noise=0.0,
+    threshold=0,
+)
+"""A sensor that measures what part of each cell is covered, and how hard, and nothing
+else: but for its few cells the moments of an object do not depend on its angle."""
 
 TABLE_3: Mapping[str, int] = MappingProxyType(
     {
@@ -89,5 +109,11 @@ def paper_task(
         splits,
         "paper",
         Settings(patterns_per_class=1),
+        conditions=_text(physics),
         is_whole=False,
     )
+
+
+def _text(physics: Physics) -> str:
+    facts = msgspec.structs.asdict(physics)
+    return ", ".join(f"{name} {value}" for name, value in facts.items())

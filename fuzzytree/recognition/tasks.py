@@ -42,6 +42,7 @@ class Task:
         splits: Each is learnt and tested by itself.
         features: The sets of features, unless others are asked for.
         settings: How it is learnt, unless told otherwise.
+        conditions: What else is known of how they came about.
         is_whole: Whether the tree to keep is learnt from all frames, and not from
             those of the first split.
     """
@@ -57,6 +58,7 @@ class Task:
     splits: tuple[Split, ...]
     features: str = SHAPES
     settings: Settings = field(default_factory=Settings)
+    conditions: str = ""
     is_whole: bool = True
 
 

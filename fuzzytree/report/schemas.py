@@ -14,6 +14,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.criteria.results import Stability
+from fuzzytree.recognition.experiment import Study as Experiment
 from fuzzytree.savings import Report
 from fuzzytree.schemas.generation import Json, of_result
 from fuzzytree.timing.records import Study
@@ -21,6 +22,7 @@ from fuzzytree.timing.records import Study
 FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
     {
         "bench.schema.json": Study,
+        "experiment.schema.json": Experiment,
         "needs.schema.json": Report,
         "stability.schema.json": Stability,
     }
