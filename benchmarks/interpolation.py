@@ -22,8 +22,8 @@ from fuzzytree.plots import draw_frames, save
 from fuzzytree.plots.frames import colours
 from fuzzytree.plots.labels import SIZE
 from fuzzytree.plots.saving import style
+from fuzzytree.tactile.given import given_frames
 from fuzzytree.tactile.interpolation import interpolated
-from fuzzytree.tactile.physics import press
 from fuzzytree.tactile.sensor import pressed
 
 if TYPE_CHECKING:
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+HAND = ROOT / "examples" / "tactile" / "hand.npz"  # a press of the simulator
 TIMES = (3, 5, 7)
 SIDE = 16
 FIELDS = 200
@@ -149,9 +151,9 @@ def _draw_profiles(axes: Axes, fuzzy: Floats, plain: Floats, times: int) -> None
 
 
 def picture_of_a_hand() -> Figure:
-    """Draw one press of a hand at each number of times (paper, Fig. 6)."""
-    made = press("hand-45", 1, seed=1)
-    cells = pressed(made.sensor, made.frames)[0]
+    """Draw a press of a hand at each number of times (paper, Fig. 6)."""
+    given = given_frames(HAND, threshold=6)
+    cells = pressed(given.sensor, given.presses.frames)[0]
     return draw_frames(
         [cells, *(interpolated(cells, times) for times in TIMES)],
         titles=["16 x 16 cells", *(f"{times} times" for times in TIMES)],
