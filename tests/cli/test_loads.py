@@ -10,7 +10,7 @@ import pytest
 
 HEAVY = (
     *("onnx", "onnxruntime", "sklearn", "skfuzzy", "scipy", "pandas", "polars"),
-    *("pyarrow", "matplotlib", "rich", "narwhals"),
+    *("pyarrow", "matplotlib", "rich", "narwhals", "serial"),
 )
 ASK = """
 import sys
