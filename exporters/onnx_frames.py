@@ -106,6 +106,11 @@ def write_frames(
     return Written(content)
 
 
+def frames_at_once(sensor: Sensor) -> int:
+    """Return how many frames are best run together, so that they stay in the cache."""
+    return max(_NUMBERS_AT_ONCE // (sensor.rows * sensor.columns), 1)
+
+
 def _check_options(
     model: Model, outputs: Sequence[Output], opset: int, ir: int, *, plain: bool
 ) -> None:
@@ -201,7 +206,7 @@ def _facts(
         "states": [state.name.lower() for state in State],
         "reject": reject,
         "outputs": list(outputs),
-        "chunk": max(_NUMBERS_AT_ONCE // (sensor.rows * sensor.columns), 1),
+        "chunk": frames_at_once(sensor),
     }
     return texts | {
         key: json.dumps(value, ensure_ascii=False) for key, value in records.items()

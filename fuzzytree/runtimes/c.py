@@ -113,7 +113,7 @@ def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) 
         text = str(error).replace("cannot write", "cannot run", 1)
         raise LossError(text.partition("\n  pass allow_loss")[0]) from error
     find = _EITHER if isinstance(model, RuleBase) else _DECIDE
-    decide = _compiled(content, _LOOP.replace("FIND", find), 4)
+    decide = compiled(content, _LOOP.replace("FIND", find), 4)
     count = len(model.rules) if isinstance(model, RuleBase) and has_strengths else 0
     real = np.dtype(dtype)
 
@@ -159,7 +159,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
     """
     made = write(system, name="model", activations=activations)
     speed = "-O1" if len(made.content) > _LONG else "-O2"
-    infer = _compiled(made.content, _INFER_LOOP, 2, speed)
+    infer = compiled(made.content, _INFER_LOOP, 2, speed)
     outputs = len(system.outputs)
     count = outputs + activations * len(system.rules)
 
@@ -179,8 +179,20 @@ def _at(array: npt.NDArray[np.generic] | None) -> int | None:
 
 
 @lru_cache(maxsize=64)
-def _compiled(content: bytes, loop: str, pointers: int, speed: str = "-O2") -> Decide:
-    """Return the function `model_many` of a file and a loop behind it."""
+def compiled(content: bytes, loop: str, pointers: int, speed: str = "-O2") -> Decide:
+    """Return the function `model_many` of a file and a loop behind it.
+
+    Args:
+        content: A file whose names begin with `model_`.
+        loop: C behind it. The function takes a pointer, a number of rows, and more
+            pointers.
+        pointers: How many pointers follow.
+        speed: An option of the compiler.
+
+    Raises:
+        MissingExtraError: If no compiler is installed.
+        FuzzyTreeError: If the compiler fails.
+    """
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
     if compiler is None:
         raise MissingExtraError(f"the runtime 'c' needs one of {', '.join(COMPILERS)}")
