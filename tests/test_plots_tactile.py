@@ -278,6 +278,17 @@ def test_a_tree_of_too_many_leaves_is_refused(monkeypatch: pytest.MonkeyPatch) -
     )
 
 
+def test_a_tree_of_too_many_levels_is_refused() -> None:
+    tree = comb(90)
+    width, height = place(boxes_of(tree), Sheet())
+    with pytest.raises(ValueError, match="inches") as caught:
+        plots.draw_tree(tree)
+    assert str(caught.value) == (
+        f"a picture of comb would be {width:.0f} x {height:.0f} inches; "
+        "learn a smaller tree, or read its rules"
+    )
+
+
 def test_a_confusion_shows_counts_rates_and_the_whole() -> None:
     figure = plots.draw_confusion(np.array([[48, 2, 0], [7, 42, 1]]), ["bar", "disc"])
     assert said(figure) >= {

@@ -33,6 +33,7 @@ COLOURS = (
 """Of classes, in their order: told apart by the colour-blind as far as ten can be, and
 dark enough for letters. More than ten classes share them; the words tell them apart."""
 
+_LARGEST = 2500.0  # square inches: 400 MB of dots
 _NOTE = 0.19  # a line below the picture
 _LONGEST = 34  # letters of a text; what is longer is cut and ends in dots
 _LEAST, _MOST = 0.8, 4.5  # points: how thick a branch is
@@ -56,7 +57,8 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Figure:
         A figure of its own, outside of any state of the library.
 
     Raises:
-        ValueError: If the tree has more leaves than that.
+        ValueError: If the tree has more leaves than that, or is so deep that its
+            picture would be larger than 50 x 50 inches.
         MissingExtraError: If matplotlib is not installed.
     """
     if len(tree.leaves) > MOST_LEAVES:
@@ -70,6 +72,11 @@ def draw_tree(tree: FuzzyTree, *, title: str | None = None) -> Figure:
     with style():
         sheet = Sheet()
         width, height = place(boxes, sheet)
+        if width * height > _LARGEST:
+            raise ValueError(
+                f"a picture of {_short(tree.name)} would be {width:.0f} x {height:.0f} "
+                "inches; learn a smaller tree, or read its rules"
+            )
         width = max([width, *(sheet.width(note) for note in notes)])
         width = max(width, sheet.width(words, SIZE + 3, bold=True))
         top = MARGIN + (TITLE if words else 0.0)
