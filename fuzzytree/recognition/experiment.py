@@ -13,8 +13,9 @@ from fuzzytree.errors import TableError
 from fuzzytree.learning import Learnt, Settings, learn_arrays
 from fuzzytree.recognition.choosing import Candidate, chosen
 from fuzzytree.recognition.pairing import Pairing, paired
-from fuzzytree.recognition.peers import PEERS, peer_answers
+from fuzzytree.recognition.peers import peer_answers
 from fuzzytree.recognition.recogniser import Recogniser, State
+from fuzzytree.recognition.splits import Split
 from fuzzytree.recognition.tasks import Task
 from fuzzytree.rulebase import Value
 from fuzzytree.runtimes.frames import Features, features_of
@@ -46,6 +47,7 @@ class Trial(Value, frozen=True):
         tested: Frames that were tested, all of them counted.
         right: How many got their class.
         accuracy: Their share.
+        is_fresh: Whether features and settings were chosen without these frames.
         leaves: Of the tree.
         features: How many features the tree asks for.
         settings: The settings that were chosen, if they were.
@@ -57,6 +59,7 @@ class Trial(Value, frozen=True):
     tested: int
     right: int
     accuracy: float
+    is_fresh: bool
     leaves: int
     features: int
     settings: str = ""
@@ -176,43 +179,19 @@ def experiment(
     base = task.settings if settings is None else settings
     base = msgspec.structs.replace(base, costs=_costs(task, names))
     school = _School(task, found, base, choose)
+    others = [_Classmate(name, school, seed) for name in peers]
     trials: list[Trial] = []
-    is_right = np.zeros((1 + len(peers), len(task.frames)), bool)
-    unanswered = np.zeros(1 + len(peers), np.int64)
-    table = np.zeros((len(task.classes), len(task.classes) + 2), np.int64)
-    kept: FuzzyTree | None = None
+    trees: list[FuzzyTree] = []
+    answers = np.full(len(task.frames), -1, np.int64)
     for number, split in enumerate(task.splits):
-        tell(f"{split.name}", number / len(task.splits))
-        learnt, picked, rows = school.learn(split.train)
-        answers = _answers(learnt.tree, task, split.test)
-        is_right[0, split.test] = answers == task.codes[split.test]
-        if task.is_whole or not number:
-            np.add.at(table, (task.codes[split.test], answers), 1)
-            kept = learnt.tree
-        trials.append(
-            Trial(
-                split.name,
-                len(rows),
-                len(split.train) - len(rows),
-                len(split.test),
-                int(np.count_nonzero(is_right[0, split.test])),
-                float(is_right[0, split.test].mean()),
-                len(learnt.tree.leaves),
-                len(learnt.tree.inputs),
-                picked.text if picked else "",
-            )
-        )
-        for line, peer in enumerate(peers, 1):
-            given = peer_answers(
-                peer,
-                found.values[:, rows],
-                task.codes[rows],
-                found.values[:, split.test],
-                seed,
-            )
-            is_right[line, split.test] = given == task.codes[split.test]
-            unanswered[line] += np.count_nonzero(given < 0)
-    if task.is_whole or kept is None:
+        tell(split.name, number / len(task.splits))
+        trial, answers[split.test], tree = school.examine(split)
+        trials.append(trial)
+        for other in others:
+            other.examine(split)
+        trees.append(tree)
+    kept = trees[0]
+    if task.is_whole:
         tell("learning from all", 1.0)
         kept = school.learn(np.arange(len(task.frames)))[0].tree
     shares = [trial.accuracy for trial in trials]
@@ -232,13 +211,23 @@ def experiment(
         float(np.mean(shares)),
         float(np.std(shares, ddof=1)) if len(shares) > 1 else 0.0,
         tuple(trials),
-        tuple(tuple(line) for line in table.tolist()),
-        tuple(
-            _peer(name, task, is_right[0], is_right[line], int(unanswered[line]))
-            for line, name in enumerate(peers, 1)
-        ),
+        _confusion(task, answers),
+        tuple(other.peer(answers == task.codes) for other in others),
     )
     return Outcome(study, kept)
+
+
+def _confusion(task: Task, answers: IntArray) -> tuple[tuple[int, ...], ...]:
+    """Return the table of all divisions if one tree is kept for all, else of the first.
+
+    Args:
+        task: Whose frames they are.
+        answers: The column of each frame that was tested.
+    """
+    table = np.zeros((len(task.classes), len(task.classes) + 2), np.int64)
+    for split in task.splits if task.is_whole else task.splits[:1]:
+        np.add.at(table, (task.codes[split.test], answers[split.test]), 1)
+    return tuple(tuple(line) for line in table.tolist())
 
 
 def _costs(task: Task, names: Sequence[str]) -> dict[str, float]:
@@ -256,7 +245,7 @@ def _silent(_text: str, _share: float) -> None:
 
 
 class _School:
-    """Learns from some frames of a task."""
+    """Learns from some frames of a task, and tests on others."""
 
     def __init__(
         self,
@@ -268,20 +257,22 @@ class _School:
         self.task, self.found = task, found
         self.settings, self.choose = settings, choose
 
-    def learn(
-        self, train: npt.NDArray[np.intp]
-    ) -> tuple[Learnt, Candidate | None, npt.NDArray[np.intp]]:
-        """Return what is learnt, what was chosen, and the frames on which one presses.
+    def rows(self, train: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+        """Return the frames to learn from on which anything presses."""
+        return train[self.found.is_pressed[train]]
+
+    def learn(self, train: npt.NDArray[np.intp]) -> tuple[Learnt, Candidate | None]:
+        """Return what is learnt, and the settings that were chosen, if they were.
 
         Raises:
             LearningError: If nothing can be learnt from them.
         """
-        task, settings = self.task, self.settings
-        rows = train[self.found.is_pressed[train]]
+        task, settings, rows = self.task, self.settings, self.rows(train)
         values, codes = self.found.values[:, rows], task.codes[rows]
         picked: Candidate | None = None
         if self.choose:
-            picked = chosen(values, codes, task.subject[rows], settings, self.choose)
+            subject = task.subject[rows]
+            picked = chosen(values, codes, subject, settings, self.choose)
             settings = picked.applied(settings)
         learnt = learn_arrays(
             values.T,
@@ -291,35 +282,73 @@ class _School:
             name=task.name,
             settings=settings,
         )
-        return learnt, picked, rows
+        return learnt, picked
+
+    def examine(self, split: Split) -> tuple[Trial, IntArray, FuzzyTree]:
+        """Return what a division gave: counts, answers as columns of the table, tree.
+
+        Raises:
+            LearningError: If nothing can be learnt from its frames.
+        """
+        task = self.task
+        learnt, picked = self.learn(split.train)
+        found = Recogniser(learnt.tree, task.sensor)(task.frames[split.test])
+        count = len(task.classes)
+        answers = np.where(found.states == State.NOTHING, count, found.codes)
+        answers = np.where(found.states == State.UNKNOWN, count + 1, answers)
+        right = int(np.count_nonzero(answers == task.codes[split.test]))
+        trained = len(self.rows(split.train))
+        known = task.subject[split.test] if len(task.subject) else task.subject
+        trial = Trial(
+            split.name,
+            trained,
+            len(split.train) - trained,
+            len(split.test),
+            right,
+            right / len(split.test),
+            not np.isin(known, task.chosen_on).any(),
+            len(learnt.tree.leaves),
+            len(learnt.tree.inputs),
+            picked.text if picked else "",
+        )
+        return trial, answers.astype(np.int64), learnt.tree
 
 
-def _answers(tree: FuzzyTree, task: Task, test: npt.NDArray[np.intp]) -> IntArray:
-    """Return the column of the confusion table of each tested frame."""
-    found = Recogniser(tree, task.sensor)(task.frames[test])
-    codes = np.where(found.states == State.NOTHING, len(task.classes), found.codes)
-    return np.where(found.states == State.UNKNOWN, len(task.classes) + 1, codes).astype(
-        np.int64
-    )
+class _Classmate:
+    """Another learner that takes the same lessons and tests."""
 
+    def __init__(self, name: str, school: _School, seed: int) -> None:
+        self.name, self.school, self.seed = name, school, seed
+        self.answers = np.full(len(school.task.frames), -1, np.int64)
 
-def _peer(
-    name: str,
-    task: Task,
-    ours: npt.NDArray[np.bool_],
-    theirs: npt.NDArray[np.bool_],
-    unanswered: int,
-) -> Peer:
-    """Return a peer's mean, and the tree beside it, by subjects or by presses."""
-    shares = [float(theirs[split.test].mean()) for split in task.splits]
-    if len(task.subject):
-        units = [split.test for split in task.splits]
-        pairs = [(int(ours[u].sum()), int(theirs[u].sum())) for u in units]
-    else:
-        test = np.concatenate([split.test for split in task.splits])
-        pairs = [*zip(ours[test].tolist(), theirs[test].tolist(), strict=True)]
-    first, second = zip(*pairs, strict=True)
-    return Peer(name, float(np.mean(shares)), paired(first, second), unanswered)
+    def examine(self, split: Split) -> None:
+        """Keep what the learner answers in a division."""
+        values, rows = self.school.found.values, self.school.rows(split.train)
+        codes = self.school.task.codes[rows]
+        self.answers[split.test] = peer_answers(
+            self.name, values[:, rows], codes, values[:, split.test], self.seed
+        )
+
+    def peer(self, ours: npt.NDArray[np.bool_]) -> Peer:
+        """Return the learner's mean, and the tree beside it, by subject or by press.
+
+        Args:
+            ours: For each frame whether the tree is right.
+        """
+        task = self.school.task
+        theirs = self.answers == task.codes
+        tests = [split.test for split in task.splits]
+        shares = [float(theirs[test].mean()) for test in tests]
+        every = np.concatenate(tests)
+        if len(task.subject):
+            pairs = [(int(ours[test].sum()), int(theirs[test].sum())) for test in tests]
+        else:
+            pairs = [*zip(ours[every].tolist(), theirs[every].tolist(), strict=True)]
+        first, second = zip(*pairs, strict=True)
+        unanswered = int(np.count_nonzero(self.answers[every] < 0))
+        return Peer(
+            self.name, float(np.mean(shares)), paired(first, second), unanswered
+        )
 
 
 def _sensor_text(task: Task) -> str:
@@ -345,6 +374,3 @@ def settings_text(settings: Settings) -> str:
     if settings.mode == "paper":
         return text
     return f"{text}, shrinkage {settings.shrinkage:g}, entry {settings.entry:g}"
-
-
-__all__ = ["PEERS", "Outcome", "Peer", "Study", "Trial", "experiment", "settings_text"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -42,6 +42,7 @@ class Task:
         splits: Each is learnt and tested by itself.
         features: The sets of features, unless others are asked for.
         settings: How it is learnt, unless told otherwise.
+        chosen_on: The subjects by whose frames features and settings were chosen.
         conditions: What else is known of how they came about.
         is_whole: Whether the tree to keep is learnt from all frames, and not from
             those of the first split.
@@ -58,6 +59,7 @@ class Task:
     splits: tuple[Split, ...]
     features: str = SHAPES
     settings: Settings = field(default_factory=Settings)
+    chosen_on: tuple[int, ...] = ()
     conditions: str = ""
     is_whole: bool = True
 
@@ -191,9 +193,10 @@ def known_task(name: str, folder: PathLike | None = None) -> Task:
             presses.subject,
         )
     sensor = _sensor(presses, known.full, known.threshold)
-    return by_subject(
+    task = by_subject(
         name, presses, sensor, known.about, known.features, known.settings
     )
+    return replace(task, chosen_on=CHOSEN_ON[known.file])
 
 
 def by_subject(

@@ -46,6 +46,10 @@ def experiment_lines(
     yield from aligned(_trials(study))
     yield ""
     yield accuracy_text(study)
+    fresh = [trial.accuracy for trial in study.trials if trial.is_fresh]
+    if 0 < len(fresh) < len(study.trials):
+        share = percent(sum(fresh) / len(fresh))
+        yield f"          {share} of the {len(fresh)} on whom nothing was chosen"
     if study.peers:
         yield ""
         yield from aligned([_PEER, *_peers(study)])
