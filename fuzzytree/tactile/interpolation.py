@@ -23,6 +23,7 @@ and t the distance to the nearest line through the centres of cells:
 from __future__ import annotations
 
 import functools
+import operator
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -106,6 +107,7 @@ def interpolated(
         Shape (..., times rows, times columns); `out` if it is given.
 
     Raises:
+        TypeError: If `times` is no whole number.
         ValueError: If `times`, `dtype` or `out` cannot be.
         TableError: If there is no cell, a number is not finite, or a frame would have
             more than `MOST_POINTS` points.
@@ -185,7 +187,7 @@ def _confine(total: Any, corners: Sequence[Any]) -> None:
 
 def _checked(cells: Real, times: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
     found: npt.NDArray[Any] = np.asarray(cells)
-    if times < 1:
+    if operator.index(times) < 1:
         raise ValueError(f"times is a whole number of at least 1, not {times}")
     if found.dtype.kind not in "iuf":
         raise TableError(f"frames hold numbers, not {found.dtype}")

@@ -266,6 +266,12 @@ def test_nothing_given_is_changed() -> None:
         ),
         (
             PAPER,
+            {"times": 2.5},
+            TypeError,
+            "'float' object cannot be interpreted as an integer",
+        ),
+        (
+            PAPER,
             {"times": 2, "dtype": np.int64},
             ValueError,
             "interpolated values are float64 or float32, not int64",
