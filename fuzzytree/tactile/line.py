@@ -150,7 +150,7 @@ class Line:
         self._waiting: deque[Frame] = deque()
         self._most_waiting = most_waiting
         self._error: PortError | None = None
-        self._decoder = decoder_of(board)
+        self._decoder = decoder_of(board, is_joined=not board.banner)
         self._before = Counters()  # what earlier decoders counted, and the line itself
         self._counted = Counters()
         self._number = 0
