@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -150,13 +150,19 @@ class FromLine:
         self._line.close()
 
 
-def simulated(seed: int = 0) -> Iterator[Record]:
+def simulated(
+    seed: int = 0, *, names: Sequence[str] = tuple(OBJECTS)
+) -> Iterator[Record]:
     """Give frames without end: the paper's objects, pressed one after another.
 
     Between two of them the sensor is empty for half a second.
 
     Args:
         seed: Of how each object is pressed.
+        names: Of the objects.
+
+    Raises:
+        ValueError: If there is no object of a name.
 
     Example:
         >>> first = next(simulated())
@@ -168,7 +174,7 @@ def simulated(seed: int = 0) -> Iterator[Record]:
     shares += [*np.linspace(1.0, 0.0, _RISE), *[0.0] * _REST]
     number = 0
     while True:
-        for name in OBJECTS:
+        for name in names:
             cells = press(name, 1, int(random.integers(2**31))).frames[0]
             for share in shares:
                 noisy = share * cells + random.normal(0.0, 0.5, cells.shape)

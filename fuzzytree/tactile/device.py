@@ -5,7 +5,9 @@ from __future__ import annotations
 import shutil
 import tempfile
 import threading
-from collections.abc import Generator, Iterable
+import time
+from collections import deque
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from types import TracebackType
@@ -92,6 +94,8 @@ class Device:
         *,
         link: str | Path | None = None,
         seed: int = 0,
+        first: Sequence[Cells] = (),
+        frames_a_second: float = 0.0,
     ) -> None:
         """Open the port.
 
@@ -103,6 +107,10 @@ class Device:
                 as fast as the host reads.
             link: The name of the port; if None, one in a folder of its own.
             seed: Of all that is random.
+            first: Frames that come first, each time that a host opens the port: with
+                nothing on the sensor, so that it can measure its baseline.
+            frames_a_second: At most, as fast as the board reads its cells; 0 for as
+                many as the line carries.
 
         Raises:
             ValueError: If a fault is asked for that the board cannot have.
@@ -111,9 +119,12 @@ class Device:
         self._board, self._frames = board, iter(frames)
         self._faults = faults or Faults()
         self._random = np.random.default_rng(seed)
+        self._first, self._coming = first, deque(first)
+        self._ahead: Cells | None = None  # the next frame, so that the last is known
+        self._frame_s = 1.0 / frames_a_second if frames_a_second else 0.0
+        self._due = 0.0
         if self._faults.marker:
-            empty = np.zeros((board.sensor.rows, board.sensor.columns), np.int64)
-            with_marker(board, empty, np.random.default_rng(0))
+            with_marker(board, empty(board), np.random.default_rng(0))
         self._stop = threading.Event()
         self._folder = None if link else Path(tempfile.mkdtemp(prefix="fuzzytree-"))
         path = Path(link) if link else Path(self._folder or "") / "board"
@@ -133,6 +144,11 @@ class Device:
         for name in ("bytes", "overrun", "garbled", "framing_errors"):
             setattr(self._truth, name, getattr(self._wire, name))
         return self._truth
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a host has the port open."""
+        return self._wire.is_open
 
     def __enter__(self) -> Device:
         """Return itself."""
@@ -164,6 +180,7 @@ class Device:
 
     def _run(self) -> None:
         try:
+            self._ahead = next(self._frames, None)
             while not self._stop.is_set():
                 gone_s = self._served()
                 self._wire.plug_out()
@@ -180,20 +197,29 @@ class Device:
                 continue
             self._stop.wait(BOOT_S)
             self._truth.opens += 1
-            self._asked = b""
+            self._asked, self._coming = b"", deque(self._first)
             self._wire.rest()
             self._wire.send(banner(self._board))
             while self._wire.is_open and not self._stop.is_set():
                 if not self._is_asked():
                     continue
-                cells = next(self._frames, None)
-                if cells is None:
+                if not self._coming and self._ahead is None:
                     self.over.set()
                     self._stop.wait(_LOOK_S)
-                elif gone_s := self._sent(cells):
+                    continue
+                if gone_s := self._sent(self._next()):
                     return gone_s
+                if not self._coming and self._ahead is None:
+                    self.over.set()
             self._truth.closes += not self._wire.is_open
         return 0.0
+
+    def _next(self) -> Cells:
+        """Return the frame to send; there is one."""
+        if self._coming or self._ahead is None:
+            return self._coming.popleft()
+        cells, self._ahead = self._ahead, next(self._frames, None)
+        return cells
 
     def _is_asked(self) -> bool:
         """Whether to send a frame now; a board that speaks by itself always does."""
@@ -214,6 +240,12 @@ class Device:
     def _sent(self, cells: Cells) -> float:
         """Send a frame; return for how long the plug is then pulled, in seconds."""
         truth, faults, random = self._truth, self._faults, self._random
+        if self._frame_s:
+            now = time.monotonic()
+            self._due = max(self._due + self._frame_s, now)
+            if self._stop.wait(self._due - now):
+                return 0.0
+            self._wire.rest()
         if faults.marker and random.random() < faults.marker:
             cells = with_marker(self._board, cells, random)
             truth.markers += 1
@@ -261,6 +293,12 @@ def bounds(board: Board) -> tuple[int, int]:
     return (full - top, full) if board.pressure == "falls" else (0, top)
 
 
+def empty(board: Board) -> Cells:
+    """Return a frame with nothing on the sensor, of shape (rows, columns)."""
+    shape = (board.sensor.rows, board.sensor.columns)
+    return np.full(shape, bounds(board)[0], np.int64)
+
+
 def blob(board: Board, seed: int = 0) -> Generator[Cells]:
     """Give frames without end: something round that wanders over the sensor.
 
@@ -282,3 +320,31 @@ def blob(board: Board, seed: int = 0) -> Generator[Cells]:
         share = np.clip(1.4 - 0.7 * distance, 0.0, 1.0)
         yield low + ((high - low) * share).astype(np.int64)
         number += 1
+
+
+def fitted(board: Board, cells: Cells, full: int) -> Cells:
+    """Return a frame of another sensor as the board could send it.
+
+    Each cell is that of the other sensor which lies under its middle, and 0 to `full`
+    becomes what the board can hold, rounded down.
+
+    Args:
+        board: The board.
+        cells: Shape (rows, columns), in 0 to `full`.
+        full: The most that a cell of the other sensor reads.
+
+    Example:
+        >>> from fuzzytree.tactile.sensor import Sensor
+        >>> board = Board("mat", Sensor(1, 4, full=100), Request("41"))
+        >>> fitted(board, np.array([[0, 200]]), full=200).tolist()
+        [[0, 0, 100, 100]]
+    """
+    sensor, (low, high) = board.sensor, bounds(board)
+    rows, columns = (
+        (2 * np.arange(wanted) + 1) * there // (2 * wanted)
+        for wanted, there in zip(
+            (sensor.rows, sensor.columns), cells.shape, strict=True
+        )
+    )
+    taken = cells[np.ix_(rows, columns)].astype(np.int64)
+    return low + np.clip(taken, 0, full) * (high - low) // full

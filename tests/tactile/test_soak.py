@@ -27,7 +27,7 @@ def test_without_faults_every_frame_comes(name: str) -> None:
 
 @pytest.mark.parametrize("name", soak.CASES)
 def test_no_wrong_frame_comes_that_its_bytes_could_tell(name: str) -> None:
-    _check(name, soak.soak(soak.CASES[name], 500))
+    _check(name, soak.soak(soak.CASES[name], 300))
 
 
 @pytest.mark.heavy
