@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import answer, answer_json, json_option, quiet_option, say
+from fuzzytree.cli.talk import (
+    answer,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    wrong_options,
+)
+from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import Document, Reading
@@ -14,9 +22,10 @@ if TYPE_CHECKING:
 
 @click.command("show", short_help="Show a model and its rules.")
 @click.argument("model", metavar="MODEL")
+@click.option("--picture", metavar="FILE", help="Draw the tree as well (.svg, .png).")
 @json_option
 @quiet_option
-def command(model: str, as_json: bool, quiet: bool) -> None:
+def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None:
     """Show a tree, a rule base or a fuzzy system, with the numbers behind the words.
 
     MODEL is a file in any format that can be read, or ONNX. What a model cannot hold
@@ -28,7 +37,11 @@ def command(model: str, as_json: bool, quiet: bool) -> None:
     from fuzzytree.report import text
     from fuzzytree.runtimes.onnxruntime import OnnxModel
 
+    if picture is not None:
+        check_place(picture)
     if Path(model).suffix.lower() == ".onnx":
+        if picture is not None:
+            raise click.UsageError(f"--picture: {model} holds no tree, but a graph")
         opened = verbs.opened(model)
         assert isinstance(opened, OnnxModel)
         facts = text.onnx_facts(opened)
@@ -39,6 +52,8 @@ def command(model: str, as_json: bool, quiet: bool) -> None:
         return
     found = verbs.read(model)
     _tell(found, quiet=quiet)
+    if picture is not None:
+        _draw(found.model, picture, quiet=quiet)
     if as_json:
         answer_json(_facts(found))
     else:
@@ -53,6 +68,19 @@ def _tell(found: Reading, *, quiet: bool) -> None:
         say(f"lost     {loss_text(loss)}")
     for remark in found.remarks:
         say(f"remark   {remark}", quiet=quiet)
+
+
+def _draw(model: Document, picture: str, *, quiet: bool) -> None:
+    from fuzzytree import plots
+    from fuzzytree.tree import FuzzyTree
+
+    if not isinstance(model, FuzzyTree):
+        raise click.UsageError(
+            f"--picture: {model.name} is no tree; rules have none to draw"
+        )
+    with wrong_options():
+        plots.save(plots.draw_tree(model), picture)
+    say(f"wrote    {picture}", quiet=quiet)
 
 
 def _lines(model: Document) -> list[str]:

@@ -134,3 +134,28 @@ def test_every_leaf_and_rule_of_a_tree_is_shown(seed: int) -> None:
 )
 def test_a_curve_is_told_in_words(shape: Shape, text: str) -> None:
     assert shape_text(shape) == text
+
+
+@pytest.mark.parametrize("name", ["grip.svg", "grip.PNG"])
+def test_a_picture_of_a_tree_is_written_beside_its_words(call: Call, name: str) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    code, out, err = call("show", "grip.yaml", "--picture", name)
+    assert (code, out, err) == (0, TREE, f"wrote    {name}\n")
+    assert Path(name).stat().st_size > 1000
+
+
+def test_what_has_no_tree_has_no_picture(call: Call) -> None:
+    code, _, err = call("show", "rules.yaml", "--picture", "no.svg")
+    assert code == 2
+    assert err.startswith("--picture: grip is no tree; rules have none to draw\n")
+    code, _, err = call("show", "grip.onnx", "--picture", "no.svg")
+    assert code == 2
+    assert err.startswith("--picture: grip.onnx holds no tree, but a graph\n")
+    assert not Path("no.svg").exists()
+
+
+def test_a_picture_of_another_kind_is_refused(call: Call) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    code, _, err = call("show", "grip.yaml", "--picture", "grip.pdf")
+    assert code == 2
+    assert "grip.pdf: a picture's name ends in .svg or .png" in err
