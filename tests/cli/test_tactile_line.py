@@ -368,5 +368,7 @@ def test_a_recording_survives_the_death_of_its_program(
     found = read_recording("b.ftr")
     assert (found.damaged, found.counters.damaged) == (0, 0)
     assert found.numbers.tolist() == list(range(3, 3 + len(found.frames)))
-    assert (found.frames == np.array(sent[3 : 3 + len(found.frames)])).all()
+    assert [*map(np.ndarray.tolist, found.frames)] == [
+        frame.tolist() for frame in sent[3 : 3 + len(found.frames)]
+    ]
     assert len(found.frames) >= moment * 100
