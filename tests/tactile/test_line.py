@@ -110,6 +110,16 @@ def test_the_frames_of_every_family_come_as_they_were_sent(protocol: Protocol) -
     assert times[0] > 0
 
 
+def test_the_rest_of_a_line_that_began_before_is_no_frame(terminal: Terminal) -> None:
+    board = Board("mat", Sensor(2, 2), Text())
+    with open_line(board, terminal.name) as line:
+        terminal.write(b"2 2 3 4\n1 2 3 4\n")  # of 12 2 3 4, say
+        frame = line.take(5.0)
+        assert frame is not None
+        assert frame.cells.tolist() == [[1, 2], [3, 4]]
+        assert (line.counters.frames, line.counters.skipped) == (1, 8)
+
+
 def test_a_frame_has_the_time_of_its_last_byte(terminal: Terminal) -> None:
     cells = _frames(1)[0]
     with open_line(BOARD, terminal.name) as line:
@@ -365,3 +375,40 @@ def test_a_line_that_ends_too_early_has_no_baseline() -> None:
         start(BOARD, frames)
     text = "mat: the baseline needs 30 frames, and only 1 came"
     assert str(caught.value) == text
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize(
+    "protocol",
+    [Marker("AA 55", checksum="crc16"), Request("41", checksum="crc16", timeout_s=0.1)],
+    ids=lambda found: type(found).__name__,
+)
+def test_no_frame_is_made_up_and_none_is_lost_uncounted(protocol: Protocol) -> None:
+    board = Board("mat", Sensor(8, 6), protocol)
+    faults = Faults(
+        flip=2e-5,
+        lose=2e-5,
+        noise=0.01,
+        unplug=Pause(seconds=0.05, every=400),
+        stall=Pause(seconds=0.5, every=900),
+    )
+    sent = _frames(2000, board)
+    known = {str(cells.tolist()) for cells in sent}
+    found: list[Frame] = []
+    with (
+        Device(board, sent, faults, rate=20.0, seed=3) as device,
+        open_line(board, device.port, most_waiting=50) as line,
+    ):
+        while not device.over.is_set():
+            found += _taken(line, 10, 0.1)
+        counters = line.counters
+        _until(lambda: line.counters.reconnects == device.truth.unplugs)
+    found += list(line)
+    assert all(str(frame.cells.tolist()) in known for frame in found)
+    numbers = [frame.number for frame in found]
+    assert numbers == sorted(set(numbers))
+    assert len(found) + line.counters.dropped == line.counters.frames
+    assert counters.stalls >= device.truth.stalls
+    assert device.truth.unplugs >= 4
+    # An unplugging takes what the system had not read yet, too.
+    assert counters.frames >= 2000 - device.truth.touched - 50 * device.truth.unplugs
