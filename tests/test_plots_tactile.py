@@ -164,6 +164,18 @@ def test_titles_stand_above_their_frames() -> None:
     assert figure.texts[0].get_text() == "five"
 
 
+def test_titles_are_no_formulas_and_stay_within_the_picture() -> None:
+    name = "$\\frac{" + "wide name " * 50
+    figure = plots.draw_frames([FRAME, FRAME], titles=[name, "$a$"], title=name)
+    figure.draw_without_rendering()
+    (title,) = figure.texts
+    above = figure.axes[0].title
+    for text in (title, above):
+        assert text.get_window_extent().x1 <= figure.bbox.x1
+        assert text.get_text().endswith("…")
+    assert above.get_window_extent().width <= figure.axes[0].get_window_extent().width
+
+
 @pytest.mark.parametrize(
     ("frames", "options", "text"),
     [

@@ -10,6 +10,7 @@ import numpy as np
 
 from fuzzytree.plots.labels import SIZE
 from fuzzytree.plots.saving import style
+from fuzzytree.plots.words import short
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -29,6 +30,8 @@ _WORDS = 0.22  # above each row of frames, if they have titles
 _TITLE = 0.3
 _BAR = (0.2, 0.12, 0.62)  # left of, of, and right of the scale
 _DOTS = 420  # a picture of fewer dots than this is enlarged, each cell to a square
+_LONGEST = 26  # letters above a frame; what is longer is cut and ends in dots
+_LETTER = 0.115  # inches, the most that one of a title takes on average
 _COLOURS = 240  # of 256: without the ones that are black
 _AXIS = "#00a3c4"  # seen on white and on the darkest colour
 
@@ -117,7 +120,8 @@ def draw_frames(
         for number, (panel, frame) in enumerate(zip(panels, drawn, strict=True)):
             image = _draw(panel, frame, end)
             if titles:
-                panel.set_title(titles[number], fontsize=SIZE, pad=4)
+                words = short(titles[number], _LONGEST)
+                panel.set_title(words, fontsize=SIZE, pad=4, parse_math=False)
             if axes and (axis := axes[number]) is not None:
                 _mark(panel, axis, frame.shape, shapes[number])
             if panel is panels[-1]:
@@ -163,7 +167,16 @@ def _panels(
     figure.set_size_inches(total_width, total_height)
     if title:
         x, y = _MARGIN / total_width, 1.0 - _MARGIN / total_height
-        figure.text(x, y, title, fontsize=SIZE + 3, fontweight="bold", va="top")
+        words = short(title, max(int(total_width / _LETTER), 1))
+        figure.text(
+            x,
+            y,
+            words,
+            fontsize=SIZE + 3,
+            fontweight="bold",
+            va="top",
+            parse_math=False,
+        )
     found: list[Axes] = []
     for number, (wide, high) in enumerate(sides):
         row, column = divmod(number, across)
