@@ -24,6 +24,7 @@ def decoder_of(board: Board, *, is_joined: bool = False) -> Decoder:
         is_joined: Whether the stream begins anywhere, as that of a board that sent
             before. Then the first line of text, or the first bytes up to one that
             ends a frame, are skipped: cut at their front they could still look whole.
+            Where the banner comes, nothing else is skipped.
 
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor

@@ -150,7 +150,7 @@ class Line:
         self._waiting: deque[Frame] = deque()
         self._most_waiting = most_waiting
         self._error: PortError | None = None
-        self._decoder = decoder_of(board, is_joined=not board.banner)
+        self._decoder = decoder_of(board, is_joined=True)
         self._before = Counters()  # what earlier decoders counted, and the line itself
         self._counted = Counters()
         self._number = 0
@@ -287,7 +287,7 @@ class Line:
                 continue
             self._before = _sum(self._before, self._decoder.counters)
             self._before.reconnects += 1
-            self._decoder = decoder_of(self.board)  # it begins with its banner again
+            self._decoder = decoder_of(self.board, is_joined=True)
             self._watch = Watch(self.board, time.monotonic())
             self._pass_on([], time.monotonic())
             self.state = "open"

@@ -33,6 +33,7 @@ class SentinelDecoder(Decoder):
         if self._banner:
             taken, self._banner = banner_bytes(bytes(self._buffer), self._banner)
             self._skip(taken)
+            self._is_joined &= not taken
             if self._banner:
                 return []
         stop = self._buffer.rfind(self._end) + 1

@@ -80,11 +80,18 @@ class TextDecoder(Decoder):
     def _line(self, line: bytes) -> list[Cells]:
         """Take a line without its line feed; return the frame that it ends."""
         size = len(line) + 1
-        if self._is_endless or self._is_joined:
-            self._is_endless = self._is_joined = False
+        if self._is_endless:
+            self._is_endless = False
             self.counters.skipped += size
             return []
         numbers = self._numbers(line)
+        if self._is_joined:
+            # Its beginning may have gone by; if it is a banner, it has not.
+            self._is_joined = False
+            self._is_waiting &= numbers is not None or not self._banner
+            self._banner = max(0, self._banner - 1) if numbers is None else 0
+            self.counters.skipped += size
+            return []
         if numbers is None:
             if self._banner:
                 self._banner -= 1

@@ -96,3 +96,11 @@ def test_the_first_bytes_of_a_joined_stream_are_not_looked_at() -> None:
     joined = decoder_of(BOARD, is_joined=True)
     assert len(joined.feed(cut + GOOD)) == 1
     assert (joined.counters.skipped, joined.counters.damaged) == (7, 0)
+
+
+def test_a_joined_stream_that_begins_with_its_banner_loses_nothing() -> None:
+    board = Board("b", Sensor(2, 3, full=254), Sentinel(), banner=2)
+    decoder = decoder_of(board, is_joined=True)
+    assert len(decoder.feed(b"matrix 2 x 3\r\nready\r\n" + GOOD * 2)) == 2
+    decoder = decoder_of(board, is_joined=True)
+    assert len(decoder.feed(GOOD * 3)) == 2

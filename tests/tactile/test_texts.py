@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.tactile.boards import Board, Text
 from fuzzytree.tactile.decoding import decoder_of
@@ -108,6 +109,15 @@ def test_the_first_line_of_a_joined_stream_is_not_looked_at() -> None:
     blocks = decoder_of(BLOCKS, is_joined=True)
     assert len(blocks.feed(b"2 2\n3 4\n5 6\n\n1 2\n3 4\n\n")) == 1
     assert blocks.counters.damaged == 0
+
+
+def test_a_joined_stream_that_begins_with_its_banner_loses_nothing() -> None:
+    for board, frame in ((STAMPED, b"F,0,1,2,3,4\n"), (BLOCKS, b"1 2\n3 4\n\n")):
+        with_banner = replace(board, banner=2)
+        decoder = decoder_of(with_banner, is_joined=True)
+        assert len(decoder.feed(b"mat\nready\n" + frame * 2)) == 2
+        decoder = decoder_of(with_banner, is_joined=True)
+        assert len(decoder.feed(frame * 3)) == 2
 
 
 def test_a_block_is_a_frame_at_its_last_line() -> None:
