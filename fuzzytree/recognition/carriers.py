@@ -81,6 +81,7 @@ def frames_export(
     opset: int = 17,
     ir: int = 8,
     plain: bool = False,
+    verify: bool = True,
 ) -> Written:
     """Return a file that takes raw frames: a graph, or C.
 
@@ -94,6 +95,7 @@ def frames_export(
         opset: Of a graph.
         ir: Of a graph.
         plain: Of a graph: whether a tree does without the operators of ai.onnx.ml.
+        verify: Of a graph: whether it is run before it counts as written.
 
     Raises:
         TableError: If an input of the model is no feature of a frame.
@@ -104,7 +106,14 @@ def frames_export(
     if form == "c":
         return write_frames_c(model, sensor, name=name, reject=reject)
     return write_frames(
-        model, sensor, outputs=outputs, reject=reject, opset=opset, ir=ir, plain=plain
+        model,
+        sensor,
+        outputs=outputs,
+        reject=reject,
+        opset=opset,
+        ir=ir,
+        plain=plain,
+        verify=verify,
     )
 
 

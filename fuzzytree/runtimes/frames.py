@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.contracts import FloatArray
 
-_CELLS_AT_ONCE = 1 << 18
+_CELLS_AT_ONCE = 1 << 15  # blocks of them stay in the cache
 
 
 @dataclass(frozen=True, slots=True)
