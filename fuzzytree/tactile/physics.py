@@ -35,7 +35,7 @@ SIDE = 16
 FULL = 255
 """What a cell reads that takes no more."""
 
-_AT_ONCE = 256  # presses: bounds the memory of one step
+_AT_ONCE = 32  # presses: what they need stays near the processor
 
 MOST = 100_000
 """The most presses at a time."""
@@ -214,8 +214,9 @@ def press(
 ) -> Simulated:
     """Press an object on the sensor again and again.
 
-    The same name, seed and settings give the same frames. Each press draws the same
-    numbers whatever the settings, so two settings are compared on the same presses.
+    The same name, seed and settings give the same frames, and a larger count begins
+    with those of a smaller one. Each press draws the same numbers whatever the
+    settings, so two settings are compared on the same presses.
 
     Args:
         name: One of `OBJECTS`.
@@ -271,16 +272,16 @@ class _Draws:
 
 
 def _draws(thing: Object, count: int, seed: int) -> Iterator[_Draws]:
-    """Draw numbers for presses, some hundred at a time to bound the memory."""
+    """Draw numbers for presses, some at a time; the first do not know the count."""
     random = np.random.default_rng([seed, zlib.crc32(thing.name.encode())])
     for begin in range(0, count, _AT_ONCE):
-        some = min(_AT_ONCE, count - begin)
+        some = slice(count - begin)
         yield _Draws(
-            place=random.uniform(-1.0, 1.0, (some, 2)),
-            turn=random.standard_normal(some),
-            force=random.standard_normal(some),
-            tilt=random.standard_normal((some, 2)),
-            noise=random.standard_normal((some, SIDE, SIDE)),
+            place=random.uniform(-1.0, 1.0, (_AT_ONCE, 2))[some],
+            turn=random.standard_normal(_AT_ONCE)[some],
+            force=random.standard_normal(_AT_ONCE)[some],
+            tilt=random.standard_normal((_AT_ONCE, 2))[some],
+            noise=random.standard_normal((_AT_ONCE, SIDE, SIDE))[some],
         )
 
 

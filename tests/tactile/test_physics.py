@@ -269,13 +269,19 @@ def test_readings_above_full_are_clipped_and_counted() -> None:
 
 
 def test_the_same_seed_gives_the_same_frames_and_another_one_others() -> None:
-    found = press("circle", 300, 4)
-    again = press("circle", 300, 4)
-    assert found.frames.shape == (300, SIDE, SIDE)
+    found = press("circle", 100, 4)
+    again = press("circle", 100, 4)
+    assert found.frames.shape == (100, SIDE, SIDE)
     assert found.frames.dtype == np.uint8
     assert np.array_equal(found.frames, again.frames)
-    assert not np.array_equal(found.frames, press("circle", 300, 5).frames)
-    assert len(np.unique(found.truth.x)) == 300
+    assert not np.array_equal(found.frames, press("circle", 100, 5).frames)
+    assert len(np.unique(found.truth.x)) == 100
+
+
+def test_more_presses_begin_with_the_same_ones() -> None:
+    many, few = press("square", 70), press("square", 40)
+    assert np.array_equal(many.frames[:40], few.frames)
+    assert np.array_equal(many.truth.force_n[:40], few.truth.force_n)
 
 
 def test_two_settings_are_compared_on_the_same_presses() -> None:

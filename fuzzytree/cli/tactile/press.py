@@ -71,8 +71,8 @@ def command(
         raise click.UsageError(
             "`-o -` leaves no room for --means, --effects or --json on stdout"
         )
-    if is_each and name != "all":
-        raise click.UsageError("--effects needs all objects: press all --effects")
+    if is_each and (name != "all" or count < 2):
+        raise click.UsageError("--effects needs all objects, and 2 presses of each")
     from fuzzytree.files import check_place, write_atomically
     from fuzzytree.tactile.objects import OBJECTS
     from fuzzytree.tactile.physics import press
