@@ -40,6 +40,13 @@ def read_matrix(
 
     Returns:
         Microsiemens, of the same shape.
+
+    Example:
+        >>> two = np.array([[[100.0, 100.0]]])
+        >>> read_matrix(two, "grounded", drive_ohm=0.0, load_ohm=0.0).tolist()
+        [[[100.0, 100.0]]]
+        >>> read_matrix(two, "grounded", drive_ohm=5000.0, load_ohm=0.0).tolist()
+        [[[50.0, 50.0]]]
     """
     drive, load = drive_ohm * 1e-6, load_ohm * 1e-6  # megohms
     match wiring:

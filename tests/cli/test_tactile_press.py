@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -32,6 +33,11 @@ def test_presses_of_all_objects_are_written_with_their_labels(
     content = (folder / "p.npz").read_bytes()
     digest = hashlib.sha256(content).hexdigest()
     assert f"wrote    p.npz {len(content)} bytes, sha256 {digest}" in err
+    assert err.splitlines()[-1] == (
+        "next     fuzzytree tactile features p.npz --features 'S1, S9' "
+        f"--threshold {PAPER.threshold}"
+    )
+    assert call(*shlex.split(err.splitlines()[-1])[2:])[0] == 0
 
 
 def test_the_same_presses_give_the_same_bytes(call: Call, folder: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import shlex
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -98,7 +99,9 @@ def command(
         write_atomically(output, content)
         digest = hashlib.sha256(content).hexdigest()
         size = f"{len(content)} bytes, sha256 {digest}"
-        say_rows(("wrote", output, size), quiet=quiet)
+        words = ["fuzzytree", "tactile", "features", output, "--features", "S1, S9"]
+        after = shlex.join([*words, "--threshold", str(settings.threshold)])
+        say_rows(("wrote", output, size), ("next", after, ""), quiet=quiet)
         facts |= {"file": output, "bytes": len(content), "sha256": digest}
     if means:
         from fuzzytree.recognition.table2 import compare
