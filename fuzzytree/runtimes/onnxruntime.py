@@ -448,6 +448,11 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
             f"{name}: the file has format {version!r}, and this fuzzytree "
             f"reads format {FORMAT_VERSION!r}; a newer one may help"
         )
+    if texts.get("carrier") == "frames":
+        raise ReadError(
+            f"{name}: the file takes frames of a sensor, and rows are asked for; "
+            "any ONNX runtime runs it on frames"
+        )
     records = {"columns", "inputs", "units", "classes", "rules", "outputs", "semantics"}
     records |= {"names", "chunk"}
     try:

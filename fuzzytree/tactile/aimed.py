@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fuzzytree.contracts import Model
 from fuzzytree.probing import landmarks
+from fuzzytree.reference import axis_values
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.plain import plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor
@@ -186,27 +187,33 @@ def proving_frames(made: FrameProgram, model: Model, presses: int = 12) -> Cells
     """
     frames = aimed_frames(made.sensor, presses)
 
-    def features(some: Cells) -> npt.NDArray[np.float64]:
-        return np.array([plain_features(made, frame)[0] for frame in some]).T
+    def values(some: Cells) -> npt.NDArray[np.float64]:
+        return np.array([_axes(made, model, frame) for frame in some]).T
 
-    pairs = edge_frames(frames, cuts_of(model)[:_MOST_CUTS], features)
+    pairs = edge_frames(frames, cuts_of(model)[:_MOST_CUTS], values)
     return np.concatenate([frames, pairs])
 
 
+def _axes(made: FrameProgram, model: Model, frame: Cells) -> list[float]:
+    """Return the values of a model's variables, combinations among them."""
+    features, _ = plain_features(made, frame)
+    row = dict(zip(model.inputs, features, strict=True))
+    return [*axis_values(model.variables, row).values()]
+
+
 def cuts_of(model: Model) -> list[tuple[int, float]]:
-    """Return where a model changes its mind: the place of an input, and a value."""
-    place = {name: line for line, name in enumerate(model.inputs)}
+    """Return where a model changes its mind: the place of a variable, and a value."""
     if isinstance(model, FuzzyTree):
-        pairs = [(node.variable, cut) for node in model.nodes for cut in node.cuts]
+        place = {one.name: line for line, one in enumerate(model.variables)}
+        pairs = [(place[one.variable], cut) for one in model.nodes for cut in one.cuts]
     else:
         pairs = [
-            (variable.name, value)
-            for variable in model.variables
+            (line, value)
+            for line, variable in enumerate(model.variables)
             for term in variable.terms
             for value in landmarks(term.shape)
         ]
-    found = [(place[name], cut) for name, cut in pairs if name in place]
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(pairs))
 
 
 def _nearest(values: npt.NDArray[np.float64], cut: float) -> tuple[int, int]:
