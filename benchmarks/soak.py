@@ -156,12 +156,13 @@ def pool_of(board: Board, faults: Faults, random: np.random.Generator) -> Pool:
             frame = with_marker(board, frame, where)
         cells.append(frame)
     sent = [encoded(board, frame, number) for number, frame in enumerate(cells)]
-    found = {_key(frame): number for number, frame in enumerate(cells)}
+    found = {frame_key(frame): number for number, frame in enumerate(cells)}
     assert len(found) == _POOL
     return Pool(cells, sent, found)
 
 
-def _key(cells: Cells) -> bytes:
+def frame_key(cells: Cells) -> bytes:
+    """Return what tells a frame from others."""
     return np.ascontiguousarray(cells, np.uint16).tobytes()
 
 
@@ -210,7 +211,7 @@ class Watch:
 
     def _number(self, cells: Cells) -> int | None:
         """Return which of the frames that were sent this is, if one behind the last."""
-        place = self.pool.found.get(_key(cells))
+        place = self.pool.found.get(frame_key(cells))
         if place is None:
             return None
         number = self._last + 1 + (place - self._last - 1) % _POOL

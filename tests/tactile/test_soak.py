@@ -7,11 +7,13 @@ import tracemalloc
 import numpy as np
 import pytest
 import soak
+import soak_line
+from msgspec.structs import replace
 
 from fuzzytree.tactile.boards import Board, Marker, Sentinel, Text
 from fuzzytree.tactile.decoding import decoder_of
 from fuzzytree.tactile.encoding import encoded
-from fuzzytree.tactile.faults import Faults
+from fuzzytree.tactile.faults import Faults, Pause
 from fuzzytree.tactile.sensor import Sensor
 
 # Where two bytes or more of a frame prove it, a wrong frame needs luck of 1 in 65536.
@@ -72,6 +74,22 @@ def test_the_memory_of_a_decoder_does_not_grow(name: str) -> None:
         sizes.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert max(sizes[10:]) < max(sizes[:10]) + 20_000
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", soak_line.NAMES)
+def test_a_line_reads_a_board_with_faults_through_a_port(name: str) -> None:
+    faults = replace(soak_line.LINE_FAULTS, unplug=Pause(0.05, every=400))
+    heard = soak_line.soak_line(soak.CASES[name], 1.5, faults=faults)
+    truth, counters = heard.truth, heard.counters
+    assert truth.frames > 100
+    # What waits in the system is thrown away with the port.
+    gone = 2 * (truth.bytes - counters.bytes) // (truth.bytes // truth.frames)
+    gaps = 3 * (truth.unplugs + 1)
+    lost = truth.frames - heard.right - counters.dropped
+    assert lost <= truth.touched + counters.damaged + counters.resyncs + gone + gaps
+    if name == PROVEN:
+        assert heard.wrong == 0
 
 
 # What the judge itself can tell.
