@@ -195,16 +195,20 @@ class MarkerDecoder(Decoder):
                 return -1
             if not alive[1:].any():
                 return 0
-        places = alive.nonzero()[0]
         if self._expected is None:
             return 0
+        places = alive.nonzero()[0]
         away = (places - self._expected) % size
-        chosen = int(places[np.minimum(away, size - away).argmin()])
-        return chosen if self._is_whole(chosen) else chosen + size
+        order = np.minimum(away, size - away).argsort(kind="stable")
+        nearest: list[int] = places[order].tolist()
+        begins = (begin for place in nearest for begin in (place, place + size))
+        return next(begin for begin in begins if self._is_whole(begin))  # at last 0
 
     def _is_whole(self, place: int) -> bool:
         block = self._buffer[place : place + self._size]
-        return bool(are_whole(self._layout, blocks_of(self._layout, block, 1))[0])
+        return len(block) == self._size and bool(
+            are_whole(self._layout, blocks_of(self._layout, block, 1))[0]
+        )
 
     def _marks(self, start: int) -> Truths:
         """Return where the marker stands within a frame's length, or may stand."""
