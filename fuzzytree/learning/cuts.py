@@ -332,6 +332,30 @@ def settled_cuts(
     return np.array(result)
 
 
+def without_empty(cuts: Cuts) -> Cuts:
+    """Drop intervals between equal cuts, unless one is all that its owner has.
+
+    Example:
+        >>> found = without_empty(
+        ...     Cuts(np.array([2.0, 2.0, 5.0]), np.array([0, 2, 1, 2]))
+        ... )
+        >>> found.cuts.tolist(), found.owners.tolist()
+        ([2.0, 5.0], [0, 1, 2])
+    """
+    points, owners = cuts.cuts, cuts.owners
+    k = 1
+    while k < len(points):
+        is_spare = np.count_nonzero(owners == owners[k]) > 1
+        if points[k] > points[k - 1] or not is_spare:
+            k += 1
+            continue
+        is_same = bool(owners[k - 1] == owners[k + 1])  # then no cut is left of both
+        points = np.delete(points, [k - 1, k] if is_same else [k])
+        owners = np.delete(owners, [k, k + 1] if is_same else [k])
+        k = max(k - 1, 1)
+    return Cuts(points, owners, cuts.reversals)
+
+
 def _tidy(cut: Fraction, low: float, high: float) -> float:
     """Return the roundest number near a cut, a quarter of the gap from its ends."""
     gap = Fraction(high) - Fraction(low)

@@ -211,8 +211,8 @@ def finished_split(
     """
     members = _members(patterns, np.concatenate(groups))
     rows, moved = patterns.rows[members], patterns.moved[members]
-    points = axis.settled(cuts.cuts, rows, moved, patterns.units)
-    return Split(axis, points, cuts.owners, groups)
+    placed = axis.settled(cuts, rows, moved, patterns.units)
+    return Split(axis, placed.cuts, placed.owners, groups)
 
 
 def _members(patterns: Patterns, chosen: IntArray) -> IntArray:

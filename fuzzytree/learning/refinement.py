@@ -147,8 +147,8 @@ def _cut_again(axis: Axis, split: Split, patterns: Patterns, task: _Task) -> Spl
     cuts = smoothed_cuts(
         places, task.labels > 0, task.weights, two=len(split.cuts) == 2
     )
-    points = axis.settled(cuts.cuts, task.rows, task.moved, patterns.units)
-    return Split(axis, points, cuts.owners, split.groups)
+    placed = axis.settled(cuts, task.rows, task.moved, patterns.units)
+    return Split(axis, placed.cuts, placed.owners, split.groups)
 
 
 def _logistic_axis(

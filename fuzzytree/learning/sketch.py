@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fuzzytree.learning.arrays import FloatArray, IntArray
-from fuzzytree.learning.cuts import settled_cuts
+from fuzzytree.learning.cuts import Cuts, settled_cuts, without_empty
 from fuzzytree.learning.units import Units
 
 
@@ -54,9 +54,12 @@ class Axis:
         return moved[:, self.features[0]]
 
     def settled(
-        self, cuts: FloatArray, rows: FloatArray, moved: FloatArray, units: Units
-    ) -> FloatArray:
+        self, cuts: Cuts, rows: FloatArray, moved: FloatArray, units: Units
+    ) -> Cuts:
         """Return cuts in the table's unit, increasing strictly, between the rows.
+
+        Cuts without a row between them become one where that leaves every branch an
+        interval.
 
         Args:
             cuts: In the axis' own unit.
@@ -69,11 +72,15 @@ class Axis:
         if not self.is_combined:
             origin = float(units.origins[self.features[0]])
             exponent = int(units.exponents[self.features[0]])
-        points = settled_cuts(cuts, values, places, origin=origin, exponent=exponent)
+        points = settled_cuts(
+            cuts.cuts, values, places, origin=origin, exponent=exponent
+        )
+        found = without_empty(Cuts(points, cuts.owners, cuts.reversals))
+        points = found.cuts
         for k in range(1, len(points)):
             if points[k] <= points[k - 1]:
                 points[k] = np.nextafter(points[k - 1], np.inf)
-        return points
+        return found
 
 
 def single(feature: int) -> Axis:

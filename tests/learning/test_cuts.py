@@ -9,7 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzytree.learning.cuts import crossing_cuts, settled_cuts, smoothed_cuts
+from fuzzytree.learning.cuts import (
+    Cuts,
+    crossing_cuts,
+    settled_cuts,
+    smoothed_cuts,
+    without_empty,
+)
 
 ORDER = np.array([0, 1])
 
@@ -162,3 +168,19 @@ def test_a_cut_is_a_round_number(
 ) -> None:
     found = settled_cuts(np.array([cut]), np.array([low, high]))
     assert found.tolist() == [expected]
+
+
+@pytest.mark.parametrize(
+    ("points", "owners", "left", "of"),
+    [
+        ([1.0, 1.0], [0, 1, 0], [1.0, 1.0], [0, 1, 0]),  # all that branch 1 has
+        ([1.0, 1.0, 4.0], [0, 1, 0, 1], [4.0], [0, 1]),
+        ([1.0, 1.0, 1.0], [0, 1, 2, 1], [1.0, 1.0], [0, 2, 1]),
+        ([1.0, 3.0], [0, 1, 0], [1.0, 3.0], [0, 1, 0]),
+    ],
+)
+def test_an_interval_without_a_row_goes_to_its_neighbours(
+    points: list[float], owners: list[int], left: list[float], of: list[int]
+) -> None:
+    found = without_empty(Cuts(np.array(points), np.array(owners)))
+    assert (found.cuts.tolist(), found.owners.tolist()) == (left, of)
