@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
+import pytest
 
 from fuzzytree.recognition.table2 import FEATURES, TABLE_2, Comparison, compare
 from fuzzytree.runtimes.frames import features_of
-from fuzzytree.tactile.objects import OBJECTS, FloatArray
-from fuzzytree.tactile.physics import PAPER, Settings, press
+from fuzzytree.tactile.objects import OBJECTS, FloatArray, Object, rectangle
+from fuzzytree.tactile.physics import PAPER, Settings, press, press_object
 
 EVEN = msgspec.structs.replace(
     PAPER,
@@ -53,6 +56,30 @@ def test_means_of_some_objects_are_those_of_all() -> None:
     every = compare(count=4)
     assert np.array_equal(few.means[:, 0], every.means[:, 4])
     assert few.paper[0].tolist() == [23.49, 6.72]
+
+
+def test_a_bar_that_reads_full_on_an_ideal_sensor_has_the_papers_means() -> None:
+    ideal = msgspec.structs.replace(
+        EVEN,
+        aperture=1.0,
+        turn_deg=0.0,
+        tilt=0.0,
+        force_spread=0.0,
+        break_n=0.0,
+        bend_n=math.inf,
+        slope_us=100.0,
+        full_us=100.0,
+        rest_us=1e-3,
+        noise=0.0,
+        threshold=0,
+    )
+    width, height = 5.55, 1.735
+    bar = Object("bar", (rectangle(width, height),), width * height)  # 1 N a cell
+    found = press_object(bar, 400, 0, ideal)
+    means = features_of(found.sensor, found.frames, FEATURES).values.mean(axis=1)
+    ratios = dict(zip(FEATURES, means / np.array(TABLE_2)[:, 0], strict=True))
+    for name in ("S1", "S2", "S7", "S8", "S9", "S10", "S11"):
+        assert ratios[name] == pytest.approx(1.0, abs=0.15), name
 
 
 def _apart(settings: Settings) -> float:
