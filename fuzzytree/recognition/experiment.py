@@ -99,6 +99,8 @@ class Study(Value, frozen=True):
         classes: Their names.
         accuracy: The mean over the divisions of the share that got their class.
         spread: The standard deviation over the divisions; 0 for one.
+        commonest: The same of who always answers the class that is the commonest
+            among the frames that are learnt from.
         trials: One for each division.
         confusion: For each class how many of its frames got each class, nothing, or
             none of the known; of the first division, or of all together.
@@ -119,6 +121,7 @@ class Study(Value, frozen=True):
     classes: tuple[str, ...]
     accuracy: float
     spread: float
+    commonest: float
     trials: tuple[Trial, ...]
     confusion: tuple[tuple[int, ...], ...]
     peers: tuple[Peer, ...]
@@ -210,11 +213,20 @@ def experiment(
         task.classes,
         float(np.mean(shares)),
         float(np.std(shares, ddof=1)) if len(shares) > 1 else 0.0,
+        _commonest(task),
         tuple(trials),
         _confusion(task, answers),
         tuple(other.peer(answers == task.codes) for other in others),
     )
     return Outcome(study, kept)
+
+
+def _commonest(task: Task) -> float:
+    shares: list[float] = []
+    for split in task.splits:
+        most = int(np.bincount(task.codes[split.train]).argmax())
+        shares.append(float(np.mean(task.codes[split.test] == most)))
+    return float(np.mean(shares))
 
 
 def _confusion(task: Task, answers: IntArray) -> tuple[tuple[int, ...], ...]:

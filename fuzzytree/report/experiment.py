@@ -46,6 +46,7 @@ def experiment_lines(
     yield from aligned(_trials(study))
     yield ""
     yield accuracy_text(study)
+    yield f"          {percent(study.commonest)} by the commonest class alone"
     fresh = [trial.accuracy for trial in study.trials if trial.is_fresh]
     if 0 < len(fresh) < len(study.trials):
         share = percent(sum(fresh) / len(fresh))

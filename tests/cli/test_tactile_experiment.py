@@ -68,6 +68,7 @@ def test_an_experiment_tells_rates_table_divisions_and_accuracy(
         "\n"
         "accuracy  100.0 %, mean of 3 divisions (100.0 % to 100.0 %, "
         "standard deviation 0.0)\n"
+        "          50.0 % by the commonest class alone\n"
     )
 
 
