@@ -165,7 +165,7 @@ def _model_proto(
         "frames",
         [helper.make_tensor_value_info("frames", kind, shape)],
         [helper.make_tensor_value_info(name, *kinds[name]) for name in outputs],
-        sheet.tensors,
+        sheet.used(),
     )
     imports = [helper.make_opsetid("", opset)]
     if any(node.domain == TREES for node in sheet.nodes):

@@ -201,6 +201,11 @@ class Sheet:
             return self.node("ReduceSum", source, axes, keepdims=keepdims)
         return self.node("ReduceSum", source, axes=[axis], keepdims=keepdims)
 
+    def used(self) -> list[onnx.TensorProto]:
+        """Return the constants that a node takes; `_turned` leaves some behind."""
+        taken = {name for node in self.nodes for name in node.input}
+        return [one for one in self.tensors if one.name in taken]
+
     def _fresh(self, hint: str) -> str:
         number = self._taken[hint] = self._taken.get(hint, 0) + 1
         return hint if number == 1 else f"{hint}_{number}"

@@ -111,6 +111,12 @@ def test_what_a_sensor_does_not_have_is_no_node() -> None:
         assert set(before[: before.index("MatMul")]) == {"Reshape", "Cast"} | expected
 
 
+def test_every_constant_is_taken_by_a_node() -> None:
+    graph = onnx.load_model_from_string(write_frames(TREE, PLAIN).content).graph
+    taken = {name for node in graph.node for name in node.input}
+    assert {one.name for one in graph.initializer} <= taken
+
+
 def test_the_same_model_gives_the_same_bytes() -> None:
     one, two = (write_frames(TREE, PLAIN, verify=v).content for v in (True, False))
     assert one == two
