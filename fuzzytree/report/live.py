@@ -27,7 +27,8 @@ SILENT_S = 1.0
 _RAMP = (" .", "::", "--", "==", "++", "**", "##", "%%", "@@")
 _EIGHTHS = " ▏▎▍▌▋▊▉"
 _BOLD, _DIM, _END = "\x1b[1m", "\x1b[2m", "\x1b[0m"
-_NAME, _BAR = 18, 24  # the widest column of classes, the longest bar
+_NAME = 18  # the widest column of classes
+_BAR = 150  # the shade of a bar: it can be seen on white and on black
 _SIDE = 34  # columns beside a picture
 
 
@@ -281,7 +282,8 @@ def _bar(share: float, width: int, *, look: Look) -> str:
     if look == "plain":
         return "#" * round(share * width)
     eighths = round(share * width * 8)
-    return "█" * (eighths // 8) + _EIGHTHS[eighths % 8].strip()
+    bar = "█" * (eighths // 8) + _EIGHTHS[eighths % 8].strip()
+    return f"\x1b[38;{_CODES[look][_BAR]}m{bar}{_END}" if bar else ""
 
 
 def _cut(text: str, columns: int) -> str:
