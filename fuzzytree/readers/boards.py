@@ -38,7 +38,6 @@ MOST_BYTES: Final = 4 * 2**20
 """The largest file of a board; one of 65536 cells with a baseline is a tenth of it."""
 
 _FAMILIES: Final = ("marker", "sentinel", "request", "text")
-_KEYS: Final = {"timeout_s": "timeout"}
 
 
 def load_board(path: PathLike) -> Board:
@@ -181,14 +180,14 @@ def _protocol(file: BoardFile) -> Protocol:
 
 
 def _renamed(file: BoardFile, mistakes: list[Mistake]) -> Iterator[Mistake]:
-    """Yield mistakes with the keys of the file on their paths."""
+    """Yield mistakes with the keys of the file on their paths.
+
+    Markers, prefixes and limits were checked with the form of the file: what is left
+    bears the same words there, but for the family and for blanks.
+    """
     family = next(key for key in _FAMILIES if getattr(file, key) is not None)
     for path, text in mistakes:
-        keys = [_KEYS.get(str(step), step) for step in path]
-        if path[0] == "protocol":
-            keys[0] = family
-            if path[1:] == ("marker",):
-                keys[1] = "bytes"
+        keys = [family if step == "protocol" else step for step in path]
         yield (
             tuple(k.replace("_", " ") if isinstance(k, str) else k for k in keys),
             text,

@@ -90,9 +90,9 @@ class Decoder(ABC):
     def _take(self) -> list[Cells]:
         """Return the frames that the buffer holds, and take them out."""
 
+    @abstractmethod
     def _take_last(self) -> list[Cells]:
-        """Return the frames that may be told though nothing more comes."""
-        return []
+        """Return the frames that only waited for more, and begin again."""
 
     def _skip(self, count: int) -> None:
         """Drop bytes that belong to no frame."""
