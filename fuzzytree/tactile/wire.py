@@ -53,9 +53,6 @@ class Wire:
             stop: Whatever waits here ends when it is set.
             rate: How many times as fast as the line would be; None for as fast as
                 the host reads.
-
-        Raises:
-            WriteError: If the link cannot be made.
         """
         self.bytes = self.overrun = self.garbled = self.framing_errors = 0
         self._port, self._link, self._stop = port, link, stop
@@ -63,7 +60,7 @@ class Wire:
         self._master: int | None = None
         self._due = 0.0
         self._receiver: tuple[int, Receiver] | None = None
-        self._check_link()
+        self._terminal = ""
 
     def _check_link(self) -> None:
         if not hasattr(os, "openpty"):
@@ -80,13 +77,15 @@ class Wire:
         Raises:
             WriteError: If it cannot be made.
         """
+        self._check_link()
         try:
             self._master, slave = os.openpty()
             os.set_blocking(self._master, False)
             tty.setraw(slave)
             self._set_speed(slave)
+            self._terminal = os.ttyname(slave)
             new = self._link.with_name(f".{self._link.name}.{os.getpid()}")
-            new.symlink_to(os.ttyname(slave))
+            new.symlink_to(self._terminal)
             new.replace(self._link)
             os.close(slave)  # so that it can be seen whether a host has it open
         except OSError as error:
@@ -96,7 +95,8 @@ class Wire:
     def plug_out(self) -> None:
         """Take the pseudo-terminal and its link away, as a pulled plug does."""
         if self._master is not None:
-            self._link.unlink(missing_ok=True)
+            if self._link.is_symlink() and str(self._link.readlink()) == self._terminal:
+                self._link.unlink()  # unless it is not ours any more
             os.close(self._master)
             self._master = None
 
