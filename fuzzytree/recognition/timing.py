@@ -173,7 +173,7 @@ def _calls(
     for way in ways:
         if way.name == PLAIN and count > _MOST_PLAIN:
             omissions.append(
-                f"{PLAIN}: {count} frames in a call; it takes one after another anyway"
+                f"{PLAIN}: {count:,} frames in a call; it takes them one by one"
             )
         else:
             calls[way.name] = partial(way.call, many)

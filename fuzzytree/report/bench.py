@@ -44,7 +44,7 @@ def study_lines(found: Study, *, is_full: bool = False) -> Iterator[str]:
             and error.
     """
     yield f"{found.model}: error against run time, in {found.seconds:.0f} s"
-    yield from aligned([("rows", found.data), *_machine_rows(found.machine)])
+    yield from aligned([("rows", found.data), *machine_rows(found.machine)])
     for rows, threads in _sizes(found.points):
         yield ""
         yield f"{rows:,} row{'' if rows == 1 else 's'}, {counted(threads, 'thread')}"
@@ -59,7 +59,8 @@ def study_lines(found: Study, *, is_full: bool = False) -> Iterator[str]:
     yield from _section("advice", found.advice)
 
 
-def _machine_rows(machine: Machine) -> Iterator[tuple[str, str]]:
+def machine_rows(machine: Machine) -> Iterator[tuple[str, str]]:
+    """Yield where it was measured, with what, and how busy the machine was."""
     yield (
         "machine",
         f"{machine.processor}, {counted(machine.cores, 'core')}, {machine.system}",

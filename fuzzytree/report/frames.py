@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from fuzzytree.recognition.carriers import FramesAgreement
 from fuzzytree.recognition.timing import FramesStudy, Point
+from fuzzytree.report.bench import machine_rows
 from fuzzytree.report.text import agreement_lines, aligned, counted, duration
 from fuzzytree.timing.records import Timing
 
@@ -32,15 +33,13 @@ def check_lines(found: FramesAgreement, *, is_full: bool = False) -> Iterator[st
 
 def study_lines(found: FramesStudy) -> Iterator[str]:
     """Yield a study of frames: what and where, a table for each number of frames."""
-    sensor, where = found.sensor, found.machine
+    sensor = found.sensor
     yield f"{found.model}: from frame to class, in {found.seconds:.0f} s"
-    versions = [f"{name} {version}" for name, version in where.versions.items()]
     yield from aligned(
         [
             ("features", ", ".join(found.features) or "none"),
             ("frames", f"{found.data}; {sensor.rows} x {sensor.columns} cells"),
-            ("machine", f"{where.processor}, {counted(where.cores, 'core')}"),
-            ("with", ", ".join([where.python, *versions])),
+            *machine_rows(found.machine),
         ]
     )
     rows = {one.rows for point in found.points for one in point.timings}
@@ -52,7 +51,7 @@ def study_lines(found: FramesStudy) -> Iterator[str]:
             if one.rows == count
         ]
         yield ""
-        yield f"{counted(count, 'frame')} in a call, 1 thread"
+        yield f"{count:,} frame{'' if count == 1 else 's'} in a call, 1 thread"
         yield from aligned([_HEAD, *(_row(*one, found) for one in timed)])
     yield ""
     yield "time is that of a frame: the median, and the ends of its 95 % interval;"

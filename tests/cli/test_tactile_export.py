@@ -113,10 +113,16 @@ def test_a_bench_tells_time_error_and_floors(capsys: Said) -> None:
     few = ["--rows", "1", "--rows", "2000", "--budget", "0.8"]
     assert main([*words, *few]) == 0
     out = capsys.readouterr().out
-    for text in ("1 frame in a call", "2000 frames in a call", "numpy", "onnx", "c   "):
+    for text in (
+        "1 frame in a call",
+        "2,000 frames in a call",
+        "numpy",
+        "onnx",
+        "c   ",
+    ):
         assert text in out
     assert "floor: the frames copied" in out
-    assert "left out: plain Python: 2000 frames in a call" in out
+    assert "left out: plain Python: 2,000 frames in a call" in out
     assert main([*words, "--rows", "1", "--budget", "0.5", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["judged"] == 9

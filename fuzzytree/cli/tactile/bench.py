@@ -45,6 +45,14 @@ from fuzzytree.cli.talk import (
     help="What is weaker is none of the known objects; for raw rules.",
 )
 @click.option(
+    "--rounds",
+    metavar="N",
+    type=click.IntRange(1, 1_000),
+    default=15,
+    show_default=True,
+    help="Samples of each; the interval needs 6.",
+)
+@click.option(
     "--budget",
     metavar="SECONDS",
     type=click.FloatRange(0.1),
@@ -64,6 +72,7 @@ def command(
     data: str | None,
     rows: Sequence[int],
     reject: float,
+    rounds: int,
     budget: float,
     seed: int,
     as_json: bool,
@@ -88,6 +97,7 @@ def command(
             data=Path(data).name if data else "",
             rows=rows,
             reject=reject,
+            rounds=rounds,
             seconds=budget,
             seed=seed,
             tell=tell,
