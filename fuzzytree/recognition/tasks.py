@@ -241,7 +241,7 @@ def file_task(
     test: PathLike | None = None,
     label: str = "label",
     full: int | None = None,
-    threshold: int = 0,
+    threshold: int | None = None,
 ) -> Task:
     """Return a task on frames of one's own.
 
@@ -261,7 +261,8 @@ def file_task(
     """
     name = os.fspath(path)
     presses = read_presses(path, label=label)
-    sensor = _sensor(presses, full or presses.full, threshold)
+    least = presses.threshold if threshold is None else threshold
+    sensor = _sensor(presses, full or presses.full, least)
     if test is None:
         return by_subject(name, presses, sensor, f"{len(presses.frames)} frames")
     other, title = read_presses(test, label=label), os.fspath(test)

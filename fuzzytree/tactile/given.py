@@ -34,7 +34,7 @@ def given_frames(
     *,
     sensor: Sensor | None = None,
     full: int | None = None,
-    threshold: int = 0,
+    threshold: int | None = None,
     label: str = "label",
 ) -> Given:
     """Return the frames of a file.
@@ -44,7 +44,7 @@ def given_frames(
         sensor: That of a board, if it is known; else that of the recording, or one of
             the size of the archive's frames.
         full: What a cell takes, instead of what the file says; for archives.
-        threshold: Above it a cell is pressed; for archives.
+        threshold: Above it a cell is pressed, the same way.
         label: The array of the classes in an archive.
 
     Raises:
@@ -66,7 +66,8 @@ def given_frames(
         rows, columns = presses.frames.shape[1:]
         try:
             limit = presses.full if full is None else full
-            found = Sensor(rows, columns, limit, threshold)
+            least = presses.threshold if threshold is None else threshold
+            found = Sensor(rows, columns, limit, least)
         except InvalidModelError as error:
             raise ReadError(f"{name}: {error}") from error
     rows, columns = presses.frames.shape[1:]

@@ -1,8 +1,9 @@
 """Labelled frames in a numpy archive (`.npz`): read within bounds, written the same.
 
 The arrays: `frames`, whole numbers of shape (frames, rows, columns); `full`, what a
-cell reads that takes no more; and, where known, `label`, the place of each frame's
-class in `label_names`, and `subject`, a number for whoever or whatever was pressing.
+cell reads that takes no more; `threshold`, above which a cell is pressed, 0 unless
+given; and, where known, `label`, the place of each frame's class in `label_names`, and
+`subject`, a number for whoever or whatever was pressing.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ LIMIT = 2**30
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first that a zip file can hold
 _MOST_MEMBERS = 64
 _LONGEST_HEADER = 4096
-_USED = ("frames", "full", "label", "label_names", "subject")
+_USED = ("frames", "full", "threshold", "label", "label_names", "subject")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,7 @@ class Presses:
             is not known.
         label_names: The names of the classes.
         subject: Shape (frames,): who was pressing; empty if it is not known.
+        threshold: Above it a cell is pressed.
     """
 
     frames: Cells
@@ -53,6 +55,7 @@ class Presses:
     label: npt.NDArray[np.int64]
     label_names: tuple[str, ...]
     subject: npt.NDArray[np.int64]
+    threshold: int = 0
 
 
 def read_presses(path: PathLike, *, label: str = "label") -> Presses:
@@ -90,9 +93,10 @@ def read_presses(path: PathLike, *, label: str = "label") -> Presses:
             f"{len(names) - 1}, not {labels.min()} to {labels.max()}"
         )
     subject = _codes(arrays.get("subject"), len(frames), name, "subject")
-    return Presses(
-        frames, _full(arrays.get("full"), frames, name), labels, names, subject
-    )
+    usual = 255 if frames.dtype.itemsize == 1 else 65535
+    full = _number(arrays.get("full"), usual, 1, 65535, f"{name}: 'full'")
+    least = _number(arrays.get("threshold"), 0, 0, full - 1, f"{name}: 'threshold'")
+    return Presses(frames, full, labels, names, subject, least)
 
 
 def presses_content(presses: Presses) -> bytes:
@@ -101,6 +105,8 @@ def presses_content(presses: Presses) -> bytes:
         "frames": presses.frames,
         "full": np.array(presses.full, np.int64),
     }
+    if presses.threshold:
+        arrays["threshold"] = np.array(presses.threshold, np.int64)
     if len(presses.label):
         arrays["label"] = presses.label
         arrays["label_names"] = np.array(presses.label_names, np.str_)
@@ -216,14 +222,13 @@ def _codes(
     return found.astype(np.int64)
 
 
-def _full(found: npt.NDArray[Any] | None, frames: Cells, name: str) -> int:
-    """Return what a cell reads that takes no more: as told, or by the type."""
+def _number(
+    found: npt.NDArray[Any] | None, usual: int, low: int, high: int, where: str
+) -> int:
+    """Return a whole number of an archive, or the usual one where it has none."""
     if found is None:
-        return 255 if frames.dtype.itemsize == 1 else 65535
-    if (
-        found.size != 1
-        or found.dtype.kind not in "iu"
-        or not 1 <= found.item() <= 65535
-    ):
-        raise ReadError(f"{name}: 'full' must be a whole number from 1 to 65535")
+        return usual
+    is_one = found.size == 1 and found.dtype.kind in "iu"
+    if not is_one or not low <= found.item() <= high:
+        raise ReadError(f"{where} must be a whole number from {low} to {high}")
     return int(found.item())

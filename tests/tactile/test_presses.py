@@ -22,7 +22,7 @@ FRAMES = np.arange(24, dtype=np.uint16).reshape(2, 3, 4)
 
 def presses() -> Presses:
     return Presses(
-        FRAMES, 1000, np.array([1, 0]), ("hand", "bär"), np.array([7, 9])
+        FRAMES, 1000, np.array([1, 0]), ("hand", "bär"), np.array([7, 9]), 5
     )  # fmt: skip
 
 
@@ -37,7 +37,8 @@ def test_what_was_written_reads_back_equal(tmp_path: Path) -> None:
     found = read_presses(path)
     assert found.frames.dtype == np.uint16
     assert found.frames.tolist() == FRAMES.tolist()
-    assert (found.full, found.label_names) == (1000, ("hand", "bär"))
+    assert (found.full, found.threshold) == (1000, 5)
+    assert found.label_names == ("hand", "bär")
     assert found.label.tolist() == [1, 0]
     assert found.subject.tolist() == [7, 9]
 
@@ -90,6 +91,10 @@ def test_classes_may_stand_under_another_name(tmp_path: Path) -> None:
         (
             {"frames": FRAMES, "full": 70000},
             "'full' must be a whole number from 1 to 65535",
+        ),
+        (
+            {"frames": FRAMES, "full": 9, "threshold": 9},
+            "'threshold' must be a whole number from 0 to 8",
         ),
         (
             {"frames": FRAMES, "subject": np.array([{}, {}])},

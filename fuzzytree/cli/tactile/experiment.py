@@ -54,7 +54,7 @@ _TIMES = (1, 3, 5, 7)
     "--sensor",
     type=click.Choice(["paper", "ideal"]),
     default="paper",
-    help="Of TASK paper: `ideal` measures area and nothing else.",
+    help="Of TASK paper: `ideal` is even and linear.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, help="Of presses and peers.")
 @click.option(
@@ -72,7 +72,7 @@ _TIMES = (1, 3, 5, 7)
     help="The classes in FILE.npz; `label`.",
 )
 @click.option("--full", type=int, help="What a cell of FILE.npz reads at most.")
-@click.option("--threshold", type=int, default=0, help="Above it a cell is pressed; 0.")
+@click.option("--threshold", type=int, help="Above it a cell is pressed.")
 @click.option("--data", metavar="FOLDER", help="Where the project's frames lie.")
 @click.option("--no-peers", is_flag=True, help="Without learners of scikit-learn.")
 @click.option("-o", "--output", metavar="FOLDER", help="For models and pictures.")
@@ -92,7 +92,7 @@ def command(
     test: str | None,
     label: str,
     full: int | None,
-    threshold: int,
+    threshold: int | None,
     data: str | None,
     no_peers: bool,
     output: str | None,
@@ -152,7 +152,7 @@ def _paper(sensor: str, seed: int, repeats: int) -> Task:
     from fuzzytree.recognition.simulated import IDEAL, paper_task
 
     if sensor == "ideal":
-        about = "the paper's seven objects on a sensor that measures area alone"
+        about = "the paper's seven objects on an even and linear sensor"
         return paper_task(seed=seed, repeats=repeats, physics=IDEAL, about=about)
     return paper_task(seed=seed, repeats=repeats)
 
@@ -162,7 +162,7 @@ def _real(
     test: str | None,
     label: str,
     full: int | None,
-    threshold: int,
+    threshold: int | None,
     data: str | None,
 ) -> Task:
     from fuzzytree.recognition.tasks import KNOWN, file_task, known_task
@@ -228,7 +228,11 @@ def _write(
     }
     for name, content in files.items():
         write_atomically(folder / name, content)
-    after = shlex.join(["fuzzytree", "show", str(folder / "tree.yaml")])
+    tree = str(folder / "tree.yaml")
+    words = ["fuzzytree", "show", tree]
+    if task.name == "paper":
+        words = ["fuzzytree", "tactile", "live", "simulator", "--model", tree]
+    after = shlex.join(words)
     say_rows(
         ("wrote", f"{folder}/", ", ".join(files)), ("next", after, ""), quiet=quiet
     )

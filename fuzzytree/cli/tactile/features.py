@@ -41,7 +41,7 @@ CLASS = "class"
 )
 @click.option("--board", metavar="FILE", help="The board of the frames.")
 @click.option("--full", type=int, help="What a cell reads that takes no more.")
-@click.option("--threshold", type=int, default=0, help="Above it a cell is pressed; 0.")
+@click.option("--threshold", type=int, help="Above it a cell is pressed.")
 @click.option(
     "--label", metavar="ARRAY", default="label", help="The classes in FRAMES; `label`."
 )
@@ -53,7 +53,7 @@ def command(
     text: str,
     board: str | None,
     full: int | None,
-    threshold: int,
+    threshold: int | None,
     label: str,
     output: str | None,
     as_json: bool,
@@ -73,7 +73,7 @@ def command(
     with wrong_options():
         names = names_of(text)
     sensor = _sensor(board)
-    if sensor and (full is not None or threshold):
+    if sensor and not full is threshold is None:
         raise click.UsageError("--board tells --full and --threshold; give one of them")
     given = given_frames(
         frames, sensor=sensor, full=full, threshold=threshold, label=label

@@ -51,7 +51,7 @@ MOST_BYTES = 2**30
 @click.option("--axis", "is_marked", is_flag=True, help="Mark centre and axis as well.")
 @click.option("--board", metavar="FILE", help="The board of the frames.")
 @click.option("--full", type=int, help="What a cell reads that takes no more.")
-@click.option("--threshold", type=int, default=0, help="Above it a cell is pressed; 0.")
+@click.option("--threshold", type=int, help="Above it a cell is pressed.")
 @click.option(
     "-o",
     "--output",
@@ -68,7 +68,7 @@ def command(
     is_marked: bool,
     board: str | None,
     full: int | None,
-    threshold: int,
+    threshold: int | None,
     output: str,
     as_json: bool,
     quiet: bool,
@@ -89,7 +89,7 @@ def command(
     times = _times(text)
     check_place(output)
     sensor = _sensor(board)
-    if sensor and (full is not None or threshold):
+    if sensor and not full is threshold is None:
         raise click.UsageError("--board tells --full and --threshold; give one of them")
     given = given_frames(frames, sensor=sensor, full=full, threshold=threshold)
     values = pressed(given.sensor, given.presses.frames)

@@ -100,7 +100,7 @@ def command(
         digest = hashlib.sha256(content).hexdigest()
         size = f"{len(content)} bytes, sha256 {digest}"
         words = ["fuzzytree", "tactile", "features", output, "--features", "S1, S9"]
-        after = shlex.join([*words, "--threshold", str(settings.threshold)])
+        after = shlex.join(words)
         say_rows(("wrote", output, size), ("next", after, ""), quiet=quiet)
         facts |= {"file": output, "bytes": len(content), "sha256": digest}
     if means:
@@ -182,9 +182,12 @@ def _content(found: dict[str, Simulated]) -> bytes:
     frames = np.concatenate([made.frames for made in found.values()])
     sizes = [len(made.frames) for made in found.values()]
     label = np.repeat(np.arange(len(found)), sizes)
-    full = next(iter(found.values())).sensor.full
+    sensor = next(iter(found.values())).sensor
     nobody = np.zeros(0, np.int64)
-    return presses_content(Presses(frames, full, label, tuple(found), nobody))
+    presses = Presses(
+        frames, sensor.full, label, tuple(found), nobody, sensor.threshold
+    )
+    return presses_content(presses)
 
 
 def _means_facts(found: Comparison) -> dict[str, object]:
