@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +12,16 @@ import soak
 import soak_line
 from msgspec.structs import replace
 
+from fuzzytree.readers.boards import load_board
 from fuzzytree.tactile.boards import Board, Marker, Sentinel, Text
 from fuzzytree.tactile.decoding import decoder_of
-from fuzzytree.tactile.encoding import encoded
+from fuzzytree.tactile.device import blob
+from fuzzytree.tactile.encoding import banner, encoded
 from fuzzytree.tactile.faults import Faults, Pause
 from fuzzytree.tactile.sensor import Sensor
 
+ROOT = Path(__file__).parents[2]
+BOARDS = sorted((ROOT / "examples" / "tactile" / "boards").glob("*.yaml"))
 # Where two bytes or more of a frame prove it, a wrong frame needs luck of 1 in 65536.
 PROVEN = "marker, sizes, crc16"
 
@@ -25,6 +31,19 @@ def test_without_faults_every_frame_comes(name: str) -> None:
     count = soak.soak(soak.CASES[name], 100, faults=Faults())
     assert count.right == count.given == count.frames == 100
     assert count.touched == count.damaged == 0
+
+
+@pytest.mark.parametrize("path", BOARDS, ids=lambda path: path.stem)
+def test_the_boards_of_the_examples_send_what_is_read(path: Path) -> None:
+    board = load_board(path)
+    frames = [*itertools.islice(blob(board), 12)]
+    decoder = decoder_of(board)
+    given = decoder.feed(banner(board)) if board.banner else []
+    for number, cells in enumerate(frames):
+        decoder.asked()
+        given += decoder.feed(encoded(board, cells, number))
+    given += decoder.flush()
+    assert [cells.tolist() for cells in given] == [cells.tolist() for cells in frames]
 
 
 @pytest.mark.parametrize("name", soak.CASES)
