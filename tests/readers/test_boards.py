@@ -96,7 +96,7 @@ def boards(draw: st.DrawFn) -> Board:
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(boards())
 def test_a_board_that_was_written_is_read_again_and_fits_the_schema(
     board: Board,
@@ -134,7 +134,7 @@ KEYS = sorted(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.sampled_from(EXAMPLES),
     st.lists(
@@ -272,6 +272,7 @@ def test_a_file_that_is_too_large_is_refused(tmp_path: Path) -> None:
     assert str(caught.value) == expected
 
 
+@pytest.mark.heavy
 def test_the_largest_board_can_be_written_and_read() -> None:
     sensor = Sensor(256, 256, 65535, baseline=(65534,) * 65536)
     board = Board("large", sensor, Marker("AA", 16))
