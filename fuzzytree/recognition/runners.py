@@ -16,7 +16,9 @@ import numpy as np
 from fuzzytree.contracts import Model
 from fuzzytree.exporters.c_frames import write_frames_c
 from fuzzytree.recognition.recogniser import Recogniser
+from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.c import COMPILERS, compiled
+from fuzzytree.runtimes.native import load
 from fuzzytree.tactile.aimed import frame_type
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.plain import Shown, plain_answer, plain_features
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from fuzzytree.exporters.onnx_frames import Output
 
 NUMPY, ONNX, C, PLAIN = "numpy", "onnx", "c", "plain Python"
+STRENGTHS = "numpy with strengths"
 
 _ANSWERS: tuple[Output, ...] = ("label", "state", "rule")
 
@@ -126,7 +129,23 @@ def _numpy(model: Model, sensor: Sensor, reject: float) -> Runner:
         found = recogniser(frames)
         return Found(found.features.values, found.codes, found.states, None)
 
-    return Runner(NUMPY, answer, recogniser)
+    decide = load(model)
+
+    def call(frames: Cells) -> object:
+        return decide(recogniser.plan(frames).values)
+
+    return Runner(NUMPY, answer, call)
+
+
+def with_strengths(model: Model, sensor: Sensor, reject: float = 0.0) -> Runner | None:
+    """Return numpy as `Recogniser` has it: with the strengths of a tree's rules.
+
+    None for a rule base, which has no answer without them.
+    """
+    if isinstance(model, RuleBase):
+        return None
+    plain = _looked_at(_numpy(model, sensor, reject), sensor)
+    return replace(plain, name=STRENGTHS, call=Recogniser(model, sensor, reject))
 
 
 def _plain(model: Model, sensor: Sensor, reject: float) -> Runner:

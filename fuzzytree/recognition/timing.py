@@ -13,7 +13,14 @@ import numpy as np
 
 from fuzzytree.contracts import Model
 from fuzzytree.recognition.recogniser import check_inputs
-from fuzzytree.recognition.runners import PLAIN, Found, Runner, as_sent, runners
+from fuzzytree.recognition.runners import (
+    PLAIN,
+    Found,
+    Runner,
+    as_sent,
+    runners,
+    with_strengths,
+)
 from fuzzytree.recognition.scales import errors
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.tactile.aimed import aimed_frames
@@ -122,6 +129,8 @@ def time_frames(
         raise ValueError("there is no frame to measure with")
     before = machine(["onnx", "onnxruntime"])
     ways, omissions = runners(model, sensor, reject)
+    more = with_strengths(model, sensor, reject)
+    ways = [ways[0], *([more] if more else []), *ways[1:]]
     judged = _judged(model, sensor, given, ways, reject)
     timings: dict[str, list[Timing]] = {}
     is_complete = True
