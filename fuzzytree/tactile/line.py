@@ -149,7 +149,7 @@ class Line:
         self._news = threading.Condition()
         self._waiting: deque[Frame] = deque()
         self._most_waiting = most_waiting
-        self._error: PortError | None = None
+        self._error: BaseException | None = None
         self._decoder = decoder_of(board, is_joined=True)
         self._before = Counters()  # what earlier decoders counted, and the line itself
         self._counted = Counters()
@@ -215,6 +215,8 @@ class Line:
                     self._serial.close()
                     if not self._is_back():
                         return
+        except BaseException as error:  # raised by `take`, in the thread that asks
+            self._error = error
         finally:
             self._serial.close()
             with self._news:

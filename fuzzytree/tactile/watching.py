@@ -39,7 +39,7 @@ class Watch:
         self._board = board
         self._frame_s = frame_time(board)
         self._has_frame = self._is_silent = False
-        self._gap_s = 0.0  # between frames, smoothed
+        self._gap_s: float | None = None  # between frames, smoothed
         self._last_frame = self._last_byte = now
         self._asked = 0  # since the last frame
         self._unread = bytearray()  # since the last frame
@@ -47,9 +47,13 @@ class Watch:
 
     @property
     def stall_s(self) -> float:
-        """How long the board may be silent now."""
-        usual = STALL_FRAMES * max(self._gap_s, self._frame_s)
-        return max(usual, _SHORTEST_STALL_S if self._has_frame else PATIENCE_S)
+        """How long the board may be silent now.
+
+        Boards that are USB devices keep to no baud rate: their own pace tells.
+        """
+        gap_s = self._frame_s if self._gap_s is None else self._gap_s
+        shortest_s = _SHORTEST_STALL_S if self._has_frame else PATIENCE_S
+        return max(STALL_FRAMES * gap_s, shortest_s)
 
     def asked(self) -> None:
         """Note that the board was asked for a frame."""
@@ -65,8 +69,9 @@ class Watch:
                 self._unread_since = now
             return
         if self._has_frame and not self._is_silent:
-            gap = (now - self._last_frame) / frames
-            self._gap_s += (gap - self._gap_s) / 8  # they come in bursts
+            gap_s = (now - self._last_frame) / frames
+            known_s = gap_s if self._gap_s is None else self._gap_s
+            self._gap_s = known_s + (gap_s - known_s) / 8  # they come in bursts
         self._has_frame, self._is_silent = True, False
         self._last_frame = now
         self._forget()

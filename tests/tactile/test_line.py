@@ -377,6 +377,20 @@ def test_a_line_that_ends_too_early_has_no_baseline() -> None:
     assert str(caught.value) == text
 
 
+def test_what_fails_within_the_line_is_raised_where_frames_are_taken(
+    terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def feed(_decoder: object, _data: bytes) -> list[Cells]:
+        raise RuntimeError("a decoder failed")
+
+    monkeypatch.setattr("fuzzytree.tactile.decoder.Decoder.feed", feed)
+    with open_line(BOARD, terminal.name) as line:
+        terminal.write(b"any")
+        with pytest.raises(RuntimeError, match="a decoder failed"):
+            line.take(5)
+        assert line.take(5) is None
+
+
 @pytest.mark.heavy
 @pytest.mark.parametrize(
     "protocol",
@@ -399,7 +413,7 @@ def test_no_frame_is_made_up_and_none_is_lost_uncounted(protocol: Protocol) -> N
         Device(board, sent, faults, rate=20.0, seed=3) as device,
         open_line(board, device.port, most_waiting=50) as line,
     ):
-        while not device.over.is_set():
+        while not device.over.is_set() and line.state != "ended":
             found += _taken(line, 10, 0.1)
         counters = line.counters
         _until(lambda: line.counters.reconnects == device.truth.unplugs)
@@ -410,5 +424,3 @@ def test_no_frame_is_made_up_and_none_is_lost_uncounted(protocol: Protocol) -> N
     assert len(found) + line.counters.dropped == line.counters.frames
     assert counters.stalls >= device.truth.stalls
     assert device.truth.unplugs >= 4
-    # An unplugging takes what the system had not read yet, too.
-    assert counters.frames >= 2000 - device.truth.touched - 50 * device.truth.unplugs

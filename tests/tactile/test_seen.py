@@ -178,6 +178,17 @@ def test_a_board_may_be_silent_for_ten_of_its_own_frame_times() -> None:
     assert not watch.is_quiet(now + 2)
 
 
+def test_the_pace_of_a_board_tells_more_than_its_baud_rate() -> None:
+    watch = Watch(_board(Text()), 0.0)
+    assert watch.stall_s == 3.0
+    watch.came(b"x", 1, 0.0)
+    assert watch.stall_s == pytest.approx(max(10 * frame_time(_board(Text())), 0.25))
+    watch.came(b"x", 4, 0.2)
+    assert watch.stall_s == pytest.approx(0.5)
+    watch.came(b"x", 8, 0.24)
+    assert watch.stall_s == pytest.approx(10 * (0.05 + (0.005 - 0.05) / 8))
+
+
 def test_bytes_are_told_once_in_each_time_of_patience() -> None:
     watch = Watch(_board(Marker("AA")), 0.0)
     told = []
