@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -10,6 +9,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.learning import Settings
+from fuzzytree.recognition.effects import EFFECTS
 from fuzzytree.recognition.splits import Split
 from fuzzytree.recognition.tasks import Task
 from fuzzytree.tactile.objects import OBJECTS
@@ -19,23 +19,9 @@ from fuzzytree.tactile.physics import Settings as Physics
 PRESSES = 50
 """Presses of each object to learn from, and as many others to test on (4.1, 3)."""
 
-IDEAL = Physics(
-    tilt=0.0,
-    aperture=1.0,
-    break_n=0.0,
-    bend_n=math.inf,
-    row_spread=0.0,
-    column_spread=0.0,
-    wiring="diodes",
-    drive_ohm=0.0,
-    load_ohm=0.0,
-    rest_us=1e-3,
-    full_us=1600.0,
-    noise=0.0,
-    threshold=0,
-)
-"""A sensor that measures what part of each cell is covered, and how hard, and nothing
-else: but for its few cells the moments of an object do not depend on its angle."""
+IDEAL: Physics = msgspec.structs.replace(PAPER, **EFFECTS["even and linear"])
+"""A sensor that measures how hard each cell is pressed and nothing else: but for its
+few cells the moments of an object do not depend on its angle."""
 
 TABLE_3: Mapping[str, int] = MappingProxyType(
     {
