@@ -15,6 +15,7 @@ import itertools
 import multiprocessing
 import os
 import pty
+import sys
 import tempfile
 import threading
 import time
@@ -24,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fuzzytree.cli.tactile.live import MOST_WAITING
+from fuzzytree.cli.tactile.live import MOST_WAITING, SWITCH_S
 from fuzzytree.cli.tactile.screen import Screen
 from fuzzytree.recognition.live import Live
 from fuzzytree.recognition.recogniser import Recogniser
@@ -54,9 +55,9 @@ def main() -> None:
     tree = paper_tree()
     print(f"{len(tree.inputs)} features, {len(tree.leaves)} leaves; load", end=" ")
     print(*(f"{load:.1f}" for load in os.getloadavg()), "on", os.cpu_count(), "cores")
-    print(
-        "line             draws  frames  dropped  median ms  99 % ms  largest ms  below 1 ms"
-    )
+    head = "line         draws  frames  dropped  median ms  99 % ms  largest ms"
+    print(f"{head}  below 1 ms")
+    sys.setswitchinterval(SWITCH_S)
     for baud, is_paced in ((115200, True), (500000, True), (500000, False)):
         for draws in (False, True):
             count = int(seconds * (baud / 10 / 262 if is_paced else 1500))
@@ -65,7 +66,7 @@ def main() -> None:
             name = f"{baud} baud" if is_paced else "no limit"
             numbers = "".join(f"{1e3 * part:11.2f}" for part in parts)
             share = f"{(late < 1e-3).mean():11.0%}"
-            print(f"{name:16} {draws!s:6} {len(late):6}  {dropped:7}{numbers}{share}")
+            print(f"{name:12} {draws!s:6} {len(late):6}  {dropped:7}{numbers}{share}")
 
 
 def paper_tree() -> FuzzyTree:

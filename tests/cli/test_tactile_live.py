@@ -177,7 +177,7 @@ def test_a_board_is_answered_through_faults_and_a_pulled_plug(call: Call) -> Non
     found = {row.split("\t")[3] for row in out.splitlines()}
     assert found == {"", "s", "l"}
     assert err.splitlines()[0] == (
-        "measures 3 frames for the baseline nothing may lie on it"
+        "measures the baseline in 3 frames: nothing may lie on the sensor"
     )
     kept = read_recording("kept.ftr")
     assert kept.counters.reconnects == 1

@@ -26,7 +26,8 @@ SIMULATOR = "simulator"
 MOST_WAITING = 4
 """Frames that wait for an answer before older ones are dropped: the newest count."""
 _PATIENCE_S = 2.0  # for a first frame
-_SWITCH_S = 2e-4  # how soon a thread that draws gives way to an answer
+SWITCH_S = 2e-4
+"""How soon a thread that reads or draws gives way to an answer."""
 
 
 @click.command("live", short_help="Recognise what lies on a sensor, on-line.")
@@ -105,7 +106,7 @@ def command(
 
     known = _model(model)
     with contextlib.ExitStack() as stack:
-        stack.callback(_switched(_SWITCH_S))
+        stack.callback(_switched(SWITCH_S))
         found, used = _opened(
             source,
             board,
@@ -213,10 +214,8 @@ def _rested(board: Board, line: Line, *, quiet: bool) -> Board:
     count = board.start.frames
     if not count:
         return board
-    say_rows(
-        ("measures", f"{count} frames for the baseline", "nothing may lie on it"),
-        quiet=quiet,
-    )
+    what = f"the baseline in {count} frames: nothing may lie on the sensor"
+    say_rows(("measures", what, ""), quiet=quiet)
     found: list[Cells] = []
     is_told = False
     while len(found) < count:
