@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -300,6 +301,23 @@ def test_a_full_disk_is_told_and_keeps_what_came_before(tmp_path: Path) -> None:
     assert path.stat().st_size == 1500
     assert len(found.frames) == found.numbers[-1] + 1 >= 5
     assert found.cut_bytes > 0
+
+
+def test_a_disk_that_keeps_nothing_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.ftr"
+    recorder = Recorder(path, BOARD)
+
+    def fail(_file: int) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr("fuzzytree.tactile.recording._to_disk", fail)
+    recorder.write(Frame(np.zeros((3, 4), int), 0.0, 0), Counters())
+    with pytest.raises(WriteError) as caught:
+        recorder.close()
+    assert str(caught.value) == f"{path}: cannot be written: input/output error"
+    assert len(read_recording(path).frames) == 1
 
 
 ENDLESS = """

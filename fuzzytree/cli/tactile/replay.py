@@ -97,7 +97,9 @@ def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
     board, sensor = file.board, file.board.sensor
     family = type(board.protocol).__name__.lower()
     size = f"{sensor.rows} x {sensor.columns} cells, full {sensor.full}"
-    yield f"{name}: {board.name}, {size}, {family}, {board.port.baud} baud"
+    # A recording may come from anywhere, and a name may hold commands for a terminal.
+    shown = board.name if board.name.isprintable() else repr(board.name)
+    yield f"{name}: {shown}, {size}, {family}, {board.port.baud} baud"
     seconds = found.seconds
     rate = f", {(found.frames - 1) / seconds:.1f} a second" if seconds > 0 else ""
     frames = counted(found.frames, "frame")
