@@ -12,30 +12,27 @@ rounding, so whatever order a library adds in, the sums have the same bits.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from fuzzytree.contracts import Model, Written
-from fuzzytree.errors import DisagreementError, LossError
+from fuzzytree.errors import DisagreementError
 from fuzzytree.exporters.onnx import FORMAT_VERSION, IRS, OPSETS, require, version
 from fuzzytree.rulebase import RuleBase, fingerprint
 from fuzzytree.tactile.aimed import frame_type, proving_frames
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
-from fuzzytree.tactile.plain import Shown, check_reject, plain_answer, plain_features
-from fuzzytree.tactile.sensor import Cells, Sensor, offsets
+from fuzzytree.tactile.plain import check_reject
+from fuzzytree.tactile.sensor import Sensor, offsets
 from fuzzytree.tactile.states import State
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     import onnx
 
     from fuzzytree.exporters.onnx_axes import Axes
     from fuzzytree.exporters.onnx_graph import Sheet
-
-    Answers = dict[str, npt.NDArray[np.generic]]
 
 Output = Literal["label", "state", "rule", "features", "strengths"]
 
@@ -100,6 +97,8 @@ def write_frames(
     proto = _model_proto(made, model, outputs, reject, opset, ir, plain=plain)
     content: bytes = proto.SerializeToString(deterministic=True)
     if verify:
+        from fuzzytree.exporters.onnx_frames_proof import differences
+
         frames = proving_frames(made, model)
         for text in differences(content, made, model, frames, outputs, reject):
             raise DisagreementError(text)
@@ -408,64 +407,3 @@ def _all_strengths(sheet: Sheet, model: Model, strengths: str, finite: str) -> N
 
 def _whole(sheet: Sheet, value: int) -> str:
     return sheet.constant(np.array(int(value), np.int64), "whole")
-
-
-# --- the proof
-
-
-def differences(
-    content: bytes,
-    made: FrameProgram,
-    model: Model,
-    frames: Cells,
-    outputs: Sequence[Output],
-    reject: float,
-) -> Iterator[str]:
-    """Yield where a file gives other answers than plain Python, bit by bit.
-
-    Raises:
-        LossError: If onnxruntime does not load or run the file.
-    """
-    found = _run(content, model, frames, outputs)
-    for number, frame in enumerate(frames):
-        values, is_pressed = plain_features(made, frame)
-        right = plain_answer(model, values, is_pressed=is_pressed, reject=reject)
-        for name in outputs:
-            given = np.asarray(found[name][number]).tolist()
-            expected = np.asarray(_expected(model, right, name)).tolist()
-            if given != expected:
-                yield (
-                    f"the onnx file of {model.name} gives other {name} than plain "
-                    f"Python for aimed frame {number}: {given}, not {expected}"
-                )
-
-
-def _run(
-    content: bytes, model: Model, frames: Cells, outputs: Sequence[Output]
-) -> Answers:
-    import onnxruntime
-
-    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_bare
-
-    try:
-        found = open_bare(content)(list(outputs), {"frames": frames})
-    except RUNTIME_ERRORS as error:
-        raise LossError(
-            f"cannot write {model.name} as onnx: onnxruntime "
-            f"{onnxruntime.__version__} does not run it: {first_line(error)}"
-        ) from error
-    return {name: np.asarray(one) for name, one in zip(outputs, found, strict=True)}
-
-
-def _expected(model: Model, shown: Shown, name: Output) -> object:
-    match name:
-        case "label":
-            return model.classes[shown.code] if shown.code >= 0 else ""
-        case "state":
-            return int(shown.state)
-        case "rule":
-            return shown.rule
-        case "features":
-            return shown.features
-        case "strengths":
-            return shown.strengths

@@ -12,9 +12,9 @@ from onnx import numpy_helper
 from fuzzytree.errors import InvalidModelError, ReadError, TableError
 from fuzzytree.exporters.onnx_frames import (
     Output,
-    differences,
     write_frames,
 )
+from fuzzytree.exporters.onnx_frames_proof import differences
 from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.rulebase import fingerprint
