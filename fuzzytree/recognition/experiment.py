@@ -306,7 +306,9 @@ class _School:
         learnt, picked = self.learn(split.train)
         found = Recogniser(learnt.tree, task.sensor)(task.frames[split.test])
         count = len(task.classes)
-        answers = np.where(found.states == State.NOTHING, count, found.codes)
+        place = {name: code for code, name in enumerate(task.classes)}
+        own = np.array([place[name] for name in found.classes], np.int64)
+        answers = np.where(found.states == State.NOTHING, count, own[found.codes])
         answers = np.where(found.states == State.UNKNOWN, count + 1, answers)
         right = int(np.count_nonzero(answers == task.codes[split.test]))
         trained = len(self.rows(split.train))

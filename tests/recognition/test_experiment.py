@@ -101,6 +101,18 @@ def test_the_cheaper_of_equal_features_is_asked() -> None:
         assert tree.inputs == ("peak",)
 
 
+def test_a_class_that_only_the_tested_person_has_is_mistaken_and_no_other() -> None:
+    task = bars()
+    codes = np.where(task.subject == 2, 0, 2 * task.codes)
+    codes[task.subject == 2] = 1
+    study = experiment(
+        dataclasses.replace(task, codes=codes, classes=("upright", "odd", "flat"))
+    ).study
+    assert study.trials[1].right == 0
+    assert study.confusion[1][1] == 0
+    assert sum(study.confusion[1]) == 8
+
+
 def test_the_same_experiment_gives_the_same_study() -> None:
     assert experiment(bars()) == experiment(bars())
 
