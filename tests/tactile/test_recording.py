@@ -148,6 +148,28 @@ def test_bytes_that_are_lost_or_too_many_cost_the_records_they_touch(
     assert found.damaged >= 1
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_however_a_file_is_damaged_only_true_frames_come_out(
+    tmp_path: Path, seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    content = _record(tmp_path / "a.ftr", 12)
+    begin = len(content) - 12 * RECORD
+    known = {number: cells.tolist() for number, cells in enumerate(_frames(12))}
+    for _ in range(40):
+        damaged = bytearray(content)
+        for _ in range(random.integers(1, 6)):
+            place = int(random.integers(begin, len(damaged) + 1))
+            end = place + int(random.choice([0, 1, 5, 150]))
+            damaged[place:end] = random.bytes(int(random.choice([0, 1, 5, 150])))
+        found = _read(tmp_path / "b.ftr", bytes(damaged))
+        for number, cells in zip(found.numbers.tolist(), found.frames, strict=True):
+            assert cells.tolist() == known[number]
+        if len(found.frames) < 12:
+            assert found.damaged or found.cut_bytes
+        assert found.numbers.tolist() == sorted(set(found.numbers.tolist()))
+
+
 def test_a_file_made_to_be_slow_is_refused(tmp_path: Path) -> None:
     board = Board("mat", Sensor(256, 256), Marker("AA 55"))
     header = records.header(board, 0)

@@ -145,7 +145,8 @@ class _Coming:
 
     def begin(self, limit_s: float | None) -> None:
         """Begin to count, now."""
-        self._begun, self._limit_s = time.monotonic(), limit_s
+        self._begun = self._said = time.monotonic()
+        self._limit_s = limit_s
 
     def is_late(self) -> bool:
         """Tell whether the time is over."""
