@@ -5,6 +5,7 @@ The only module that knows pyserial.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import itertools
 import os
@@ -212,16 +213,20 @@ class Line:
                 try:
                     self._listen()
                 except OSError:  # pyserial's error is one
-                    self._serial.close()
+                    self._shut()
                     if not self._is_back():
                         return
         except BaseException as error:  # raised by `take`, in the thread that asks
             self._error = error
         finally:
-            self._serial.close()
+            self._shut()
             with self._news:
                 self.state = "ended"
                 self._news.notify_all()
+
+    def _shut(self) -> None:
+        with contextlib.suppress(OSError):  # of a port that is away
+            self._serial.close()
 
     def _listen(self) -> None:
         """Read and ask until told to stop, or until the port fails."""

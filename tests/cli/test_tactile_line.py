@@ -137,6 +137,12 @@ def test_a_file_that_is_there_is_replaced_only_by_force(
     assert len(read_recording("a.ftr").frames) == 1
 
 
+def test_a_recording_is_a_file(call: Call, place: Path) -> None:
+    code, _, err = call("tactile", "record", "mat.yaml", "/dev/nix", "-o", "-")
+    message = "a recording is a file, and not standard output"
+    assert (code, err.splitlines()[0]) == (2, message)
+
+
 def test_a_port_that_is_not_there_is_one_sentence(call: Call, place: Path) -> None:
     there = ", ".join(port.device for port in ports()) or "none"
     code, _, err = call("tactile", "record", "mat.yaml", "/dev/nix", "-o", "b.ftr")

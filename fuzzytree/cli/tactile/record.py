@@ -70,6 +70,8 @@ def command(
     from fuzzytree.tactile.line import open_line, start
     from fuzzytree.tactile.recording import Recorder
 
+    if output == "-":
+        raise click.UsageError("a recording is a file, and not standard output")
     known = load_board(board)
     check_place(output)
     if Path(output).exists() and not force:
