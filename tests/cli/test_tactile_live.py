@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import itertools
 import json
 import os
 import pty
+import re
 import select
+import shlex
 import signal
 import struct
 import subprocess
@@ -15,7 +18,7 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -350,3 +353,39 @@ def test_lines_come_at_once_while_live_goes_on(call: Call, tmp_path: Path) -> No
         assert run.wait(30) == 0
         timer.cancel()
     assert line.count(b"\t") == 5
+
+
+@pytest.mark.heavy
+def test_the_commands_of_the_page_do_what_it_says(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = Path(__file__).parents[2].joinpath("docs/live.md").read_text("utf-8")
+    monkeypatch.chdir(tmp_path)
+    (board,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    Path("mat.yaml").write_text(board, "utf-8")
+    lines = "".join(re.findall(r"```console\n(.*?)```", page, re.DOTALL)).splitlines()
+    assert len(lines) == 6
+    with contextlib.ExitStack() as stack:
+        for line in lines:
+            words = shlex.split(line)[1:]
+            if "simulate" in words:
+                stack.enter_context(simulated(*words))
+                continue
+            is_live = "live" in words
+            assert main([*words, *(("--frames", "130") if is_live else ())]) == 0
+            out = capsys.readouterr().out
+            assert ("\tobject\trectangle-27\t" in out) == is_live
+
+
+@contextlib.contextmanager
+def simulated(*words: str) -> Iterator[None]:
+    """Run a board until the end of the block."""
+    command = [sys.executable, "-m", "fuzzytree", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as run:
+        assert run.stdout is not None
+        assert run.stdout.readline() == b"board\n"
+        yield
+        run.send_signal(signal.SIGINT)
+        assert run.wait(30) == 0
