@@ -21,6 +21,7 @@ from fuzzytree.tactile.plain import check_reject, plain_answer, plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor, offsets
 
 _PRESSES = 6  # in the self-test, beside aimed frames
+_CELLS, _FEWEST = 40_000, 6  # of its frames
 _LIBRARY = {"square_root": LIBRARY["square_root"]}
 
 _TYPES = """
@@ -343,6 +344,8 @@ def _selftest(
     """Yield aimed frames with their answers, and a program that compares them."""
     frames = proving_frames(made, model, _PRESSES)
     size = made.sensor.rows * made.sensor.columns
+    few = max(_FEWEST, _CELLS // size)  # a large sensor would make a file of megabytes
+    frames = frames[:: -(-len(frames) // few)]
     yield fill("\n#ifdef NAME_SELFTEST\n#include <stdio.h>\n\n", prefix)
     yield fill(
         f"static const name_cell name_frame[{len(frames)}][{size}] = {{\n", prefix

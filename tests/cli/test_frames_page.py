@@ -22,7 +22,7 @@ def test_the_commands_of_the_page_run(
     blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     lines = [line for block in blocks for line in block.splitlines()]
     lines += re.findall(r"`(fuzzytree convert [^`]+)`", text)
-    assert len(lines) == 7
+    assert len(lines) == 10
     for line in lines:
         words = shlex.split(line)[1:]
         few = ["--rounds", "6", "--quiet"] if "bench" in words else []

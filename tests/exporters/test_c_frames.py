@@ -56,6 +56,12 @@ def test_a_library_is_needed_for_roots_alone() -> None:
     assert "math.h" in text_of(SMALL, "angle")
 
 
+def test_a_large_sensor_makes_no_large_file() -> None:
+    found = re.search(r"tree_frame\[(\d+)\]", text_of(Sensor(100, 100), "area"))
+    assert found is not None
+    assert int(found[1]) in range(4, 7)
+
+
 def test_the_same_model_gives_the_same_bytes() -> None:
     one, two = (write_frames_c(TREE, PLAIN, name="pad").content for _ in range(2))
     assert one == two
