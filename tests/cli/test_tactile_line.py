@@ -153,8 +153,8 @@ def test_a_port_that_is_not_there_is_one_sentence(call: Call, place: Path) -> No
 def test_a_port_that_goes_away_for_good_ends_the_recording(
     call: Call, place: Path
 ) -> None:
-    faults = Faults(unplug=Pause(seconds=60.0, every=8))
-    with Device(BOARD, blob(BOARD), faults, rate=3.0) as device:
+    faults = Faults(unplug=Pause(seconds=60.0, every=100))
+    with Device(BOARD, blob(BOARD), faults) as device:
         code, out, err = call(
             "tactile",
             "record",
@@ -163,24 +163,25 @@ def test_a_port_that_goes_away_for_good_ends_the_recording(
     assert code == 1
     found = json.loads(out)
     assert found["end"] == "port"
-    assert 3 <= found["frames"] == len(read_recording("b.ftr").frames) <= 4
+    # What the system had not given yet when the plug was pulled is lost.
+    assert 1 <= found["frames"] == len(read_recording("b.ftr").frames) < 97
     assert f"{device.port}: went away after {found['counters']['frames']} frames" in err
 
 
 def test_a_port_that_comes_back_goes_on_in_the_same_recording(
     call: Call, place: Path
 ) -> None:
-    faults = Faults(unplug=Pause(seconds=0.05, every=8))
-    with Device(BOARD, blob(BOARD), faults, rate=3.0) as device:
+    faults = Faults(unplug=Pause(seconds=0.05, every=100))
+    with Device(BOARD, blob(BOARD), faults) as device:
         code, out, err = call(
             "tactile",
             "record",
-            *("mat.yaml", device.port, "-o", "b.ftr", "--frames", "8", "--json"),
+            *("mat.yaml", device.port, "-o", "b.ftr", "--frames", "110", "--json"),
         )
     assert code == 0
     assert json.loads(out)["counters"]["reconnects"] >= 1
     assert f"{device.port}: went away, and is back\n" in err
-    assert len(read_recording("b.ftr").frames) == 8
+    assert len(read_recording("b.ftr").frames) == 110
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -356,6 +357,27 @@ def test_bytes_that_contradict_the_board_end_before_anything_is_written(
     last = err.splitlines()[-1]
     assert last.startswith(f"{name}: for 0 s bytes came but no frame of 'mat': the mar")
     assert last.endswith("mostly 18 bytes apart, which is 3 x 5 and not 4 x 5")
+    assert not Path("b.ftr").exists()
+
+
+def test_a_board_that_is_silent_is_told_and_leaves_no_file(
+    call: Call, place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fuzzytree.tactile.watching.PATIENCE_S", 0.05)
+    end, host = os.openpty()
+    name = os.ttyname(host)
+    timer = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    found = call("tactile", "record", "mat.yaml", name, "-o", "b.ftr")
+    os.close(end)
+    os.close(host)
+    assert found == (
+        0,
+        "",
+        f"opened   {name} mat, 115200 baud\n"
+        f"{name}: no frame comes; waiting\n"
+        "ended before the baseline was measured; nothing was written\n",
+    )
     assert not Path("b.ftr").exists()
 
 

@@ -115,16 +115,17 @@ def _record(
         recorder.write(frame, line.counters)
         if coming.written(frame) == frames:
             return "frames"
-    if coming.is_late():
+    if line.state == "ended":
+        return "port"
+    if not coming.is_told():
         return "seconds"
-    end: End = "told" if line.state != "ended" else "port"
     line.close()  # what came before is kept
     with contextlib.suppress(PortError):  # whatever it is, it comes too late
         for frame in line:
             recorder.write(frame, line.counters)
             if coming.written(frame) == frames:
                 break
-    return end
+    return "told"
 
 
 class _Coming:
@@ -150,15 +151,14 @@ class _Coming:
         self._begun = self._said = time.monotonic()
         self._limit_s = limit_s
 
-    def is_late(self) -> bool:
-        """Tell whether the time is over."""
-        limit_s = self._limit_s
-        return limit_s is not None and time.monotonic() - self._begun >= limit_s
+    def is_told(self) -> bool:
+        """Tell whether to end."""
+        return self._told.is_set()
 
     def takes(self, frame: Frame) -> bool:
-        """Tell whether a frame came within the time."""
-        begun_s = self._begun - self._line.opened_at
-        return self._limit_s is None or frame.time - begun_s < self._limit_s
+        """Tell whether a frame came within the time, from the first one on."""
+        limit_s = self._limit_s
+        return limit_s is None or not self.count or frame.time - self.first_s < limit_s
 
     def written(self, frame: Frame) -> int:
         """Count a frame; return how many there are."""
@@ -169,8 +169,8 @@ class _Coming:
         return self.count
 
     def frames(self) -> Iterator[Frame]:
-        """Give frames until told to end, until it is late or the line ends."""
-        while not self._told.is_set() and not self.is_late():
+        """Give frames until told to end, until the time is over or the line ends."""
+        while not self._told.is_set():
             frame = None
             try:
                 frame = self._line.take(_LOOK_S)
@@ -182,8 +182,12 @@ class _Coming:
             if frame is not None:
                 self._any = True
                 yield frame
-            elif self._line.state == "ended":
+            elif self._line.state == "ended" or self._is_late():
                 return
+
+    def _is_late(self) -> bool:
+        limit_s = self._limit_s
+        return limit_s is not None and time.monotonic() - self._begun >= limit_s
 
     def _tell(self) -> None:
         """Say when the line changes, and each second, on a terminal, how far it is."""
