@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import msgspec
 import numpy as np
 
-from fuzzytree.errors import TableError
+from fuzzytree.errors import LearningError, TableError
 from fuzzytree.learning import Learnt, Settings, learn_arrays
 from fuzzytree.recognition.choosing import Candidate, chosen
 from fuzzytree.recognition.pairing import Pairing, paired
@@ -34,6 +34,7 @@ Progress = Callable[[str, float], None]
 NOTHING, UNKNOWN = "(nothing)", "(unknown)"
 """The columns of a confusion table behind those of the classes."""
 
+_FEWEST_TO_CHOOSE = 3  # one is tested, one is left out to choose, one is learnt from
 _TIE = 1e-6  # of a cost: among equals the cheaper one wins, and nothing else changes
 
 
@@ -165,14 +166,16 @@ def experiment(
         progress: Told what is done and which share of it.
 
     Raises:
-        TableError: If a feature is unknown, or to choose where subjects are not known.
+        TableError: If a feature is unknown, or to choose by fewer than three subjects.
         InvalidModelError: If a feature is beyond the sensor.
         LearningError: If nothing can be learnt.
         MissingExtraError: If peers are asked for and scikit-learn is not there.
     """
-    if choose and not len(task.subject):
+    known = len(np.unique(task.subject))
+    if choose and known < _FEWEST_TO_CHOOSE:
         raise TableError(
-            f"{task.name}: settings are chosen by subjects, and there are none"
+            f"{task.name}: settings are chosen by leaving subjects out twice, which "
+            f"needs {_FEWEST_TO_CHOOSE} at least, not {known}"
         )
     text = task.features if features is None else features
     names = names_of(text)
@@ -280,6 +283,8 @@ class _School:
             LearningError: If nothing can be learnt from them.
         """
         task, settings, rows = self.task, self.settings, self.rows(train)
+        if not len(rows):
+            raise LearningError(f"nothing presses on any of {len(train)} frames")
         values, codes = self.found.values[:, rows], task.codes[rows]
         picked: Candidate | None = None
         if self.choose:
@@ -303,7 +308,10 @@ class _School:
             LearningError: If nothing can be learnt from its frames.
         """
         task = self.task
-        learnt, picked = self.learn(split.train)
+        try:
+            learnt, picked = self.learn(split.train)
+        except LearningError as error:
+            raise LearningError(f"without {split.name}: {error}") from error
         found = Recogniser(learnt.tree, task.sensor)(task.frames[split.test])
         count = len(task.classes)
         place = {name: code for code, name in enumerate(task.classes)}

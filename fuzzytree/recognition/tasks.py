@@ -262,7 +262,7 @@ def file_task(
     name = os.fspath(path)
     presses = read_presses(path, label=label)
     least = presses.threshold if threshold is None else threshold
-    sensor = _sensor(presses, full or presses.full, least)
+    sensor = _sensor(presses, presses.full if full is None else full, least)
     if test is None:
         return by_subject(name, presses, sensor, f"{len(presses.frames)} frames")
     other, title = read_presses(test, label=label), os.fspath(test)

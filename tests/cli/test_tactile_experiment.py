@@ -132,7 +132,11 @@ def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
             "there is no task 'hands'; there is postures, postures-17, touch, "
             "touch-fingers",
         ),
-        (["paper", "--choose"], "paper: settings are chosen by subjects"),
+        (["paper", "--choose", "--repeats", "1"], "paper: settings are chosen by"),
+        (["paper", "--full", "9"], "--full does nothing for 'paper'"),
+        (["touch", "--test", "bars.npz"], "--test does nothing for 'touch'"),
+        (["bars.npz", "--sensor", "ideal"], "--sensor does nothing for 'bars.npz'"),
+        (["bars.npz", "--full", "0"], "full lies in 1 to 65535, not 0"),
         (["bars.npz", "--label", "kind"], "bars.npz: no class is known"),
         (["bars.npz", "--test", "bars.npz"], "3 subjects are both in bars.npz and in"),
         (["bars.npz", "--entry", "-1"], "entry is at least 0, not -1.0"),

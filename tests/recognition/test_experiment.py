@@ -8,7 +8,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from fuzzytree.errors import MissingExtraError, TableError
+from fuzzytree.errors import LearningError, MissingExtraError, TableError
 from fuzzytree.learning import Settings
 from fuzzytree.recognition import peers
 from fuzzytree.recognition.choosing import CANDIDATES, Candidate, chosen
@@ -134,12 +134,29 @@ def test_the_settings_that_carry_over_to_other_people_are_chosen() -> None:
     assert chosen(values, codes, subject, Settings(), few) == few[1]
 
 
+def test_frames_without_pressure_are_told_with_the_division() -> None:
+    task = bars()
+    with pytest.raises(LearningError) as told:
+        experiment(dataclasses.replace(task, frames=0 * task.frames))
+    assert str(told.value) == ("without subject 1: nothing presses on any of 16 frames")
+
+
+def test_one_class_to_learn_from_is_told_with_the_division() -> None:
+    task = bars(subjects=2)
+    with pytest.raises(LearningError) as told:
+        experiment(dataclasses.replace(task, codes=task.subject - 1))
+    assert str(told.value) == (
+        "without subject 1: cannot learn from one class: every row is 'flat'"
+    )
+
+
 def test_settings_are_not_chosen_where_subjects_are_not_known() -> None:
     task = dataclasses.replace(bars(), subject=np.zeros(0, np.int64))
     with pytest.raises(TableError) as told:
         experiment(task, choose=CANDIDATES)
     assert str(told.value) == (
-        "bars: settings are chosen by subjects, and there are none"
+        "bars: settings are chosen by leaving subjects out twice, which needs 3 at "
+        "least, not 0"
     )
 
 

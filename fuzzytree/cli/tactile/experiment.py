@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 import msgspec
+from click.core import ParameterSource
 
 from fuzzytree.cli.talk import (
     answer,
@@ -30,6 +31,18 @@ if TYPE_CHECKING:
 _FRAMES_SHOWN = 7
 _TIMES = (1, 3, 5, 7)
 """Points for a cell in the pictures, as in the paper's Fig. 6."""
+
+
+_ONLY = {
+    "sensor": ("paper",),
+    "repeats": ("paper",),
+    "test": ("file",),
+    "label": ("file",),
+    "full": ("file",),
+    "threshold": ("file",),
+    "data": ("known",),
+}
+"""The kinds of task that an option is for."""
 
 
 @click.command("experiment", short_help="Learn, test and compare on frames.")
@@ -111,6 +124,7 @@ def command(
     from fuzzytree.recognition.peers import PEERS, are_there
     from fuzzytree.report.experiment import experiment_lines
 
+    _check_options(task)
     if output is not None:
         _check_folder(Path(output))
     given = {
@@ -146,6 +160,20 @@ def command(
         )
     if output is not None:
         _write(Path(output), found, outcome, lines, quiet=quiet)
+
+
+def _check_options(task: str) -> None:
+    """Refuse options of another kind of task, which would do nothing.
+
+    Raises:
+        click.UsageError: If one was given.
+    """
+    context = click.get_current_context()
+    kind = "paper" if task == "paper" else "file" if task.endswith(".npz") else "known"
+    for name, kinds in _ONLY.items():
+        source = context.get_parameter_source(name)
+        if kind not in kinds and source is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name} does nothing for {task!r}")
 
 
 def _paper(sensor: str, seed: int, repeats: int) -> Task:
