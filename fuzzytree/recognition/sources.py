@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from fuzzytree.errors import PortError
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.line import Line
@@ -118,6 +119,7 @@ class FromLine:
 
     def __init__(self, line: Line) -> None:
         self._line = line
+        self._contradiction = ""
 
     @property
     def counters(self) -> Counters:
@@ -129,17 +131,33 @@ class FromLine:
         """A sentence about a line that gives no frames."""
         match self._line.state:
             case "open":
-                return ""
+                return self._contradiction
             case "silent":
-                return "the board is silent"
+                return self._contradiction or "the board is silent"
             case "away":
                 return f"{self._line.port} went away; waiting until it is back"
             case "ended":
                 return f"{self._line.port} gives no more frames"
 
     def __iter__(self) -> Iterator[Frame]:
-        """Give frames until the line ends."""
-        return iter(self._line)
+        """Give frames until the line ends.
+
+        Raises:
+            PortError: If bytes come that are no frames of the board, and no frame has
+                come before; later that is a trouble, and it goes on.
+        """
+        while True:
+            try:
+                frame = self._line.take()
+            except PortError as error:
+                if not self._line.counters.frames:
+                    raise
+                self._contradiction = str(error)
+                continue
+            if frame is None:
+                return
+            self._contradiction = ""
+            yield frame
 
     def now(self) -> float:
         """Return the time since the line was opened."""
