@@ -71,6 +71,23 @@ def test_orientation_features_tell_angles_apart_on_either_sensor() -> None:
         assert study.accuracy > 0.97
 
 
+def test_on_an_even_sensor_invariants_tell_shapes_and_scatter_tells_some_angles() -> (
+    None
+):
+    task = paper_task(physics=IDEAL)
+    plain = experiment(task).study
+    assert 4 / 7 - 0.05 < plain.accuracy < 0.75  # 4 / 7: shapes, and no angle
+    scaled = experiment(task, features="log paper / force").study
+    assert is_within(scaled, 0.816), scaled.accuracy
+    assert scaled.accuracy > plain.accuracy + 0.05
+
+
+def test_the_learner_of_the_paper_comes_to_the_papers_rate() -> None:
+    study = experiment(paper_task(), settings=Settings(mode="paper")).study
+    assert is_within(study, 0.899), study.accuracy
+    assert all(trial.features <= 3 for trial in study.trials)
+
+
 def test_frames_divided_at_random_would_flatter() -> None:
     pytest.importorskip("sklearn")
     task = known_task("postures-17")
