@@ -101,7 +101,7 @@ def test_the_frames_of_every_family_come_as_they_were_sent(protocol: Protocol) -
     ):
         found = _taken(line, 30)
         assert line.counters.frames == 30
-        assert line.counters.bytes == device.truth.bytes
+        _until(lambda: line.counters.bytes == device.truth.bytes)
         assert line.state == "open"
     assert [frame.number for frame in found] == list(range(30))
     assert (np.array([frame.cells for frame in found]) == np.array(sent)).all()
