@@ -182,6 +182,7 @@ class Watch:
         alone: Whether it stands alone.
         came: Whether it came.
         end_is_hit: Whether a fault touched the end of the last frame.
+        answer: The last answer of a board that is asked, whole; empty for others.
     """
 
     def __init__(self, board: Board, pool: Pool, frames: int) -> None:
@@ -190,6 +191,7 @@ class Watch:
         self.touched, self.alone = bytearray(frames), bytearray(frames)
         self.came = bytearray(frames)
         self.end_is_hit = False
+        self.answer = b""
         self._last = -1  # the number of the last right frame
 
     def sent(self, is_touched: bool, *, is_alone: bool = False) -> None:
@@ -206,7 +208,8 @@ class Watch:
             assert cells.shape == shape, cells.shape
             number = self._number(cells)
             if number is None:
-                verdict = explained(self.board, bytes(self.recent), cells)
+                came = self.answer or bytes(self.recent)
+                verdict = explained(self.board, came, cells)
                 setattr(self.count, verdict, getattr(self.count, verdict) + 1)
             else:
                 self._last = number
@@ -372,6 +375,7 @@ def _answers(
         watch.sent(len(after.touched) > 0)
         given = watch.count.given
         data = after.data
+        watch.answer = data
         if random.random() < faults.noise:  # late: the rest comes when nobody waits
             half = len(data) // 2
             watch.touched[number] = True
@@ -478,7 +482,7 @@ def _explained_request(
         body = recent[max(found - protocol.skip, 0) : end]
         check = checksum(protocol.checksum, body)
         if recent[end : end + len(check)] == check:
-            return "untold"
+            return "untold" if end + len(check) == len(recent) else "late"
     return "unexplained"
 
 

@@ -22,10 +22,14 @@ class RequestDecoder(Decoder):
         self.ask = bytes.fromhex(protocol.ask)
         self._layout = layout_of(board, protocol)
         self._banner = board.banner
+        self._is_given = False  # the last bytes were an answer, and it is not proven
 
     def asked(self) -> None:
         """Note that `ask` was sent: what came before is no part of the answer."""
         if not self._banner:
+            # An answer that was too long: a byte of it may have been added.
+            self.counters.doubtful += self._is_given and bool(self._buffer)
+            self._is_given = False
             self._skip(len(self._buffer))
 
     def timed_out(self) -> None:
@@ -34,6 +38,7 @@ class RequestDecoder(Decoder):
         What came of it is damaged; a banner that did not come is awaited no longer.
         """
         self._banner = 0
+        self._is_given = False
         self.counters.damaged += bool(self._buffer)
         self._skip(len(self._buffer))
 
@@ -47,6 +52,8 @@ class RequestDecoder(Decoder):
         blocks = blocks_of(self._layout, self._buffer, count)
         good = are_whole(self._layout, blocks)
         whole = int(good.sum())
+        if whole:
+            self._is_given = self._layout.proof_bytes < 2
         self.counters.damaged += count - whole
         self.counters.skipped += (count - whole) * self._layout.size
         self.framed += whole * self._layout.size

@@ -129,9 +129,10 @@ class Wire:
             if self._due > now:
                 self._stop.wait(self._due - now)
             self._due = max(self._due, now - _SLACK_S)
+            self.bytes += len(piece)  # before a host can have them, and count
             if self._stop.is_set() or not self._given(self._as_heard(piece)):
+                self.bytes -= len(piece)
                 return False
-            self.bytes += len(piece)
         return True
 
     def _given(self, data: bytes) -> bool:

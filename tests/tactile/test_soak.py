@@ -13,7 +13,7 @@ import soak_line
 from msgspec.structs import replace
 
 from fuzzytree.readers.boards import load_board
-from fuzzytree.tactile.boards import Board, Marker, Sentinel, Text
+from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.decoding import decoder_of
 from fuzzytree.tactile.device import blob
 from fuzzytree.tactile.encoding import banner, encoded
@@ -135,6 +135,21 @@ def test_a_frame_is_late_if_only_the_next_marker_could_tell() -> None:
     assert soak.explained(board, data, lost) == "late"
     # Out of step nobody may believe it.
     assert soak.explained(board, b"\x00" + data[5:], lost) == "unexplained"
+
+
+def test_an_answer_that_was_too_long_is_late_and_doubtful() -> None:
+    board = Board("mat", Sensor(2, 2), Request("41"))
+    cells = np.array([[1, 2], [3, 4]])
+    decoder = decoder_of(board)
+    for answer, verdict, doubtful in (
+        (b"\1\2\3\4", "untold", 0),
+        (b"\1\2\3\4\4", "late", 1),
+    ):
+        decoder.asked()
+        assert [one.tolist() for one in decoder.feed(answer)] == [cells.tolist()]
+        assert soak.explained(board, answer, cells) == verdict
+        decoder.asked()
+        assert decoder.counters.doubtful == doubtful
 
 
 def test_the_judge_unpacks_runs_and_lines_by_itself() -> None:
