@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from fuzzytree.errors import PortError
+from fuzzytree.files import PathLike
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.line import Line
@@ -49,7 +50,8 @@ class Paced:
     def __init__(self, records: Iterable[Record], speed: float = 1.0) -> None:
         if not speed >= 0.0:
             raise ValueError(f"a speed is 0 or more, not {speed!r}")
-        self._records, self._speed = records, speed
+        self._records: Iterable[Record] = records
+        self._speed = speed
         self._is_closed = threading.Event()
         self._last = 0.0, time.monotonic()  # a frame's time, and when it went out
         self.counters = Counters()
@@ -65,7 +67,8 @@ class Paced:
             if self._speed:
                 before, went = self._last
                 due = went + (frame.time - before) / self._speed
-                self._is_closed.wait(max(due - time.monotonic(), 0.0))
+                rest = max(due - time.monotonic(), 0.0)
+                self._is_closed.wait(min(rest, threading.TIMEOUT_MAX))
             if self._is_closed.is_set():
                 return
             self._last = frame.time, time.monotonic()
@@ -86,16 +89,21 @@ class Replayed(Paced):
     """Gives the frames of a recording out, as `Paced`.
 
     Args:
-        file: The recording; it is closed with this.
+        path: The recording; it is open until this is closed.
         speed: How many times as fast as they came; 0 for no waiting at all.
+
+    Attributes:
+        board: What sent the frames.
 
     Raises:
         ValueError: If the speed is below 0.
+        ReadError: If it is no recording.
     """
 
-    def __init__(self, file: RecordingFile, speed: float = 1.0) -> None:
-        super().__init__(file, speed)
-        self._file = file
+    def __init__(self, path: PathLike, speed: float = 1.0) -> None:
+        super().__init__((), speed)
+        self._records = self._file = RecordingFile(path)
+        self.board = self._file.board
 
     @property
     def trouble(self) -> str:

@@ -163,6 +163,20 @@ def test_a_source_and_a_board_that_do_not_go_together_are_told(
     assert (code, err) == (2, f"{text}\n  {hint}\n")
 
 
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--speed", "nan"), "a speed is 0 or more, not nan"),
+        (("--reject", "nan"), "reject lies in 0 to 1, not nan"),
+    ],
+)
+def test_what_is_no_number_is_no_speed_and_no_share(
+    call: Call, words: tuple[str, ...], text: str
+) -> None:
+    code, _, err = call("some.ftr", "--model", "area.yaml", *words)
+    assert (code, err.splitlines()[0]) == (2, text)
+
+
 def test_a_port_that_is_not_there_is_told(call: Call) -> None:
     words = ("./gone", "--board", "mat.yaml", "--model", "area.yaml")
     code, _, err = call(*words)

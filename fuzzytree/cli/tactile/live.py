@@ -107,16 +107,16 @@ def command(
     known = _model(model)
     with contextlib.ExitStack() as stack:
         stack.callback(_switched(SWITCH_S))
-        found, used = _opened(
-            source,
-            board,
-            speed=speed,
-            seed=seed,
-            is_kept=record is not None,
-            quiet=quiet,
-        )
-        stack.callback(found.close)
         with wrong_options():
+            found, used = _opened(
+                source,
+                board,
+                speed=speed,
+                seed=seed,
+                is_kept=record is not None,
+                quiet=quiet,
+            )
+            stack.callback(found.close)
             recogniser = Recogniser(known, used.sensor, reject)
         live = Live(recogniser, found, source)
         recorder = _recorder(record, used)
@@ -171,7 +171,6 @@ def _opened(
 ) -> tuple[Source, Board]:
     """Return where frames come from, and the board that they fit."""
     from fuzzytree.recognition import sources
-    from fuzzytree.tactile.recording import RecordingFile
 
     is_file = Path(source).is_file()
     if board is None and source != SIMULATOR and not is_file:
@@ -183,8 +182,8 @@ def _opened(
     if source == SIMULATOR:
         return sources.Paced(sources.simulated(seed), speed), sources.PAPER_BOARD
     if is_file:
-        file = RecordingFile(source)
-        return sources.Replayed(file, speed), file.board
+        replayed = sources.Replayed(source, speed)
+        return replayed, replayed.board
     assert board is not None  # refused above
     return _line(source, board, is_kept=is_kept, quiet=quiet)
 
