@@ -95,11 +95,13 @@ def _cell(text: str) -> str:
 
 
 def _features_text(study: Study) -> str:
-    shown = ", ".join(study.names[:_NAMES_TOLD])
-    more = ", ..." if len(study.names) > _NAMES_TOLD else ""
+    names = study.names
+    shown = ", ".join(names)
+    if len(names) > _NAMES_TOLD:
+        shown = f"{names[0]}, ..., {names[-1]}"
     if study.features == shown:
         return shown
-    return f"{study.features} ({len(study.names)}: {shown}{more})"
+    return f"{study.features} ({len(names)}: {shown})"
 
 
 def _trees_text(study: Study) -> str:
