@@ -355,7 +355,8 @@ def test_bytes_that_contradict_the_board_end_before_anything_is_written(
     os.close(host)
     assert code == 2
     last = err.splitlines()[-1]
-    assert last.startswith(f"{name}: for 0 s bytes came but no frame of 'mat': the mar")
+    assert last.startswith(f"{name}: for ")
+    assert " s bytes came but no frame of 'mat': the marker AA 55 came " in last
     assert last.endswith("mostly 18 bytes apart, which is 3 x 5 and not 4 x 5")
     assert not Path("b.ftr").exists()
 
