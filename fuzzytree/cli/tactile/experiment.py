@@ -295,7 +295,8 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
     if len(study.classes) <= MOST_CLASSES:
         table = np.array(study.confusion, np.int64)
         count = len(study.classes)
-        counts = np.column_stack([table[:, :count], table[:, count:].sum(axis=1)])
+        none = table[:, count:].sum(axis=1, keepdims=True)
+        counts = np.hstack([table[:, :count], none]) if none.any() else table[:, :count]
         found["confusion.svg"] = drawn(draw_confusion(counts, study.classes), ".svg")
     first = [int(np.argmax(task.codes == code)) for code in range(len(study.classes))]
     cells = pressed(task.sensor, task.frames[first[:_FRAMES_SHOWN]])
