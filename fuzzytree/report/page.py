@@ -36,6 +36,7 @@ MOST_BROWSERS = 8
 _REFRESHES = 30  # a second, at most
 _PATIENCE_S = 10.0  # for a browser that neither reads nor asks
 _ALIVE_S = 0.5  # between two events where no frames come
+_RETRY_MS = 1000  # after which a browser that lost the connection asks again
 _BACKLOG = 1 << 16  # bytes that wait for a slow browser: newer frames replace older
 _MOST_POINTS = 1 << 16  # of a picture
 
@@ -216,6 +217,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Send what there is to see, the newest only, until it is over."""
         live, server = self.own.live, self.own
         self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BACKLOG)
+        self.wfile.write(b"retry: %d\n\n" % _RETRY_MS)
         self._send("hello", hello_facts(live.view()))
         seen, is_over = 0, False
         while not is_over:

@@ -203,6 +203,22 @@ def test_the_page_says_that_the_source_is_gone(seen: Seen) -> None:
     assert seen.text("status") == gone
 
 
+def test_the_page_comes_back_when_live_is_started_anew(seen: Seen) -> None:
+    seen.show(SMALL)
+    seen.until_text("label", "s")
+    seen.source.put(None)
+    seen.until_text("status", "the source is gone: no more frames")
+    seen.page.close()
+    source = Shown()
+    source.put(NOTHING)
+    source.put(None)
+    live = Live(seen.live.recogniser, source, "another board")
+    answers = live.answers()
+    next(answers)
+    with Page(live, int(seen.page.url.strip("/").rpartition(":")[2])):
+        seen.until_text("source", "another board")
+
+
 def test_the_page_says_that_the_board_is_silent(seen: Seen) -> None:
     seen.show(SMALL)
     seen.source.trouble = "the board is silent"
