@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 import serial
@@ -221,6 +223,14 @@ def test_a_port_is_made_over_a_dead_link_only(tmp_path: Path) -> None:
     assert link.read_text("utf-8") == "mine"
 
 
+def test_what_took_the_place_of_the_link_is_left_alone(tmp_path: Path) -> None:
+    link = tmp_path / "board"
+    with Device(MAT, [], link=link):
+        link.unlink()
+        link.write_text("mine", "utf-8")
+    assert link.read_text("utf-8") == "mine"
+
+
 def test_a_fault_that_the_board_cannot_have_is_refused() -> None:
     board = Board("mat", Sensor(4, 4), Text())
     with pytest.raises(ValueError, match="has no marker that cells could hold"):
@@ -245,3 +255,14 @@ def test_a_blob_holds_only_what_the_board_can_send(
     frames = np.array(_frames(board, 50))
     assert (frames.min(), frames.max()) == expected
     assert len({cells.tobytes() for cells in frames}) == 50
+
+
+def test_the_page_names_every_fault_and_its_example_runs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "device.md").read_text("utf-8")
+    for fault in msgspec.structs.fields(Faults):
+        assert f"| `{fault.name}=" in page
+    (script,) = re.findall("```python\n(.*?)```", page, re.DOTALL)
+    exec(script, {})
+    assert capsys.readouterr().out == "200 True\n"
