@@ -32,11 +32,11 @@ from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.recognition.sources import PAPER_BOARD, FromLine, simulated
 from fuzzytree.runtimes.frames import features_of
 from fuzzytree.tactile.boards import Board, Marker, Port
-from fuzzytree.tactile.encoding import encoded
 from fuzzytree.tactile.line import open_line
-from fuzzytree.tactile.objects import OBJECTS
-from fuzzytree.tactile.physics import press
-from fuzzytree.tactile.wire import Wire
+from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulated.objects import OBJECTS
+from fuzzytree.tactile.simulated.physics import press
+from fuzzytree.tactile.simulated.wire import Wire
 from fuzzytree.tree import FuzzyTree
 from fuzzytree.verbs import learn
 

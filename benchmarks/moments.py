@@ -18,9 +18,9 @@ import numpy as np
 
 from fuzzytree.runtimes.frames import FramePlan, features_of
 from fuzzytree.runtimes.images import features_of_images
-from fuzzytree.tactile.exact import exact_features
 from fuzzytree.tactile.features import costs
-from fuzzytree.tactile.names import FEATURES, PAPER
+from fuzzytree.tactile.features.exact import exact_features
+from fuzzytree.tactile.features.names import FEATURES, PAPER
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from fuzzytree.contracts import Model, Written
 from fuzzytree.exporters.c import Made, beginning
 from fuzzytree.exporters.c_steps import HELPERS, LIBRARY, Steps
 from fuzzytree.exporters.c_text import DOUBLE, fill, remark, whole_lines, whole_table
-from fuzzytree.tactile.aimed import frame_type, proving_frames
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
-from fuzzytree.tactile.plain import check_reject, plain_answer, plain_features
+from fuzzytree.tactile.features.aimed import frame_type, proving_frames
+from fuzzytree.tactile.features.plain import check_reject, plain_answer, plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor, offsets
 
 _PRESSES = 6  # in the self-test, beside aimed frames

@@ -12,7 +12,7 @@ from fuzzytree.contracts import Model
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_bare
 from fuzzytree.tactile.features import FrameProgram
-from fuzzytree.tactile.plain import Shown, plain_answer, plain_features
+from fuzzytree.tactile.features.plain import Shown, plain_answer, plain_features
 from fuzzytree.tactile.sensor import Cells
 
 if TYPE_CHECKING:

@@ -21,12 +21,12 @@ from fuzzytree.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.recognition.runners import NUMPY, PLAIN, Found, Runner, as_sent, runners
 from fuzzytree.recognition.scales import errors
 from fuzzytree.rulebase import RuleBase, fingerprint
-from fuzzytree.tactile.aimed import proving_frames
-from fuzzytree.tactile.exact import exact_features
 from fuzzytree.tactile.features import frame_program
-from fuzzytree.tactile.plain import plain_answer
+from fuzzytree.tactile.features.aimed import proving_frames
+from fuzzytree.tactile.features.exact import exact_features
+from fuzzytree.tactile.features.plain import plain_answer
+from fuzzytree.tactile.features.states import State
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
-from fuzzytree.tactile.states import State
 
 EXACT = "exact arithmetic"
 

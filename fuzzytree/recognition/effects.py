@@ -18,9 +18,9 @@ import numpy as np
 
 from fuzzytree.recognition.table2 import FEATURES, TABLE_2, Comparison
 from fuzzytree.runtimes.frames import FramePlan
-from fuzzytree.tactile.objects import OBJECTS
-from fuzzytree.tactile.physics import FULL, PAPER, SIDE, Settings, press
 from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulated.objects import OBJECTS
+from fuzzytree.tactile.simulated.physics import FULL, PAPER, SIDE, Settings, press
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

@@ -20,8 +20,8 @@ from fuzzytree.recognition.tasks import Task
 from fuzzytree.rulebase import Value
 from fuzzytree.runtimes.frames import Features, features_of
 from fuzzytree.tactile.features import costs
-from fuzzytree.tactile.names import feature_of
-from fuzzytree.tactile.sets import names_of
+from fuzzytree.tactile.features.names import feature_of
+from fuzzytree.tactile.features.sets import names_of
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -157,7 +157,8 @@ def experiment(
 
     Args:
         task: The frames and how they are divided.
-        features: Sets of features (`fuzzytree.tactile.sets`); the task's unless given.
+        features: Sets of features (`fuzzytree.tactile.features.sets`); the task's
+            unless given.
         settings: How to learn; the task's unless given.
         choose: Settings to choose from in each division, by the subjects that are
             learnt from alone; `fuzzytree.recognition.choosing.CANDIDATES`, say.

@@ -14,9 +14,9 @@ from fuzzytree.reference import Status
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.frames import Features, FramePlan
 from fuzzytree.runtimes.native import load
-from fuzzytree.tactile.names import feature_of
+from fuzzytree.tactile.features.names import feature_of
+from fuzzytree.tactile.features.states import State as State
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
-from fuzzytree.tactile.states import State as State
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:

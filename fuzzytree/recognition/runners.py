@@ -19,9 +19,9 @@ from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.c import COMPILERS, compiled
 from fuzzytree.runtimes.native import load
-from fuzzytree.tactile.aimed import frame_type
 from fuzzytree.tactile.features import frame_program
-from fuzzytree.tactile.plain import Shown, plain_answer, plain_features
+from fuzzytree.tactile.features.aimed import frame_type
+from fuzzytree.tactile.features.plain import Shown, plain_answer, plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor, check_frames
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Found:
     Attributes:
         features: Shape (features, frames).
         codes: Shape (frames,): the place of the class, -1 for none.
-        states: Shape (frames,): a `fuzzytree.tactile.states.State` each.
+        states: Shape (frames,): a `fuzzytree.tactile.features.states.State` each.
         rules: Shape (frames,): the rule or leaf that decides; None where it is not
             told.
     """

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.tactile.names import Feature, features_of_names
+from fuzzytree.tactile.features.names import Feature, features_of_names
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from fuzzytree.learning import Settings
 from fuzzytree.recognition.effects import EFFECTS
 from fuzzytree.recognition.splits import Split
 from fuzzytree.recognition.tasks import Task
-from fuzzytree.tactile.objects import OBJECTS
-from fuzzytree.tactile.physics import PAPER, press
-from fuzzytree.tactile.physics import Settings as Physics
+from fuzzytree.tactile.simulated.objects import OBJECTS
+from fuzzytree.tactile.simulated.physics import PAPER, press
+from fuzzytree.tactile.simulated.physics import Settings as Physics
 
 PRESSES = 50
 """Presses of each object to learn from, and as many others to test on (4.1, 3)."""

@@ -13,11 +13,11 @@ from fuzzytree.files import PathLike
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.line import Line
-from fuzzytree.tactile.objects import OBJECTS
-from fuzzytree.tactile.physics import FULL, PAPER, SIDE, press
-from fuzzytree.tactile.recording import RecordingFile
-from fuzzytree.tactile.records import Record
+from fuzzytree.tactile.line.recording import RecordingFile
+from fuzzytree.tactile.line.records import Record
 from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulated.objects import OBJECTS
+from fuzzytree.tactile.simulated.physics import FULL, PAPER, SIDE, press
 
 PAPER_BOARD = Board(
     "simulator", Sensor(SIDE, SIDE, FULL, PAPER.threshold), Marker("AA 55")

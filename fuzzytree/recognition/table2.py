@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.runtimes.frames import features_of
-from fuzzytree.tactile.objects import OBJECTS
-from fuzzytree.tactile.physics import PAPER, Settings, press
+from fuzzytree.tactile.simulated.objects import OBJECTS
+from fuzzytree.tactile.simulated.physics import PAPER, Settings, press
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

@@ -23,9 +23,9 @@ from fuzzytree.recognition.runners import (
 )
 from fuzzytree.recognition.scales import errors
 from fuzzytree.rulebase import fingerprint
-from fuzzytree.tactile.aimed import aimed_frames
-from fuzzytree.tactile.exact import exact_features
-from fuzzytree.tactile.plain import plain_answer
+from fuzzytree.tactile.features.aimed import aimed_frames
+from fuzzytree.tactile.features.exact import exact_features
+from fuzzytree.tactile.features.plain import plain_answer
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 from fuzzytree.timing.clock import Call, Tell, time_calls
 from fuzzytree.timing.machine import after, machine

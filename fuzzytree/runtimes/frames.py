@@ -105,7 +105,7 @@ def features_of(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features
     Args:
         sensor: The sensor.
         frames: Shape (frames, rows, columns), whole numbers; or one frame.
-        names: Of the features; see `fuzzytree.tactile.names`.
+        names: Of the features; see `fuzzytree.tactile.features.names`.
 
     Raises:
         TableError: If a name is no feature's, or the frames do not fit the sensor.

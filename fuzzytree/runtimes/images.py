@@ -17,8 +17,8 @@ from fuzzytree.errors import TableError
 from fuzzytree.runtimes.frames import Features
 from fuzzytree.runtimes.programs import plan_program, run_program
 from fuzzytree.tactile.features import image_program
-from fuzzytree.tactile.moments import ORDER
-from fuzzytree.tactile.noise import UNIT
+from fuzzytree.tactile.features.moments import ORDER
+from fuzzytree.tactile.features.noise import UNIT
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray

@@ -10,9 +10,9 @@ import numpy as np
 
 from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.files import PathLike, reason
+from fuzzytree.tactile.line.recording import read_recording
+from fuzzytree.tactile.line.records import MAGIC
 from fuzzytree.tactile.presses import Presses, read_presses
-from fuzzytree.tactile.recording import read_recording
-from fuzzytree.tactile.records import MAGIC
 from fuzzytree.tactile.sensor import Sensor
 
 

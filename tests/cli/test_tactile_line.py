@@ -19,14 +19,14 @@ import pytest
 from fuzzytree.exporters.board_yaml import board_text
 from fuzzytree.readers.boards import load_board
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.device import Device, blob
-from fuzzytree.tactile.encoding import encoded
-from fuzzytree.tactile.faults import Faults, Pause
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.line import SerialPort, open_line, ports
+from fuzzytree.tactile.line.recording import Recorder, read_recording
 from fuzzytree.tactile.presses import read_presses
-from fuzzytree.tactile.recording import Recorder, read_recording
 from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tactile.simulated.device import Device, blob
+from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulated.faults import Faults, Pause
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -336,7 +336,7 @@ def test_a_recording_goes_through_a_port_again(place: Path) -> None:
 def test_bytes_that_contradict_the_board_end_before_anything_is_written(
     call: Call, place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fuzzytree.tactile.watching.PATIENCE_S", 0.2)
+    monkeypatch.setattr("fuzzytree.tactile.line.watching.PATIENCE_S", 0.2)
     end, host = os.openpty()
     other = Board("mat", Sensor(3, 5), Marker("AA 55", checksum="sum8"))
     stop = threading.Event()
@@ -364,7 +364,7 @@ def test_bytes_that_contradict_the_board_end_before_anything_is_written(
 def test_a_board_that_is_silent_is_told_and_leaves_no_file(
     call: Call, place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fuzzytree.tactile.watching.PATIENCE_S", 0.05)
+    monkeypatch.setattr("fuzzytree.tactile.line.watching.PATIENCE_S", 0.05)
     end, host = os.openpty()
     name = os.ttyname(host)
     timer = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT))

@@ -30,11 +30,11 @@ from fuzzytree.cli import main
 from fuzzytree.cli.tactile.screen import look_of
 from fuzzytree.exporters.board_yaml import board_text
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.device import Device
-from fuzzytree.tactile.faults import Faults, Pause
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.recording import Recorder, read_recording
+from fuzzytree.tactile.line.recording import Recorder, read_recording
 from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulated.device import Device
+from fuzzytree.tactile.simulated.faults import Faults, Pause
 
 Call = Callable[..., tuple[int, str, str]]
 

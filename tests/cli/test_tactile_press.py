@@ -13,9 +13,9 @@ import pytest
 
 from fuzzytree.recognition.effects import EFFECTS
 from fuzzytree.recognition.table2 import FEATURES
-from fuzzytree.tactile.objects import OBJECTS
-from fuzzytree.tactile.physics import PAPER, Settings, press
 from fuzzytree.tactile.presses import read_presses
+from fuzzytree.tactile.simulated.objects import OBJECTS
+from fuzzytree.tactile.simulated.physics import PAPER, Settings, press
 
 Call = Callable[..., tuple[int, str, str]]
 

@@ -17,9 +17,9 @@ import serial
 
 from fuzzytree.exporters.board_yaml import board_text
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.decoding import decoder_of
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.recording import Recorder
+from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.line.recording import Recorder
 from fuzzytree.tactile.sensor import Cells, Sensor
 from tests.cli.conftest import Call
 

@@ -19,9 +19,9 @@ from fuzzytree.exporters.onnx_session import open_bare
 from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.tactile.aimed import aimed_frames, proving_frames
 from fuzzytree.tactile.features import frame_program
-from fuzzytree.tactile.plain import plain_features
+from fuzzytree.tactile.features.aimed import aimed_frames, proving_frames
+from fuzzytree.tactile.features.plain import plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree

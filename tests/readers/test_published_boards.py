@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.readers.boards import load_board
-from fuzzytree.tactile.decoding import decoder_of
+from fuzzytree.tactile.line.decoding import decoder_of
 from fuzzytree.tactile.sensor import Cells
 
 BOARDS = Path(__file__).parents[2] / "examples" / "tactile" / "boards"

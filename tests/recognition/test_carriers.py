@@ -14,9 +14,9 @@ from fuzzytree.recognition.carriers import check_frames_carriers, frames_export
 from fuzzytree.recognition.runners import Found, Runner, as_sent, runners
 from fuzzytree.recognition.scales import errors
 from fuzzytree.runtimes.frames import features_of
-from fuzzytree.tactile.aimed import aimed_frames
-from fuzzytree.tactile.exact import exact_features
-from fuzzytree.tactile.names import FEATURES
+from fuzzytree.tactile.features.aimed import aimed_frames
+from fuzzytree.tactile.features.exact import exact_features
+from fuzzytree.tactile.features.names import FEATURES
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.testing import random_tree
 from tests.tactile.frame_models import PLAIN, SMALL, WIDE, learnt_tree, raw_rules

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fuzzytree.recognition.effects import EFFECTS, Effect, discriminate, effects
-from fuzzytree.tactile.objects import OBJECTS
-from fuzzytree.tactile.physics import PAPER
+from fuzzytree.tactile.simulated.objects import OBJECTS
+from fuzzytree.tactile.simulated.physics import PAPER
 
 ANGLED = tuple(name for name in OBJECTS if "-" in name)
 

@@ -13,7 +13,7 @@ from fuzzytree.recognition.peers import peer_answers
 from fuzzytree.recognition.simulated import IDEAL, paper_task
 from fuzzytree.recognition.tasks import known_task
 from fuzzytree.runtimes.frames import features_of
-from fuzzytree.tactile.sets import names_of
+from fuzzytree.tactile.features.sets import names_of
 
 pytestmark = pytest.mark.heavy
 

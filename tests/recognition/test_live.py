@@ -14,7 +14,7 @@ from fuzzytree.recognition.live import Hold, Live
 from fuzzytree.recognition.recogniser import Recogniser, State
 from fuzzytree.recognition.sources import Paced, simulated
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.records import Record
+from fuzzytree.tactile.line.records import Record
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.verbs import learn
 

@@ -7,7 +7,7 @@ import pytest
 
 from fuzzytree.recognition.experiment import experiment
 from fuzzytree.recognition.simulated import TABLE_3, paper_task
-from fuzzytree.tactile.objects import OBJECTS
+from fuzzytree.tactile.simulated.objects import OBJECTS
 
 
 def test_presses_to_learn_from_and_to_test_on_are_as_many_and_others() -> None:

@@ -12,10 +12,10 @@ import pytest
 
 from fuzzytree.recognition.sources import FromLine
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.encoding import encoded
 from fuzzytree.tactile.line import open_line
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.wire import Wire
+from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulated.wire import Wire
 
 BOARD = Board("mat", Sensor(4, 4), Marker("AA 55", checksum="crc16"))
 FRAME = encoded(BOARD, np.arange(16).reshape(4, 4), 0)

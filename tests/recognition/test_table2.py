@@ -10,8 +10,8 @@ import pytest
 
 from fuzzytree.recognition.table2 import FEATURES, TABLE_2, Comparison, compare
 from fuzzytree.runtimes.frames import features_of
-from fuzzytree.tactile.objects import OBJECTS, FloatArray, Object, rectangle
-from fuzzytree.tactile.physics import PAPER, Settings, press, press_object
+from fuzzytree.tactile.simulated.objects import OBJECTS, FloatArray, Object, rectangle
+from fuzzytree.tactile.simulated.physics import PAPER, Settings, press, press_object
 
 EVEN = msgspec.structs.replace(
     PAPER,

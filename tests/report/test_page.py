@@ -21,7 +21,7 @@ from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.recognition.sources import Paced
 from fuzzytree.report.page import MOST_BROWSERS, Page
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.records import Record
+from fuzzytree.tactile.line.records import Record
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.verbs import learn
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from fuzzytree.programs.evaluate import evaluate
 from fuzzytree.runtimes.frames import FramePlan, features_of
-from fuzzytree.tactile.names import FEATURES, blocks
+from fuzzytree.tactile.features.names import FEATURES, blocks
 from fuzzytree.tactile.sensor import Sensor
 
 NAMES = [*FEATURES, "log S10 / force", *blocks(3, 2), "cell r2 c4 / force"]

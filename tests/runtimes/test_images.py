@@ -10,7 +10,7 @@ import pytest
 from fuzzytree.errors import TableError
 from fuzzytree.runtimes.frames import features_of
 from fuzzytree.runtimes.images import features_of_images
-from fuzzytree.tactile.names import FEATURES
+from fuzzytree.tactile.features.names import FEATURES
 from fuzzytree.tactile.sensor import Sensor
 
 TABLE_2 = {

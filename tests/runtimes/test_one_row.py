@@ -7,7 +7,7 @@ import numpy as np
 from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.runtimes.frames import FramePlan
 from fuzzytree.runtimes.one_row import row_runner
-from fuzzytree.tactile.names import FEATURES
+from fuzzytree.tactile.features.names import FEATURES
 from fuzzytree.tactile.sensor import Sensor
 
 NAMES = (

@@ -9,7 +9,7 @@ import numpy as np
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.frames import features_of
-from fuzzytree.tactile.aimed import aimed_frames
+from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tree import FuzzyTree
 from fuzzytree.verbs import learn

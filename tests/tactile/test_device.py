@@ -24,11 +24,11 @@ from fuzzytree.tactile.boards import (
     Sentinel,
     Text,
 )
-from fuzzytree.tactile.device import Device, Truth, blob, bounds
-from fuzzytree.tactile.encoding import banner, encoded
-from fuzzytree.tactile.faults import Faults, Pause
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.uart import Receiver
+from fuzzytree.tactile.simulated.device import Device, Truth, blob, bounds
+from fuzzytree.tactile.simulated.encoding import banner, encoded
+from fuzzytree.tactile.simulated.faults import Faults, Pause
+from fuzzytree.tactile.simulated.uart import Receiver
 
 MAT = Board("mat", Sensor(8, 8), Marker("AA 55"), banner=1)
 

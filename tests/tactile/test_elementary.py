@@ -11,7 +11,7 @@ from fuzzytree.programs.evaluate import evaluate
 from fuzzytree.programs.operations import INEXACT
 from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.runtimes.programs import plan_program, run_program
-from fuzzytree.tactile.elementary import angle, signed_log
+from fuzzytree.tactile.features.elementary import angle, signed_log
 
 
 def log_program() -> Program:

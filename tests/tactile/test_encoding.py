@@ -15,8 +15,8 @@ from fuzzytree.tactile.boards import (
     Sentinel,
     Text,
 )
-from fuzzytree.tactile.encoding import banner, checksum, encoded
 from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulated.encoding import banner, checksum, encoded
 
 CELLS = np.array([[1, 0, 258], [0, 0, 16]])
 

@@ -9,8 +9,9 @@ import pytest
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.tactile.boards import Board, Marker, Port, Protocol, Text
-from fuzzytree.tactile.encoding import encoded
-from fuzzytree.tactile.faults import (
+from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulated.faults import (
     Faults,
     Pause,
     damaged,
@@ -18,8 +19,7 @@ from fuzzytree.tactile.faults import (
     noise,
     with_marker,
 )
-from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.uart import Receiver, bits_of_a_byte
+from fuzzytree.tactile.simulated.uart import Receiver, bits_of_a_byte
 
 DATA = np.random.default_rng(1).bytes(100_000)
 

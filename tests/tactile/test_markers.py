@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fuzzytree.tactile.boards import Board, Checksum, Marker
-from fuzzytree.tactile.decoding import decoder_of
-from fuzzytree.tactile.fixed import crc16
+from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.line.fixed import crc16
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 PLAIN = Board("b", Sensor(1, 4), Marker("AA 55"))

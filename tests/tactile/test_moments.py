@@ -13,12 +13,11 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.runtimes.frames import FramePlan, features_of
 from fuzzytree.runtimes.programs import plan_program, run_program
-from fuzzytree.tactile import moments
-from fuzzytree.tactile.exact import exact_features
-from fuzzytree.tactile.features import frame_program
-from fuzzytree.tactile.moments import Centred, complex_moment, sum_name
-from fuzzytree.tactile.names import FEATURES, PAPER
-from fuzzytree.tactile.noise import Noisy
+from fuzzytree.tactile.features import frame_program, moments
+from fuzzytree.tactile.features.exact import exact_features
+from fuzzytree.tactile.features.moments import Centred, complex_moment, sum_name
+from fuzzytree.tactile.features.names import FEATURES, PAPER
+from fuzzytree.tactile.features.noise import Noisy
 from fuzzytree.tactile.sensor import Cells, Sensor
 from tests.tactile.frames import hard_frames
 

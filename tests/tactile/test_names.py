@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fuzzytree.errors import TableError
-from fuzzytree.tactile.names import FEATURES, blocks, feature_of
+from fuzzytree.tactile.features.names import FEATURES, blocks, feature_of
 
 LIST = (
     "; there is S1 to S11, angle, cos2, sin2, Re C20 to Im C40, force, area, peak, "

@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.programs.evaluate import evaluate
 from fuzzytree.programs.steps import Maker, Result
-from fuzzytree.tactile.noise import UNIT, Noise, Noisy
+from fuzzytree.tactile.features.noise import UNIT, Noise, Noisy
 
 Operation = Callable[[Noise, Noisy, Noisy], Noisy]
 OPERATIONS: dict[str, tuple[Operation, Callable[[Fraction, Fraction], Fraction]]] = {

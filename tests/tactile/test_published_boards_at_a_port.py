@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.readers.boards import load_board
-from fuzzytree.tactile.device import Device, blob
 from fuzzytree.tactile.line import open_line
+from fuzzytree.tactile.simulated.device import Device, blob
 
 BOARDS = sorted(
     (Path(__file__).parents[2] / "examples" / "tactile" / "boards").glob("*.yaml")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fuzzytree.errors import TableError
-from fuzzytree.tactile.names import PAPER, feature_of
-from fuzzytree.tactile.sets import SETS, names_of
+from fuzzytree.tactile.features.names import PAPER, feature_of
+from fuzzytree.tactile.features.sets import SETS, names_of
 
 
 def test_a_set_behind_log_leaves_what_is_alike_at_every_pressure() -> None:

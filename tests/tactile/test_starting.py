@@ -7,8 +7,8 @@ import pytest
 
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import Board, Marker, Start
+from fuzzytree.tactile.line.starting import measured, remarks, still
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
-from fuzzytree.tactile.starting import measured, remarks, still
 
 BOARD = Board("mat", Sensor(3, 4), Marker("AA 55"))
 

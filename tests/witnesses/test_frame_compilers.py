@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.exporters.c_frames import write_frames_c
-from fuzzytree.tactile.names import PAPER
+from fuzzytree.tactile.features.names import PAPER
 from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.frame_models import PLAIN, SMALL, WIDE, learnt_tree, raw_rules
 

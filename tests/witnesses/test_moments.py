@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.runtimes.frames import features_of
-from fuzzytree.tactile.names import PAPER
+from fuzzytree.tactile.features.names import PAPER
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 SENSOR = Sensor(16, 16)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 
 import click
 
-_ORDER = (
+ACTIONS = (
     "ports",
     "record",
     "replay",
@@ -19,9 +18,6 @@ _ORDER = (
     "export",
     "bench",
     "experiment",
-)
-ACTIONS = tuple(
-    name for name in _ORDER if importlib.util.find_spec(f"{__name__}.{name}")
 )
 """Each action is the `command` of the module `fuzzytree.cli.tactile.ACTION`."""
 

@@ -65,8 +65,8 @@ def command(
     costs is listed. Frames on which nothing presses are left out and counted.
     """
     from fuzzytree.tactile.features import costs
+    from fuzzytree.tactile.features.sets import names_of
     from fuzzytree.tactile.given import given_frames
-    from fuzzytree.tactile.sets import names_of
 
     if output and output != "-":
         check_place(output)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fuzzytree.recognition.live import Answer, Hold, Live, Source
     from fuzzytree.tactile.boards import Board
     from fuzzytree.tactile.line import Line
-    from fuzzytree.tactile.recording import Recorder
+    from fuzzytree.tactile.line.recording import Recorder
     from fuzzytree.tactile.sensor import Cells
 
 SIMULATOR = "simulator"
@@ -208,7 +208,7 @@ def _rested(board: Board, line: Line, *, quiet: bool) -> Board:
     """Return a board with the baseline that its first frames show."""
     import numpy as np
 
-    from fuzzytree.tactile.starting import measured, remarks
+    from fuzzytree.tactile.line.starting import measured, remarks
 
     count = board.start.frames
     if not count:
@@ -237,7 +237,7 @@ def _served(live: Live, port: int, times: int, stack: contextlib.ExitStack) -> s
 
 
 def _recorder(path: str | None, board: Board) -> Recorder | None:
-    from fuzzytree.tactile.recording import Recorder
+    from fuzzytree.tactile.line.recording import Recorder
 
     return None if path is None else Recorder(path, board)
 

@@ -24,7 +24,7 @@ from fuzzytree.cli.talk import (
 
 if TYPE_CHECKING:
     from fuzzytree.recognition.table2 import Comparison
-    from fuzzytree.tactile.physics import Settings, Simulated
+    from fuzzytree.tactile.simulated.physics import Settings, Simulated
 
 
 @click.command("press", short_help="Press objects on a simulated sensor.")
@@ -75,8 +75,8 @@ def command(
     if is_each and (name != "all" or count < 2):
         raise click.UsageError("--effects needs all objects, and 2 presses of each")
     from fuzzytree.files import check_place, write_atomically
-    from fuzzytree.tactile.objects import OBJECTS
-    from fuzzytree.tactile.physics import press
+    from fuzzytree.tactile.simulated.objects import OBJECTS
+    from fuzzytree.tactile.simulated.physics import press
 
     if output not in (None, "-"):
         check_place(output)
@@ -118,7 +118,7 @@ def command(
 
 def _settings(changes: Sequence[str]) -> Settings:
     """Return the simulator's settings with those that were given."""
-    from fuzzytree.tactile.physics import PAPER
+    from fuzzytree.tactile.simulated.physics import PAPER
 
     before = msgspec.structs.asdict(PAPER)
     given: dict[str, object] = {}
@@ -226,7 +226,7 @@ def _tell_effects(
 ) -> list[dict[str, object]]:
     """Print a line for each effect that is switched off, and return the facts."""
     from fuzzytree.recognition.effects import effects
-    from fuzzytree.tactile.objects import OBJECTS
+    from fuzzytree.tactile.simulated.objects import OBJECTS
 
     facts: list[dict[str, object]] = []
     if not is_silent:

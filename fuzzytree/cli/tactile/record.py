@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
     from fuzzytree.tactile.frames import Frame
     from fuzzytree.tactile.line import Line, Started, State
-    from fuzzytree.tactile.recording import Recorder
+    from fuzzytree.tactile.line.recording import Recorder
 
 End = Literal["frames", "seconds", "told", "port"]
 """Enough frames, or seconds; Ctrl-C or SIGTERM; or the port went away."""
@@ -68,7 +68,7 @@ def command(
     """
     from fuzzytree.readers.boards import load_board
     from fuzzytree.tactile.line import open_line, start
-    from fuzzytree.tactile.recording import Recorder
+    from fuzzytree.tactile.line.recording import Recorder
 
     if output == "-":
         raise click.UsageError("a recording is a file, and not standard output")

@@ -23,8 +23,8 @@ from fuzzytree.cli.talk import (
 from fuzzytree.files import check_place, open_atomically, write_atomically
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.recording import RecordingFile
-    from fuzzytree.tactile.review import Review
+    from fuzzytree.tactile.line.recording import RecordingFile
+    from fuzzytree.tactile.line.review import Review
 
 _LOOK_S = 0.1
 _LAST_S = 0.2  # for the reader of a port to take the last bytes
@@ -60,8 +60,8 @@ def command(
     With --to-port the frames go out through a new port, whose name is printed, once
     something reads there, each when it came; Ctrl-C ends.
     """
-    from fuzzytree.tactile.recording import RecordingFile
-    from fuzzytree.tactile.review import review
+    from fuzzytree.tactile.line.recording import RecordingFile
+    from fuzzytree.tactile.line.review import review
 
     if speed is not None and not to_port:
         raise click.UsageError("--speed is for --to-port")
@@ -92,7 +92,7 @@ def _facts(file: RecordingFile, found: Review) -> dict[str, object]:
 def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
     """Yield what is in a recording, in words."""
     from fuzzytree.report.text import counted
-    from fuzzytree.tactile.starting import named
+    from fuzzytree.tactile.line.starting import named
 
     board, sensor = file.board, file.board.sensor
     family = type(board.protocol).__name__.lower()
@@ -143,8 +143,8 @@ def _write_arrays(output: str, name: str, _: RecordingFile) -> None:
     """Write a numpy archive that the other actions read."""
     import numpy as np
 
+    from fuzzytree.tactile.line.recording import read_recording
     from fuzzytree.tactile.presses import packed_arrays
-    from fuzzytree.tactile.recording import read_recording
 
     found = read_recording(name)
     arrays = {
@@ -170,7 +170,7 @@ def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
     """Send the frames through a port of our own, each when it came."""
     from fuzzytree.recognition.sources import Paced
     from fuzzytree.report.text import counted
-    from fuzzytree.tactile.device import Device
+    from fuzzytree.tactile.simulated.device import Device
 
     paced = Paced(file, speed)
     cells = (frame.cells for frame in paced)

@@ -22,8 +22,8 @@ from fuzzytree.cli.talk import (
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.device import Device
     from fuzzytree.tactile.sensor import Cells
+    from fuzzytree.tactile.simulated.device import Device
 
 ALL = "all"
 _LOOK_S = 0.05
@@ -70,8 +70,8 @@ def command(
         raise click.UsageError("--object and --recording exclude each other")
     from fuzzytree.readers.boards import load_board
     from fuzzytree.recognition.sources import FRAMES_A_SECOND
-    from fuzzytree.tactile.device import Device
-    from fuzzytree.tactile.faults import faults_of
+    from fuzzytree.tactile.simulated.device import Device
+    from fuzzytree.tactile.simulated.faults import faults_of
 
     known = load_board(board)
     rest, coming = _frames(known, name, recording, seed, quiet=quiet)
@@ -132,13 +132,13 @@ def _frames(
     board: Board, name: str | None, recording: str | None, seed: int, *, quiet: bool
 ) -> tuple[Cells, Iterator[Cells]]:
     """Return a frame without pressure and those to send, fitted to the board."""
-    from fuzzytree.tactile.device import blob, empty, fitted
-    from fuzzytree.tactile.physics import FULL, SIDE
+    from fuzzytree.tactile.simulated.device import blob, empty, fitted
+    from fuzzytree.tactile.simulated.physics import FULL, SIDE
 
     if recording is not None:
         import numpy as np
 
-        from fuzzytree.tactile.recording import read_recording
+        from fuzzytree.tactile.line.recording import read_recording
 
         found = read_recording(recording)
         if not len(found.frames):
@@ -154,7 +154,7 @@ def _frames(
     if name is None:
         return empty(board), blob(board, seed)
     from fuzzytree.recognition.sources import simulated
-    from fuzzytree.tactile.objects import OBJECTS
+    from fuzzytree.tactile.simulated.objects import OBJECTS
 
     if name not in (*OBJECTS, ALL):
         known = ", ".join(OBJECTS)
@@ -167,7 +167,7 @@ def _frames(
 
 def _say_fit(board: Board, sides: tuple[int, int], full: int, *, quiet: bool) -> None:
     """Say how frames are changed, so that the board can send them."""
-    from fuzzytree.tactile.device import bounds
+    from fuzzytree.tactile.simulated.device import bounds
 
     wanted, (low, high) = (board.sensor.rows, board.sensor.columns), bounds(board)
     if wanted != sides:

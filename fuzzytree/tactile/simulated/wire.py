@@ -16,7 +16,7 @@ from pathlib import Path
 from fuzzytree.errors import WriteError
 from fuzzytree.files import reason
 from fuzzytree.tactile.boards import Port
-from fuzzytree.tactile.uart import Receiver, bits_of_a_byte
+from fuzzytree.tactile.simulated.uart import Receiver, bits_of_a_byte
 
 if sys.platform != "win32":
     import fcntl

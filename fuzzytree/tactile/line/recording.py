@@ -24,7 +24,7 @@ from fuzzytree.errors import ReadError, WriteError
 from fuzzytree.files import PathLike, reason
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.records import (
+from fuzzytree.tactile.line.records import (
     FIXED,
     LARGEST_BOARD,
     Record,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fuzzytree.tactile.frames import Counters
-from fuzzytree.tactile.recording import RecordingFile
-from fuzzytree.tactile.starting import still
+from fuzzytree.tactile.line.recording import RecordingFile
+from fuzzytree.tactile.line.starting import still
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 
 from fuzzytree.errors import TableError
-from fuzzytree.tactile.names import (
+from fuzzytree.tactile.features.names import (
     LOG,
     ORIENTATION,
     PAPER,

@@ -21,11 +21,11 @@ import numpy as np
 
 from fuzzytree.errors import MissingExtraError, PortError
 from fuzzytree.tactile.boards import Board
-from fuzzytree.tactile.decoding import decoder_of
 from fuzzytree.tactile.frames import Counters, Frame
+from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.line.starting import measured, remarks
+from fuzzytree.tactile.line.watching import PATIENCE_S, Questions, Watch
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.starting import measured, remarks
-from fuzzytree.tactile.watching import PATIENCE_S, Questions, Watch
 
 if TYPE_CHECKING:
     from serial import Serial

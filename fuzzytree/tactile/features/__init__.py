@@ -14,8 +14,8 @@ from typing import Literal
 from fuzzytree.errors import InvalidModelError, TableError
 from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.rulebase import Value
-from fuzzytree.tactile.elementary import angle, signed_log
-from fuzzytree.tactile.moments import (
+from fuzzytree.tactile.features.elementary import angle, signed_log
+from fuzzytree.tactile.features.moments import (
     ORDER,
     Centred,
     Measured,
@@ -23,8 +23,8 @@ from fuzzytree.tactile.moments import (
     complex_moment,
     sum_name,
 )
-from fuzzytree.tactile.names import Feature, features_of_names
-from fuzzytree.tactile.noise import Noisy
+from fuzzytree.tactile.features.names import Feature, features_of_names
+from fuzzytree.tactile.features.noise import Noisy
 from fuzzytree.tactile.sensor import Sensor
 
 PRESSED = "pressed"
@@ -79,7 +79,7 @@ def frame_program(sensor: Sensor, names: Sequence[str]) -> FrameProgram:
 
     Args:
         sensor: The sensor.
-        names: Of the features; see `fuzzytree.tactile.names`.
+        names: Of the features; see `fuzzytree.tactile.features.names`.
 
     Raises:
         TableError: If a name is no feature's.

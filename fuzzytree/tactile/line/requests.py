@@ -8,8 +8,8 @@ calls the bytes are taken for one answer after the other.
 from __future__ import annotations
 
 from fuzzytree.tactile.boards import Board, Request
-from fuzzytree.tactile.decoder import Decoder, banner_bytes
-from fuzzytree.tactile.fixed import are_whole, blocks_of, cells_of, layout_of
+from fuzzytree.tactile.line.decoder import Decoder, banner_bytes
+from fuzzytree.tactile.line.fixed import are_whole, blocks_of, cells_of, layout_of
 from fuzzytree.tactile.sensor import Cells
 
 

@@ -16,10 +16,10 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.tactile.boards import Board, Port, Request, Sentinel
-from fuzzytree.tactile.encoding import banner, encoded
-from fuzzytree.tactile.faults import Faults, damaged, noise, with_marker
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.wire import Wire
+from fuzzytree.tactile.simulated.encoding import banner, encoded
+from fuzzytree.tactile.simulated.faults import Faults, damaged, noise, with_marker
+from fuzzytree.tactile.simulated.wire import Wire
 
 BOOT_S = 0.05
 """How long the device waits after a host has opened it, as boards do that reset."""

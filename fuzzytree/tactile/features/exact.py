@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 
-from fuzzytree.tactile.names import Feature, features_of_names
+from fuzzytree.tactile.features.names import Feature, features_of_names
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
 BITS = 256

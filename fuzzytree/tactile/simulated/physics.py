@@ -18,7 +18,8 @@ import numpy.typing as npt
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import Mistake, Value
-from fuzzytree.tactile.objects import (
+from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulated.objects import (
     OBJECTS,
     FloatArray,
     Object,
@@ -26,8 +27,7 @@ from fuzzytree.tactile.objects import (
     covered,
     radius_of,
 )
-from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.wiring import Wiring, read_matrix
+from fuzzytree.tactile.simulated.wiring import Wiring, read_matrix
 
 SIDE = 16
 """The sensor's rows and columns."""

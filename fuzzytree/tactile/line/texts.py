@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from fuzzytree.tactile.boards import Board, Text
-from fuzzytree.tactile.decoder import Decoder, largest_cell
+from fuzzytree.tactile.line.decoder import Decoder, largest_cell
 from fuzzytree.tactile.sensor import Cells
 
 _BYTES_OF_A_NUMBER: Final = 32  # with what separates it; what is longer is no line

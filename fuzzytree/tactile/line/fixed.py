@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.tactile.boards import Board, Checksum, Marker, Request
-from fuzzytree.tactile.decoder import largest_cell
+from fuzzytree.tactile.line.decoder import largest_cell
 from fuzzytree.tactile.sensor import Cells
 
 Blocks = npt.NDArray[np.uint8]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from fuzzytree.programs.steps import Maker
-from fuzzytree.tactile.noise import UNIT, Noise, Noisy
+from fuzzytree.tactile.features.noise import UNIT, Noise, Noisy
 
 Power = tuple[int, int]
 """p and q of the moment `sum of g x^p y^q`."""

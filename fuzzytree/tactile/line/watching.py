@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from fuzzytree.tactile.boards import Board, Request
-from fuzzytree.tactile.seen import line_bytes, seen
+from fuzzytree.tactile.line.seen import line_bytes, seen
 
 STALL_FRAMES: Final = 10
 """For how many frame times a board may be silent."""

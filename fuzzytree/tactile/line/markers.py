@@ -24,8 +24,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.decoder import Decoder
-from fuzzytree.tactile.fixed import (
+from fuzzytree.tactile.line.decoder import Decoder
+from fuzzytree.tactile.line.fixed import (
     Truths,
     are_whole,
     blocks_of,

@@ -12,8 +12,8 @@ from fuzzytree.programs.evaluate import evaluate as run
 from fuzzytree.reference import Status, descend, evaluate
 from fuzzytree.rulebase import RuleBase, Value
 from fuzzytree.tactile.features import FrameProgram
+from fuzzytree.tactile.features.states import State
 from fuzzytree.tactile.sensor import Cells, pressed
-from fuzzytree.tactile.states import State
 
 
 class Shown(Value, frozen=True):

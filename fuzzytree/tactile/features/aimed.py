@@ -12,7 +12,7 @@ from fuzzytree.contracts import Model
 from fuzzytree.probing import landmarks
 from fuzzytree.reference import axis_values
 from fuzzytree.tactile.features import FrameProgram
-from fuzzytree.tactile.plain import plain_features
+from fuzzytree.tactile.features.plain import plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.tree import FuzzyTree
 

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.tactile.boards import Board, Sentinel
-from fuzzytree.tactile.decoder import Decoder, banner_bytes, largest_cell
-from fuzzytree.tactile.fixed import Truths
+from fuzzytree.tactile.line.decoder import Decoder, banner_bytes, largest_cell
+from fuzzytree.tactile.line.fixed import Truths
 from fuzzytree.tactile.sensor import Cells
 
 

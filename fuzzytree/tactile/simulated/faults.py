@@ -14,8 +14,8 @@ from msgspec.structs import fields, replace
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import Mistake, Value
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.encoding import in_board_order, packed
 from fuzzytree.tactile.sensor import Cells
+from fuzzytree.tactile.simulated.encoding import in_board_order, packed
 
 EVERY = 100
 """After how many frames a stall or an unplugging comes, if it is not told."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import assert_never
 
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
-from fuzzytree.tactile.decoder import Decoder
-from fuzzytree.tactile.markers import MarkerDecoder
-from fuzzytree.tactile.requests import RequestDecoder
-from fuzzytree.tactile.sentinels import SentinelDecoder
-from fuzzytree.tactile.texts import TextDecoder
+from fuzzytree.tactile.line.decoder import Decoder
+from fuzzytree.tactile.line.markers import MarkerDecoder
+from fuzzytree.tactile.line.requests import RequestDecoder
+from fuzzytree.tactile.line.sentinels import SentinelDecoder
+from fuzzytree.tactile.line.texts import TextDecoder
 
 __all__ = ["Decoder", "decoder_of"]
 
