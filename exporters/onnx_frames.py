@@ -58,8 +58,8 @@ def write_frames(
     sensor of 16 bits. The outputs, each with one entry per frame: `label`, the class,
     or "" where nothing presses or nothing known; `state`, a
     `fuzzytree.tactile.features.states.State`; `rule`, the number of the rule or leaf
-    that decides, from 1, or 0; `features`, of shape (frames, features); `strengths` of a
-    rule base, of shape (frames, rules), 0 where nothing presses. The same model,
+    that decides, from 1, or 0; `features`, of shape (frames, features); `strengths` of
+    a rule base, of shape (frames, rules), 0 where nothing presses. The same model,
     sensor and options give the same bytes.
 
     Args:
