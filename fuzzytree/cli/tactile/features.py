@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fuzzytree.cli.tactile.sensors import given_options, wanted_frames
 from fuzzytree.cli.talk import (
     answer_bytes,
     answer_json,
@@ -23,7 +24,6 @@ from fuzzytree.files import check_place, write_atomically
 if TYPE_CHECKING:
     from fuzzytree.runtimes.frames import Features
     from fuzzytree.tactile.given import Given
-    from fuzzytree.tactile.sensor import Sensor
 
 CLASS = "class"
 """The column of the classes."""
@@ -39,9 +39,7 @@ CLASS = "class"
     show_default=True,
     help="Names and sets of features, with commas between them.",
 )
-@click.option("--board", metavar="FILE", help="The board of the frames.")
-@click.option("--full", type=int, help="What a cell reads that takes no more.")
-@click.option("--threshold", type=int, help="Above it a cell is pressed.")
+@given_options
 @click.option(
     "--label", metavar="ARRAY", default="label", help="The classes in FRAMES; `label`."
 )
@@ -66,18 +64,12 @@ def command(
     """
     from fuzzytree.tactile.features import costs
     from fuzzytree.tactile.features.sets import names_of
-    from fuzzytree.tactile.given import given_frames
 
     if output and output != "-":
         check_place(output)
     with wrong_options():
         names = names_of(text)
-    sensor = _sensor(board)
-    if sensor and not full is threshold is None:
-        raise click.UsageError("--board tells --full and --threshold; give one of them")
-    given = given_frames(
-        frames, sensor=sensor, full=full, threshold=threshold, label=label
-    )
+    given = wanted_frames(frames, board, full, threshold, label=label)
     found = costs(given.sensor, names)
     if output is None:
         if as_json:
@@ -87,14 +79,6 @@ def command(
                 click.echo(f"{found[name]:8.0f}  {name}")
         return 0
     return _table(frames, given, names, found, output, as_json=as_json, quiet=quiet)
-
-
-def _sensor(board: str | None) -> Sensor | None:
-    if board is None:
-        return None
-    from fuzzytree.readers.boards import load_board
-
-    return load_board(board).sensor
 
 
 def _table(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fuzzytree.cli.tactile.sensors import given_options, wanted_frames
 from fuzzytree.cli.talk import (
     answer_json,
     json_option,
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
     from fuzzytree.plots.frames import Axis
     from fuzzytree.tactile.given import Given
-    from fuzzytree.tactile.sensor import Sensor
 
     Pressed = npt.NDArray[np.int64]
 
@@ -49,9 +49,7 @@ MOST_BYTES = 2**30
     help="From 0; a picture is of the first that something presses on if none.",
 )
 @click.option("--axis", "is_marked", is_flag=True, help="Mark centre and axis as well.")
-@click.option("--board", metavar="FILE", help="The board of the frames.")
-@click.option("--full", type=int, help="What a cell reads that takes no more.")
-@click.option("--threshold", type=int, help="Above it a cell is pressed.")
+@given_options
 @click.option(
     "-o",
     "--output",
@@ -79,7 +77,6 @@ def command(
     `times_N` of each number of times. `docs/interpolation.md` has the mathematics.
     """
     from fuzzytree.plots.saving import SUFFIXES
-    from fuzzytree.tactile.given import given_frames
     from fuzzytree.tactile.sensor import pressed
 
     suffix = Path(output).suffix.lower()
@@ -88,10 +85,7 @@ def command(
         raise click.UsageError(f"{output}: the name ends in {names} or {ARCHIVE}")
     times = _times(text)
     check_place(output)
-    sensor = _sensor(board)
-    if sensor and not full is threshold is None:
-        raise click.UsageError("--board tells --full and --threshold; give one of them")
-    given = given_frames(frames, sensor=sensor, full=full, threshold=threshold)
+    given = wanted_frames(frames, board, full, threshold)
     values = pressed(given.sensor, given.presses.frames)
     number = _chosen(frames, frame, values, is_picture=suffix != ARCHIVE)
     if number is not None:
@@ -162,14 +156,6 @@ def _times(text: str) -> list[int]:
     if len({*times}) < len(times):
         raise click.UsageError(f"--times {text}: names a number twice")
     return times
-
-
-def _sensor(board: str | None) -> Sensor | None:
-    if board is None:
-        return None
-    from fuzzytree.readers.boards import load_board
-
-    return load_board(board).sensor
 
 
 def _chosen(

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
+from fuzzytree.cli.tactile.sensors import asked_model
 from fuzzytree.cli.talk import quiet_option, say_rows, wrong_options
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import Model
     from fuzzytree.recognition.live import Answer, Hold, Live, Source
     from fuzzytree.tactile.boards import Board
     from fuzzytree.tactile.line import Line
@@ -104,7 +104,7 @@ def command(
     from fuzzytree.recognition.live import Hold, Live
     from fuzzytree.recognition.recogniser import Recogniser
 
-    known = _model(model)
+    known = asked_model(model)
     with contextlib.ExitStack() as stack:
         stack.callback(_switched(SWITCH_S))
         with wrong_options():
@@ -138,19 +138,6 @@ def command(
         except KeyboardInterrupt:
             pass
     tally.tell(live, record, quiet=quiet)
-
-
-def _model(path: str) -> Model:
-    """Return a model that frames can be asked of."""
-    from fuzzytree import verbs
-    from fuzzytree.errors import TableError
-    from fuzzytree.rulebase import RuleBase
-    from fuzzytree.tree import FuzzyTree
-
-    found = verbs.opened(path)
-    if not isinstance(found, FuzzyTree | RuleBase):
-        raise TableError(f"{path}: frames are asked of a tree or rules, not of this")
-    return found
 
 
 def _switched(seconds: float) -> Callable[[], None]:

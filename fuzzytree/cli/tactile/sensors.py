@@ -12,6 +12,7 @@ from fuzzytree.cli.talk import wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import Model
+    from fuzzytree.tactile.given import Given
     from fuzzytree.tactile.sensor import Cells, Sensor
 
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
@@ -60,6 +61,43 @@ def wanted_sensor(
     rows, columns = map(int, found.groups())
     with wrong_options():
         return Sensor(rows, columns, 255 if full is None else full, threshold or 0)
+
+
+def given_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say more of a file of frames than it does itself."""
+    for option in (
+        click.option("--threshold", type=int, help="Above it a cell is pressed."),
+        click.option("--full", type=int, help="What a cell reads that takes no more."),
+        click.option("--board", metavar="FILE", help="The board of the frames."),
+    ):
+        command = option(command)
+    return command
+
+
+def wanted_frames(
+    path: str,
+    board: str | None,
+    full: int | None,
+    threshold: int | None,
+    *,
+    label: str = "label",
+) -> Given:
+    """Return the frames of an archive or recording, with the sensor they fit.
+
+    Raises:
+        click.UsageError: If a board is named, and what it tells as well.
+        ReadError: If a file is none, or the frames do not fit the board.
+    """
+    from fuzzytree.tactile.given import given_frames
+
+    if board is None:
+        return given_frames(path, full=full, threshold=threshold, label=label)
+    from fuzzytree.readers.boards import load_board
+
+    sensor = load_board(board).sensor
+    if full is not None or threshold is not None:
+        raise click.UsageError("--board tells --full and --threshold; give one of them")
+    return given_frames(path, sensor=sensor, label=label)
 
 
 def frames_of(path: str | None, sensor: Sensor) -> Cells | None:
