@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections import Counter
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,9 +18,9 @@ from fuzzytree.cli.talk import quiet_option, say_rows, wrong_options
 if TYPE_CHECKING:
     from fuzzytree.recognition.live import Answer, Hold, Live, Source
     from fuzzytree.tactile.boards import Board
+    from fuzzytree.tactile.frames import Frame
     from fuzzytree.tactile.line import Line
     from fuzzytree.tactile.line.recording import Recorder
-    from fuzzytree.tactile.sensor import Cells
 
 SIMULATOR = "simulator"
 MOST_WAITING = 4
@@ -193,28 +193,28 @@ def _line(port: str, board: str, *, is_kept: bool, quiet: bool) -> tuple[Source,
 
 def _rested(board: Board, line: Line, *, quiet: bool) -> Board:
     """Return a board with the baseline that its first frames show."""
-    import numpy as np
-
-    from fuzzytree.tactile.line.starting import measured, remarks
+    from fuzzytree.tactile.line import start
 
     count = board.start.frames
-    if not count:
-        return board
-    what = f"the baseline in {count} frames: nothing may lie on the sensor"
-    say_rows(("measures", what, ""), quiet=quiet)
-    found: list[Cells] = []
+    if count:
+        what = f"the baseline in {count} frames: nothing may lie on the sensor"
+        say_rows(("measures", what, ""), quiet=quiet)
+    found = start(board, _coming(line, quiet=quiet))
+    for remark in found.remarks:
+        say_rows(("remark", remark, ""), quiet=quiet)
+    return found.board
+
+
+def _coming(line: Line, *, quiet: bool) -> Iterator[Frame]:
+    """Give the frames of a line; say once that none comes."""
     is_told = False
-    while len(found) < count:
+    while line.state != "ended":
         frame = line.take(_PATIENCE_S)
         if frame is not None:
-            found.append(frame.cells)
+            yield frame
         elif not is_told:
             is_told = True
             say_rows(("waits", "no frame comes", "Ctrl-C ends"), quiet=quiet)
-    frames = np.stack(found)
-    for remark in remarks(board, frames):
-        say_rows(("remark", remark, ""), quiet=quiet)
-    return measured(board, frames)
 
 
 def _served(live: Live, port: int, times: int, stack: contextlib.ExitStack) -> str:
