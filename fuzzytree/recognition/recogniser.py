@@ -13,7 +13,7 @@ from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.frames import Features, FramePlan
-from fuzzytree.runtimes.native import load
+from fuzzytree.runtimes.one_row import load
 from fuzzytree.tactile.features.names import feature_of
 from fuzzytree.tactile.features.states import State as State
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
@@ -121,7 +121,7 @@ class Recogniser:
             raise TypeError(f"{self.model.name}: no strengths")
         rules, is_none = outcome.rule, outcome.rule == 0
         codes = np.where(is_none, self._uncovered, self._class_of[rules - 1])
-        own = np.take_along_axis(strengths, np.maximum(rules - 1, 0)[None], 0)[0]
+        own = strengths[np.maximum(rules - 1, 0), np.arange(len(rules))]
         is_unknown = (codes < 0) | (~is_none & (own < self.reject))
         states = np.where(is_unknown, State.UNKNOWN, State.OBJECT)
         states = np.where(features.is_pressed, states, State.NOTHING)
@@ -140,7 +140,7 @@ class Recogniser:
         self, strengths: FloatArray, is_pressed: npt.NDArray[np.bool_]
     ) -> FloatArray:
         found = np.zeros((len(self.model.classes), strengths.shape[1]))
-        np.maximum.at(found, self._class_of, np.nan_to_num(strengths, nan=0.0))
+        np.fmax.at(found, self._class_of, strengths)  # NaN, which is missing, counts 0
         return np.where(is_pressed, found, 0.0)
 
 

@@ -18,7 +18,7 @@ from fuzzytree.exporters.c_frames import write_frames_c
 from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.c import COMPILERS, compiled
-from fuzzytree.runtimes.native import load
+from fuzzytree.runtimes.one_row import load
 from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import frame_type
 from fuzzytree.tactile.features.plain import Shown, plain_answer, plain_features

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Literal
 
+import numpy as np
+import pytest
+
+from fuzzytree.lowering import rules_from_tree
 from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.runtimes.frames import FramePlan
-from fuzzytree.runtimes.one_row import row_runner
+from fuzzytree.runtimes.one_row import load, row_runner
 from fuzzytree.tactile.features.names import FEATURES
 from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.testing import random_tree
 
 NAMES = (
     *FEATURES,
@@ -43,3 +48,22 @@ def test_functions_that_round_in_their_own_way_are_left_to_numpy() -> None:
     run = row_runner(program("square_root"))
     assert run is not None
     assert run([9.0]) == [3.0]
+
+
+@pytest.mark.parametrize("kind", ["raw", "relative"])
+@pytest.mark.parametrize("seed", range(4))
+def test_one_row_of_rules_has_the_bits_of_many(
+    seed: int, kind: Literal["raw", "relative"]
+) -> None:
+    rules = rules_from_tree(random_tree(seed), kind)
+    values = np.random.default_rng(seed).normal(0.0, 3.0, (len(rules.inputs), 40))
+    values[0, 0], values[:, 1] = np.nan, 1e9
+    answer = load(rules)
+    many = answer(values)
+    for row in range(values.shape[1]):
+        one = answer(values[:, row : row + 1])
+        assert one.rule == many.rule[row]
+        assert one.status == many.status[row]
+        assert one.strengths is not None
+        assert many.strengths is not None
+        assert one.strengths.tobytes() == many.strengths[:, row].tobytes()
