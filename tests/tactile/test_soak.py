@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import soak
 import soak_line
+import soak_verdicts
 from msgspec.structs import replace
 
 from fuzzytree.readers.boards import load_board
@@ -118,11 +119,11 @@ def test_a_frame_that_stands_nowhere_is_unexplained() -> None:
     board = Board("mat", Sensor(2, 2), Marker("AA", checksum="sum8"))
     first, second = np.array([[1, 2], [3, 4]]), np.array([[5, 6], [7, 8]])
     data = encoded(board, first) + encoded(board, second)
-    assert soak.explained(board, data, first) == "untold"
-    assert soak.explained(board, data, second) == "untold"
-    assert soak.explained(board, data, first + second) == "unexplained"
+    assert soak_verdicts.explained(board, data, first) == "untold"
+    assert soak_verdicts.explained(board, data, second) == "untold"
+    assert soak_verdicts.explained(board, data, first + second) == "unexplained"
     wrong = data.replace(b"\x0a", b"\x0b")  # a wrong checksum
-    assert soak.explained(board, wrong, first) == "unexplained"
+    assert soak_verdicts.explained(board, wrong, first) == "unexplained"
 
 
 def test_a_frame_is_late_if_only_the_next_marker_could_tell() -> None:
@@ -131,10 +132,10 @@ def test_a_frame_is_late_if_only_the_next_marker_could_tell() -> None:
     lost = np.array([[1, 2], [4, 0xAA]])
     sent = encoded(board, cells)
     data = sent + sent.replace(b"\x03", b"") + sent
-    assert soak.explained(board, data, cells) == "untold"
-    assert soak.explained(board, data, lost) == "late"
+    assert soak_verdicts.explained(board, data, cells) == "untold"
+    assert soak_verdicts.explained(board, data, lost) == "late"
     # Out of step nobody may believe it.
-    assert soak.explained(board, b"\x00" + data[5:], lost) == "unexplained"
+    assert soak_verdicts.explained(board, b"\x00" + data[5:], lost) == "unexplained"
 
 
 def test_an_answer_that_was_too_long_is_late_and_doubtful() -> None:
@@ -147,19 +148,19 @@ def test_an_answer_that_was_too_long_is_late_and_doubtful() -> None:
     ):
         decoder.asked()
         assert [one.tolist() for one in decoder.feed(answer)] == [cells.tolist()]
-        assert soak.explained(board, answer, cells) == verdict
+        assert soak_verdicts.explained(board, answer, cells) == verdict
         decoder.asked()
         assert decoder.counters.doubtful == doubtful
 
 
 def test_the_judge_unpacks_runs_and_lines_by_itself() -> None:
-    assert soak.unpacked(Sentinel(), b"\x05\x00\x02\x07") == [5, 0, 0, 7]
-    assert soak.unpacked(Sentinel(), b"\x05\x00") is None
-    assert soak.unpacked(Sentinel(), b"\x05\x00\x00") is None
+    assert soak_verdicts.unpacked(Sentinel(), b"\x05\x00\x02\x07") == [5, 0, 0, 7]
+    assert soak_verdicts.unpacked(Sentinel(), b"\x05\x00") is None
+    assert soak_verdicts.unpacked(Sentinel(), b"\x05\x00\x00") is None
     lines = Text(separator="comma", prefix="F", skip=1)
-    assert soak.numbers(lines, b"F,9,1, 2\r") == [1, 2]
-    assert soak.numbers(lines, b"G,9,1,2\r") is None
-    assert soak.numbers(lines, b"F,9,1,x\r") is None
+    assert soak_verdicts.numbers(lines, b"F,9,1, 2\r") == [1, 2]
+    assert soak_verdicts.numbers(lines, b"G,9,1,2\r") is None
+    assert soak_verdicts.numbers(lines, b"F,9,1,x\r") is None
 
 
 def test_only_spaces_and_tabs_are_blanks_between_numbers() -> None:
