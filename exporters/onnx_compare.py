@@ -50,10 +50,11 @@ def graph_difference(content: bytes, model: Model | FuzzySystem) -> str | None:
         plain=facts["carrier"] == "tree" and TREES not in versions,
         verify=False,
     )
-    return _difference(onnx.load_model_from_string(fresh.content), found)
+    return proto_difference(onnx.load_model_from_string(fresh.content), found)
 
 
-def _difference(fresh: onnx.ModelProto, found: onnx.ModelProto) -> str | None:
+def proto_difference(fresh: onnx.ModelProto, found: onnx.ModelProto) -> str | None:
+    """Return how a file differs from a fresh one, metadata and texts left out."""
     for what, one, two in (
         ("node", fresh.graph.node, found.graph.node),
         ("constant", fresh.graph.initializer, found.graph.initializer),

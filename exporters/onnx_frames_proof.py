@@ -42,11 +42,11 @@ def differences(
         right = plain_answer(model, values, is_pressed=is_pressed, reject=reject)
         for name in outputs:
             given = np.asarray(found[name][number]).tolist()
-            expected = np.asarray(_expected(model, right, name)).tolist()
-            if given != expected:
+            wanted = np.asarray(expected(model, right, name)).tolist()
+            if given != wanted:
                 yield (
                     f"the onnx file of {model.name} gives other {name} than plain "
-                    f"Python for aimed frame {number}: {given}, not {expected}"
+                    f"Python for aimed frame {number}: {given}, not {wanted}"
                 )
 
 
@@ -63,7 +63,8 @@ def _run(
     return {name: np.asarray(one) for name, one in zip(outputs, found, strict=True)}
 
 
-def _expected(model: Model, shown: Shown, name: Output) -> object:
+def expected(model: Model, shown: Shown, name: Output) -> object:
+    """Return what an output of a graph is for a frame, from plain Python's answer."""
     match name:
         case "label":
             return model.classes[shown.code] if shown.code >= 0 else ""

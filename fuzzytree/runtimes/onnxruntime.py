@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import onnx
 
     from fuzzytree.contracts import FloatArray
-    from fuzzytree.exporters.onnx_session import Session
+    from fuzzytree.exporters.onnx_session import Bare, Session
 
     Outputs = dict[str, npt.NDArray[np.generic]]
 
@@ -125,28 +125,12 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
         >>> open_onnx(content, "random.onnx").kind
         'descent'
     """
-    _require_packages("reading")
-    if len(content) > _LARGEST_FILE:
-        raise ReadError(
-            f"{name}: the file has {len(content) >> 20} MiB, "
-            f"and {_LARGEST_FILE >> 20} are the most that is read"
-        )
-    proto = _parsed(content, name)
+    proto = parsed(content, name)
     facts = _facts(proto, name)
-    for danger in _dangers(proto):
-        raise ReadError(f"{name}: {danger}")
     _check_signature(proto, facts, name)
-    from fuzzytree.exporters.onnx_session import (
-        RUNTIME_ERRORS,
-        first_line,
-        open_session,
-    )
+    from fuzzytree.exporters.onnx_session import named
 
-    try:
-        session = open_session(content)
-    except RUNTIME_ERRORS as error:
-        text = f"{name}: onnxruntime does not load it: {first_line(error)}"
-        raise ReadError(text) from error
+    session = named(loaded(content, name))
     has_labels = "label" in facts.outputs
     is_system = facts.carrier == "system"
     return OnnxModel(
@@ -230,7 +214,7 @@ def prepare(
         plain=plain,
         verify=False,
     ).content
-    facts = _facts(_parsed(content, model.name), model.name)
+    facts = _facts(_decoded(content, model.name), model.name)
     bare = open_bare(content, threads)
     names: list[str] = [*outputs]
     rows = _rows_at_once(facts)
@@ -335,7 +319,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
     outputs: tuple[Output, ...] = ("outputs", "status", "activations")
     outputs = outputs if activations else outputs[:2]
     content = write(system, outputs=outputs, verify=False).content
-    facts = _facts(_parsed(content, system.name), system.name)
+    facts = _facts(_decoded(content, system.name), system.name)
     return functools.partial(_run_system, open_session(content), facts)
 
 
@@ -416,21 +400,46 @@ def _is_answer(facts: Facts, found: Outputs, rows: int) -> bool:
     return "label" not in found or found["label"].shape == (rows,)
 
 
-def _parsed(content: bytes, name: str) -> onnx.ModelProto:
-    import onnx
-    from google.protobuf.message import (  # type: ignore[import-untyped] # has none
-        DecodeError,
-    )
+def parsed(content: bytes, name: str) -> onnx.ModelProto:
+    """Return an ONNX file as its parts, if it may be run.
+
+    Raises:
+        ReadError: If it is none, too large, or holds what a model does not need.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+    """
+    _require_packages("reading")
+    if len(content) > _LARGEST_FILE:
+        raise ReadError(
+            f"{name}: the file has {len(content) >> 20} MiB, "
+            f"and {_LARGEST_FILE >> 20} are the most that is read"
+        )
+    proto = _decoded(content, name)
+    for danger in _dangers(proto):
+        raise ReadError(f"{name}: {danger}")
+    return proto
+
+
+def loaded(content: bytes, name: str) -> Bare:
+    """Return what runs an ONNX file.
+
+    Raises:
+        ReadError: If onnxruntime does not load it.
+    """
+    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_bare
 
     try:
-        return onnx.load_from_string(content)
-    except DecodeError as error:
-        text = f"{name}: this is no ONNX file, or only a part of one"
+        return open_bare(content)
+    except RUNTIME_ERRORS as error:
+        text = f"{name}: onnxruntime does not load it: {first_line(error)}"
         raise ReadError(text) from error
 
 
-def _facts(proto: onnx.ModelProto, name: str) -> Facts:
-    """Return the metadata, which must be complete and of a known version."""
+def texts_of(proto: onnx.ModelProto, name: str) -> dict[str, str]:
+    """Return the metadata of a file of ours, which must be of a known version.
+
+    Raises:
+        ReadError: If it is a file of others, or of another version.
+    """
     prefix = "fuzzytree."
     texts = {
         entry.key.removeprefix(prefix): entry.value
@@ -448,10 +457,29 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
             f"{name}: the file has format {version!r}, and this fuzzytree "
             f"reads format {FORMAT_VERSION!r}; a newer one may help"
         )
+    return texts
+
+
+def _decoded(content: bytes, name: str) -> onnx.ModelProto:
+    import onnx
+    from google.protobuf.message import (  # type: ignore[import-untyped] # has none
+        DecodeError,
+    )
+
+    try:
+        return onnx.load_from_string(content)
+    except DecodeError as error:
+        text = f"{name}: this is no ONNX file, or only a part of one"
+        raise ReadError(text) from error
+
+
+def _facts(proto: onnx.ModelProto, name: str) -> Facts:
+    """Return the metadata, which must be complete and of a known version."""
+    texts = texts_of(proto, name)
     if texts.get("carrier") == "frames":
         raise ReadError(
             f"{name}: the file takes frames of a sensor, and rows are asked for; "
-            "any ONNX runtime runs it on frames"
+            "`fuzzytree tactile check` asks it"
         )
     records = {"columns", "inputs", "units", "classes", "rules", "outputs", "semantics"}
     records |= {"names", "chunk"}

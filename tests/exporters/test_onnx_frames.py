@@ -141,7 +141,7 @@ def test_a_graph_of_frames_is_no_graph_of_rows() -> None:
         open_onnx(content, "frames.onnx")
     assert str(caught.value) == (
         "frames.onnx: the file takes frames of a sensor, and rows are asked for; "
-        "any ONNX runtime runs it on frames"
+        "`fuzzytree tactile check` asks it"
     )
 
 

@@ -16,6 +16,7 @@ ACTIONS = (
     "features",
     "interpolate",
     "export",
+    "check",
     "bench",
     "experiment",
 )

@@ -1,0 +1,46 @@
+"""`fuzzytree tactile check`: files from frame to class, held against their model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from fuzzytree.cli.tactile.sensors import asked_model
+from fuzzytree.cli.talk import answer, answer_json, json_option, quiet_option, say
+
+
+@click.command("check", short_help="Hold files of frames against their model.")
+@click.argument("model", metavar="MODEL")
+@click.argument("files", metavar="FILE.onnx...", nargs=-1, required=True)
+@click.option(
+    "--data", metavar="FRAMES", help="Frames to check with, beside made ones."
+)
+@json_option
+@quiet_option
+def command(
+    model: str, files: Sequence[str], data: str | None, as_json: bool, quiet: bool
+) -> int:
+    """Compare ONNX files that take frames with MODEL, as `tactile export` wrote them.
+
+    What a file says of itself, its graph, and its answers to frames must be those of
+    the model, bit by bit; made frames are aimed at bounds and cuts. Exit 1 if not.
+    """
+    from fuzzytree.files import read_bounded
+    from fuzzytree.recognition.shipped import check_shipped
+    from fuzzytree.report.text import agreement_lines
+    from fuzzytree.tactile.given import given_frames
+
+    asked = asked_model(model)
+    contents = {name: read_bounded(name) for name in files}
+    frames = None if data is None else given_frames(data).presses.frames
+    found = check_shipped(asked, contents, frames)
+    if as_json:
+        answer_json({"check": found, "ok": found.ok})
+    else:
+        answer("\n".join(agreement_lines(found, is_full=False)))
+    wrong = sum(one.verdict == "DISAGREES" for one in found.comparisons)
+    if wrong:
+        verb = "disagrees" if wrong == 1 else "disagree"
+        say(f"{wrong} of {len(found.comparisons)} comparisons {verb}", quiet=quiet)
+    return 0 if found.ok else 1

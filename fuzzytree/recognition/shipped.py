@@ -1,0 +1,232 @@
+"""An ONNX file of frames that was shipped, held against the model that it is of."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.agreement import Agreement, Comparison
+from fuzzytree.contracts import Model
+from fuzzytree.errors import InvalidModelError, ReadError
+from fuzzytree.exporters.onnx_frames import Output, write_frames
+from fuzzytree.recognition.recogniser import check_inputs
+from fuzzytree.recognition.runners import PLAIN, as_sent
+from fuzzytree.rulebase import fingerprint
+from fuzzytree.runtimes.onnxruntime import loaded, parsed, texts_of
+from fuzzytree.tactile.features import frame_program
+from fuzzytree.tactile.features.aimed import proving_frames
+from fuzzytree.tactile.features.plain import plain_answer, plain_features
+from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.exporters.onnx_session import Bare
+
+_TOLD = 3
+_MOST_CELLS = 2**22  # of frames that are asked in plain Python, about a minute
+
+
+class FramesFile(msgspec.Struct, frozen=True, kw_only=True):
+    """What an ONNX file of frames says about itself.
+
+    Attributes:
+        name: Of the model.
+        fingerprint: Of the model.
+        sensor: Whose frames it takes.
+        features: What it computes of them.
+        classes: The possible answers.
+        outputs: What it gives.
+        reject: What is weaker in the rule that decides is unknown.
+    """
+
+    name: str
+    fingerprint: str
+    sensor: Sensor
+    features: tuple[str, ...]
+    classes: tuple[str, ...]
+    outputs: tuple[Output, ...]
+    reject: float = 0.0
+
+
+def frames_file(content: bytes, name: str) -> FramesFile:
+    """Return what an ONNX file of frames says about itself.
+
+    Args:
+        content: The file.
+        name: Of the file, for messages.
+
+    Raises:
+        ReadError: If it is no such file.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+    """
+    proto = parsed(content, name)
+    texts = texts_of(proto, name)
+    if texts.get("carrier") != "frames":
+        raise ReadError(
+            f"{name}: the file takes rows, and not frames of a sensor; "
+            "`fuzzytree check` asks it"
+        )
+    records = {"sensor", "features", "classes", "outputs", "reject"}
+    try:
+        known = {k: json.loads(v) if k in records else v for k, v in texts.items()}
+        found = msgspec.convert(known, FramesFile)
+    except (json.JSONDecodeError, msgspec.ValidationError, RecursionError) as error:
+        raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
+    except InvalidModelError as error:
+        raise ReadError(f"{name}: the file's sensor is none: {error}") from error
+    given = [entry.name for entry in proto.graph.input]
+    outputs = tuple(entry.name for entry in proto.graph.output)
+    if given != ["frames"] or outputs != found.outputs:
+        raise ReadError(
+            f"{name}: the graph's inputs and outputs are not those of its metadata"
+        )
+    return found
+
+
+def check_shipped(
+    model: Model, files: Mapping[str, bytes], frames: Cells | None = None
+) -> Agreement:
+    """Hold ONNX files of frames against a model, by what they say and by their answers.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        files: The files by name; each may be of a sensor of its own.
+        frames: Shape (frames, rows, columns); beside the aimed ones.
+
+    Raises:
+        ReadError: If a file is no graph of frames, or does not run.
+        TableError: If the model asks for other features, or frames do not fit.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+
+    Example:
+        >>> from fuzzytree.verbs import learn
+        >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> content = write_frames(tree, Sensor(4, 4)).content
+        >>> check_shipped(tree, {"tree.onnx": content}).ok
+        True
+    """
+    check_inputs(model)
+    comparisons: list[Comparison] = []
+    probes = 0
+    for name, content in files.items():
+        known = frames_file(content, name)
+        comparisons.append(_fingerprints(model, known, name))
+        if known.features != model.inputs or known.classes != model.classes:
+            comparisons.append(_strangers(known, name))
+            continue
+        made = frame_program(known.sensor, model.inputs)
+        aimed = proving_frames(made, model)
+        every = [aimed] if frames is None else [aimed, as_sent(known.sensor, frames)]
+        rows = np.concatenate(every)[: _MOST_CELLS // aimed[0].size]
+        probes += len(aimed)
+        comparisons.append(_fresh(model, known, content, name))
+        comparisons.append(_answers(model, known, loaded(content, name), rows, name))
+    return Agreement(model.name, fingerprint(model), tuple(comparisons), probes=probes)
+
+
+def _fingerprints(model: Model, known: FramesFile, name: str) -> Comparison:
+    is_same = known.fingerprint == fingerprint(model)
+    told = () if is_same else (f"it was written of another model, {known.name!r}",)
+    return _of_file(name, "the model's fingerprint", told)
+
+
+def _strangers(known: FramesFile, name: str) -> Comparison:
+    asked, classes = ", ".join(known.features), ", ".join(known.classes)
+    told = f"it asks for {asked}, and knows {classes}"
+    return _of_file(name, "the model's features and classes", (told,))
+
+
+def _fresh(model: Model, known: FramesFile, content: bytes, name: str) -> Comparison:
+    """Compare the file with the one that the model gives now."""
+    import onnx
+
+    from fuzzytree.exporters.onnx_compare import proto_difference
+    from fuzzytree.exporters.onnx_graph import TREES
+
+    proto = onnx.load_model_from_string(content)
+    versions = {one.domain: one.version for one in proto.opset_import}
+    try:
+        fresh = write_frames(
+            model,
+            known.sensor,
+            outputs=known.outputs,
+            reject=known.reject,
+            opset=versions.get("", 0),
+            ir=proto.ir_version,
+            plain=isinstance(model, FuzzyTree) and TREES not in versions,
+            verify=False,
+        ).content
+    except ValueError as error:
+        return _of_file(name, "a freshly written graph", (str(error),))
+    apart = proto_difference(onnx.load_model_from_string(fresh), proto)
+    told = () if apart is None else (apart,)
+    return _of_file(name, "a freshly written graph", told)
+
+
+def _of_file(name: str, against: str, told: tuple[str, ...]) -> Comparison:
+    return Comparison(
+        name,
+        against,
+        "file",
+        1,
+        "DISAGREES" if told else "agrees",
+        differing=len(told),
+        detail=told,
+    )
+
+
+def _answers(
+    model: Model, known: FramesFile, bare: Bare, frames: Cells, name: str
+) -> Comparison:
+    """Hold the answers to some frames against those of plain Python, bit by bit."""
+    from fuzzytree.exporters.onnx_frames_proof import expected
+
+    found = _run(bare, known, frames, name)
+    made = frame_program(known.sensor, model.inputs)
+    wrong, flips, told = 0, 0, list[str]()
+    for number, frame in enumerate(frames):
+        values, is_pressed = plain_features(made, frame)
+        right = plain_answer(model, values, is_pressed=is_pressed, reject=known.reject)
+        apart: dict[Output, str] = {}
+        for one in known.outputs:
+            given = np.asarray(found[one][number]).tolist()
+            wanted = np.asarray(expected(model, right, one)).tolist()
+            if given != wanted:
+                apart[one] = f"{one} {given}, not {wanted}"
+        wrong += bool(apart)
+        flips += "label" in apart or "state" in apart
+        if apart and len(told) < _TOLD:
+            told.append(f"frame {number}: {next(iter(apart.values()))}")
+    return Comparison(
+        name,
+        PLAIN,
+        "rows",
+        len(frames),
+        "DISAGREES" if wrong else "agrees",
+        differing=wrong,
+        flips=flips,
+        detail=tuple(told),
+    )
+
+
+def _run(
+    bare: Bare, known: FramesFile, frames: Cells, name: str
+) -> dict[Output, npt.NDArray[np.generic]]:
+    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line
+
+    try:
+        found = bare(list(known.outputs), {"frames": frames})
+    except RUNTIME_ERRORS as error:
+        text = f"{name}: onnxruntime does not run it: {first_line(error)}"
+        raise ReadError(text) from error
+    arrays = [np.asarray(one) for one in found]
+    if any(not one.ndim or len(one) != len(frames) for one in arrays):
+        raise ReadError(f"{name}: it does not give an answer for each frame")
+    return dict(zip(known.outputs, arrays, strict=True))
