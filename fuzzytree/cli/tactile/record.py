@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import signal
 import sys
 import threading
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
+from fuzzytree.cli.tactile.ending import told_to_end
 from fuzzytree.cli.talk import answer_json, json_option, quiet_option, say, say_rows
 from fuzzytree.errors import PortError, WriteError
 from fuzzytree.files import check_place
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.line.recording import Recorder
 
 End = Literal["frames", "seconds", "told", "port"]
-"""Enough frames, or seconds; Ctrl-C or SIGTERM; or the port went away."""
+"""Enough frames, or seconds; Ctrl-C and its like; or the port went away."""
 
 _SENTENCES: dict[State, str] = {
     "open": "frames come again",
@@ -77,7 +77,7 @@ def command(
     if Path(output).exists() and not force:
         raise WriteError(f"{output}: is there already; --force replaces it")
     with (
-        _told_to_end() as told,
+        told_to_end() as told,
         open_line(known, port, wait=not no_wait, most_waiting=_waiting(known)) as line,
     ):
         coming = _Coming(line, told, quiet=quiet)
@@ -215,30 +215,6 @@ def _waiting(board: Board) -> int:
     """Return how many frames may wait."""
     size = board.sensor.rows * board.sensor.columns * board.sensor.bits // 8
     return min(max(_WAITING_BYTES // size, 64), 4096)
-
-
-@contextlib.contextmanager
-def _told_to_end() -> Generator[threading.Event]:
-    """Give an event that Ctrl-C or SIGTERM sets; a second one is an interruption."""
-    told = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield told
-        return
-
-    def note(number: int, _: object) -> None:
-        if told.is_set():
-            raise KeyboardInterrupt
-        told.set()
-
-    before = {
-        number: signal.signal(number, note)
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield told
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _tell_start(started: Started, *, quiet: bool) -> None:

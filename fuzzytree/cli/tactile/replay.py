@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Iterator
 from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fuzzytree.cli.tactile.ending import told_to_end
 from fuzzytree.cli.talk import (
     answer,
     answer_json,
@@ -175,11 +175,10 @@ def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
     paced = Paced(file, speed)
     cells = (frame.cells for frame in paced)
     device = Device(file.board, cells, rate=max(speed, 1.0))
-    with contextlib.closing(device), contextlib.closing(paced):
+    with contextlib.closing(device), contextlib.closing(paced), told_to_end() as told:
         answer(device.port)
         say("the frames begin when it is opened; Ctrl-C ends", quiet=quiet)
-        with contextlib.suppress(KeyboardInterrupt):
-            while not device.over.wait(_LOOK_S):
-                pass
-            time.sleep(_LAST_S)
+        while not (device.over.wait(_LOOK_S) or told.is_set()):
+            pass
+        told.wait(_LAST_S)
     say_rows(("sent", counted(device.truth.frames, "frame"), ""), quiet=quiet)

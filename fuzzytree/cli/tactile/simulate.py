@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import signal
 import threading
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import cycle, islice
 from typing import TYPE_CHECKING
 
 import click
 
+from fuzzytree.cli.tactile.ending import told_to_end
 from fuzzytree.cli.talk import (
     answer,
     answer_json,
@@ -75,7 +74,7 @@ def command(
 
     known = load_board(board)
     rest, coming = _frames(known, name, recording, seed, quiet=quiet)
-    with _told_to_end() as told:
+    with told_to_end() as told:
         with wrong_options():
             device = Device(
                 known,
@@ -106,26 +105,6 @@ def _wait(device: Device, told: threading.Event) -> None:
     while not told.wait(_LOOK_S):
         if device.over.is_set() and not device.is_open:
             return
-
-
-@contextlib.contextmanager
-def _told_to_end() -> Generator[threading.Event]:
-    """Give an event that Ctrl-C or SIGTERM sets."""
-    told = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield told
-        return
-    numbers = (signal.SIGINT, signal.SIGTERM)
-
-    def note(_number: int, _frame: object) -> None:
-        told.set()
-
-    before = {number: signal.signal(number, note) for number in numbers}
-    try:
-        yield told
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _frames(
