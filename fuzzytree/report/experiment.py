@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterator, Mapping
 
 from fuzzytree.recognition.experiment import NOTHING, UNKNOWN, Study
@@ -85,13 +87,9 @@ def confusion_csv(study: Study) -> str:
     rows = [["class", *study.classes, NOTHING, UNKNOWN]]
     for name, counts in zip(study.classes, study.confusion, strict=True):
         rows.append([name, *map(str, counts)])
-    return "".join(",".join(map(_cell, row)) + "\n" for row in rows)
-
-
-def _cell(text: str) -> str:
-    if any(sign in text for sign in ',"\r\n'):
-        return '"' + text.replace('"', '""') + '"'
-    return text
+    file = io.StringIO()
+    csv.writer(file, lineterminator="\n").writerows(rows)
+    return file.getvalue()
 
 
 def _features_text(study: Study) -> str:

@@ -71,10 +71,6 @@ class Noise:
             errors.append(make("multiply", size, one.error))
         return self._rounded(value, errors)
 
-    def quotient(self, one: int, two: int) -> Noisy:
-        """Return the quotient of two exact numbers."""
-        return self._rounded(self._make("divide", one, two), [])
-
     def settled(self, one: Noisy) -> int:
         """Return the value, exactly 0 where it is not beyond its bound."""
         if one.error is None:
