@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.programs.evaluate import evaluate
 from fuzzytree.programs.steps import Maker, Result
-from fuzzytree.tactile.features.noise import UNIT, Noise, Noisy
+from fuzzytree.tactile.features.noise import Noise, Noisy
 
 Operation = Callable[[Noise, Noisy, Noisy], Noisy]
 OPERATIONS: dict[str, tuple[Operation, Callable[[Fraction, Fraction], Fraction]]] = {
@@ -63,14 +63,3 @@ def test_what_is_within_its_bound_is_exactly_0_and_the_rest_is_untouched() -> No
         (-5.0, 0.0, -5.0),
     ):
         assert evaluate(program, {"a": value, "e": error}).values == (wanted,)
-
-
-def test_an_exact_quotient_is_off_by_its_own_rounding_alone() -> None:
-    make = Maker()
-    found = Noise(make).quotient(make.input("a"), make.input("b"))
-    assert found.error is not None
-    results = (Result("output", "v", found.value), Result("output", "e", found.error))
-    program = make.program("q", ("a", "b"), results)
-    value, bound = evaluate(program, {"a": 1.0, "b": 3.0}).values
-    assert abs(Fraction(value) - Fraction(1, 3)) <= Fraction(bound)
-    assert bound <= UNIT
