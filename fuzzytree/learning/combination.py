@@ -23,6 +23,7 @@ _PLACES = 32
 _MANY = 48
 _OWN = 1e-12
 _DIGITS = 9
+_CHEAPEST = 2.0**-100  # gains divided by it are finite
 
 
 @dataclass(frozen=True)
@@ -203,6 +204,7 @@ def selected_features(
     share = float(view.weights[is_right].sum() / total)
     factor = share * (1.0 - share)
     original = np.diag(view.within).copy()
+    prices = np.maximum(costs, _CHEAPEST)
     selected: list[int] = []
     power = 0.0
     for _ in range(min(most, len(step))):
@@ -210,10 +212,10 @@ def selected_features(
         is_free = variances > _OWN * original
         is_free[selected] = False
         gains = np.where(is_free, step**2 / np.where(is_free, variances, 1.0), 0.0)
-        best = int(np.argmax(gains / costs))
+        best = int(np.argmax(gains / prices))
         gain = float(gains[best])
         freedom = max(rows - 2 - len(selected), 1.0)
-        helps = freedom * factor * gain / (1.0 + factor * power) / costs[best]
+        helps = freedom * factor * gain / (1.0 + factor * power) / prices[best]
         if gain <= 0.0 or (selected and helps < entry):
             break
         selected.append(best)

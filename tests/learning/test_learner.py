@@ -121,6 +121,13 @@ def test_a_dear_feature_is_left_out_if_a_cheap_one_does_it() -> None:
     assert cheap.tree.inputs == ("x1",)
 
 
+def test_a_feature_that_costs_nothing_ends_no_combination() -> None:
+    values = np.random.default_rng(1).normal(size=(400, 3))
+    labels = (values.sum(axis=1) > 0).astype(np.int64)
+    free = learn(values, labels, Settings(patterns_per_class=1, costs={"x0": 0.0}))
+    assert free.report.features_per_node == (3,)
+
+
 @pytest.mark.parametrize(
     ("name", "least"), [("xor", 0.95), ("ring", 0.9), ("checkerboard", 0.9)]
 )
