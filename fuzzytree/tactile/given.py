@@ -60,7 +60,9 @@ def given_frames(
         recording = read_recording(path)
         found = recording.board.sensor
         none = np.zeros(0, np.int64)
-        presses = Presses(recording.frames, found.full, none, (), none)
+        presses = Presses(
+            recording.frames, found.full, none, (), none, found.threshold
+        )
     else:
         presses = read_presses(path, label=label)
         rows, columns = presses.frames.shape[1:]

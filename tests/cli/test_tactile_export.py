@@ -8,8 +8,10 @@ import onnx
 import pytest
 
 from fuzzytree.cli import main
+from fuzzytree.cli.tactile.sensors import frames_of
 from fuzzytree.recognition import carriers
 from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.verbs import save
 from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
 
@@ -41,6 +43,17 @@ def test_a_graph_is_checked_and_written(capsys: Said) -> None:
     content = Path("pad.onnx").read_bytes()
     assert err.startswith(f"wrote    pad.onnx onnx, {len(content)} bytes, sha256 ")
     onnx.checker.check_model(onnx.load_model_from_string(content))
+
+
+def test_frames_that_were_pressed_above_another_threshold_are_told(
+    capsys: Said,
+) -> None:
+    cells = np.ones((1, 6, 4), np.uint8)
+    write_presses("six.npz", Presses(cells, 100, NONE, (), NONE, threshold=6))
+    for threshold in (4, 6):
+        frames_of("six.npz", Sensor(6, 4, 100, threshold))
+    told = capsys.readouterr().err
+    assert told == "differs  six.npz tells the threshold 6, not 4\n"
 
 
 def test_c_goes_to_standard_output(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
@@ -125,6 +138,7 @@ def test_a_bench_tells_time_error_and_floors(capsys: Said) -> None:
     assert "left out: plain Python: 2,000 frames in a call" in out
     assert main([*words, "--rows", "1", "--budget", "0.5", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
+    jsonschema.validate(found, json.loads(SCHEMA.read_text("utf-8")))
     assert found["judged"] == 9
     errors = {one["name"]: one["error"] for one in found["points"]}
     assert max(errors[name] for name in ("numpy", "onnx", "c")) < 1e-14

@@ -88,7 +88,7 @@ def command(
 
     sensor = wanted_sensor(board, size, full, threshold)
     asked = asked_model(model)
-    frames = frames_of(data, sensor)
+    frames = frames_of(data, sensor, quiet=quiet)
     with wrong_options(), progress_bar(quiet=quiet) as tell:
         found = time_frames(
             asked,

@@ -81,7 +81,7 @@ def command(
         check_place(output)
     sensor = wanted_sensor(board, size, full, threshold)
     asked = asked_model(model)
-    frames = frames_of(data, sensor)
+    frames = frames_of(data, sensor, quiet=quiet)
     with wrong_options():
         written = frames_export(asked, sensor, form, **options)
         found = check_frames_carriers(

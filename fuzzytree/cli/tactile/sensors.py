@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fuzzytree.cli.talk import wrong_options
+from fuzzytree.cli.talk import say_rows, wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import Model
@@ -100,8 +100,12 @@ def wanted_frames(
     return given_frames(path, sensor=sensor, label=label)
 
 
-def frames_of(path: str | None, sensor: Sensor) -> Cells | None:
+def frames_of(
+    path: str | None, sensor: Sensor, *, quiet: bool = False
+) -> Cells | None:
     """Return the frames of an archive or recording, None if none is named.
+
+    Says so where the file tells another threshold than the sensor's.
 
     Raises:
         ReadError: If the file is neither, or its frames do not fit the sensor.
@@ -110,7 +114,11 @@ def frames_of(path: str | None, sensor: Sensor) -> Cells | None:
         return None
     from fuzzytree.tactile.given import given_frames
 
-    return given_frames(path, sensor=sensor).presses.frames
+    presses = given_frames(path, sensor=sensor).presses
+    if presses.threshold not in (0, sensor.threshold):  # 0 where it tells none
+        told = f"tells the threshold {presses.threshold}, not {sensor.threshold}"
+        say_rows(("differs", path, told), quiet=quiet)
+    return presses.frames
 
 
 def asked_model(path: str) -> Model:
