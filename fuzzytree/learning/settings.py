@@ -28,7 +28,8 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         entry: How much a further feature must help a combination: the smallest
             partial F; 0 takes every feature that helps at all.
         costs: Cost of a feature by column name, 1 for those not named: among equally
-            powerful features the cheaper one is chosen.
+            powerful features the cheaper one is chosen, and what a further feature
+            gains a combination is divided by it.
         choices: What inner validation may choose beside the patterns, of `alpha`,
             `l_max`, `shrinkage` and `entry`.
         rows_per_class: How many rows of a class are kept at most for clusters,

@@ -1,8 +1,8 @@
 """Which effect of the simulated sensor lets invariants tell objects apart.
 
-A rotation invariant is the same for an object at every angle, so on an even sensor no
-learner can tell angles apart. Each effect is switched off alone, on the same presses,
-and Fisher's linear discriminants say what is left.
+The mean of a rotation invariant is nearly the same at every angle on an even sensor, so
+learners that compare means cannot tell angles apart. Each effect is switched off alone,
+on the same presses, and Fisher's linear discriminants say what is left.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ PAPER: tuple[str, ...] = tuple(f"S{number}" for number in range(1, 12))
 """The paper's features (2.1)."""
 
 ORIENTATION: tuple[str, ...] = ("angle", "Re C30", "Re C21")
-"""What tells orientations apart, which invariants cannot."""
+"""What tells orientations apart on any sensor; invariants hardly do."""
 
 _UNSCALED = frozenset(("angle", "cos2", "sin2", "area", "x", "y"))
 _PLACE = "(0|[1-9][0-9]{0,2})"
