@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
 
 
+USUAL_FLOOR = 0.001
+"""What is weaker lies beyond all that was learnt, unless one knows better."""
+
+
 @dataclass(frozen=True, slots=True)
 class Recognition:
     """The answers to some frames.
@@ -142,6 +146,22 @@ class Recogniser:
         found = np.zeros((len(self.model.classes), strengths.shape[1]))
         np.fmax.at(found, self._class_of, strengths)  # NaN, which is missing, counts 0
         return np.where(is_pressed, found, 0.0)
+
+
+def usual_floor(model: Model) -> float:
+    """Return the floor of strength below which one usually rejects.
+
+    Far from all that a model has learnt every fitted set is 0, and the class that is
+    nearest means nothing. Relative rules have no such strength: their floor is 0.
+
+    Example:
+        >>> from fuzzytree.verbs import learn
+        >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> usual_floor(tree), usual_floor(rules_from_tree(tree))
+        (0.001, 0.0)
+    """
+    return 0.0 if strength_rules(model).kind == "relative" else USUAL_FLOOR
 
 
 def strength_rules(model: Model) -> RuleBase:

@@ -130,9 +130,24 @@ def test_a_recording_that_is_there_is_not_written_over(call: Call) -> None:
 
 def test_a_simulated_press_is_answered(call: Call) -> None:
     words = ("simulator", "--model", "area.yaml", "--speed", "0", "--frames", "60")
-    code, out, _ = call(*words)
+    code, out, _ = call(*words, "--reject", "0")
     assert code == 0
     assert "\tobject\t" in out
+
+
+def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_asks(
+    call: Call,
+) -> None:
+    words = ("simulator", "--model", "area.yaml", "--speed", "0", "--frames", "60")
+    _, out, err = call(*words)
+    assert {row.split("\t")[2] for row in out.splitlines()} == {"unknown"}
+    assert "no rule covers it, or the one that decides is below 0.001" in err
+    tree = ft.load("area.yaml")
+    assert isinstance(tree, ft.FuzzyTree)
+    ft.save(ft.rules_from_tree(tree), "relative.yaml")
+    code, out, _ = call("some.ftr", "--model", "relative.yaml", "--speed", "0")
+    assert code == 0  # relative rules have no floor, and need not be told so
+    assert "\tobject\ts\t" in out
 
 
 def test_a_model_of_other_features_is_refused_by_name(call: Call) -> None:
@@ -197,7 +212,7 @@ def test_a_board_is_answered_through_faults_and_a_pulled_plug(call: Call) -> Non
         "measures the baseline in 3 frames: nothing may lie on the sensor"
     )
     kept = read_recording("kept.ftr")
-    assert kept.counters.reconnects == 1
+    assert kept.counters.reconnects >= 1
     assert kept.counters.damaged >= 1
     assert len(kept.frames) == 250
     assert kept.board.sensor.baseline == (0,) * 16

@@ -37,9 +37,8 @@ SWITCH_S = 2e-4
 @click.option(
     "--reject",
     type=click.FloatRange(0.0, 1.0),
-    default=0.0,
     metavar="SHARE",
-    help="What is weaker is none of the known objects.",
+    help="What is weaker is none of the known objects; 0.001 if strengths can tell.",
 )
 @click.option(
     "--hold",
@@ -83,7 +82,7 @@ def command(
     source: str,
     model: str,
     board: str | None,
-    reject: float,
+    reject: float | None,
     hold: int,
     lines: bool,
     as_json: bool,
@@ -102,9 +101,10 @@ def command(
     is a line for each object that is newly recognised. Ctrl-C ends.
     """
     from fuzzytree.recognition.live import Hold, Live
-    from fuzzytree.recognition.recogniser import Recogniser
+    from fuzzytree.recognition.recogniser import Recogniser, usual_floor
 
     known = asked_model(model)
+    floor = usual_floor(known) if reject is None else reject
     with contextlib.ExitStack() as stack:
         stack.callback(_switched(SWITCH_S))
         with wrong_options():
@@ -117,7 +117,7 @@ def command(
                 quiet=quiet,
             )
             stack.callback(found.close)
-            recogniser = Recogniser(known, used.sensor, reject)
+            recogniser = Recogniser(known, used.sensor, floor)
         live = Live(recogniser, found, source)
         recorder = _recorder(record, used)
         if recorder is not None:
@@ -137,7 +137,7 @@ def command(
                         recorder.write(answer.frame, found.counters)
         except KeyboardInterrupt:
             pass
-    tally.tell(live, record, quiet=quiet)
+    tally.tell(live, floor, record, quiet=quiet)
 
 
 def _switched(seconds: float) -> Callable[[], None]:
@@ -271,15 +271,22 @@ class _Tally:
         word = "refused" if answer.state is None else STATES[answer.state]
         self._labels[answer.label or word] += 1
 
-    def tell(self, live: Live, record: str | None, *, quiet: bool) -> None:
+    def tell(
+        self, live: Live, reject: float, record: str | None, *, quiet: bool
+    ) -> None:
         """Say what was answered, how fast, and what was out of the ordinary."""
+        from fuzzytree.recognition.live import STATES
+        from fuzzytree.recognition.recogniser import State
         from fuzzytree.report.live import counts, timing, visible
 
         view = live.view()
         found = [f"{visible(label)} {n}" for label, n in sorted(self._labels.items())]
         total = sum(self._labels.values())
+        word = STATES[State.UNKNOWN]
+        floor = f"no rule covers it, or the one that decides is below {reject:g}"
         say_rows(
             ("answered", f"{total} frames", ", ".join(found)),
+            *([(word, floor, "--reject sets it")] if self._labels[word] else []),
             ("counted", counts(view), ""),
             *([("took", timing(view), "")] if view.latency else []),
             *([("wrote", record, "")] if record else []),
