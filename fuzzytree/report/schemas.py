@@ -15,6 +15,7 @@ import msgspec
 
 from fuzzytree.criteria.results import Stability
 from fuzzytree.recognition.experiment import Study as Experiment
+from fuzzytree.recognition.timing import FramesStudy
 from fuzzytree.savings import Report
 from fuzzytree.schemas.generation import Json, of_result
 from fuzzytree.timing.records import Study
@@ -25,6 +26,7 @@ FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
         "experiment.schema.json": Experiment,
         "needs.schema.json": Report,
         "stability.schema.json": Stability,
+        "tactile-bench.schema.json": FramesStudy,
     }
 )
 """Each file's name and the record that it describes."""

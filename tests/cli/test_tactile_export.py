@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import numpy as np
 import onnx
 import pytest
@@ -15,6 +16,7 @@ from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.verbs import save
 from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
 
+SCHEMA = Path(__file__).resolve().parents[2] / "schemas" / "tactile-bench.schema.json"
 NONE = np.zeros(0, np.int64)
 SIZE = ["--sensor", "6x4", "--full", "100"]
 Said = pytest.CaptureFixture[str]
