@@ -60,9 +60,7 @@ def given_frames(
         recording = read_recording(path)
         found = recording.board.sensor
         none = np.zeros(0, np.int64)
-        presses = Presses(
-            recording.frames, found.full, none, (), none, found.threshold
-        )
+        presses = Presses(recording.frames, found.full, none, (), none, found.threshold)
     else:
         presses = read_presses(path, label=label)
         rows, columns = presses.frames.shape[1:]

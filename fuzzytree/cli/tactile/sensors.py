@@ -100,9 +100,7 @@ def wanted_frames(
     return given_frames(path, sensor=sensor, label=label)
 
 
-def frames_of(
-    path: str | None, sensor: Sensor, *, quiet: bool = False
-) -> Cells | None:
+def frames_of(path: str | None, sensor: Sensor, *, quiet: bool = False) -> Cells | None:
     """Return the frames of an archive or recording, None if none is named.
 
     Says so where the file tells another threshold than the sensor's.
