@@ -129,6 +129,16 @@ class Port(Value, frozen=True):
     parity: Literal["none", "even", "odd"] = "none"
     stop_bits: Literal[1, 2] = 1
 
+    @property
+    def bits_of_a_byte(self) -> int:
+        """How many bits are on the line for each byte.
+
+        Example:
+            >>> Port().bits_of_a_byte
+            10
+        """
+        return 1 + self.data_bits + (self.parity != "none") + self.stop_bits
+
 
 class Start(Value, frozen=True):
     """What is measured before the first frame counts.

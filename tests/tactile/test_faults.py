@@ -19,7 +19,7 @@ from fuzzytree.tactile.simulated.faults import (
     noise,
     with_marker,
 )
-from fuzzytree.tactile.simulated.uart import Receiver, bits_of_a_byte
+from fuzzytree.tactile.simulated.uart import Receiver
 
 DATA = np.random.default_rng(1).bytes(100_000)
 
@@ -180,4 +180,4 @@ def test_a_byte_at_twice_the_rate_is_what_is_worked_out_by_hand() -> None:
 
 
 def test_a_byte_takes_as_many_bits_as_its_port_says() -> None:
-    assert [bits_of_a_byte(port) for port in PORTS] == [10, 11, 11]
+    assert [port.bits_of_a_byte for port in PORTS] == [10, 11, 11]

@@ -155,6 +155,4 @@ def frame_time(board: Board) -> float:
         >>> round(frame_time(Board("mat", Sensor(16, 16), Marker("AA 55"))), 4)
         0.0224
     """
-    port = board.port
-    bits = 1 + port.data_bits + (port.parity != "none") + port.stop_bits
-    return line_bytes(board) * bits / port.baud
+    return line_bytes(board) * board.port.bits_of_a_byte / board.port.baud

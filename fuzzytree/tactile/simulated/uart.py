@@ -16,16 +16,6 @@ import numpy.typing as npt
 from fuzzytree.tactile.boards import Port
 
 
-def bits_of_a_byte(port: Port) -> int:
-    """Return how many bits are on the line for each byte.
-
-    Example:
-        >>> bits_of_a_byte(Port())
-        10
-    """
-    return 1 + port.data_bits + (port.parity != "none") + port.stop_bits
-
-
 class Receiver:
     """Samples what a sender puts on the line, at a rate of its own.
 
@@ -56,7 +46,7 @@ class Receiver:
 
     def idle(self) -> bytes:
         """Return what still comes when the line then rests at 1."""
-        ticks = bits_of_a_byte(self._port) * self._port.baud // self._baud + 2
+        ticks = self._port.bits_of_a_byte * self._port.baud // self._baud + 2
         self._line = np.concatenate([self._line, np.ones(ticks, np.int64)])
         return self._sampled()
 

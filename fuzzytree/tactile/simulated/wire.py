@@ -16,7 +16,7 @@ from pathlib import Path
 from fuzzytree.errors import WriteError
 from fuzzytree.files import reason
 from fuzzytree.tactile.boards import Port
-from fuzzytree.tactile.simulated.uart import Receiver, bits_of_a_byte
+from fuzzytree.tactile.simulated.uart import Receiver
 
 if sys.platform != "win32":
     import fcntl
@@ -56,7 +56,7 @@ class Wire:
         """
         self.bytes = self.overrun = self.garbled = self.framing_errors = 0
         self._port, self._link, self._stop = port, link, stop
-        self._byte_s = bits_of_a_byte(port) / port.baud / rate if rate else 0.0
+        self._byte_s = port.bits_of_a_byte / port.baud / rate if rate else 0.0
         self._master: int | None = None
         self._due = 0.0
         self._receiver: tuple[int, Receiver] | None = None
