@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.tactile.boards import Board, Checksum, Marker
+from fuzzytree.tactile.boards import Board, Checksum, Marker, Pressure
 from fuzzytree.tactile.line.decoding import decoder_of
-from fuzzytree.tactile.line.fixed import crc16
+from fuzzytree.tactile.line.fixed import are_whole, are_whole_at, crc16, layout_of
 from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tactile.simulated.encoding import encoded
 
 PLAIN = Board("b", Sensor(1, 4), Marker("AA 55"))
 
@@ -148,3 +149,39 @@ def test_columns_become_rows() -> None:
     [found] = decoder.feed(bytes.fromhex("AA 01 02 03 04 05 06 AA"))
     assert found.tolist() == [[1, 3, 5], [2, 4, 6]]
     assert found.flags.c_contiguous
+
+
+@pytest.mark.parametrize("checksum", ["none", "sum8", "xor8", "crc16"])
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("pressure", ["rises", "falls"])
+def test_many_places_are_judged_together_as_each_by_itself(
+    checksum: Checksum, bits: int, pressure: Pressure
+) -> None:
+    random = np.random.default_rng(5)
+    full = 200 if bits == 8 else 40_000
+    for columns in (1, 2, 7):
+        protocol = Marker(
+            "AA", bits=8 if bits == 8 else 16, skip=1, checksum=checksum, tail="00"
+        )
+        board = Board("b", Sensor(1, columns, full=full), protocol, pressure=pressure)
+        layout = layout_of(board, protocol)
+        # Few different bytes, so that many places are whole by chance.
+        data = random.choice(np.array([0, 0, 0, 0xAA, 255], np.uint8), 200_000)
+        whole = encoded(board, np.full((1, columns), 170), 0)
+        data[1000 : 1000 + layout.size] = np.frombuffer(whole, np.uint8)
+        places = (data[: -layout.size] == 0xAA).nonzero()[0]
+        blocks = np.lib.stride_tricks.sliding_window_view(data, layout.size)[places]
+        good = are_whole(layout, blocks)
+        assert are_whole_at(layout, data, places).tolist() == good.tolist()
+        assert 0 < good.sum() < len(places)
+
+
+def test_a_long_run_of_markers_is_judged_in_time_that_grows_with_its_bytes() -> None:
+    protocol = Marker("AA", bits=16, checksum="crc16")
+    board = Board("b", Sensor(256, 256, full=65535), protocol)
+    decoder = decoder_of(board)
+    good = np.full(2 * 256 * 256, 0xAA, np.uint8)
+    whole = b"\xaa" + good.tobytes() + crc16(good[np.newaxis]).tobytes()
+    found = decoder.feed(b"\xaa" * 70_000 + whole)
+    assert [(one == 0xAAAA).all() for one in found] == [True]
+    assert decoder.counters.skipped == 70_000

@@ -18,6 +18,7 @@ Blocks = npt.NDArray[np.uint8]
 Truths = npt.NDArray[np.bool_]
 
 _CHECKSUM_BYTES: Final = {"none": 0, "sum8": 1, "xor8": 1, "crc16": 2}
+_CRC_PERIOD: Final = 32767  # bytes of zeros that change no CRC-16: x has that order
 
 
 class Layout(msgspec.Struct, frozen=True):
@@ -130,6 +131,50 @@ def are_whole(layout: Layout, blocks: Blocks) -> Truths:
     return good
 
 
+def are_whole_at(
+    layout: Layout, data: npt.NDArray[np.uint8], places: npt.NDArray[np.int64]
+) -> Truths:
+    """Return at which places a whole frame stands, as `are_whole` would tell.
+
+    The time grows with the bytes plus the places, not with their product: what a
+    frame sums up to is the difference of two running totals.
+
+    Args:
+        layout: How a frame lies in its bytes.
+        data: Bytes of shape (bytes,), in which a frame's length fits at each place.
+        places: Where heads stand, of shape (places,); heads are not looked at again.
+    """
+    good: Truths = np.ones(len(places), np.bool_)
+    begin = places + layout.cells_from
+    end = begin + layout.cell_bytes
+    tail_from = places + (layout.size - len(layout.tail))
+    for place, byte in enumerate(layout.tail):
+        good &= data[tail_from + place] == byte
+    if layout.largest < (255 if layout.dtype == "u1" else 65535):
+        large = _large_cells(layout, data)
+        good &= large[end] == large[begin]
+    begin = places + layout.checked_from
+    match layout.checksum:
+        case "none":
+            pass
+        case "sum8":
+            sums = np.concatenate([[np.uint8(0)], data.cumsum(dtype=np.uint8)])
+            good &= sums[end] - sums[begin] == data[end]
+        case "xor8":
+            parts = _running_xor(data)
+            good &= parts[end] ^ parts[begin] == data[end]
+        case "crc16":
+            # With its CRC behind it, a message that begins with two bytes inverted
+            # gives 0 from a start of 0; zeros behind it change nothing of that.
+            parts = _running_xor(_crc_parts(data, np.arange(len(data))))
+            ones = np.full((2, len(places)), 255, np.uint8)
+            start = np.bitwise_xor.reduce(_crc_parts(ones, [begin, begin + 1]))
+            good &= parts[end + 2] ^ parts[begin] ^ start == 0
+        case _:
+            assert_never(layout.checksum)
+    return good
+
+
 def crc16(rows: Blocks) -> npt.NDArray[np.uint16]:
     """Return the CRC-16 of Modbus of each row.
 
@@ -150,18 +195,49 @@ def crc16(rows: Blocks) -> npt.NDArray[np.uint16]:
     return found
 
 
+def _crc_parts(data: Blocks, at: npt.ArrayLike) -> npt.NDArray[np.uint16]:
+    """Return what bytes at places give to a CRC that a number of zeros ends."""
+    _, table = _crc_table(_CRC_PERIOD)
+    places = np.asarray(at) % _CRC_PERIOD * 32
+    low, high = table.take(places + (data & 15)), table.take(places + 16 + (data >> 4))
+    found: npt.NDArray[np.uint16] = low ^ high
+    return found
+
+
 @functools.lru_cache(maxsize=8)
 def _crc_table(length: int) -> tuple[np.uint16, npt.NDArray[np.uint16]]:
     """Return what 0xFFFF at the start gives, and half bytes (0-15) at each place."""
     bits = np.arange(256)
     for _ in range(8):
         bits = (bits >> 1) ^ (bits & 1) * 0xA001
-    of_byte = bits.astype(np.uint16)
-    halves = of_byte[[*range(16), *range(0, 256, 16)]]
-    table = np.empty((length, 32), np.uint16)
-    start = np.uint16(0xFFFF)
-    for place in reversed(range(length)):
-        table[place] = halves
-        halves = of_byte[halves & 255] ^ (halves >> 8)
-        start = of_byte[start & 255] ^ (start >> 8)
-    return start, table.ravel()
+    low, high = bits.astype(np.uint16), np.arange(256, dtype=np.uint16)
+    rows = low[np.newaxis, [*range(16), *range(0, 256, 16)]]
+    start, zeros = np.uint16(0xFFFF), 1
+    while zeros <= length:  # behind a value, which `low` and `high` give half by half
+        if length & zeros:
+            start = low[start & 255] ^ high[start >> 8]
+        if len(rows) < length:
+            rows = np.concatenate([low[rows & 255] ^ high[rows >> 8], rows])
+        low, high = (low[half & 255] ^ high[half >> 8] for half in (low, high))
+        zeros *= 2
+    return start, rows[len(rows) - length :].ravel()
+
+
+def _running_xor(
+    values: npt.NDArray[np.unsignedinteger],
+) -> npt.NDArray[np.unsignedinteger]:
+    """Return the XOR of all values before each, and of all of them at the end."""
+    before = np.zeros(len(values) + 1, values.dtype)
+    np.bitwise_xor.accumulate(values, out=before[1:])
+    return before
+
+
+def _large_cells(layout: Layout, data: Blocks) -> npt.NDArray[np.int64]:
+    """Return how many cells too large begin a whole number of cells before a place."""
+    step = np.dtype(layout.dtype).itemsize
+    counts = np.zeros(len(data) + 1, np.int64)
+    for phase in range(step):
+        count = (len(data) - phase) // step
+        cells = data[phase : phase + count * step].view(layout.dtype)
+        (cells > layout.largest).cumsum(out=counts[phase + step :: step][:count])
+    return counts

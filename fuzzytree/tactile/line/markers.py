@@ -21,13 +21,13 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.line.decoder import Decoder
 from fuzzytree.tactile.line.fixed import (
     Truths,
     are_whole,
+    are_whole_at,
     blocks_of,
     cells_of,
     layout_of,
@@ -35,7 +35,7 @@ from fuzzytree.tactile.line.fixed import (
 from fuzzytree.tactile.sensor import Cells
 
 _SURE: Final = 2  # bytes of proof; one of them fits by chance once in 256 times
-_MOST_AT_ONCE: Final = 64  # markers that are looked at together
+_MOST_AT_ONCE: Final = 1024  # markers that are looked at together
 _MOST_PERIODS: Final = 8  # frames that are awaited to choose between beginnings
 
 
@@ -120,7 +120,7 @@ class MarkerDecoder(Decoder):
 
     def _is_found(self, *, is_final: bool) -> bool:
         """Bring the next beginning to the front; tell whether there is one so far."""
-        head = self._layout.head
+        head, many = self._layout.head, 1
         while True:
             place = self._buffer.find(head)
             if place < 0:
@@ -131,7 +131,8 @@ class MarkerDecoder(Decoder):
             if len(self._buffer) < self._size:
                 self._need = self._size
                 return False
-            if not self._is_whole_soon():
+            if not self._is_whole_soon(many):
+                many = min(4 * many, _MOST_AT_ONCE)
                 continue
             chosen = self._chosen(is_final=is_final)
             if chosen is None:
@@ -153,19 +154,19 @@ class MarkerDecoder(Decoder):
         self._need = self._size
         return True
 
-    def _is_whole_soon(self) -> bool:
+    def _is_whole_soon(self, many: int) -> bool:
         """Bring the next whole frame to the front; tell whether one came soon.
 
-        Markers at which none stands are skipped, many at once: they may be frequent.
+        Markers at which none stands are skipped, so many at once: they may be frequent.
         """
         places: list[int] = []
         place = 0
         last = len(self._buffer) - self._size
-        while 0 <= place <= last and len(places) < _MOST_AT_ONCE:
+        while 0 <= place <= last and len(places) < many:
             places.append(place)
             place = self._buffer.find(self._layout.head, place + 1)
         data = np.frombuffer(bytes(self._buffer[: places[-1] + self._size]), np.uint8)
-        good = are_whole(self._layout, sliding_window_view(data, self._size)[places])
+        good = are_whole_at(self._layout, data, np.array(places))
         found = bool(good.any())
         self._drop(places[int(good.argmax())] if found else places[-1] + 1)
         return found
@@ -180,6 +181,8 @@ class MarkerDecoder(Decoder):
         if self._is_confirmed or self._expected in (0, -self._size):
             return 0
         size, head = self._size, self._layout.head
+        if not head.startswith(self._buffer[size : size + len(head)]):
+            return -1  # as most are; what follows looks at many more bytes
         alive = self._marks(0)
         if self._expected is not None and 0 < self._expected < size:
             # The marker there is damaged; the ones behind it may not be.
