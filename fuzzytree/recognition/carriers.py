@@ -38,7 +38,7 @@ _PLAIN_CELLS, _EXACT_CELLS = 512_000, 51_200  # of frames that are asked slowly
 _FEWEST, _TOLD = 10, 3
 
 
-class Shown(msgspec.Struct, frozen=True):
+class FrameCounts(msgspec.Struct, frozen=True):
     """What the frames of a check show: nothing of this is hidden in a total.
 
     Attributes:
@@ -66,7 +66,7 @@ class FramesAgreement(Agreement, frozen=True, kw_only=True):
         largest_error: Of a feature against exact arithmetic, as a share of its scale.
     """
 
-    shown: Shown
+    shown: FrameCounts
     largest_error: float
 
 
@@ -179,11 +179,11 @@ def check_frames_carriers(
 
 def _shown(
     model: Model, sensor: Sensor, frames: Cells, aimed: int, reject: float
-) -> Shown:
+) -> FrameCounts:
     found = Recogniser(model, sensor, reject)(frames)
     top = np.sort(np.vstack([np.zeros((2, len(frames))), found.strengths]), axis=0)
     is_tied = (top[-1] == top[-2]) & (top[-1] > 0.0)
-    return Shown(
+    return FrameCounts(
         len(frames),
         aimed,
         int((found.states == State.NOTHING).sum()),

@@ -15,6 +15,7 @@ from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.frames import Features, FramePlan
 from fuzzytree.runtimes.one_row import load
 from fuzzytree.tactile.features.names import feature_of
+from fuzzytree.tactile.features.plain import check_reject
 from fuzzytree.tactile.features.states import State as State
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
 from fuzzytree.tree import FuzzyTree
@@ -88,15 +89,9 @@ class Recogniser:
     """
 
     def __init__(self, model: Model, sensor: Sensor, reject: float = 0.0) -> None:
-        if not 0.0 <= reject <= 1.0:
-            raise ValueError(f"reject lies in 0 to 1, not {reject!r}")
         check_inputs(model)
         rules = strength_rules(model)
-        if reject and rules.kind == "relative":
-            raise ValueError(
-                f"{model.name}: relative rules reject nothing, for one of them always "
-                "has the strength 1; give the tree or its raw rules"
-            )
+        check_reject(rules, reject)
         self.model, self.sensor, self.reject = model, sensor, reject
         self.plan = FramePlan(sensor, model.inputs)
         self._decide: Run = load(model)

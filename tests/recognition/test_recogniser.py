@@ -77,7 +77,7 @@ def test_relative_rules_cannot_reject() -> None:
         Recogniser(rules, SENSOR, reject=0.1)
     assert str(caught.value) == (
         "tree: relative rules reject nothing, for one of them always has the strength "
-        "1; give the tree or its raw rules"
+        "1; give the raw rules"
     )
 
 
