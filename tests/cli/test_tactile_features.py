@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 from fuzzytree.cli import main
+from fuzzytree.tactile.boards import Board, Marker
+from fuzzytree.tactile.frames import Counters, Frame
+from fuzzytree.tactile.line.recording import Recorder
 from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.sensor import Sensor
 
 NONE = np.zeros(0, np.int64)
 
@@ -78,3 +82,38 @@ def test_what_cannot_be_done_is_one_sentence(
     assert main(["tactile", "features", *words]) == 2
     assert capsys.readouterr().err == text
     assert not Path("t.csv").exists()
+
+
+def test_files_of_one_class_each_become_one_table(
+    frames: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cells = np.zeros((2, 6, 6), np.uint8)
+    cells[0, 1:3, 1:3] = 90
+    for name, rest in (("cup", 0), ("pen", 9)):
+        board = Board("mat", Sensor(6, 6, baseline=(rest,) * 36), Marker("AA 55"))
+        with Recorder(f"{name}.ftr", board) as recorder:
+            for number, frame in enumerate(cells):
+                recorder.write(Frame(frame, float(number), number), Counters())
+    words = ["tactile", "features", "cup=cup.ftr", "a pen=pen.ftr", "cup=cup.ftr"]
+    assert main([*words, "--features", "S1,force", "-o", "t.csv"]) == 0
+    assert Path("t.csv").read_text().splitlines()[1:] == [
+        "0.7058823529411765,1.411764705882353,cup",
+        "0.6352941176470588,1.2705882352941176,a pen",
+        "0.7058823529411765,1.411764705882353,cup",
+    ]
+    assert capsys.readouterr().err.splitlines()[:2] == [
+        "read     cup=cup.ftr   2 frames of 6 x 6 cells",
+        "read     a pen=pen.ftr 2 frames of 6 x 6 cells",
+    ]
+    refused = {
+        ("cup.ftr", "pen=pen.ftr"): "of several files, each has a class: "
+        "CLASS=cup.ftr, not cup.ftr\n  fuzzytree tactile features --help tells more\n",
+        ("cup=cup.ftr", "f=f.npz"): "of f=f.npz and cup=cup.ftr, only one tells "
+        "subjects\n",
+        ("cup=cup.ftr", "f=g.npz"): "f=g.npz: is of another sensor (6 x 6 cells, full "
+        "255, threshold 3) than cup=cup.ftr (6 x 6 cells, full 255, threshold 0)\n",
+    }
+    write_presses("g.npz", Presses(cells, 255, NONE, (), NONE, threshold=3))
+    for given, text in refused.items():
+        assert main(["tactile", "features", *given]) == 2
+        assert capsys.readouterr().err == text
