@@ -121,8 +121,8 @@ def pressed(sensor: Sensor, frames: Cells) -> npt.NDArray[np.int64]:
         >>> pressed(sensor, np.array([[[9, 13, 14]]])).tolist()
         [[[0, 0, 5]]]
     """
-    values = check_frames(sensor, frames).astype(np.int64)
-    np.clip(values, 0, sensor.full, out=values)
+    # 64 bits without a sign reach beyond those with one: clip first
+    values = np.clip(check_frames(sensor, frames), 0, sensor.full).astype(np.int64)
     if sensor.baseline:
         baseline = np.array(sensor.baseline, np.int64)
         values -= baseline.reshape(sensor.rows, sensor.columns)

@@ -67,3 +67,10 @@ def test_all_mistakes_of_a_sensor_are_told_at_once() -> None:
     with pytest.raises(InvalidModelError) as caught:
         Sensor(0, 300)
     assert str(caught.value) == "a sensor has 1 to 256 rows, not 0"
+
+
+def test_a_number_of_any_size_is_clipped_at_full() -> None:
+    largest = np.array([[np.iinfo(np.uint64).max]])
+    assert pressed(Sensor(1, 1, full=100), largest).tolist() == [[[100]]]
+    least = np.array([[np.iinfo(np.int64).min]])
+    assert pressed(Sensor(1, 1), least).tolist() == [[[0]]]
