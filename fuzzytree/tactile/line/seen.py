@@ -9,9 +9,8 @@ from itertools import pairwise
 from typing import assert_never
 
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
-
-_CHECK_BYTES = {"none": 0, "sum8": 1, "xor8": 1, "crc16": 2}
-_SPLIT = {"space": None, "comma": b",", "semicolon": b";"}
+from fuzzytree.tactile.line.fixed import layout_of
+from fuzzytree.tactile.line.texts import SEPARATORS
 
 
 def line_bytes(board: Board) -> int:
@@ -23,7 +22,7 @@ def line_bytes(board: Board) -> int:
         case Text():
             return cells * (len(str(board.sensor.full)) + 1)
         case Marker() | Request() as protocol:
-            return cells * protocol.bits // 8 + _around(protocol)
+            return layout_of(board, protocol).size
         case _:
             assert_never(board.protocol)
 
@@ -72,7 +71,7 @@ def _seen_markers(board: Board, protocol: Marker, content: bytes) -> str:
     apart = _usual([after - before for before, after in pairwise(places)])
     if apart is None:
         return f"{text}, at no steady distance"
-    wrong = _wrong_bytes(board, apart - _around(protocol), protocol.bits)
+    wrong = _wrong_bytes(board, apart - _around(board, protocol), protocol.bits)
     return f"{text}, mostly {apart} bytes apart{wrong or _wrong_around(protocol)}"
 
 
@@ -91,7 +90,7 @@ def _seen_answers(board: Board, protocol: Request, content: bytes, asked: int) -
     if not asked:
         return text
     size = round(len(content) / asked)
-    wrong = _wrong_bytes(board, size - _around(protocol), protocol.bits)
+    wrong = _wrong_bytes(board, size - _around(board, protocol), protocol.bits)
     return f"{text} and gave about {size} bytes each time{wrong}"
 
 
@@ -99,7 +98,7 @@ def _seen_lines(board: Board, protocol: Text, content: bytes) -> str:
     lines = [line.strip() for line in content.split(b"\n")[1:-1]]
     if not _is_text(content):
         return "it is no text: is the baud rate right?"
-    split = _SPLIT[protocol.separator]
+    split = SEPARATORS[protocol.separator]
     counts = [
         len(words) - protocol.skip
         for line in lines
@@ -163,13 +162,10 @@ def _wrong_around(protocol: Marker) -> str:
     return f", as expected, but {' or '.join(parts)} did not fit" if parts else ""
 
 
-def _around(protocol: Marker | Request) -> int:
+def _around(board: Board, protocol: Marker | Request) -> int:
     """Return how many bytes of a frame are no cells."""
-    count = protocol.skip + _CHECK_BYTES[protocol.checksum]
-    if isinstance(protocol, Marker):
-        count += len(bytes.fromhex(protocol.marker)) + 4 * protocol.sizes
-        count += len(bytes.fromhex(protocol.tail))
-    return count
+    layout = layout_of(board, protocol)
+    return layout.size - layout.cell_bytes
 
 
 def _unpacked_length(frame: bytes, zero: int) -> int:

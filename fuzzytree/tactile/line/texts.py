@@ -18,7 +18,8 @@ _BYTES_OF_A_NUMBER: Final = 32  # with what separates it; what is longer is no l
 _BYTES_BESIDE: Final = 256
 _LONGEST_NUMBER: Final = 9
 _ODD_BLANKS: Final = bytes.maketrans(b"\v\f\r", b"???")  # blanks, but no separators
-_SEPARATORS: Final = {"space": None, "comma": b",", "semicolon": b";"}
+SEPARATORS: Final = {"space": None, "comma": b",", "semicolon": b";"}
+"""As `bytes.split` takes them."""
 
 
 class TextDecoder(Decoder):
@@ -33,7 +34,7 @@ class TextDecoder(Decoder):
         self._is_block = protocol.frame == "block"
         if not self._is_block:
             self._lines, self._width = 1, sensor.rows * sensor.columns
-        self._separator = _SEPARATORS[protocol.separator]
+        self._separator = SEPARATORS[protocol.separator]
         self._prefix = protocol.prefix.encode()
         self._stamps = protocol.skip
         self._largest = largest_cell(board)
