@@ -275,16 +275,22 @@ def test_frames_become_a_table(call: Call, place: Path) -> None:
 
 
 def test_frames_become_arrays_that_other_actions_read(call: Call, place: Path) -> None:
-    assert call("tactile", "replay", "a.ftr", "-o", "a.npz")[0] == 0
+    assert call("tactile", "replay", "a.ftr", "-o", "a.npz")[2] == "wrote    a.npz\n"
     before = Path("a.npz").read_bytes()
     assert call("tactile", "replay", "a.ftr", "-o", "a.npz", "--quiet")[2] == ""
     assert Path("a.npz").read_bytes() == before
     found = read_presses("a.npz")
-    assert found.full == 255
+    assert (found.full, found.threshold) == (255, BOARD.sensor.threshold)
     assert (found.frames == read_recording("a.ftr").frames).all()
     arrays = np.load("a.npz", allow_pickle=False)
     assert arrays["times"].tolist() == [1.0, 1.25, 1.5, 2.25, 2.5, 3.75]
     assert arrays["numbers"].tolist() == [4, 5, 6, 9, 10, 15]
+    sensor = Sensor(4, 5, masked=((0, 0),))
+    with Recorder("m.ftr", Board("mat", sensor, Marker("AA 55"))) as recorder:
+        recorder.write(Frame(_cells(9), 0.0, 0), Counters(frames=1))
+    hint = "without baseline and mask: give its board with --board"
+    _, _, err = call("tactile", "replay", "m.ftr", "-o", "m.npz")
+    assert err == f"wrote    m.npz {hint}\n"
 
 
 def test_the_board_of_a_recording_becomes_its_file(call: Call, place: Path) -> None:

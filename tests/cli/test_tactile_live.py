@@ -141,7 +141,7 @@ def test_what_is_far_from_all_that_was_learnt_is_unknown_unless_one_asks(
     words = ("simulator", "--model", "area.yaml", "--speed", "0", "--frames", "60")
     _, out, err = call(*words)
     assert {row.split("\t")[2] for row in out.splitlines()} == {"unknown"}
-    assert "no rule covers it, or the one that decides is below 0.001" in err
+    assert "no rule, or one below 0.001, decides; --reject sets it\n" in err
     tree = ft.load("area.yaml")
     assert isinstance(tree, ft.FuzzyTree)
     ft.save(ft.rules_from_tree(tree), "relative.yaml")

@@ -283,10 +283,11 @@ class _Tally:
         found = [f"{visible(label)} {n}" for label, n in sorted(self._labels.items())]
         total = sum(self._labels.values())
         word = STATES[State.UNKNOWN]
-        floor = f"no rule covers it, or the one that decides is below {reject:g}"
+        unknown = self._labels[word]
+        floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
         say_rows(
             ("answered", f"{total} frames", ", ".join(found)),
-            *([(word, floor, "--reject sets it")] if self._labels[word] else []),
+            *([(word, f"{unknown} frames", floor)] if unknown else []),
             ("counted", counts(view), ""),
             *([("took", timing(view), "")] if view.latency else []),
             *([("wrote", record, "")] if record else []),

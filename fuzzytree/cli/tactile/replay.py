@@ -82,7 +82,11 @@ def command(
             answer("\n".join(_lines(recording, file, found)))
         if output is not None:
             _WRITERS[Path(output).suffix](output, recording, file)
-            say_rows(("wrote", output, ""), quiet=quiet)
+            sensor = file.board.sensor
+            rests = any(sensor.baseline) or bool(sensor.masked)
+            is_bare = Path(output).suffix == ".npz" and rests
+            hint = "without baseline and mask: give its board with --board"
+            say_rows(("wrote", output, hint if is_bare else ""), quiet=quiet)
 
 
 def _facts(file: RecordingFile, found: Review) -> dict[str, object]:
@@ -150,6 +154,7 @@ def _write_arrays(output: str, name: str, _: RecordingFile) -> None:
     arrays = {
         "frames": found.frames,
         "full": np.array(found.board.sensor.full),
+        "threshold": np.array(found.board.sensor.threshold),
         "times": found.times,
         "numbers": found.numbers,
     }
