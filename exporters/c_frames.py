@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 
 from fuzzytree.contracts import Model, Written
 from fuzzytree.exporters.c import Made, beginning
-from fuzzytree.exporters.c_steps import HELPERS, LIBRARY, Steps
+from fuzzytree.exporters.c_steps import LIBRARY, Steps
 from fuzzytree.exporters.c_text import DOUBLE, fill, remark, whole_lines, whole_table
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
@@ -167,9 +167,7 @@ def _text(
     steps = Steps(made.program, _LIBRARY)
     ends = [*_features(made, steps)]
     yield "\n#include <math.h>\n" if steps.needs_library else ""
-    for operation, text in HELPERS.items():
-        if operation in steps.needs:
-            yield fill(text, prefix)
+    yield from steps.helper_text(prefix)
     yield from (fill(text, prefix) for text in _cells(sensor))
     yield from (fill(text, prefix) for text in _sums(made))
     yield from (fill(text, prefix) for text in ends)

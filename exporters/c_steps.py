@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.exporters.c_text import DOUBLE, real_lines
+from fuzzytree.exporters.c_text import DOUBLE, fill, real_lines
 from fuzzytree.programs.evaluate import still_results
 from fuzzytree.programs.steps import Program, Step
 
@@ -179,6 +179,12 @@ class Steps:
         return not (
             self.needs.isdisjoint(self.library) and all(map(math.isfinite, numbers))
         )
+
+    def helper_text(self, prefix: str) -> Iterator[str]:
+        """Yield the helpers that the steps call, but for functions of the library."""
+        for name, text in HELPERS.items():
+            if name in self.needs and name not in self.library:
+                yield fill(text, prefix)
 
     def table_text(self, prefix: str) -> Iterator[str]:
         """Yield the tables."""

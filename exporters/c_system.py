@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fuzzytree.exporters.c_steps import HELPERS, Steps
+from fuzzytree.exporters.c_steps import Steps
 from fuzzytree.exporters.c_text import fill, remark
 from fuzzytree.inference import infer
 from fuzzytree.probing import Row, system_probes
@@ -122,9 +122,7 @@ def system_code(
         yield "#include <math.h>\n"
     yield "\n"
     yield from steps.table_text(prefix)
-    for name, text in HELPERS.items():
-        if name in steps.needs:
-            yield fill(text, prefix)
+    yield from steps.helper_text(prefix)
     yield fill("\nint name_infer(const name_real *x, name_real *outputs)\n{\n", prefix)
     if any("for (i" in line for line in steps.body):
         yield "    unsigned long i;\n"
