@@ -185,14 +185,14 @@ def experiment(
     found = features_of(task.sensor, task.frames, names)
     base = task.settings if settings is None else settings
     base = msgspec.structs.replace(base, costs=_costs(task, names))
-    school = _School(task, found, base, choose)
-    others = [_Classmate(name, school, seed) for name in peers]
+    learner = _Learner(task, found, base, choose)
+    others = [_PeerLearner(name, learner, seed) for name in peers]
     trials: list[Trial] = []
     trees: list[FuzzyTree] = []
     answers = np.full(len(task.frames), -1, np.int64)
     for number, split in enumerate(task.splits):
         tell(split.name, number / len(task.splits))
-        trial, answers[split.test], tree = school.examine(split)
+        trial, answers[split.test], tree = learner.examine(split)
         trials.append(trial)
         for other in others:
             other.examine(split)
@@ -200,7 +200,7 @@ def experiment(
     kept = trees[0]
     if task.is_whole:
         tell("learning from all", 1.0)
-        kept = school.learn(np.arange(len(task.frames)))[0].tree
+        kept = learner.learn(np.arange(len(task.frames)))[0].tree
     shares = [trial.accuracy for trial in trials]
     study = Study(
         task.name,
@@ -260,7 +260,7 @@ def _silent(_text: str, _share: float) -> None:
     """Tell nobody."""
 
 
-class _School:
+class _Learner:
     """Learns from some frames of a task, and tests on others."""
 
     def __init__(
@@ -337,17 +337,17 @@ class _School:
         return trial, answers.astype(np.int64), learnt.tree
 
 
-class _Classmate:
-    """Another learner that takes the same lessons and tests."""
+class _PeerLearner:
+    """Another learner on the same divisions."""
 
-    def __init__(self, name: str, school: _School, seed: int) -> None:
-        self.name, self.school, self.seed = name, school, seed
-        self.answers = np.full(len(school.task.frames), -1, np.int64)
+    def __init__(self, name: str, learner: _Learner, seed: int) -> None:
+        self.name, self.learner, self.seed = name, learner, seed
+        self.answers = np.full(len(learner.task.frames), -1, np.int64)
 
     def examine(self, split: Split) -> None:
         """Keep what the learner answers in a division."""
-        values, rows = self.school.found.values, self.school.rows(split.train)
-        codes = self.school.task.codes[rows]
+        values, rows = self.learner.found.values, self.learner.rows(split.train)
+        codes = self.learner.task.codes[rows]
         self.answers[split.test] = peer_answers(
             self.name, values[:, rows], codes, values[:, split.test], self.seed
         )
@@ -358,7 +358,7 @@ class _Classmate:
         Args:
             ours: For each frame whether the tree is right.
         """
-        task = self.school.task
+        task = self.learner.task
         theirs = self.answers == task.codes
         tests = [split.test for split in task.splits]
         shares = [float(theirs[test].mean()) for test in tests]
