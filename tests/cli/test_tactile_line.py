@@ -388,6 +388,16 @@ def test_a_board_that_is_silent_is_told_and_leaves_no_file(
     assert not Path("b.ftr").exists()
 
 
+def test_the_seconds_of_a_board_that_is_silent_end(call: Call, place: Path) -> None:
+    end, host = os.openpty()
+    words = ("mat.yaml", os.ttyname(host), "-o", "b.ftr", "--seconds", "0.1", "--quiet")
+    found = call("tactile", "record", *words)
+    os.close(end)
+    os.close(host)
+    assert found == (2, "", "mat: the baseline needs 3 frames, and only 0 came\n")
+    assert not Path("b.ftr").exists()
+
+
 @pytest.mark.heavy
 @pytest.mark.parametrize("moment", [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0])
 def test_a_recording_survives_the_death_of_its_program(

@@ -83,6 +83,7 @@ def command(
         coming = _Coming(line, told, quiet=quiet)
         settings = f"{known.port.baud} baud"
         say_rows(("opened", port, f"{known.name}, {settings}"), quiet=quiet)
+        coming.begin(seconds)  # a line that stays silent ends, too
         try:
             started = start(known, coming.frames())
         except PortError:
