@@ -125,7 +125,7 @@ def test_a_model_for_other_things_is_refused(capsys: Said) -> None:
 
 def test_a_bench_tells_time_error_and_floors(capsys: Said) -> None:
     words = ["tactile", "bench", "tree.yaml", *SIZE, "--data", "f.npz", "--quiet"]
-    few = ["--rows", "1", "--rows", "2000", "--budget", "0.2"]
+    few = ["--rows", "1", "--rows", "2000", "--rounds", "3"]
     assert main([*words, *few]) == 0
     out = capsys.readouterr().out
     for text in (
@@ -138,7 +138,7 @@ def test_a_bench_tells_time_error_and_floors(capsys: Said) -> None:
         assert text in out
     assert "floor: the frames copied" in out
     assert "left out: plain Python: 2,000 frames in a call" in out
-    assert main([*words, "--rows", "1", "--budget", "0.1", "--json"]) == 0
+    assert main([*words, "--rows", "1", "--rounds", "3", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     jsonschema.validate(found, json.loads(SCHEMA.read_text("utf-8")))
     assert found["judged"] == 9
