@@ -44,7 +44,7 @@ def test_one_press_of_each_is_too_few() -> None:
 
 
 @pytest.mark.heavy
-def test_an_even_sensor_cannot_tell_angles_apart_unless_places_are_fixed() -> None:
+def test_on_an_even_sensor_discriminants_see_no_angle_unless_places_are_fixed() -> None:
     found = {one.name: one for one in effects(count=100)}
 
     def angled(one: Effect) -> float:
