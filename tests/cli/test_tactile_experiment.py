@@ -127,8 +127,8 @@ def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
     [
         (
             ["hands"],
-            "there is no task 'hands'; there is postures, postures-17, touch, "
-            "touch-fingers",
+            "there is no task 'hands'; there is paper, postures, postures-17, touch, "
+            "touch-fingers, and FILE.npz for frames of your own",
         ),
         (["paper", "--choose", "--repeats", "1"], "paper: settings are chosen by"),
         (["paper", "--full", "9"], "--full does nothing for 'paper'"),

@@ -163,13 +163,18 @@ def command(
 
 
 def _check_options(task: str) -> None:
-    """Refuse options of another kind of task, which would do nothing.
+    """Refuse a task that is none, and options that would do nothing for it.
 
     Raises:
         click.UsageError: If one was given.
     """
+    from fuzzytree.recognition.tasks import KNOWN
+
     context = click.get_current_context()
     kind = "paper" if task == "paper" else "file" if task.endswith(".npz") else "known"
+    if kind == "known" and task not in KNOWN:
+        there = f"paper, {', '.join(KNOWN)}, and FILE.npz for frames of your own"
+        raise click.UsageError(f"there is no task {task!r}; there is {there}")
     for name, kinds in _ONLY.items():
         source = context.get_parameter_source(name)
         if kind not in kinds and source is ParameterSource.COMMANDLINE:
