@@ -35,7 +35,7 @@ def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
     except (OSError, ValueError) as error:
         raise ReadError(f"{name}: cannot be read: {reason(error)}") from error
     if len(content) > limit:
-        raise ReadError(f"{name}: is larger than {limit} bytes, too large for a model")
+        raise ReadError(f"{name}: is larger than {limit} bytes, too large to be read")
     return content
 
 

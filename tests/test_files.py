@@ -23,7 +23,7 @@ def test_a_file_larger_than_the_limit_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"12345")
     with pytest.raises(ReadError) as caught:
         read_bounded(path, 4)
-    assert str(caught.value) == f"{path}: is larger than 4 bytes, too large for a model"
+    assert str(caught.value) == f"{path}: is larger than 4 bytes, too large to be read"
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,8 @@ class Page:
     """Serves the page of what is recognised, in threads, until it is closed.
 
     It listens on 127.0.0.1, answers only what names that host (a page of another name
-    that leads here is refused), only GET, and only its two paths.
+    that leads here is refused), only GET, only its two paths, and no page of another
+    place.
 
     Args:
         live: What is shown.
@@ -184,9 +185,16 @@ class _Handler(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
         elif self.headers.get("Host", "").lower() not in self.own.hosts:
             self._refuse(HTTPStatus.MISDIRECTED_REQUEST, "this is another host")
+        elif not self._is_asked_by_own_page():
+            self._refuse(HTTPStatus.FORBIDDEN, "only this page is answered")
         else:
             return True
         return False
+
+    def _is_asked_by_own_page(self) -> bool:
+        """Whether no page of another place asks: it could keep connections busy."""
+        origin = self.headers.get("Origin", "").lower()
+        return not origin or origin.removeprefix("http://") in self.own.hosts
 
     def do_GET(self) -> None:
         """Answer with the page, or with events."""

@@ -51,6 +51,8 @@ def given_frames(
         ReadError: If the file is neither, or holds frames of another size.
     """
     name = os.fspath(path)
+    if Path(path).is_fifo():  # it is read twice, and can keep us waiting
+        raise ReadError(f"{name}: is a pipe, and no file")
     try:
         with Path(path).open("rb") as file:
             is_recording = file.read(len(MAGIC)) == MAGIC

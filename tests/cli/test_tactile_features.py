@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -117,3 +118,12 @@ def test_files_of_one_class_each_become_one_table(
     for given, text in refused.items():
         assert main(["tactile", "features", *given]) == 2
         assert capsys.readouterr().err == text
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes")
+def test_a_pipe_is_refused_and_not_waited_for(
+    frames: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    os.mkfifo("pipe")
+    assert main(["tactile", "features", "pipe"]) == 2
+    assert capsys.readouterr().err == "pipe: is a pipe, and no file\n"

@@ -51,13 +51,19 @@ def page(live: Live) -> Iterator[Page]:
 
 
 def asked(
-    page: Page, path: str = "/", method: str = "GET", host: str | None = None
+    page: Page,
+    path: str = "/",
+    method: str = "GET",
+    host: str | None = None,
+    origin: str | None = None,
 ) -> HTTPResponse:
     place = urlsplit(page.url)
     connection = HTTPConnection(place.netloc, timeout=10)
     connection.putrequest(method, path, skip_host=host is not None)
     if host is not None:
         connection.putheader("Host", host)
+    if origin is not None:
+        connection.putheader("Origin", origin)
     connection.endheaders()
     return connection.getresponse()
 
@@ -110,6 +116,13 @@ def test_the_policy_allows_the_own_script_and_style_and_nothing_else(
 def test_a_name_of_another_host_is_refused(page: Page, host: str, path: str) -> None:
     found = asked(page, path, host=host)
     assert (found.status, found.read()) == (421, b"this is another host\n")
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost"])
+def test_a_page_of_another_place_is_refused(page: Page, origin: str) -> None:
+    found = asked(page, "/events", origin=origin)
+    assert (found.status, found.read()) == (403, b"only this page is answered\n")
+    assert asked(page, origin=page.url.rstrip("/")).status == 200
 
 
 def test_the_name_localhost_is_this_host(page: Page) -> None:
