@@ -119,6 +119,13 @@ def test_every_link_of_the_readme_and_the_docs_leads_to_a_file() -> None:
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
+def test_every_example_that_a_page_names_is_there() -> None:
+    for page in [README, *sorted((ROOT / "docs").rglob("*.md"))]:
+        text = page.read_text("utf-8")
+        for path in re.findall(r"\b(?:examples|benchmarks)/[\w./-]*\w", text):
+            assert (ROOT / path).exists(), f"{page.name}: {path}"
+
+
 def test_the_picture_is_the_one_that_its_script_draws() -> None:
     drawn = _script("picture.py")["drawn"]()
     assert (ROOT / "docs" / "wine.svg").read_text("utf-8") == drawn
