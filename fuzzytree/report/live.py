@@ -311,7 +311,8 @@ def line(answer: Answer) -> str:
     r"""Return a recognised object as a line of fields with tabs between them.
 
     A backslash, tab or end of line within a class's name is written as `\\`, `\t`,
-    `\n` or `\r`, as in the text format of PostgreSQL.
+    `\n` or `\r`, as in the text format of PostgreSQL; what else cannot be printed,
+    such as commands for a terminal, as `\x1b` or `\u202e`.
     """
     facts = line_facts(answer)
     facts["class"] = escaped(answer.label)
@@ -319,11 +320,14 @@ def line(answer: Answer) -> str:
 
 
 def escaped(text: str) -> str:
-    r"""Return a text that fits between tabs.
+    r"""Return a text that fits between tabs, and commands no terminal.
 
     Example:
-        >>> print(escaped("a\tb"))
-        a\tb
+        >>> print(escaped("a\tb" + chr(27)))
+        a\tb\x1b
     """
-    text = text.replace("\\", "\\\\").replace("\t", "\\t")
-    return text.replace("\n", "\\n").replace("\r", "\\r")
+    signs = text.replace("\\", "\\\\")
+    return "".join(
+        sign if sign.isprintable() else sign.encode("unicode_escape").decode()
+        for sign in signs
+    )

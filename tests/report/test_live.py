@@ -158,4 +158,5 @@ def test_a_line_has_six_fields_between_tabs() -> None:
 
 def test_a_name_with_tabs_and_ends_of_lines_stays_one_field() -> None:
     assert escaped("a\tb\\c\r\n") == "a\\tb\\\\c\\r\\n"
+    assert escaped("\x1b[2J\x9b\u202eä") == "\\x1b[2J\\x9b\\u202eä"
     assert line(dataclasses.replace(ANSWER, label="a\tb\n")).count("\t") == 5
