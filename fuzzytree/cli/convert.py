@@ -23,6 +23,7 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say,
     say_rows,
+    setting,
     standard_input,
     wrong_options,
 )
@@ -87,7 +88,7 @@ def command(
         raise click.UsageError("`-` has no suffix; name the format with --to")
     from fuzzytree.report.systems import document_text
 
-    given = [("dialect", dialect), ("tolerance", tolerance), *map(_pair, settings)]
+    given = [("dialect", dialect), ("tolerance", tolerance), *map(setting, settings)]
     form = wanted_format(output, to)
     with wrong_options():
         options = _options(form, given)
@@ -106,13 +107,6 @@ def command(
         as_json=as_json,
         quiet=quiet,
     )
-
-
-def _pair(text: str) -> tuple[str, str | None]:
-    name, mark, value = text.partition("=")
-    if not mark or not name.strip():
-        raise click.UsageError(f"--set {text}: must be NAME=VALUE")
-    return name.strip().replace("-", "_"), value.strip()
 
 
 def _options(

@@ -97,6 +97,22 @@ def standard_input() -> BinaryIO:
     return sys.stdin.buffer
 
 
+def setting(text: str) -> tuple[str, str]:
+    """Return the name and the value of a `--set`.
+
+    Raises:
+        click.UsageError: If it is none.
+
+    Example:
+        >>> setting("load-ohm = 5")
+        ('load_ohm', '5')
+    """
+    name, mark, value = text.partition("=")
+    if not mark or not name.strip():
+        raise click.UsageError(f"--set {text}: must be NAME=VALUE")
+    return name.strip().replace("-", "_"), value.strip()
+
+
 @contextlib.contextmanager
 def wrong_options() -> Generator[None]:
     """Tell a value that an option cannot have as a mistake in the command."""

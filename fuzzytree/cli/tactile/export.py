@@ -23,6 +23,7 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say,
     say_rows,
+    setting,
     wrong_options,
 )
 from fuzzytree.files import check_place, write_atomically
@@ -130,14 +131,11 @@ def _options(form: Form, settings: Sequence[str]) -> dict[str, Any]:
     known = Format(form, (f".{form}",), ("tree", "rules"), write)  # for its options
     found: dict[str, Any] = {}
     for text in settings:
-        name, mark, value = text.partition("=")
-        name = name.strip().replace("-", "_")
-        if not mark or not name:
-            raise click.UsageError(f"--set {text}: must be NAME=VALUE")
+        name, value = setting(text)
         if name in found:
             raise click.UsageError(f"the option {name!r} is given twice")
         with wrong_options():
-            found[name] = option_value(known, name, value.strip())
+            found[name] = option_value(known, name, value)
     return found
 
 

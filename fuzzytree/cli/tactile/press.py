@@ -19,6 +19,7 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say,
     say_rows,
+    setting,
     wrong_options,
 )
 
@@ -123,10 +124,7 @@ def _settings(changes: Sequence[str]) -> Settings:
     before = msgspec.structs.asdict(PAPER)
     given: dict[str, object] = {}
     for change in changes:
-        title, mark, text = (part.strip() for part in change.partition("="))
-        if not mark or not title:
-            raise click.UsageError(f"--set {change}: must be NAME=VALUE")
-        name = title.replace("-", "_")
+        name, text = setting(change)
         if name not in before:
             close = difflib.get_close_matches(name, before, n=1)
             hint = f" (did you mean {close[0]!r}?)" if close else ""
@@ -137,11 +135,10 @@ def _settings(changes: Sequence[str]) -> Settings:
         if name in given:
             raise click.UsageError(f"the setting {name!r} is given twice")
         given[name] = _value(name, text, type(before[name]))
-    with wrong_options():
-        try:
-            return msgspec.structs.replace(PAPER, **given)
-        except ValueError as error:
-            raise click.UsageError(str(error)) from error
+    try:
+        return msgspec.structs.replace(PAPER, **given)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
 
 
 def _value(name: str, text: str, kind: type) -> object:
