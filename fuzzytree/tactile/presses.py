@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import ast
 import io
+import lzma
 import math
 import os
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -155,9 +157,12 @@ def _arrays(content: bytes, name: str, label: str) -> Mapping[str, npt.NDArray[A
                     with archive.open(member) as file:
                         found[title] = _array(file.read(LIMIT), name, title)
             return found
+    except ReadError:
+        raise
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
         raise ReadError(f"{name}: is no numpy archive (.npz): {error}") from error
-    except zlib.error as error:
+    except (zlib.error, lzma.LZMAError, struct.error, OSError, ValueError) as error:
+        # What is packed is damaged, or places that lie outside the file.
         raise ReadError(f"{name}: is damaged: {error}") from error
 
 
@@ -204,6 +209,10 @@ def _texts(found: npt.NDArray[Any] | None, name: str, title: str) -> tuple[str, 
         return ()
     if found.ndim != 1 or found.dtype.kind != "U":
         raise ReadError(f"{name}: {title!r} must be a list of texts")
+    # Numpy takes any number for a sign: those beyond Unicode, and halves of pairs, too.
+    signs = np.ascontiguousarray(found).view(f"{found.dtype.byteorder}u4")
+    if ((signs > 0x10FFFF) | ((signs >= 0xD800) & (signs < 0xE000))).any():
+        raise ReadError(f"{name}: {title!r} holds signs that are none")
     texts = tuple(str(text) for text in found)
     if len(set(texts)) != len(texts) or "" in texts:
         raise ReadError(f"{name}: {title!r} must be different names, none empty")

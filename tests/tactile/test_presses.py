@@ -153,3 +153,29 @@ def test_a_hostile_header_is_refused(tmp_path: Path, header: bytes) -> None:
         archive.writestr("frames.npy", b"\x93NUMPY\1\0" + size + header)
     with pytest.raises(ReadError):
         read_presses(path)
+
+
+def test_an_array_that_lies_before_the_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "n.npz"
+    # The end tells of a directory that is longer than it is: places become negative.
+    content = bytearray(presses_content(presses()))
+    end = content.rfind(b"PK\5\6")
+    size = int.from_bytes(content[end + 12 : end + 16], "little")
+    start = int.from_bytes(content[end + 16 : end + 20], "little")
+    content[end + 16 : end + 20] = (start + 27).to_bytes(4, "little")
+    assert start + size == end
+    path.write_bytes(content)
+    with pytest.raises(ReadError) as caught:
+        read_presses(path)
+    assert str(caught.value) == f"{path}: is damaged: negative seek value -27"
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    for sign in (0x110000, 0xD800):
+        names = np.array([[97], [sign]], "<u4").view("<U1")[:, 0]
+        path = saved(
+            tmp_path / "n.npz", frames=np.zeros((2, 2, 2), int), label_names=names
+        )
+        with pytest.raises(ReadError) as caught:
+            read_presses(path)
+        assert str(caught.value) == f"{path}: 'label_names' holds signs that are none"
