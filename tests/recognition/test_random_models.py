@@ -68,7 +68,7 @@ def random_model(
     draw: np.random.Generator, tree: FuzzyTree
 ) -> tuple[FuzzyTree | RuleBase, float]:
     """Return a tree, or rules of it, and a floor where rules have one."""
-    match draw.integers(4):
+    match int(draw.integers(4)):
         case 0:
             return tree, 0.0
         case 1:
