@@ -51,7 +51,8 @@ def signed_log(make: Maker, x: int) -> int:
     ratio = make("divide", make("subtract", root, one), make("add", root, one))
     series = _odd(make, ratio, [1.0] * _LOG_TERMS)
     found = make("multiply", series, make.constant(2.0 ** (_ROOTS + 1)))
-    return make("where", make("less", x, zero), make("negate", found), found)
+    below = make("subtract", zero, found)  # 0 for 0, where a negation has -0
+    return make("where", make("less", x, zero), below, found)
 
 
 def _odd(make: Maker, x: int, signs: list[float]) -> int:
