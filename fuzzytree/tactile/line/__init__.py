@@ -37,6 +37,7 @@ MOST_WAITING: Final = 64
 """How many frames wait for a slow reader before the oldest are dropped."""
 _LOOK_S = 0.02  # how often the thread looks up while nothing comes
 _MOST_AT_ONCE = 65536  # bytes
+_PAUSES = (0.002, 0.02)  # seconds, before a port that fails is taken for gone
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 1.0  # before a port is tried again
 
 
@@ -240,7 +241,7 @@ class Line:
                 self._decoder.asked()
                 self._watch.asked()
                 questions.asked(time.monotonic())
-            data = port.read(max(min(port.in_waiting, _MOST_AT_ONCE), 1))
+            data = self._read()
             now = time.monotonic()
             if data:
                 found = self._decoder.feed(data)
@@ -248,6 +249,21 @@ class Line:
                 self._watch.came(data, len(found), now)
                 self._pass_on(found, now)
             self._look(now)
+
+    def _read(self) -> bytes:
+        """Return what has come, after a short wait if nothing has.
+
+        A port that is busy is sometimes said to have bytes when it has none, which
+        pyserial takes for a port that is gone: so it is asked again before it is.
+        """
+        port = self._serial
+        for pause in _PAUSES:
+            try:
+                return bytes(port.read(max(min(port.in_waiting, _MOST_AT_ONCE), 1)))
+            except OSError:  # pyserial's error is one
+                if self._stop.wait(pause):
+                    return b""
+        return bytes(port.read(1))
 
     def _pass_on(self, found: list[Cells], now: float) -> None:
         """Give frames to whoever reads them, and what was counted."""
