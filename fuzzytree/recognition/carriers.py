@@ -225,7 +225,8 @@ def _compared(
 def _told(frame: int, one: Found, other: Found, model: Model) -> str:
     ends = (found.features[:, frame].tolist() for found in (one, other))
     every = zip(model.inputs, *ends, strict=True)
-    texts = [f"{name} {a!r}, not {b!r}" for name, a, b in every if a != b]
+    shown = [(name, repr(a), repr(b)) for name, a, b in every]  # -0.0 is not 0.0
+    texts = [f"{name} {a}, not {b}" for name, a, b in shown if a != b]
     labels = [_label(found, frame, model) for found in (one, other)]
     if labels[0] != labels[1]:
         texts.append(f"{labels[0]}, not {labels[1]}")
