@@ -136,8 +136,9 @@ def cost_lines(count: int = 20_000) -> list[str]:
             best = min(best, time.perf_counter() - begin)
         times.append(best / count * 1e9)
         lines.append(f"{known[name]:8.0f} {times[-1]:8.0f} ns  {name}")
-    ranks = np.argsort(np.argsort([list(known.values()), times], axis=1), axis=1)
-    lines.append(f"correlation of their ranks {np.corrcoef(ranks)[0, 1]:.2f}")
+    one, two = np.argsort(np.argsort([list(known.values()), times], axis=1), axis=1)
+    ranked = np.atleast_2d(np.corrcoef(one, two))[0, 1]
+    lines.append(f"correlation of their ranks {ranked:.2f}")
     return lines
 
 
