@@ -67,9 +67,6 @@ class Centred:
     is_pressed: int = field(init=False)
     near: tuple[int, int] = field(init=False)
     rest: tuple[int, int] = field(init=False)
-    _known: dict[tuple[str, int, int, int], Noisy | int] = field(
-        init=False, default_factory=dict
-    )
 
     def __post_init__(self) -> None:
         """Find the centre."""
@@ -94,7 +91,7 @@ class Centred:
 
     def moment(self, p: int, q: int) -> Noisy:
         """Return the moment about the centre; that of order 1 is 0."""
-        return self._across(p, q, q)
+        return self._centred(p, q, p, q)
 
     def _raw(self, p: int, q: int) -> int:
         return self.make.input(sum_name(p, q))
@@ -108,58 +105,32 @@ class Centred:
 
         One move takes the sum of `u x` to that of `u (x - near)`, exactly.
         """
-        key = ("shift", p * 8 + q, by_x, by_y)
-        found = self._known.get(key)
-        if isinstance(found, int):
-            return found
         if by_y:
             one = self._shifted(p, q, by_x, by_y - 1)
             other = self._shifted(p, q - 1, by_x, by_y - 1)
-            made = self._move(one, other, self.near[1])
-        elif by_x:
+            return self._move(one, other, self.near[1])
+        if by_x:
             one = self._shifted(p, q, by_x - 1, 0)
             other = self._shifted(p - 1, q, by_x - 1, 0)
-            made = self._move(one, other, self.near[0])
-        else:
-            made = self._raw(p, q)
-        self._known[key] = made
-        return made
+            return self._move(one, other, self.near[0])
+        return self._raw(p, q)
 
     def _move(self, one: int, other: int, by: int) -> int:
         return self.make("subtract", one, self.make("multiply", by, other))
 
-    def _across(self, p: int, q: int, by_y: int) -> Noisy:
-        """Return a moment after all its moves in x by the rest and some in y."""
-        key = ("y", p, q, by_y)
-        found = self._known.get(key)
-        if isinstance(found, Noisy):
-            return found
-        if (p, q) == (0, 1) and by_y == 1:
-            made = Noisy(self.make.constant(0.0))
-        elif by_y:
-            one = self._across(p, q, by_y - 1)
-            other = self._across(p, q - 1, by_y - 1)
-            made = self._settle(one, other, self.rest[1])
-        else:
-            made = self._along(p, q, p)
-        self._known[key] = made
-        return made
-
-    def _along(self, p: int, q: int, by_x: int) -> Noisy:
-        key = ("x", p, q, by_x)
-        found = self._known.get(key)
-        if isinstance(found, Noisy):
-            return found
-        if (p, q) == (1, 0) and by_x == 1:
-            made = Noisy(self.make.constant(0.0))
-        elif by_x:
-            one = self._along(p, q, by_x - 1)
-            other = self._along(p - 1, q, by_x - 1)
-            made = self._settle(one, other, self.rest[0])
-        else:
-            made = Noisy(self._moved(p, q))
-        self._known[key] = made
-        return made
+    def _centred(self, p: int, q: int, by_x: int, by_y: int) -> Noisy:
+        """Return a moment after some of its moves by the rest; of order 1 it is 0."""
+        if (p, q, by_x, by_y) in ((1, 0, 1, 0), (0, 1, 0, 1)):
+            return Noisy(self.make.constant(0.0))
+        if by_y:
+            one = self._centred(p, q, by_x, by_y - 1)
+            other = self._centred(p, q - 1, by_x, by_y - 1)
+            return self._settle(one, other, self.rest[1])
+        if by_x:
+            one = self._centred(p, q, by_x - 1, 0)
+            other = self._centred(p - 1, q, by_x - 1, 0)
+            return self._settle(one, other, self.rest[0])
+        return Noisy(self._moved(p, q))
 
     def _settle(self, one: Noisy, other: Noisy, rest: int) -> Noisy:
         """Return one - rest * other; the rest itself is rounded once."""
