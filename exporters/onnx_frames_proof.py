@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.exporters.onnx_frames import Output
 
-    Answers = dict[str, npt.NDArray[np.generic]]
+    Answers = dict[Output, npt.NDArray[np.generic]]
 
 
 def differences(
@@ -37,17 +37,33 @@ def differences(
         LossError: If onnxruntime does not load or run the file.
     """
     found = _run(content, model, frames, outputs)
+    for number, name, text in apart(found, made, model, frames, reject):
+        yield (
+            f"the onnx file of {model.name} gives other {name} than plain Python for "
+            f"aimed frame {number}: {text}"
+        )
+
+
+def apart(
+    found: Answers, made: FrameProgram, model: Model, frames: Cells, reject: float
+) -> Iterator[tuple[int, Output, str]]:
+    """Yield each answer that is not plain Python's: frame, output, and both in words.
+
+    Args:
+        found: The answers, by output: an entry for each frame.
+        made: What computes the features.
+        model: The model.
+        frames: Shape (frames, rows, columns).
+        reject: As `fuzzytree.exporters.onnx_frames.write_frames`.
+    """
     for number, frame in enumerate(frames):
         values, is_pressed = plain_features(made, frame)
         right = plain_answer(model, values, is_pressed=is_pressed, reject=reject)
-        for name in outputs:
-            given = np.asarray(found[name][number]).tolist()
-            wanted = np.asarray(expected(model, right, name)).tolist()
+        for name, answers in found.items():
+            given = np.asarray(answers[number]).tolist()
+            wanted = np.asarray(_expected(model, right, name)).tolist()
             if given != wanted:
-                yield (
-                    f"the onnx file of {model.name} gives other {name} than plain "
-                    f"Python for aimed frame {number}: {given}, not {wanted}"
-                )
+                yield number, name, f"{given}, not {wanted}"
 
 
 def _run(
@@ -63,8 +79,7 @@ def _run(
     return {name: np.asarray(one) for name, one in zip(outputs, found, strict=True)}
 
 
-def expected(model: Model, shown: Shown, name: Output) -> object:
-    """Return what an output of a graph is for a frame, from plain Python's answer."""
+def _expected(model: Model, shown: Shown, name: Output) -> object:
     match name:
         case "label":
             return model.classes[shown.code] if shown.code >= 0 else ""

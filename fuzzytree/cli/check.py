@@ -69,11 +69,5 @@ def command(
         answer(found.to_json())
     else:
         answer("\n".join(text.agreement_lines(found, is_full=is_full)))
-    wrong = sum(c.verdict == "DISAGREES" for c in found.comparisons)
-    count = text.counted(len(found.comparisons), "comparison")
-    if wrong:
-        verb = "disagrees" if wrong == 1 else "disagree"
-        say(f"{wrong} of {count} {verb}")
-        return 1
-    say(f"{count}, and none disagrees", quiet=quiet)
-    return 0
+    say(text.verdict_text(found), quiet=quiet and found.ok)
+    return 0 if found.ok else 1

@@ -103,7 +103,7 @@ class Recogniser:
         self._class_of = np.array([number[label] for label in ends], np.int64)
         semantics = model.semantics
         self._uncovered = (
-            -1 if semantics.uncovered is None else (number[semantics.uncovered])
+            -1 if semantics.uncovered is None else number[semantics.uncovered]
         )
 
     def __call__(self, frames: Cells) -> Recognition:

@@ -336,6 +336,20 @@ _COMPARISON = (
 )
 
 
+def verdict_text(found: Agreement) -> str:
+    """Return how many comparisons of a check disagree, and how many bounds fail."""
+    wrong = sum(one.verdict == "DISAGREES" for one in found.comparisons)
+    broken = sum(one.verdict == "DISAGREES" for one in found.certificates)
+    count = counted(len(found.comparisons), "comparison")
+    said = f"{count}, and none disagrees"
+    if wrong:
+        said = f"{wrong} of {count} {'disagrees' if wrong == 1 else 'disagree'}"
+    if broken:
+        verb = "does" if broken == 1 else "do"
+        said += f"; {counted(broken, 'bound')} {verb} not hold"
+    return said
+
+
 def _basis_text(found: Agreement) -> str:
     rows = max((c.rows for c in found.counts), default=found.probes)
     data = rows - found.probes

@@ -106,3 +106,19 @@ def test_the_metadata_say_which_sensor_it_is() -> None:
     proto = onnx.load_model_from_string(write_frames(tree(), SENSOR).content)
     told = {entry.key: entry.value for entry in proto.metadata_props}
     assert json.loads(told["fuzzytree.sensor"])["threshold"] == 3
+
+
+def test_a_file_that_another_version_wrote_is_judged_by_its_answers() -> None:
+    proto = onnx.load_model_from_string(write_frames(tree(), SENSOR).content)
+    for entry in proto.metadata_props:
+        if entry.key == "fuzzytree.version":
+            entry.value = "0.0.1"
+    proto.graph.node[-1].name += " of old"
+    found = check_shipped(tree(), {"pad.onnx": proto.SerializeToString()})
+    assert found.ok
+    assert [one.against for one in found.comparisons] == [
+        "the model's fingerprint", "plain Python",
+    ]  # fmt: skip
+    assert found.skipped == (
+        "pad.onnx: another version, 0.0.1, wrote it, so only frames tell",
+    )

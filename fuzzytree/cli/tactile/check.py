@@ -28,7 +28,7 @@ def command(
     """
     from fuzzytree.files import read_bounded
     from fuzzytree.recognition.shipped import check_shipped
-    from fuzzytree.report.text import agreement_lines
+    from fuzzytree.report.text import agreement_lines, verdict_text
     from fuzzytree.tactile.given import given_frames
 
     asked = asked_model(model)
@@ -39,8 +39,5 @@ def command(
         answer_json({"check": found, "ok": found.ok})
     else:
         answer("\n".join(agreement_lines(found, is_full=False)))
-    wrong = sum(one.verdict == "DISAGREES" for one in found.comparisons)
-    if wrong:
-        verb = "disagrees" if wrong == 1 else "disagree"
-        say(f"{wrong} of {len(found.comparisons)} comparisons {verb}", quiet=quiet)
+    say(verdict_text(found), quiet=quiet and found.ok)
     return 0 if found.ok else 1

@@ -29,8 +29,6 @@ from fuzzytree.cli.talk import (
 from fuzzytree.files import check_place, write_atomically
 
 if TYPE_CHECKING:
-    from fuzzytree.recognition.carriers import FramesAgreement
-
     Form = Literal["onnx", "c"]
 
 _SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
@@ -75,6 +73,7 @@ def command(
     """
     from fuzzytree.recognition.carriers import check_frames_carriers, frames_export
     from fuzzytree.report.frames import check_lines
+    from fuzzytree.report.text import verdict_text
 
     form = _form(output, to)
     options = _options(form, settings)
@@ -98,7 +97,7 @@ def command(
     else:
         answer("\n".join(lines))
     if not found.ok:
-        say(_refusal(found))
+        say(f"{verdict_text(found)}; nothing is written")
         return 1
     if output == "-":
         answer_bytes(written.content)
@@ -137,9 +136,3 @@ def _options(form: Form, settings: Sequence[str]) -> dict[str, Any]:
         with wrong_options():
             found[name] = option_value(known, name, value)
     return found
-
-
-def _refusal(found: FramesAgreement) -> str:
-    wrong = sum(one.verdict == "DISAGREES" for one in found.comparisons)
-    verb = "disagrees" if wrong == 1 else "disagree"
-    return f"{wrong} of {len(found.comparisons)} comparisons {verb}; nothing is written"

@@ -1,0 +1,54 @@
+"""Results in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from fuzzytree.agreement import Agreement, Certified, Comparison, Verdict
+from fuzzytree.report.text import verdict_text
+
+
+def agreement(comparisons: list[Verdict], bounds: list[Verdict]) -> Agreement:
+    certified = [
+        Certified(
+            "rules",
+            "float64",
+            "",
+            None,
+            "",
+            "probes",
+            1,
+            None,
+            0,
+            0,
+            None,
+            0,
+            0,
+            0,
+            one,
+        )
+        for one in bounds
+    ]
+    found = [Comparison("a", "b", "rows", 1, one) for one in comparisons]
+    return Agreement("m", "f", tuple(found), certificates=tuple(certified))
+
+
+@pytest.mark.parametrize(
+    ("comparisons", "bounds", "said"),
+    [
+        (["agrees"], ["agrees"], "1 comparison, and none disagrees"),
+        (["agrees", "DISAGREES"], [], "1 of 2 comparisons disagrees"),
+        (["DISAGREES", "DISAGREES"], [], "2 of 2 comparisons disagree"),
+        (
+            ["agrees", "agrees"],
+            ["DISAGREES"],
+            "2 comparisons, and none disagrees; 1 bound does not hold",
+        ),
+    ],
+)
+def test_a_check_ends_with_how_much_of_it_disagrees(
+    comparisons: list[Verdict], bounds: list[Verdict], said: str
+) -> None:
+    found = agreement(comparisons, bounds)
+    assert verdict_text(found) == said
+    assert found.ok == (" and none disagrees" in said and "bound" not in said)
