@@ -1,0 +1,68 @@
+"""What is audited, in the form that every family of questions takes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from fuzzytree.auditing.records import Answer, Policy, Settings
+from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.domain import Domain
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, IntArray
+
+
+class Rows(msgspec.Struct, frozen=True, eq=False):
+    """Rows of a table.
+
+    Attributes:
+        name: What messages call the table.
+        values: Shape (inputs, rows), in the order of the model's inputs.
+        codes: The number of each row's class, -1 if it has none of the model's; None
+            if the table has no column of classes.
+    """
+
+    name: str
+    values: FloatArray
+    codes: IntArray | None = None
+
+
+class Subject(msgspec.Struct, frozen=True, eq=False):
+    """A model as it is audited.
+
+    Attributes:
+        rules: The rules: of a tree its relative rules, which decide as it does; of a
+            system a view of it, whose classes are the texts of conclusions.
+        policy: How the rules decide.
+        domain: Where everything is asked.
+        settings: What is taken for small.
+        clock: How much time is left.
+        tree: The tree that the rules come from.
+        raw: The tree's raw rules, if it has fitted sets.
+        system: The system that the rules are a view of.
+        rows: The user's rows.
+        places: Texts such as `rule 2 of block 1` for the rules of a system, one for
+            each rule; empty where rules are simply numbered.
+        declined: What the view could not take over, as answers.
+    """
+
+    rules: RuleBase
+    policy: Policy
+    domain: Domain
+    settings: Settings
+    clock: Clock
+    tree: FuzzyTree | None = None
+    raw: RuleBase | None = None
+    system: FuzzySystem | None = None
+    rows: Rows | None = None
+    places: tuple[str, ...] = ()
+    declined: tuple[Answer, ...] = ()
+
+    def rule_name(self, number: int) -> str:
+        """Return what messages call a rule."""
+        return self.places[number - 1] if self.places else f"rule {number}"
