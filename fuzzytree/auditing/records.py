@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import Span, State
 from fuzzytree.rulebase import Value
 
-FORMAT = "fuzzytree-audit/1"
+FORMAT: Final = "fuzzytree-audit/1"
 
 Severity = Literal["error", "warning", "info"]
 
