@@ -247,8 +247,8 @@ def _single(
         starts_well = low == base or (below < 0) == rising
         ends_well = high == base + (1 << _FINE) or (above > 0) == rising
         if starts_well and ends_well:
-            return Fraction(low, 1 << shift), Fraction(high, 1 << shift), True
-    return _bisected(numbers, base, base + (1 << _FINE), shift, 8, is_rising=rising)
+            return _bisected(numbers, low, high, shift, 16, is_rising=rising)
+    return _bisected(numbers, base, base + (1 << _FINE), shift, 16, is_rising=rising)
 
 
 def _bisected(
@@ -294,6 +294,7 @@ def _guess(bends: Sequence[int]) -> float:
     if below * above >= 0.0:  # an end is a root, or too near to tell
         below = below or -math.copysign(1e-9, above)
         above = above or -math.copysign(1e-9, below)
+    last = 0
     for _ in range(40):
         middle = high - above * (high - low) / (above - below)
         if not low < middle < high:
@@ -302,9 +303,13 @@ def _guess(bends: Sequence[int]) -> float:
         if found == 0.0 or high - low < 2.0**-_FINE:
             return middle
         if (found > 0.0) == (above > 0.0):
-            high, above, below = middle, found, below / 2
+            high, above = middle, found
+            below = below / 2 if last > 0 else below
+            last = 1
         else:
-            low, below, above = middle, found, above / 2
+            low, below = middle, found
+            above = above / 2 if last < 0 else above
+            last = -1
     return (low + high) / 2
 
 

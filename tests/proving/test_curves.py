@@ -1,5 +1,6 @@
 """A shape laid out in pieces is the shape of the exact definition."""
 
+import itertools
 from fractions import Fraction
 
 import pytest
@@ -27,7 +28,7 @@ def test_pieces_have_the_exact_degrees_at_their_ends_and_between(seed: int) -> N
             laid = pieces(term.shape)
             assert laid[0].low is None
             assert laid[-1].high is None
-            assert all(a.high == b.low for a, b in zip(laid, laid[1:], strict=False))
+            assert all(a.high == b.low for a, b in itertools.pairwise(laid))
             for mark in map(Fraction, landmarks(term.shape)):
                 for x in (mark, mark + Fraction(1, 7), mark * Fraction(3, 2)):
                     assert piece_at(laid, x).degree(x) == exact_degree(term.shape, x)

@@ -90,7 +90,7 @@ def test_a_polynomial_is_moved_differentiated_and_integrated() -> None:
     assert integral(derivative(cubic), half, Fraction(7)) == value_at(
         cubic, Fraction(7)
     ) - value_at(cubic, half)
-    assert difference(cubic, cubic) == (0,)
+    assert difference(cubic, cubic) == (Fraction(0),)
 
 
 def test_no_interval_is_refused() -> None:
