@@ -9,6 +9,8 @@ from fuzzytree.proving.states import Span, State
 from fuzzytree.rulebase import Value
 
 FORMAT: Final = "fuzzytree-audit/1"
+INTERRUPTED: Final = "interrupted"
+"""How a sentence of `Audit.unasked` ends where Ctrl-C is the reason."""
 
 Severity = Literal["error", "warning", "info"]
 
@@ -148,6 +150,7 @@ class Audit(Value, frozen=True):
             by the budget, or by an interruption.
         limits: What this audit does not establish: fixed sentences.
         is_complete: Whether nothing was cut short.
+        accepted: The ids of findings that the user's baseline accepts.
         digest: The SHA-256 of all else, as canonical JSON; see `digest_of`.
     """
 
@@ -165,6 +168,7 @@ class Audit(Value, frozen=True):
     unasked: tuple[str, ...]
     limits: tuple[str, ...]
     is_complete: bool
+    accepted: tuple[str, ...] = ()
     digest: str = ""
     format: Literal["fuzzytree-audit/1"] = FORMAT
 
@@ -172,3 +176,14 @@ class Audit(Value, frozen=True):
     def findings(self) -> tuple[Answer, ...]:
         """The answers that a reader should see."""
         return tuple(answer for answer in self.answers if answer.is_finding)
+
+    @property
+    def open_findings(self) -> tuple[Answer, ...]:
+        """The findings that no baseline accepts."""
+        known = set(self.accepted)
+        return tuple(answer for answer in self.findings if answer.id not in known)
+
+    @property
+    def was_interrupted(self) -> bool:
+        """Whether Ctrl-C cut it short."""
+        return any(text.endswith(INTERRUPTED) for text in self.unasked)
