@@ -56,9 +56,9 @@ class Clock:
         if self.is_over:
             raise OutOfTimeError
 
-    def share(self, part: float) -> Clock:
-        """Return a clock that ends after a part of what is left, and tells nothing."""
-        return Clock(max(self.left_s * part, 1e-3), now=self._now)
+    def share(self, part: float, *, tell: Progress | None = None) -> Clock:
+        """Return a clock that ends after a part of what is left; it tells `tell`."""
+        return Clock(max(self.left_s * part, 1e-3), tell=tell, now=self._now)
 
     def tell(self, text: str, share: float) -> None:
         """Tell what is being done."""

@@ -1,0 +1,245 @@
+"""An audit: every family of questions is asked, and what is known is kept."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import Final, cast
+
+import msgspec
+
+from fuzzytree.auditing.codes import CODES
+from fuzzytree.auditing.domains import domain_of
+from fuzzytree.auditing.limits import LIMITS, digest_of
+from fuzzytree.auditing.places import ModelFile, places_of, with_ids
+from fuzzytree.auditing.records import (
+    INTERRUPTED,
+    Answer,
+    Audit,
+    Policy,
+    Settings,
+    Source,
+)
+from fuzzytree.auditing.selecting import check_settings, chosen_codes
+from fuzzytree.auditing.subject import Rows, Subject
+from fuzzytree.contracts import Document
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.domain import Domain
+from fuzzytree.rulebase import RuleBase, fingerprint
+from fuzzytree.tree import FuzzyTree
+
+Asking = Callable[[Subject], Iterator[Answer]]
+
+
+class Family(msgspec.Struct, frozen=True):
+    """Questions that one module of this package asks.
+
+    Attributes:
+        module: Its name; its `answers` yields an answer to each question.
+        codes: Of the questions.
+    """
+
+    module: str
+    codes: tuple[str, ...]
+
+
+FAMILIES: Final[tuple[Family, ...]] = ()
+"""In the order in which they are asked: the quick ones first, so that a spent budget
+costs as few answers as it can. Each takes at most half of the time that is left."""
+
+ASKED: Final = tuple(code for family in FAMILIES for code in family.codes)
+"""The codes that an audit asks; the others belong to a comparison, or say why not."""
+
+
+def audit(
+    model: Document,
+    *,
+    rows: Rows | None = None,
+    domain: Domain | None = None,
+    settings: Settings | None = None,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    clock: Clock | None = None,
+    file: ModelFile | None = None,
+    data: Source | None = None,
+    accepted: Collection[str] = (),
+    repeat: str = "",
+) -> Audit:
+    """Ask everything of a model, and return what is known.
+
+    When the budget is spent, or at a Ctrl-C, nothing new is begun: what is proved is
+    kept, and the rest stands among what was not asked.
+
+    Args:
+        model: The model.
+        rows: The user's rows.
+        domain: Where everything is asked; the model's ranges unless given.
+        settings: What is taken for small.
+        select: Beginnings of codes that are asked; all if none.
+        ignore: Beginnings of codes that are left out.
+        clock: The budget; that of the settings unless given.
+        file: The file of the model, for places.
+        data: The table that the rows come from.
+        accepted: Ids of findings that a baseline accepts.
+        repeat: The command that asks all of this again.
+
+    Raises:
+        ValueError: If a code or a setting is none, or the domain is not known.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> audit(random_tree(1), select=["FT501"]).is_complete
+        True
+    """
+    settings = settings or Settings()
+    check_settings(settings)
+    wanted = chosen_codes(select, ignore)
+    domain = domain or domain_of(model)
+    clock = clock or Clock(settings.budget_s)
+    subject = _subject(model, domain, settings, clock, rows)
+    asked = _Asked([*subject.declined])
+    _ask_all(subject, wanted, clock, asked)
+    kept = sorted(
+        (one for one in asked.answers if one.code in wanted), key=lambda one: one.code
+    )
+    carriers = [subject.rules, *([subject.raw] if subject.raw else [])]
+    answers = tuple(
+        _placed(one, model, file, repeat) for one in with_ids(kept, *carriers)
+    )
+    ids = {one.id for one in answers if one.is_finding}
+    found = Audit(
+        version=_version(),
+        model=model.name,
+        form=_form(model),
+        fingerprint=fingerprint(model),
+        file=source_of(file.name, file.content) if file else None,
+        data=data,
+        rows=0 if rows is None else rows.values.shape[1],
+        policy=subject.policy,
+        domain=domain,
+        settings=settings,
+        answers=answers,
+        unasked=tuple(_unasked(subject.policy, wanted, asked)),
+        limits=LIMITS,
+        is_complete=not asked.cut,
+        accepted=tuple(sorted(ids.intersection(accepted))),
+    )
+    return msgspec.structs.replace(found, digest=digest_of(found))
+
+
+def _subject(
+    model: Document,
+    domain: Domain,
+    settings: Settings,
+    clock: Clock,
+    rows: Rows | None,
+) -> Subject:
+    if isinstance(model, RuleBase):
+        rules, tree, raw = model, None, None
+    elif isinstance(model, FuzzyTree):
+        tree, rules = model, rules_from_tree(model)
+        raw = rules_from_tree(model, "raw") if model.sets else None
+    else:
+        raise NotImplementedError
+    meant = rules.semantics
+    policy = Policy(meant.conjunction, "strongest", meant.uncovered, meant.missing)
+    return Subject(rules, policy, domain, settings, clock, tree, raw, rows=rows)
+
+
+def source_of(name: str, content: bytes) -> Source:
+    """Return the name of a file and the SHA-256 of its bytes."""
+    return Source(name, hashlib.sha256(content).hexdigest())
+
+
+class _Asked:
+    """What came of the families so far.
+
+    Attributes:
+        answers: All of them.
+        cut: Why a code was cut short or not begun, by code.
+    """
+
+    def __init__(self, answers: list[Answer]) -> None:
+        self.answers = answers
+        self.cut: dict[str, str] = {}
+
+
+def _ask_all(subject: Subject, wanted: set[str], clock: Clock, asked: _Asked) -> None:
+    """Ask each family, within its part of the budget, until all are asked."""
+    todo = [family for family in FAMILIES if wanted.intersection(family.codes)]
+    for position, family in enumerate(todo):
+        codes = [code for code in family.codes if code in wanted]
+        part = 1.0 if position == len(todo) - 1 else 0.5
+        own = clock.share(part, tell=_telling(clock, position, len(todo)))
+        try:
+            clock.check()
+            own.tell(CODES[codes[0]].title, 0.0)
+            _ask(family, msgspec.structs.replace(subject, clock=own), asked)
+        except OutOfTimeError:
+            why = f"the budget of {subject.settings.budget_s:g} s is spent"
+            asked.cut |= dict.fromkeys(codes, why)
+        except KeyboardInterrupt:
+            rest = [code for one in todo[position:] for code in one.codes]
+            asked.cut |= {code: INTERRUPTED for code in rest if code in wanted}
+            return
+
+
+def _ask(family: Family, subject: Subject, asked: _Asked) -> None:
+    """Ask one family; what it answered before it is stopped is kept."""
+    module = importlib.import_module(f"fuzzytree.auditing.{family.module}")
+    # Every module of the table has a function of this type; a test asks each.
+    asking = cast("Asking", module.answers)
+    for answer in asking(subject):
+        asked.answers.append(answer)
+
+
+def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
+    """Return a function that tells a family's progress as part of all."""
+    return lambda text, share: clock.tell(text, (position + share) / count)
+
+
+def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
+    """Yield what was not asked and why, in order of the codes."""
+    answered = {one.code for one in asked.answers}
+    for code in sorted(ASKED):
+        name = f"{code} {CODES[code].title}"
+        if code not in wanted:
+            yield f"{name}: left out by the user"
+        elif code in asked.cut:
+            begun = "cut short" if code in answered else "not asked"
+            yield f"{name}: {begun}: {asked.cut[code]}"
+        elif code in answered:
+            continue
+        elif policy.decision == "all" and CODES[code].decision == "strongest":
+            yield f"{name}: not asked: every rule takes part in the answer"
+        else:
+            yield f"{name}: nothing in this model to ask it of"
+
+
+def _placed(
+    answer: Answer, model: Document, file: ModelFile | None, repeat: str
+) -> Answer:
+    """Return an answer with its places and the command that finds it again."""
+    return msgspec.structs.replace(
+        answer,
+        places=places_of(answer, model, file, answer.rules),
+        repeat=f"{repeat} --select {answer.code}" if repeat else "",
+    )
+
+
+def _form(model: Document) -> str:
+    match model:
+        case FuzzyTree():
+            return "tree"
+        case RuleBase(kind=kind):
+            return f"{kind} rules" if kind else "rules"
+        case _:
+            return "system"
+
+
+def _version() -> str:
+    import fuzzytree
+
+    return fuzzytree.__version__

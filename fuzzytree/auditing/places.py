@@ -1,0 +1,176 @@
+"""Where rules and terms stand in a model's file, and ids that outlive their order."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import PurePath
+
+import msgspec
+
+from fuzzytree.auditing.records import Answer, Label, Place
+from fuzzytree.contracts import Document
+from fuzzytree.errors import ReadError
+from fuzzytree.readers.nodes import Node, compose
+from fuzzytree.readers.places import find
+from fuzzytree.rulebase import Path, Rule, RuleBase, Shape, sentence, shapes_of
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree
+
+_YAML = (".yaml", ".yml")
+
+
+class ModelFile(msgspec.Struct, frozen=True, eq=False):
+    """A file that a model was read from.
+
+    Attributes:
+        name: Its path as the user wrote it.
+        content: Its bytes.
+        root: What it holds, node by node; None if it is no YAML.
+    """
+
+    name: str
+    content: bytes
+    root: Node | None = None
+
+    def place(self, path: Path) -> Place | None:
+        """Return where a part of the model stands, None if that is not known."""
+        if self.root is None:
+            return None
+        node = find(self.root, path)
+        return Place(self.name, node.line, node.column)
+
+
+def model_file(name: str, content: bytes) -> ModelFile:
+    """Return a file with its places: lines and columns where it is YAML."""
+    root: Node | None = None
+    if PurePath(name).suffix.lower() in _YAML:
+        try:
+            root, _ = compose(content, name)
+        except ReadError:  # another format under this suffix: it has no places
+            root = None
+    return ModelFile(name, content, root)
+
+
+def rule_path(model: Document, number: int) -> Path:
+    """Return where a model holds a rule; a tree's rules are its leaves.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> rule_path(random_tree(1), 2)
+        ('leaves', 1)
+    """
+    match model:
+        case RuleBase():
+            return ("rules", number - 1)
+        case FuzzyTree():
+            return ("leaves", number - 1)
+        case FuzzySystem():
+            return _system_rule_path(model, number)
+
+
+def _system_rule_path(system: FuzzySystem, number: int) -> Path:
+    for position, block in enumerate(system.blocks):
+        if number <= len(block.rules):
+            return ("blocks", position, "rules", number - 1)
+        number -= len(block.rules)
+    return ("blocks",)
+
+
+def term_path(model: Document, label: Label) -> Path:
+    """Return where a model holds a term; `variables` if it has none of that name."""
+    if isinstance(model, FuzzySystem):
+        return _label_path(model, label)
+    for k, variable in enumerate(model.variables):
+        terms = [term.name for term in variable.terms]
+        if variable.name == label.variable and label.term in terms:
+            return ("variables", k, "terms", terms.index(label.term))
+    for k, fitted in enumerate(model.sets if isinstance(model, FuzzyTree) else ()):
+        terms = [term.name for term in fitted.terms]
+        if fitted.variable == label.variable and label.term in terms:
+            return ("sets", k, "terms", terms.index(label.term))
+    return ("variables",)
+
+
+def _label_path(system: FuzzySystem, label: Label) -> Path:
+    for position, one in enumerate(system.variables):
+        names = [found.name for found in one.labels]
+        if one.name == label.variable and label.term in names:
+            k = position - len(system.inputs)
+            field = ("inputs", position) if k < 0 else ("outputs", k)
+            return (*field, "labels", names.index(label.term))
+    return ("inputs",)
+
+
+def places_of(
+    answer: Answer, model: Document, file: ModelFile | None, numbers: Iterable[int]
+) -> tuple[Place, ...]:
+    """Return where the rules and terms of an answer stand, in that order.
+
+    Args:
+        answer: The answer.
+        model: The model in the file.
+        file: The file; without one there are no places.
+        numbers: The numbers in the file of the answer's rules.
+    """
+    if file is None:
+        return ()
+    paths = [rule_path(model, number) for number in numbers]
+    paths += [term_path(model, label) for label in answer.terms]
+    found = (file.place(path) for path in paths)
+    return tuple(dict.fromkeys(place for place in found if place is not None))
+
+
+# --- ids
+
+
+def with_ids(answers: Iterable[Answer], *carriers: RuleBase) -> Iterator[Answer]:
+    """Yield answers with ids: the code and a hash of what it is about.
+
+    The hash is taken over the sentences and curves of the rules and the terms
+    concerned, whatever their place in the file; where there are neither, over the
+    subject and the region. Equal ids are told apart by `-2`, `-3` in order.
+
+    Args:
+        answers: The answers.
+        carriers: The rules that their numbers mean; then rules that share the
+            variables, whose terms may be concerned as well.
+    """
+    shapes: dict[tuple[str, str], Shape] = {}
+    for carrier in reversed(carriers):
+        shapes |= shapes_of(carrier.variables)
+    rules = carriers[0].rules
+    counts: dict[str, int] = {}
+    for answer in answers:
+        known = [_rule_facts(rules[k - 1], shapes) for k in answer.rules]
+        known += [_label_facts(label, shapes) for label in answer.terms]
+        other = [] if known else [answer.subject, answer.region]
+        content = msgspec.json.encode([answer.code, known, other])
+        name = f"{answer.code}-{hashlib.sha256(content).hexdigest()[:8]}"
+        counts[name] = counts.get(name, 0) + 1
+        if counts[name] > 1:
+            name = f"{name}-{counts[name]}"
+        yield msgspec.structs.replace(answer, id=name)
+
+
+def _rule_facts(rule: Rule, shapes: dict[tuple[str, str], Shape]) -> list[object]:
+    """Return what a rule says, with its clauses in an order of their own."""
+    curves = [
+        [
+            clause.variable,
+            clause.negated,
+            sorted(
+                msgspec.json.encode(shapes[clause.variable, term]).decode()
+                for term in clause.terms
+            ),
+        ]
+        for clause in rule.when
+    ]
+    text = sentence(
+        msgspec.structs.replace(rule, when=tuple(sorted(rule.when, key=str)))
+    )
+    return [text, sorted(curves, key=str)]
+
+
+def _label_facts(label: Label, shapes: dict[tuple[str, str], Shape]) -> list[object]:
+    return [label.variable, label.term, shapes.get((label.variable, label.term))]
