@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from fuzzytree.system import FuzzySystem
     from fuzzytree.tree import FuzzyTree
     from fuzzytree.verbs import (
+        audit,
         bench,
         certify,
         check,
@@ -46,6 +47,7 @@ __all__ = [
     "Outputs",
     "RuleBase",
     "__version__",
+    "audit",
     "bench",
     "certify",
     "check",
@@ -70,6 +72,7 @@ _HOMES = {
     "FuzzyTreeError": "fuzzytree.errors",
     "Outputs": "fuzzytree.outputs",
     "RuleBase": "fuzzytree.rulebase",
+    "audit": "fuzzytree.verbs",
     "bench": "fuzzytree.verbs",
     "certify": "fuzzytree.verbs",
     "check": "fuzzytree.verbs",

@@ -176,9 +176,28 @@ def load(
             the message lists all losses.
         ValueError: If there is no such format.
     """
-    found = read(path, format=format)
+    return _whole(read(path, format=format), os.fspath(path), allow_loss=allow_loss)
+
+
+def load_content(content: bytes, name: str, *, allow_loss: bool = False) -> Document:
+    """Return the model of a file that was read already; its name tells the format.
+
+    Raises:
+        ReadError: As `load`.
+        LossError: As `load`.
+    """
+    found = read_content(content, format_of(name), name=name)
+    return _whole(found, name, allow_loss=allow_loss)
+
+
+def _whole(found: Reading, name: str, *, allow_loss: bool) -> Document:
+    """Return what was read.
+
+    Raises:
+        LossError: If the model cannot hold all of it, unless allowed.
+    """
     if found.losses and not allow_loss:
-        raise LossError(losses_text(found.losses, os.fspath(path)))
+        raise LossError(losses_text(found.losses, name))
     return found.model
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -18,23 +20,30 @@ from fuzzytree.converting import (
     convert,
     deciding,
     export,
+    format_of,
     load,
+    load_content,
     read,
+    refuse_unreadable,
 )
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
-from fuzzytree.files import write_atomically
+from fuzzytree.files import read_bounded, reason, write_atomically
 from fuzzytree.options import Option
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.rulebase import RuleBase, name_choice
 from fuzzytree.runtimes import chosen_runtimes
 from fuzzytree.runtimes.onnxruntime import OnnxModel
 from fuzzytree.system import FuzzySystem
-from fuzzytree.tables import Table, batches, read_table
+from fuzzytree.tables import Table, batches, class_names, read_table
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from fuzzytree.auditing.domains import Within
+    from fuzzytree.auditing.records import Audit, Source
+    from fuzzytree.auditing.records import Settings as AuditSettings
+    from fuzzytree.auditing.subject import Rows
     from fuzzytree.contracts import FloatArray
     from fuzzytree.criteria.results import Stability
     from fuzzytree.learning import Learnt, Settings
@@ -46,6 +55,8 @@ __all__ = [
     "Carried",
     "Conversion",
     "answering",
+    "audit",
+    "audited_rows",
     "bench",
     "certify",
     "check",
@@ -476,6 +487,177 @@ def _data_name(data: object) -> str:
     if isinstance(data, str | os.PathLike):
         return Path(data).name
     return "the table"
+
+
+def audit(
+    model: Document | str | os.PathLike[str],
+    *,
+    data: object = None,
+    target: str | None = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    within: Within = "model",
+    spreads: float | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    row: Mapping[str, float] | None = None,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    settings: AuditSettings | None = None,
+    accepted: Collection[str] = (),
+    allow_loss: bool = False,
+    repeat: str = "",
+    progress: Progress | None = None,
+) -> Audit:
+    """Ask what is odd in a rule base: dead rules, gaps, conflicts, and more.
+
+    Ctrl-C ends it early and keeps what is proved; see `Audit.was_interrupted`.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system, or the path of one.
+        data: A table with rows of one's own.
+        target: The column of the classes, if the table has one.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        within: Where everything is asked: the ranges of the `model`, or of the `data`.
+        spreads: Instead, so many spreads around the fitted sets of each input.
+        limits: The ends of some variables, which go before the others.
+        row: A row whose nearest other decision is looked for besides.
+        select: Beginnings of codes that are asked, such as `FT1`; all if none.
+        ignore: Beginnings of codes that are left out.
+        settings: What is taken for small, and the budget.
+        accepted: Ids of findings that a baseline accepts.
+        allow_loss: As in `load`.
+        repeat: The command that asks the same, for the answers.
+        progress: Told what is done and which share of it.
+
+    Raises:
+        ReadError: If the file cannot be read.
+        LossError: As `load`.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a limit, a code or a setting is none, or an input has no limits.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> audit(random_tree(1), select=["FT501"]).is_complete
+        True
+    """
+    from fuzzytree.auditing import audit as auditing
+    from fuzzytree.auditing.domains import domain_of
+    from fuzzytree.auditing.places import model_file
+    from fuzzytree.auditing.records import Settings
+    from fuzzytree.auditing.selecting import check_settings
+    from fuzzytree.proving.clock import Clock
+    from fuzzytree.proving.domain import limited
+
+    chosen = settings or Settings()
+    check_settings(chosen)
+    file = None
+    if isinstance(model, str | os.PathLike):
+        file = model_file(os.fspath(model), _bytes_of(model))
+        model = load_content(file.content, file.name, allow_loss=allow_loss)
+    source = _source_of(data)
+    rows = audited_rows(
+        data, model, target=target, columns=columns, delimiter=delimiter
+    )
+    ends = limits or {}
+    box = domain_of(model, within=within, spreads=spreads, rows=rows, limited=ends)
+    return auditing.audit(
+        model,
+        rows=rows,
+        domain=limited(box, ends, model),
+        settings=chosen,
+        select=select,
+        ignore=ignore,
+        clock=Clock(chosen.budget_s, tell=progress),
+        file=file,
+        data=source,
+        row=row,
+        accepted=accepted,
+        repeat=repeat,
+    )
+
+
+def _bytes_of(path: str | os.PathLike[str]) -> bytes:
+    """Return the content of a model's file.
+
+    Raises:
+        ReadError: If it cannot be read, or is in a format that only others read.
+    """
+    refuse_unreadable(format_of(path), os.fspath(path))
+    return read_bounded(path)
+
+
+def _source_of(data: object) -> Source | None:
+    """Return the name and the hash of a table that is a file, None for another."""
+    from fuzzytree.auditing.audit import source_of
+    from fuzzytree.auditing.records import Source
+
+    if isinstance(data, io.BytesIO):
+        return source_of("standard input", data.getvalue())
+    if isinstance(data, str | os.PathLike):
+        try:
+            with Path(data).open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError as error:
+            raise TableError(
+                f"{os.fspath(data)}: cannot be read: {reason(error)}"
+            ) from error
+        return Source(os.fspath(data), digest)
+    return None
+
+
+def audited_rows(
+    data: object,
+    model: Document,
+    *,
+    target: str | None = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+) -> Rows | None:
+    """Return the rows of a table for an audit, with their classes; None without one.
+
+    Args:
+        data: A table; see `fuzzytree.tables`.
+        model: Whose inputs they are for.
+        target: The column of the classes. A class that the model does not know is -1.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+
+    Raises:
+        TableError: If a column is absent or holds text, or the table has no row.
+    """
+    from fuzzytree.auditing.subject import Rows
+
+    if data is None:
+        return None
+    is_system = isinstance(model, FuzzySystem)
+    found = [
+        *batches(
+            data,
+            model.columns if isinstance(model, FuzzySystem) else model.inputs,
+            trained=() if is_system else model.columns,
+            columns=columns,
+            delimiter=delimiter,
+            with_others=target is not None,
+        )
+    ]
+    name = found[0].piece.name
+    values = np.hstack([batch.values for batch in found])
+    if not values.shape[1]:
+        raise TableError(f"{name} has no rows")
+    if target is None:
+        return Rows(name, values)
+    known = found[0].piece.columns
+    if target not in known:
+        raise TableError(
+            f"{name} has no column {target!r}; {name_choice(target, known)}"
+        )
+    place = known.index(target)
+    labels = class_names([batch.piece.cells[place] for batch in found])
+    classes = () if isinstance(model, FuzzySystem) else model.classes
+    numbers = {label: number for number, label in enumerate(classes)}
+    codes = np.array([numbers.get(label or "", -1) for label in labels], np.int64)
+    return Rows(name, values, codes)
 
 
 def stability(

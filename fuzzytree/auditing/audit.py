@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-from collections.abc import Callable, Collection, Iterator, Sequence
+import importlib.metadata
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final, cast
 
 import msgspec
@@ -64,6 +65,7 @@ def audit(
     clock: Clock | None = None,
     file: ModelFile | None = None,
     data: Source | None = None,
+    row: Mapping[str, float] | None = None,
     accepted: Collection[str] = (),
     repeat: str = "",
 ) -> Audit:
@@ -82,6 +84,7 @@ def audit(
         clock: The budget; that of the settings unless given.
         file: The file of the model, for places.
         data: The table that the rows come from.
+        row: A row whose nearest other decision is looked for besides.
         accepted: Ids of findings that a baseline accepts.
         repeat: The command that asks all of this again.
 
@@ -240,6 +243,7 @@ def _form(model: Document) -> str:
 
 
 def _version() -> str:
-    import fuzzytree
-
-    return fuzzytree.__version__
+    try:
+        return importlib.metadata.version("fuzzytree-toolkit")
+    except importlib.metadata.PackageNotFoundError:
+        return "uninstalled"

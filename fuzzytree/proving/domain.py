@@ -10,8 +10,9 @@ import math
 from collections.abc import Mapping
 from typing import Literal
 
-from fuzzytree.rulebase import RuleBase, Value, name_choice
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.contracts import Document
+from fuzzytree.rulebase import Value, name_choice
+from fuzzytree.system import FuzzySystem
 
 Origin = Literal["model", "data", "spreads", "curves", "limits"]
 """Where a side comes from: the range in the model, the rows' smallest and largest
@@ -49,7 +50,7 @@ class Domain(Value, frozen=True):
 def limited(
     domain: Domain,
     limits: Mapping[str, tuple[float, float]],
-    model: RuleBase | FuzzyTree,
+    model: Document,
 ) -> Domain:
     """Return a domain with other ends for some variables.
 
@@ -62,7 +63,8 @@ def limited(
         >>> limited(Domain(()), {tree.inputs[0]: (0.0, 1.0)}, tree).sides[0].high
         1.0
     """
-    names = [variable.name for variable in model.variables]
+    variables = model.inputs if isinstance(model, FuzzySystem) else model.variables
+    names = [variable.name for variable in variables]
     for name, (low, high) in limits.items():
         if name not in names:
             raise ValueError(
