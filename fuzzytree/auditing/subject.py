@@ -49,6 +49,9 @@ class Subject(msgspec.Struct, frozen=True, eq=False):
         places: Texts such as `rule 2 of block 1` for the rules of a system, one for
             each rule; empty where rules are simply numbered.
         declined: What the view could not take over, as answers.
+        is_whole: Whether no rule is left out of the view that may fire. Otherwise what
+            no rule of it covers may be covered all the same, and a term that no rule of
+            it asks may be asked.
     """
 
     rules: RuleBase
@@ -62,6 +65,7 @@ class Subject(msgspec.Struct, frozen=True, eq=False):
     rows: Rows | None = None
     places: tuple[str, ...] = ()
     declined: tuple[Answer, ...] = ()
+    is_whole: bool = True
 
     def rule_name(self, number: int) -> str:
         """Return what messages call a rule."""
