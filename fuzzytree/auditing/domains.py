@@ -37,7 +37,8 @@ def domain_of(
         model: The model.
         within: `model`: the ranges that it declares; where there is none, the span
             of the input's curves, and as much again on both sides where one of them
-            goes on without end. `data`: the smallest and largest value of the rows.
+            goes on without end; where there is no curve either, the rows. `data`: the
+            smallest and largest value of the rows.
         spreads: If given, so many spreads around the means of the fitted sets of
             each input instead, and around the mean of the rows for an input without.
         rows: The rows, in the order of the model's inputs.
@@ -59,7 +60,7 @@ def domain_of(
         elif within == "data":
             sides.append(_seen(axis, values))
         else:
-            sides.append(_declared(axis))
+            sides.append(_declared(axis, values))
     return Domain(tuple(sides))
 
 
@@ -68,16 +69,18 @@ def inputs_of(model: Document) -> tuple[str, ...]:
     return model.columns if isinstance(model, FuzzySystem) else model.inputs
 
 
-def _declared(axis: _Axis) -> Side:
-    """Return the range of an input, or the span of its curves.
+def _declared(axis: _Axis, values: FloatArray | None) -> Side:
+    """Return the range of an input, or the span of its curves, or of its rows.
 
     Raises:
-        ValueError: If it has neither.
+        ValueError: If it has none.
     """
     name, low, high = axis.name, axis.low, axis.high
     if low is not None and high is not None:
         return Side(name, low, high, "model")
     ends = [*axis.ends, *(one for one in (low, high) if one is not None)]
+    if not axis.ends and values is not None:
+        return _seen(axis, values)
     if not axis.ends:
         raise ValueError(
             f"input {name!r} has neither a range nor a curve to take its limits from; "
