@@ -1,0 +1,313 @@
+"""The findings of an audit on its page: what, where, how it is known, what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.auditing.codes import CODES
+from fuzzytree.auditing.records import Answer, Measure, Place, Severity
+from fuzzytree.proving.states import Bracket, Span, Witness, point_of
+from fuzzytree.report.audit_states import (
+    SEVERITIES,
+    evidence,
+    severity_badge,
+    state_badge,
+    state_word,
+)
+from fuzzytree.report.decision_map import exact_axes
+from fuzzytree.report.drawing import Axis
+from fuzzytree.report.markup import Content, Markup, folded, joined, listed, tag, text
+from fuzzytree.report.svg_regions import (
+    bar_picture,
+    map_picture,
+    span_text,
+    windows,
+)
+from fuzzytree.report.text import counted, number
+from fuzzytree.rulebase import RuleBase
+
+MOST_FINDINGS = 300
+"""That are told one by one."""
+
+MOST_PICTURED = 30
+"""That have pictures: the first, and the gravest stand first."""
+
+_MOST_BARS = 6  # of one finding
+_MOST_MAP_WORK = 60_000  # rules times terms of a map, which is slow beyond
+_PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
+
+
+class Scene(NamedTuple):
+    """What pictures of findings are drawn from.
+
+    Attributes:
+        axes: Every variable, by name.
+        rules: What decides, if the strongest rule does.
+        sentences: Every rule as markup.
+    """
+
+    axes: Mapping[str, Axis]
+    rules: RuleBase | None
+    sentences: Sequence[Markup]
+
+
+def anchors(findings: Sequence[Answer]) -> list[str]:
+    """Return a name for each finding by which links find it: its id if it has one."""
+    names: list[str] = []
+    for place, answer in enumerate(findings, 1):
+        is_plain = _PLAIN.fullmatch(answer.id) and answer.id not in names
+        names.append(answer.id if is_plain else f"finding-{place}")
+    return names
+
+
+def gravest_first(findings: Sequence[Answer]) -> list[Answer]:
+    """Return findings by severity, then by code, else in their order."""
+    order = {severity: place for place, severity in enumerate(SEVERITIES)}
+    return sorted(findings, key=lambda one: (order[one.severity], one.code))
+
+
+def findings_section(
+    findings: Sequence[Answer], scene: Scene, accepted: Collection[str] = ()
+) -> Markup:
+    """Return all findings, the gravest first, those of one code together.
+
+    Args:
+        findings: In this order.
+        scene: What pictures are drawn from.
+        accepted: The ids of those that a baseline accepts.
+    """
+    if not findings:
+        return tag("p", "There is no finding.", class_="calm")
+    names = anchors(findings)
+    told = [*zip(findings, names, strict=True)][:MOST_FINDINGS]
+    groups: dict[tuple[Severity, str], list[Markup]] = {}
+    for place, (answer, name) in enumerate(told):
+        known = answer.id in accepted
+        is_pictured = place < MOST_PICTURED
+        shown = _finding(answer, name, scene, is_pictured=is_pictured, is_known=known)
+        groups.setdefault((answer.severity, answer.code), []).append(shown)
+    parts = [_group(code, shown) for (_, code), shown in groups.items()]
+    more = len(findings) - len(told)
+    if more > 0:
+        said = f"{counted(more, 'more finding')}: the JSON has all of them"
+        parts.append(tag("p", said, class_="left-out"))
+    if len(told) > MOST_PICTURED:
+        said = f"Only the first {MOST_PICTURED} findings have pictures"
+        parts.append(tag("p", said, class_="left-out"))
+    return joined(parts)
+
+
+def _group(code: str, shown: Sequence[Markup]) -> Markup:
+    known = CODES.get(code)
+    title = known.title if known else "a finding"
+    head = tag(
+        "h3", tag("span", code, class_="code"), f" {title}", id=f"code-{_slug(code)}"
+    )
+    parts: list[Content] = [head]
+    if known and (known.what or known.why or known.example or known.remedy):
+        named = (
+            ("What it means", known.what),
+            ("Why it matters", known.why),
+            ("Example", known.example),
+            ("What to do", known.remedy),
+        )
+        pairs: list[Markup] = []
+        for name, said in named:
+            if said:
+                lines = (tag("span", line, class_="line") for line in said.splitlines())
+                pairs += [tag("dt", name), tag("dd", *lines)]
+        parts.append(folded("What this means and what to do", tag("dl", *pairs)))
+    return tag("section", *parts, *shown, class_="group")
+
+
+def _slug(code: str) -> str:
+    return code if _PLAIN.fullmatch(code) else "other"
+
+
+def _finding(
+    answer: Answer, name: str, scene: Scene, *, is_pictured: bool, is_known: bool
+) -> Markup:
+    places = joined((tag("code", _place(one)) for one in answer.places[:6]), ", ")
+    facts: list[Content] = [
+        severity_badge(answer.severity),
+        state_badge(state_word(answer.state)),
+        tag("span", answer.subject, class_="subject"),
+    ]
+    if is_known:
+        facts.append(tag("span", "accepted", class_="accepted"))
+    if places:
+        facts.append(tag("span", places, class_="places"))
+    parts: list[Content] = [
+        tag("h4", answer.sentence),
+        tag("p", *facts, class_="facts"),
+        _concerned(answer, scene),
+    ]
+    if is_pictured:
+        parts.append(_pictures(answer, name, scene))
+    elif answer.region:
+        parts.append(tag("p", f"Where: {_region_text(answer.region, scene)}"))
+    parts += [evidence(answer.state), _measures(answer.measures)]
+    named = tag("code", answer.id) if answer.id else None
+    repeat = tag("code", answer.repeat, class_="copied") if answer.repeat else None
+    if named or repeat:
+        parts.append(tag("p", named, repeat, class_="repeat"))
+    return tag("article", *parts, id=name, class_=f"finding {answer.severity}")
+
+
+def _place(place: Place) -> str:
+    return f"{place.file}:{place.line}:{place.column}"
+
+
+def _region_text(region: Sequence[Span], scene: Scene) -> str:
+    units = {span.variable: scene.axes.get(span.variable) for span in region}
+    return " and ".join(
+        f"{span.variable} {span_text(span, axis.unit if axis else '')}"
+        for span, axis in zip(region, units.values(), strict=True)
+    )
+
+
+def _concerned(answer: Answer, scene: Scene) -> Markup | None:
+    """Return the rules and terms that a finding is about, in words."""
+    rules = [k for k in answer.rules if 0 < k <= len(scene.sentences)]
+    items: list[Content] = [
+        joined(
+            [
+                tag("a", f"rule {k}", href=f"#rule-{k}"),
+                text(": "),
+                scene.sentences[k - 1],
+            ]
+        )
+        for k in rules[:6]
+    ]
+    if len(rules) > 6:
+        items.append(f"and {counted(len(rules) - 6, 'more rule')}")
+    if not rules:
+        items += [f"{one.variable} is {one.term}" for one in answer.terms[:6]]
+        if len(answer.terms) > 6:
+            items.append(f"and {counted(len(answer.terms) - 6, 'more term')}")
+    return listed(items, class_="concerned") if items else None
+
+
+def _measures(measures: Sequence[Measure]) -> Markup | None:
+    if not measures:
+        return None
+    pairs: list[Markup] = []
+    for one in measures:
+        exact = one.exact if one.exact and 0 < len(one.exact) <= 40 else None
+        unit = f" {one.unit}" if one.unit else ""
+        is_told = exact is not None and exact != number(one.value)
+        note = tag("span", f" = {exact}", class_="exact") if is_told else None
+        pairs.append(
+            tag("div", tag("dt", one.name), tag("dd", number(one.value), unit, note))
+        )
+    return tag("dl", *pairs, class_="measures")
+
+
+def _pictures(answer: Answer, name: str, scene: Scene) -> Markup | None:
+    """Return the region as pictures: a bar for each variable, a map of two."""
+    point: dict[str, Fraction] = {}
+    if isinstance(answer.state, (Witness, Bracket)):
+        point = point_of(answer.state.point)
+    spans = answer.region
+    if not spans and isinstance(answer.state, Witness):
+        spans = answer.state.region
+    region = {span.variable: span for span in spans}
+    values = _values(point, scene)
+    shown = _concerning(answer, region, values, scene)
+    parts = [
+        bar_picture(
+            axis,
+            region.get(axis.name),
+            _near(values, axis),
+            f"{name}-v{k}",
+            {one.term for one in answer.terms if one.variable == axis.name},
+        )
+        for k, axis in enumerate(shown[:_MOST_BARS])
+    ]
+    if len(shown) > _MOST_BARS:
+        others = ", ".join(axis.name for axis in shown[_MOST_BARS:])
+        parts.append(tag("p", f"not drawn: {others}", class_="left-out"))
+    maps = [*_maps(shown, region, values, name, scene)]
+    if not parts and not maps:
+        return None
+    return tag(
+        "div",
+        tag("div", *parts, class_="bars") if parts else None,
+        *maps,
+        class_="pictures",
+    )
+
+
+def _values(point: Mapping[str, Fraction], scene: Scene) -> dict[str, Fraction]:
+    """Return the value of every variable at a point, as far as it is known."""
+    if scene.rules is None or not point:
+        return dict(point)
+    return exact_axes(scene.rules, point) or dict(point)
+
+
+def _near(values: Mapping[str, Fraction], axis: Axis) -> float | None:
+    value = values.get(axis.name)
+    return None if value is None else float(value)
+
+
+def _concerning(
+    answer: Answer,
+    region: Mapping[str, Span],
+    values: Mapping[str, Fraction],
+    scene: Scene,
+) -> list[Axis]:
+    """Return the variables to draw: of the region, or else of the rules and terms."""
+    names = dict.fromkeys(region)
+    if not names:
+        names = dict.fromkeys(one.variable for one in answer.terms)
+    if not names and scene.rules is not None and values:
+        for k in answer.rules[:2]:
+            if 0 < k <= len(scene.rules.rules):
+                names |= dict.fromkeys(
+                    c.variable for c in scene.rules.rules[k - 1].when
+                )
+    return [scene.axes[one] for one in names if one in scene.axes]
+
+
+def _maps(
+    shown: Sequence[Axis],
+    region: Mapping[str, Span],
+    values: Mapping[str, Fraction],
+    name: str,
+    scene: Scene,
+) -> Iterator[Markup]:
+    """Yield maps of the decision on the two variables that a region limits most."""
+    rules = scene.rules
+    if rules is None or len(shown) < 2:
+        return
+    asked = {clause.variable for rule in rules.rules for clause in rule.when}
+    drawn = [axis for axis in shown if axis.name in asked]
+    drawn.sort(key=lambda axis: _share(axis, region.get(axis.name)))
+    work = len(rules.rules) * sum(len(v.terms) for v in rules.variables)
+    if len(drawn) < 2 or asked - values.keys() or work > _MOST_MAP_WORK:
+        return
+    across, down = drawn[:2]
+    for k, (where, window) in enumerate(windows(across, down, region)):
+        picture = map_picture(
+            rules, (across, down), window, region, values, f"{name}-m{k}"
+        )
+        said = f"The decision {where}"
+        others = asked - {across.name, down.name}
+        if others:
+            said += f", with {counted(len(others), 'other variable')} as at the witness"
+        if across.parts or down.parts:
+            said += "; a combination is drawn as if it were free"
+        yield tag("figure", picture, tag("figcaption", said))
+
+
+def _share(axis: Axis, span: Span | None) -> float:
+    """Return which part of the domain a side of a region takes."""
+    if span is None or axis.low is None or axis.high is None:
+        return 1.0
+    low = axis.low if span.low is None else span.low
+    high = axis.high if span.high is None else span.high
+    width = axis.high - axis.low
+    return (high - low) / width if width > 0.0 else 1.0

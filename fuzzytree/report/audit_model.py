@@ -1,0 +1,269 @@
+"""The audited model on the page: its tree, its terms, its rules with what rows say."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+
+from fuzzytree.auditing.records import Answer
+from fuzzytree.proving.states import Sampled
+from fuzzytree.report.audit_rows import Data, Passing
+from fuzzytree.report.audit_states import percent
+from fuzzytree.report.drawing import Axis
+from fuzzytree.report.markup import Content, Markup, folded, joined, table, tag, text
+from fuzzytree.report.svg_terms import terms_picture
+from fuzzytree.report.svg_tree import MOST_LEAVES, class_mark, tree_picture
+from fuzzytree.report.systems import curve_text, rule_text
+from fuzzytree.report.text import counted, number, shape_text, tree_lines
+from fuzzytree.rulebase import Rule, RuleBase
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree
+
+MOST_RULES = 1000
+MOST_VARIABLES = 60
+_MOST_LINES = 400  # of a tree as an outline
+_MOST_PARTS = 12  # of a combination that are written
+
+
+def class_name(label: str, code: int) -> Markup:
+    """Return a class with the mark of its colour."""
+    mark = tag("span", class_=f"chip {class_mark(code)}", aria_hidden="true")
+    return tag("span", mark, label, class_="class")
+
+
+def legend(classes: Sequence[str]) -> Markup:
+    """Return the classes with their colours."""
+    shown = [class_name(label, code) for code, label in enumerate(classes[:40])]
+    if len(classes) > len(shown):
+        shown.append(text(f"and {len(classes) - len(shown)} more"))
+    return tag("p", "Classes: ", joined(shown, " "), class_="legend")
+
+
+def rule_sentences(model: RuleBase | FuzzySystem) -> list[Markup]:
+    """Return every rule as a person reads it."""
+    if isinstance(model, FuzzySystem):
+        return [text(rule_text(rule)) for rule in model.rules]
+    codes = {label: code for code, label in enumerate(model.classes)}
+    return [_sentence(rule, codes) for rule in model.rules]
+
+
+def _sentence(rule: Rule, codes: Mapping[str, int]) -> Markup:
+    then = class_name(rule.then, codes[rule.then])
+    if not rule.when:
+        return joined([_word("ALWAYS"), then], " ")
+    clauses = [
+        joined(
+            [
+                tag("b", one.variable),
+                " is not " if one.negated else " is ",
+                joined((tag("i", term) for term in one.terms), " or "),
+            ]
+        )
+        for one in rule.when
+    ]
+    parts = [_word("IF"), clauses[0]]
+    for clause in clauses[1:]:
+        parts += [_word("AND"), clause]
+    return joined([*parts, _word("THEN"), then], " ")
+
+
+def _word(said: str) -> Markup:
+    return tag("span", said, class_="word")
+
+
+def tree_section(tree: FuzzyTree, passed: Passing | None) -> Markup:
+    """Return a tree as a picture and as an outline."""
+    lines = [*itertools.islice(tree_lines(tree), _MOST_LINES)]
+    outline = tag("pre", joined((text(line) for line in lines), "\n"), tabindex="0")
+    parts: list[Content] = []
+    if len(tree.leaves) <= MOST_LEAVES:
+        parts.append(legend(tree.classes))
+        picture = tree_picture(tree, passed)
+        frame = {"role": "region", "aria_label": "The tree"}
+        parts.append(tag("div", picture, class_="scrolls tree", tabindex="0", **frame))
+        parts.append(tag("p", _bars_mean(tree, passed), class_="caption"))
+        parts.append(folded("The tree as an outline", outline))
+    else:
+        said = f"A picture shows at most {MOST_LEAVES} leaves, and this tree has "
+        parts += [tag("p", f"{said}{len(tree.leaves)}; here is its outline"), outline]
+    if len(lines) == _MOST_LINES:
+        said = f"Only the first {_MOST_LINES} lines are shown"
+        parts.append(tag("p", said, class_="left-out"))
+    return joined(parts)
+
+
+def _bars_mean(tree: FuzzyTree, passed: Passing | None) -> str:
+    if passed is not None:
+        said = "The bar in a box shows the rows that pass it, by their class"
+        if passed.missing:
+            said += f"; {counted(passed.missing, 'row')} with a missing value left out"
+        return said
+    if all(leaf.support is not None for leaf in tree.leaves):
+        return "The bar in a box shows training rows, by the class of their leaf"
+    return "How many rows reach the leaves is not known"
+
+
+def terms_section(
+    model: FuzzyTree | RuleBase | FuzzySystem,
+    axes: Mapping[str, Axis],
+    data: Data | None,
+) -> Markup:
+    """Return a picture of each variable; those without terms folded away."""
+    told = _terms_in_words(model)
+    with_terms = [a for a in axes.values() if a.curves or a.undrawn]
+    others = [axis for axis in axes.values() if not (axis.curves or axis.undrawn)]
+    parts: list[Content] = [_lines_mean(data)]
+    parts.append(_grid(with_terms[:MOST_VARIABLES], told, data, "v"))
+    more = len(with_terms) - MOST_VARIABLES
+    if more > 0:
+        said = f"{counted(more, 'more variable')} not drawn"
+        parts.append(tag("p", said, class_="left-out"))
+    if others:
+        said = f"{counted(len(others), 'input')} without terms of "
+        said += "its own" if len(others) == 1 else "their own"
+        inner: list[Content] = [_grid(others[:MOST_VARIABLES], told, data, "i")]
+        if len(others) > MOST_VARIABLES:
+            said += f", {MOST_VARIABLES} drawn"
+        parts.append(folded(said, *inner))
+    return joined(parts)
+
+
+def _lines_mean(data: Data | None) -> Markup:
+    said = "Lines are degrees, from 0 to 1; hatched is what lies outside of the domain"
+    if data is not None:
+        rows = counted(len(data.codes), "row")
+        by = " by class" if data.classes else ""
+        said += f"; bars count the {rows} of the table{by}"
+    return tag("p", said, class_="caption")
+
+
+def _grid(
+    axes: Sequence[Axis], told: Mapping[str, list[str]], data: Data | None, name: str
+) -> Markup:
+    cards: list[Markup] = []
+    for place, axis in enumerate(axes):
+        lines: list[Content] = [*told.get(axis.name, [])]
+        if axis.parts:
+            lines.append(_sum(axis))
+        if axis.undrawn:
+            lines.append(f"not drawn: {', '.join(axis.undrawn)}")
+        words = [tag("p", line) for line in lines]
+        cards.append(
+            tag(
+                "figure",
+                tag("figcaption", tag("b", axis.name), _unit(axis.unit)),
+                terms_picture(axis, data, f"{name}{place}"),
+                folded("In words", *words) if words else None,
+            )
+        )
+    return tag("div", *cards, class_="cards")
+
+
+def _unit(unit: str) -> str:
+    return f" in {unit}" if unit else ""
+
+
+def _sum(axis: Axis) -> str:
+    parts = [
+        f"{number(one.weight)} · ({one.input} - {number(one.centre)})"
+        if one.centre
+        else f"{number(one.weight)} · {one.input}"
+        for one in axis.parts[:_MOST_PARTS]
+    ]
+    more = len(axis.parts) - _MOST_PARTS
+    after = f" + {counted(more, 'more input')}" if more > 0 else ""
+    return f"{axis.name} = {' + '.join(parts)}{after}"
+
+
+def _terms_in_words(
+    model: FuzzyTree | RuleBase | FuzzySystem,
+) -> dict[str, list[str]]:
+    if isinstance(model, FuzzySystem):
+        return {
+            one.name: [
+                f"{label.name}: {curve_text(label.curve, model.columns)}"
+                for label in one.labels[:40]
+            ]
+            for one in model.inputs
+        }
+    return {
+        one.name: [f"{term.name}: {shape_text(term.shape)}" for term in one.terms[:40]]
+        for one in model.variables
+    }
+
+
+def rules_section(
+    sentences: Sequence[Markup],
+    model: RuleBase | FuzzySystem,
+    answers: Sequence[Answer],
+    links: Mapping[int, Sequence[Markup]],
+) -> Markup:
+    """Return the rules as a table, with what the rows say of each.
+
+    Args:
+        sentences: Every rule.
+        model: The rules.
+        answers: All answers; those of FT701 tell about rows.
+        links: The findings about each rule, by its number.
+    """
+    support = _support(model)
+    told = {k: answer for answer in answers for k in _of_rows(answer)}
+    head = ["rule", "sentence"]
+    if support:
+        head.append("training rows")
+    names = [*dict.fromkeys(m.name for one in told.values() for m in one.measures)]
+    head += names
+    is_shared = any(isinstance(one.state, Sampled) for one in told.values())
+    if is_shared:
+        head.append("confidence")
+    head.append("findings")
+    rows: list[list[Content]] = []
+    for place, said in enumerate(sentences[:MOST_RULES]):
+        answer = told.get(place + 1)
+        row: list[Content] = [tag("span", str(place + 1), id=f"rule-{place + 1}"), said]
+        if support:
+            row.append(_or_dash(support[place]))
+        row += _measured(answer, names)
+        if is_shared:
+            row.append(_confidence(answer))
+        row.append(joined(links.get(place + 1, ()), " ") or text("-"))
+        rows.append(row)
+    right = tuple(range(2, len(head) - 1))
+    caption = f"{counted(len(sentences), 'rule')}, in the order of the model"
+    shown = table(head, rows, caption=caption, right=right, sorts=True)
+    more = len(sentences) - MOST_RULES
+    if more <= 0:
+        return shown
+    note = tag("p", f"{counted(more, 'more rule')} not shown", class_="left-out")
+    return joined([shown, note])
+
+
+def _support(model: RuleBase | FuzzySystem) -> list[int | None]:
+    if isinstance(model, FuzzySystem):
+        return []
+    found = [rule.support for rule in model.rules]
+    return found if any(one is not None for one in found) else []
+
+
+def _of_rows(answer: Answer) -> Iterator[int]:
+    """Yield the rule that an answer about rows is about."""
+    if answer.code == "FT701" and len(answer.rules) == 1:
+        yield answer.rules[0]
+
+
+def _measured(answer: Answer | None, names: Sequence[str]) -> list[Content]:
+    known = {one.name: one.value for one in answer.measures} if answer else {}
+    return [number(known[name]) if name in known else "-" for name in names]
+
+
+def _confidence(answer: Answer | None) -> Content:
+    state = answer.state if answer else None
+    if not isinstance(state, Sampled) or not state.rows:
+        return "-"
+    ends = f"{percent(state.low)} to {percent(state.high)}"
+    sure = tag("span", f" ({ends})", class_="interval", title="95 % sure")
+    return joined([f"{percent(state.hits / state.rows)} %", sure])
+
+
+def _or_dash(value: int | None) -> str:
+    return "-" if value is None else str(value)

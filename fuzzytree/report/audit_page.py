@@ -1,0 +1,380 @@
+"""An audit as one HTML page: it needs no network, and can be read without its script.
+
+The page is `audit.html` with its style and script, filled with what is made here. The
+same audit gives the same bytes. What a policy of content allows is the page's own style
+and script, named by their digests, and nothing else.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Iterator, Sequence
+from importlib import resources
+from string import Template
+from typing import TYPE_CHECKING
+
+from fuzzytree.agreement import Agreement
+from fuzzytree.auditing.codes import CODES
+from fuzzytree.auditing.records import Answer, Audit
+from fuzzytree.auditing.subject import Rows
+from fuzzytree.report.audit_checks import agreement_section, stability_section
+from fuzzytree.report.audit_findings import (
+    Scene,
+    anchors,
+    findings_section,
+    gravest_first,
+)
+from fuzzytree.report.audit_model import (
+    class_name,
+    rule_sentences,
+    rules_section,
+    terms_section,
+    tree_section,
+)
+from fuzzytree.report.audit_rows import data_of, passing
+from fuzzytree.report.audit_states import (
+    SEVERITIES,
+    STATES,
+    icon,
+    known_as,
+    state_badge,
+    state_word,
+)
+from fuzzytree.report.drawing import axes_of
+from fuzzytree.report.markup import (
+    Content,
+    Markup,
+    folded,
+    joined,
+    listed,
+    table,
+    tag,
+    text,
+)
+from fuzzytree.report.text import as_rules, counted, number
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.criteria.results import Stability
+
+MOST_QUESTIONS = 1000
+"""That are listed one by one."""
+
+_MOST_URGENT = 12  # findings that the verdict names
+
+_Section = tuple[str, str, Markup]  # its anchor, its title, its content
+
+_FORMS = {"tree": "a tree", "rules": "a rule base", "system": "a fuzzy system"}
+
+_ORIGINS = {
+    "model": "the model's range",
+    "data": "the rows",
+    "spreads": "spreads around the fitted sets",
+    "curves": "the span of the curves",
+    "limits": "given",
+}
+
+
+def page(
+    audit: Audit,
+    model: FuzzyTree | RuleBase | FuzzySystem,
+    *,
+    rows: Rows | None = None,
+    agreement: Agreement | None = None,
+    stability: Stability | None = None,
+) -> str:
+    """Return an audit as a page for a browser.
+
+    Args:
+        audit: What was found.
+        model: What was audited.
+        rows: The user's rows, in the order of the model's inputs.
+        agreement: The result of a check of the same model.
+        stability: The result of a study of the same model.
+
+    Example:
+        >>> from fuzzytree.auditing.records import Policy, Settings
+        >>> from fuzzytree.proving.domain import Domain
+        >>> from fuzzytree.testing import random_tree
+        >>> tree, nothing = random_tree(1), Domain(())
+        >>> audit = Audit("0.1", tree.name, "tree", "", None, None, 0,
+        ...     Policy("min", "strongest"), nothing, Settings(), (), (), (), True)
+        >>> "Nothing was found" in page(audit, tree)
+        True
+    """
+    sections = [*_sections(audit, model, rows, agreement, stability)]
+    links = [tag("li", tag("a", title, href=f"#{name}")) for name, title, _ in sections]
+    shown = [
+        tag(
+            "section",
+            tag("h2", title, id=f"{name}-title"),
+            content,
+            id=name,
+            aria_labelledby=f"{name}-title",
+        )
+        for name, title, content in sections
+    ]
+    whole = (
+        resources.files("fuzzytree.report").joinpath("audit.html").read_text("utf-8")
+    )
+    return Template(whole).substitute(
+        policy=_policy(whole),
+        title=text(f"{audit.model}: audit"),
+        head=_head(audit, model),
+        verdict=_verdict(audit),
+        links=joined(links),
+        body=joined(shown),
+    )
+
+
+def _policy(whole: str) -> str:
+    """Return what the page may do: run its own style and script."""
+    allowed: list[str] = []
+    for kind in ("script", "style"):
+        found = re.search(f"<{kind}>(.*?)</{kind}>", whole, re.DOTALL)
+        content = found[1] if found else ""
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        allowed.append(f"{kind}-src 'sha256-{digest}'")
+    others = "base-uri 'none'; form-action 'none'"
+    return f"default-src 'none'; {'; '.join(allowed)}; {others}"
+
+
+def _sections(
+    audit: Audit,
+    model: FuzzyTree | RuleBase | FuzzySystem,
+    rows: Rows | None,
+    agreement: Agreement | None,
+    stability: Stability | None,
+) -> Iterator[_Section]:
+    axes = axes_of(model, audit.domain)
+    data = data_of(model, rows) if rows is not None else None
+    rules = model if isinstance(model, FuzzySystem) else as_rules(model)
+    sentences = rule_sentences(rules)
+    findings = gravest_first(audit.findings)
+    decides = rules if isinstance(rules, RuleBase) else None
+    if audit.policy.decision != "strongest":
+        decides = None
+    if isinstance(model, FuzzyTree):
+        passed = passing(model, data) if data is not None else None
+        yield "tree", "The tree", tree_section(model, passed)
+    yield "terms", "Variables and terms", terms_section(model, axes, data)
+    linked = _links(findings)
+    shown = rules_section(sentences, rules, audit.answers, linked)
+    yield "rules", "Rules", shown
+    scene = Scene(axes, decides, sentences)
+    yield "findings", "Findings", findings_section(findings, scene, audit.accepted)
+    yield "questions", "Everything that was asked", _questions(audit)
+    if agreement is not None:
+        yield "agreement", "Agreement", agreement_section(agreement)
+    if stability is not None:
+        yield "stability", "Numerical stability", stability_section(stability)
+    yield "limits", "What this audit does not establish", _limits(audit)
+    yield "repeat", "How to repeat it", _repeat(audit)
+
+
+def _head(audit: Audit, model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
+    said = f"fuzzytree audit of {_FORMS.get(audit.form, audit.form)}"
+    file = audit.file.name if audit.file else "a model in memory"
+    facts: list[tuple[str, Content]] = [("read from", tag("code", file))]
+    if not isinstance(model, FuzzySystem):
+        names = [class_name(label, k) for k, label in enumerate(model.classes[:12])]
+        more = len(model.classes) - len(names)
+        names += [text(f"and {more} more")] if more > 0 else []
+        facts.append(("classes", joined(names, " ")))
+    facts.append(("decides", _policy_text(audit)))
+    data = "no table was given"
+    if audit.data is not None:
+        data = f"{audit.data.name}, {counted(audit.rows, 'row')}"
+    elif audit.rows:
+        data = counted(audit.rows, "row")
+    facts.append(("rows", data))
+    pairs = [tag("div", tag("dt", name), tag("dd", said)) for name, said in facts]
+    return joined(
+        [
+            tag("p", said, class_="kicker"),
+            tag("h1", audit.model),
+            tag("dl", *pairs, class_="about"),
+        ]
+    )
+
+
+def _policy_text(audit: Audit) -> str:
+    policy = audit.policy
+    who = "the first of the strongest rules wins"
+    if policy.decision == "all":
+        who = "every rule that fires takes part"
+    none = [
+        f"{what}: {'no class' if label is None else label}"
+        for what, label in (
+            ("no rule fires", policy.uncovered),
+            ("a missing value", policy.missing),
+        )
+    ]
+    return f"AND is {policy.conjunction}; {'; '.join([who, *none])}"
+
+
+def _verdict(audit: Audit) -> Markup:
+    """Return what was found, in words, and how it is known."""
+    findings = gravest_first(audit.open_findings)
+    counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
+    told = [counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]]
+    worst = next((one for one, n in counts.items() if n), "calm")
+    said = "Nothing was found"
+    if told:
+        verb = "was" if len(findings) == 1 else "were"
+        listing = ", ".join(told[:-1])
+        said = f"{listing} and {told[-1]}" if listing else told[-1]
+        said += f" {verb} found"
+    accepted = len(audit.findings) - len(findings)
+    if accepted:
+        said += f"; {counted(accepted, 'other')} {'is' if accepted == 1 else 'are'} "
+        said += "accepted"
+    asked = counted(len(audit.answers), "question")
+    whole = f"The audit is complete: {asked} asked, all of them answered or declined"
+    if not audit.is_complete:
+        by = "by hand" if audit.was_interrupted else "by its budget"
+        whole = f"The audit was cut short {by}: {asked} asked, others were not"
+    mark = icon("calm" if worst == "calm" else worst)
+    states = known_as(audit.answers)
+    shown = [
+        tag("li", state_badge(word), tag("b", str(states[word])), f" {meaning}")
+        for word, meaning in STATES.items()
+    ]
+    return joined(
+        [
+            tag("p", mark, said, class_=f"said {worst}"),
+            tag("p", whole, class_="whole" if audit.is_complete else "whole cut"),
+            _urgent(findings, gravest_first(audit.findings)),
+            tag("ul", *shown, class_="known"),
+        ]
+    )
+
+
+def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | None:
+    """Return links to the errors and warnings among findings.
+
+    Args:
+        findings: Those that are not accepted.
+        named: All, in the order of the page.
+    """
+    told = {id(one) for one in findings if one.severity != "info"}
+    names = zip(named, anchors(named), strict=True)
+    urgent = [(one, name) for one, name in names if id(one) in told]
+    if not urgent:
+        return None
+    items: list[Content] = [
+        joined(
+            [
+                icon(one.severity),
+                tag("a", one.sentence, href=f"#{name}"),
+                " ",
+                tag("span", one.code, class_="code"),
+            ]
+        )
+        for one, name in urgent[:_MOST_URGENT]
+    ]
+    more = len(urgent) - _MOST_URGENT
+    if more > 0:
+        items.append(tag("a", f"and {more} more", href="#findings"))
+    return listed(items, class_="urgent")
+
+
+def _links(findings: Sequence[Answer]) -> dict[int, list[Markup]]:
+    """Return a link to each finding about a rule, by the rule's number."""
+    links: dict[int, list[Markup]] = {}
+    for answer, name in zip(findings, anchors(findings), strict=True):
+        link = tag("a", answer.code, href=f"#{name}", title=answer.sentence)
+        for k in dict.fromkeys(answer.rules):
+            mine = links.setdefault(k, [])
+            if len(mine) < 12:
+                mine.append(link)
+    return links
+
+
+def _questions(audit: Audit) -> Markup:
+    groups: dict[str, list[Answer]] = {}
+    for answer in audit.answers:
+        groups.setdefault(answer.code, []).append(answer)
+    rows: list[Sequence[Content]] = []
+    for code, answers in groups.items():
+        title = CODES[code].title if code in CODES else ""
+        found = sum(answer.is_finding for answer in answers)
+        states = [str(n) if n else "·" for n in known_as(answers).values()]
+        rows.append((code, title, str(len(answers)), str(found), *states))
+    head = ("code", "question", "asked", "findings", *map(str.lower, STATES))
+    right = tuple(range(2, len(head)))
+    summary = table(head, rows, caption="Questions by code", right=right, sorts=True)
+    parts: list[Content] = [summary]
+    if audit.unasked:
+        parts += [tag("h3", "Not asked"), listed(audit.unasked, class_="unasked")]
+    each = [
+        (
+            answer.code,
+            answer.subject,
+            state_badge(state_word(answer.state)),
+            "yes" if answer.is_finding else "no",
+            answer.sentence,
+        )
+        for answer in audit.answers[:MOST_QUESTIONS]
+    ]
+    head = ("code", "about", "known as", "finding", "answer")
+    said = f"Every question, {len(audit.answers)} in all"
+    if len(audit.answers) > MOST_QUESTIONS:
+        said += f"; the first {MOST_QUESTIONS} are here, the JSON has all"
+    listing = table(head, each, caption="Every question with its answer", sorts=True)
+    parts.append(folded(said, listing))
+    return joined(parts)
+
+
+def _limits(audit: Audit) -> Markup:
+    said = tag("p", "This audit does not establish")
+    return tag("div", said, listed(audit.limits), class_="panel")
+
+
+def _repeat(audit: Audit) -> Markup:
+    facts: list[tuple[str, Content]] = [("fuzzytree", audit.version)]
+    command = _command(audit.answers)
+    if command:
+        facts.insert(0, ("command", tag("code", command, class_="copied")))
+    facts.append(("the model", audit.model))
+    facts.append(("its content, SHA-256", tag("code", audit.fingerprint)))
+    for what, source in (("model", audit.file), ("table", audit.data)):
+        if source is not None:
+            facts.append((f"the {what}'s file", tag("code", source.name)))
+            facts.append(("its bytes, SHA-256", tag("code", source.sha256)))
+    facts.append(("this audit, SHA-256", tag("code", audit.digest or "not taken")))
+    for name in audit.settings.__struct_fields__:
+        value: float = getattr(audit.settings, name)
+        unit = " s" if name.endswith("_s") else ""
+        facts.append((name.removesuffix("_s"), f"{number(value)}{unit}"))
+    pairs = [tag("div", tag("dt", name), tag("dd", said)) for name, said in facts]
+    head = ("variable", "from", "to", "where that comes from")
+    sides = [
+        (
+            side.variable,
+            tag("code", f"{'above ' if side.is_open else ''}{side.low!r}"),
+            tag("code", repr(side.high)),
+            _ORIGINS[side.origin],
+        )
+        for side in audit.domain.sides[:MOST_QUESTIONS]
+    ]
+    caption = "The domain: everything was asked here and nowhere else"
+    return joined(
+        [
+            tag("dl", *pairs, class_="facts-list"),
+            table(head, sides, caption=caption, right=(1, 2), is_compact=True),
+        ]
+    )
+
+
+def _command(answers: Sequence[Answer]) -> str:
+    """Return the command that asked all of this: what all the answers' have in common.
+
+    The command of an answer is that of the audit with `--select` and its code.
+    """
+    found = {one.repeat.replace(f" --select {one.code}", "") for one in answers}
+    return found.pop() if len(found) == 1 else ""

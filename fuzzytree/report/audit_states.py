@@ -1,0 +1,213 @@
+"""How an answer is known, as badges and sentences of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fuzzytree.auditing.codes import CODES
+from fuzzytree.auditing.records import Answer, Severity
+from fuzzytree.proving.states import (
+    Bracket,
+    Claim,
+    Coordinate,
+    Declined,
+    Proved,
+    Sampled,
+    State,
+    Witness,
+)
+from fuzzytree.report.markup import Markup, folded, joined, table, tag
+from fuzzytree.report.text import counted, number
+
+_MOST_UNFOLDED = 6  # inputs of a witness that are shown at once
+
+STATES: dict[str, str] = {
+    "PROVED": "holds on all of the domain",
+    "WITNESS": "happens: a point is shown",
+    "BRACKET": "lies between two bounds",
+    "SAMPLED": "was counted in rows",
+    "DECLINED": "was not decided",
+}
+"""Every state, with what it means."""
+
+SEVERITIES: dict[Severity, str] = {
+    "error": "error",
+    "warning": "warning",
+    "info": "note",
+}
+"""What a reader calls each severity, the gravest first."""
+
+MOST_INPUTS = 60
+"""Of a witness that are shown; beyond, only those that the JSON has."""
+
+
+def state_word(state: State) -> str:
+    """Return the name of a state.
+
+    Example:
+        >>> state_word(Proved("all of it"))
+        'PROVED'
+    """
+    return str(type(state).__struct_config__.tag)
+
+
+def icon(name: str) -> Markup:
+    """Return a sign of the page; the word beside it says the same."""
+    used = tag("use", href=f"#i-{name}")
+    return tag("svg", used, class_="icon", aria_hidden="true", viewBox="0 0 16 16")
+
+
+def state_badge(word: str) -> Markup:
+    """Return the badge of a state: a sign, a frame of its own, and the word."""
+    name = word.lower()
+    return tag("span", icon(name), word, class_=f"state {name}")
+
+
+def severity_badge(severity: Severity) -> Markup:
+    """Return the badge of a severity."""
+    shown = SEVERITIES[severity]
+    return tag("span", icon(severity), shown, class_=f"severity {severity}")
+
+
+def evidence(state: State) -> Markup:
+    """Return how an answer is known: in a sentence, with the point if there is one."""
+    match state:
+        case Proved(how=how):
+            return tag("p", how, class_="how")
+        case Witness(point=point, claims=claims):
+            return joined([_claims(claims, "Here"), point_table(point)])
+        case Bracket(of=of, low=low, high=high, why=why, point=point, claims=claims):
+            said = f"{of} lies between {number(low)} and {number(high)}; {why}"
+            return joined(
+                [
+                    tag("p", said, class_="how"),
+                    _claims(claims, "Here"),
+                    point_table(point),
+                ]
+            )
+        case Sampled():
+            return tag("p", sampled_text(state), class_="how")
+        case Declined(code=code, reason=reason):
+            title = CODES[code].title if code in CODES else code
+            return tag("p", f"{code}, {title}: {reason}", class_="how")
+
+
+def sampled_text(state: Sampled) -> str:
+    """Return a counted share in words.
+
+    Example:
+        >>> sampled_text(Sampled("rows that tie", 1, 50, 0.0035, 0.105, 0.95, "drawn"))
+        'rows that tie: 1 of 50 rows, 2 % (95 % sure: 0.35 to 10.5 %); drawn'
+    """
+    share = f"{percent(state.hits / state.rows)} %" if state.rows else "no rows"
+    sure = f"{percent(state.confidence)} % sure"
+    ends = f"{percent(state.low)} to {percent(state.high)} %"
+    return (
+        f"{state.of}: {state.hits} of {counted(state.rows, 'row')}, {share} "
+        f"({sure}: {ends}); {state.how}"
+    )
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, three digits."""
+    return f"{100.0 * share:.3g}"
+
+
+def point_table(point: Sequence[Coordinate]) -> Markup:
+    """Return a point with all digits of its values, also as the command takes it."""
+    if not point:
+        return Markup("")
+    shown = point[:MOST_INPUTS]
+    rows = [
+        (
+            one.input,
+            tag("code", one.decimal),
+            tag("code", one.hex) if one.hex else tag("code", one.exact),
+        )
+        for one in shown
+    ]
+    more = len(point) - len(shown)
+    caption = "The witness" + (f", and {counted(more, 'more input')}" if more else "")
+    head = ("input", "decimal", "hex, or p/q where it is no double")
+    row = ",".join(f"{one.input}={one.decimal}" for one in shown)
+    copied = tag("code", row, class_="copied")
+    line = tag("p", "As a row: ", copied, class_="as-row") if not more else None
+    listing = table(head, rows, caption=caption, is_compact=True)
+    if len(rows) > _MOST_UNFOLDED:
+        folds = folded(f"{caption}: {counted(len(point), 'input')}", listing)
+        return joined([folds, line])
+    return joined([listing, line])
+
+
+def _claims(claims: Sequence[Claim], where: str) -> Markup | None:
+    if not claims:
+        return None
+    said = "; ".join(map(claim_text, claims))
+    return tag("p", f"{where}, in fractions: {said}", class_="how")
+
+
+def claim_text(claim: Claim) -> str:
+    """Return a claim in words.
+
+    Example:
+        >>> claim_text(Claim("beats", rules=(3,), rivals=(1, 2)))
+        'rule 3 is stronger than rules 1, 2'
+        >>> claim_text(Claim("decides", of="tree", label="firm"))
+        "the tree decides for 'firm'"
+    """
+    mine, theirs = _rules(claim.rules), _rules(claim.rivals)
+    is_, level = "is" if len(claim.rules) == 1 else "are", _level(claim.level)
+    of = "" if claim.of == "rules" else f" of the {claim.of}"
+    match claim.kind:
+        case "strength":
+            return f"{mine}{of} has the strength {level}"
+        case "beats":
+            after = f" than {theirs}" if claim.rivals else " than any other"
+            return f"{mine}{of} {is_} stronger{after}"
+        case "ties":
+            above = f", and stronger than {theirs}" if claim.rivals else ""
+            return f"{mine}{of} are equally strong{above}"
+        case "below":
+            if claim.level == "0":
+                return f"{mine}{of} {'does' if is_ == 'is' else 'do'} not fire"
+            return f"{mine}{of} {is_} below {level}"
+        case "reaches":
+            return f"{mine}{of} {'reaches' if is_ == 'is' else 'reach'} {level}"
+        case "decides":
+            named = "no class" if claim.label is None else repr(claim.label)
+            verb = "decide" if claim.of in ("rules", "raw rules") else "decides"
+            return f"the {claim.of} {verb} for {named}"
+        case "degree":
+            return f"{claim.variable!r} is {claim.term!r} to the degree {level}"
+        case "covered":
+            return f"some rule{of} fires"
+
+
+def _rules(numbers: Sequence[int]) -> str:
+    if not numbers:
+        return "no rule"
+    shown = ", ".join(map(str, numbers[:12]))
+    more = len(numbers) - 12
+    shown += f" and {more} more" if more > 0 else ""
+    return f"rule {shown}" if len(numbers) == 1 else f"rules {shown}"
+
+
+def _level(level: str | None) -> str:
+    """Return a number `p/q` in words: itself if short, near it if long."""
+    if level is None:
+        return "?"
+    if len(level) <= 12:
+        return level
+    top, _, bottom = level.partition("/")
+    try:
+        return f"about {number(int(top) / int(bottom or '1'))}"
+    except (ValueError, ZeroDivisionError, OverflowError):
+        return level
+
+
+def known_as(answers: Sequence[Answer]) -> dict[str, int]:
+    """Return how many answers have each state, in the order of `STATES`."""
+    counts = dict.fromkeys(STATES, 0)
+    for answer in answers:
+        counts[state_word(answer.state)] += 1
+    return counts

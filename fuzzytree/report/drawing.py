@@ -1,0 +1,353 @@
+"""What all pictures of the page share: scales, ticks, the curves of terms, words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.inference.curves import curve_degree
+from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.proving.domain import Domain
+from fuzzytree.report.markup import Attribute, Content, Markup, tag, trimmed
+from fuzzytree.rulebase import LR, Band, Part, Points, RuleBase, Shape, Variable
+from fuzzytree.system import Curve as SystemCurve
+from fuzzytree.system import Formula, FuzzySystem, Label, Linear, SystemInput
+from fuzzytree.tree import FuzzyTree
+
+LETTER = 0.58
+"""How wide a letter of a picture is on average, in sizes of its font."""
+
+_STEPS = 72  # at which a curve is looked at, beside its corners
+_CORNERS = 160  # of one curve that are drawn exactly
+_FLAT = 0.04  # points of a picture that nobody sees
+
+
+class Scale(NamedTuple):
+    """A map from values to points of a picture."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def at(self, value: float) -> float:
+        """Return the point of a value, held between the ends.
+
+        Example:
+            >>> Scale(0.0, 4.0, 100.0, 200.0).at(1.0)
+            125.0
+        """
+        width = self.high / 2 - self.low / 2  # halves: no range overflows
+        part = (value / 2 - self.low / 2) / width if width > 0.0 else 0.5
+        return self.start + min(max(part, 0.0), 1.0) * (self.end - self.start)
+
+
+class Curve(NamedTuple):
+    """A term's curve as it is drawn.
+
+    Attributes:
+        name: Of the term.
+        degree: The degree of a value.
+        corners: The values at which it may turn or step, ascending.
+    """
+
+    name: str
+    degree: Callable[[float], float]
+    corners: tuple[float, ...]
+
+
+class Axis(NamedTuple):
+    """A variable as it is drawn.
+
+    Attributes:
+        name: Of the variable.
+        unit: Of its values; may be empty.
+        curves: Of its terms that can be drawn.
+        undrawn: The names of the others.
+        low: The lower end of the domain; None if it has none.
+        high: The upper end.
+        parts: The summands, if it is a combination.
+    """
+
+    name: str
+    unit: str
+    curves: tuple[Curve, ...]
+    undrawn: tuple[str, ...]
+    low: float | None
+    high: float | None
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """The name with the unit."""
+        return f"{self.name} ({self.unit})" if self.unit else self.name
+
+
+def axes_of(
+    model: FuzzyTree | RuleBase | FuzzySystem, domain: Domain
+) -> dict[str, Axis]:
+    """Return every input and combination of a model as it is drawn, by name."""
+    if isinstance(model, FuzzySystem):
+        found = (_system_axis(one) for one in model.inputs)
+    else:
+        found = (_axis(one) for one in model.variables)
+    axes: dict[str, Axis] = {}
+    for axis in found:
+        side = domain.side(axis.name)
+        if side is not None:
+            axes[axis.name] = axis._replace(low=side.low, high=side.high)
+        else:
+            low, high = _reached(axis.parts, axes)
+            axes[axis.name] = axis._replace(low=low, high=high)
+    return axes
+
+
+def _reached(
+    parts: Sequence[Part], axes: dict[str, Axis]
+) -> tuple[float | None, float | None]:
+    """Return the ends that a combination has on the domain of its inputs."""
+    low = high = 0.0
+    for part in parts:
+        axis = axes[part.input]
+        if axis.low is None or axis.high is None:
+            return None, None
+        ends = [part.weight * (end - part.centre) for end in (axis.low, axis.high)]
+        low, high = low + min(ends), high + max(ends)
+    is_known = bool(parts) and math.isfinite(low) and math.isfinite(high)
+    return (low, high) if is_known else (None, None)
+
+
+def _axis(variable: Variable) -> Axis:
+    curves = tuple(curve_of(term.name, term.shape) for term in variable.terms)
+    return Axis(variable.name, variable.unit, curves, (), None, None, variable.parts)
+
+
+def _system_axis(one: SystemInput) -> Axis:
+    drawn = [label for label in one.labels if not _is_undrawn(label.curve)]
+    others = tuple(label.name for label in one.labels if _is_undrawn(label.curve))
+    curves = tuple(map(_labelled, drawn))
+    return Axis(one.name, one.unit, curves, others, None, None, one.parts)
+
+
+def _is_undrawn(curve: SystemCurve) -> bool:
+    return isinstance(curve, (Linear, Formula))
+
+
+def curve_of(name: str, shape: Shape) -> Curve:
+    """Return a shape's curve: its degrees are computed in fractions.
+
+    Example:
+        >>> curve_of("low", Band(0.0, 1.0)).corners
+        (0.0, 1.0)
+    """
+
+    def degree(value: float) -> float:
+        return float(exact_degree(shape, Fraction(value)))
+
+    corners = sorted({c for c in _corners(shape) if c is not None and math.isfinite(c)})
+    return Curve(name, degree, tuple(corners))
+
+
+def _corners(shape: Shape) -> Iterator[float | None]:
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            yield from (low, high)
+            for flank in (left, right):
+                if flank is not None:
+                    yield from (flank.start, flank.end)
+        case LR(mean=mean, left=left, right=right):
+            yield mean
+            for sign, side in ((-1.0, left), (1.0, right)):
+                yield mean + sign * side.spread
+                yield mean + sign * side.spread * side.reach
+        case Points(values=values):
+            yield from values
+
+
+def _labelled(label: Label) -> Curve:
+    curve = label.curve
+    if isinstance(curve, (Band, LR, Points)) and label.height == 1.0:
+        return curve_of(label.name, curve)
+
+    def degree(value: float) -> float:
+        return min(max(label.height * curve_degree(curve, value), 0.0), 1.0)
+
+    fields = (getattr(curve, field) for field in curve.__struct_fields__)
+    corners = {field for field in fields if isinstance(field, float)}
+    return Curve(label.name, degree, tuple(sorted(filter(math.isfinite, corners))))
+
+
+def polyline(curve: Curve, x: Scale, y: Scale) -> Markup:
+    """Return a curve as the path of a picture, with its corners and steps.
+
+    Args:
+        curve: The curve.
+        x: From values to the picture.
+        y: From degrees to the picture.
+    """
+    corners = [one for one in curve.corners if x.low <= one <= x.high]
+    corners = corners[:: 1 + len(corners) // _CORNERS]
+    width = x.high / _STEPS - x.low / _STEPS
+    values = {x.low, x.high, *(x.low + k * width for k in range(1, _STEPS))}
+    for corner in corners:
+        values |= {corner, math.nextafter(corner, math.inf)}
+    dots = [(x.at(v), y.at(curve.degree(v))) for v in sorted(values)]
+    return path_of(thinned(dots))
+
+
+def thinned(dots: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return the dots of a line without those that lie on a straight part of it.
+
+    Example:
+        >>> thinned([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (3.0, 0.0)])
+        [(0.0, 0.0), (2.0, 2.0), (3.0, 0.0)]
+    """
+    kept: list[tuple[float, float]] = []
+    for dot in dots:
+        while len(kept) >= 2 and _is_between(kept[-2], kept[-1], dot):
+            kept.pop()
+        kept.append(dot)
+    return kept
+
+
+def _is_between(
+    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
+) -> bool:
+    across = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    return abs(across) <= _FLAT * max(math.dist(a, c), _FLAT)
+
+
+def path_of(dots: Sequence[tuple[float, float]]) -> Markup:
+    """Return dots joined by lines, as the path of a picture.
+
+    Example:
+        >>> path_of([(0.0, 1.5), (2.0, 3.0)])
+        'M0 1.5L2 3'
+    """
+    return Markup("M" + "L".join(f"{trimmed(a)} {trimmed(b)}" for a, b in dots))
+
+
+def ticks(low: float, high: float, most: int = 4) -> list[float]:
+    """Return round values between two, so that few digits name them.
+
+    Example:
+        >>> ticks(0.3, 9.2)
+        [2.0, 4.0, 6.0, 8.0]
+    """
+    width = high - low
+    if not 0.0 < width < math.inf:
+        return [low]
+    power = 10.0 ** math.floor(math.log10(width / most))
+    for size in (1.0, 2.0, 5.0, 10.0, 20.0):
+        step = size * power
+        first, last = math.ceil(low / step), math.floor(high / step)
+        if last - first < most:
+            return [k * step for k in range(first, last + 1)] or [low]
+    return [low]
+
+
+def tick_words(values: Sequence[float]) -> list[str]:
+    """Return values with as few digits, three at least, as tell them apart.
+
+    Example:
+        >>> tick_words([1000.25, 1000.5])
+        ['1000.2', '1000.5']
+    """
+    words: list[str] = []
+    for digits in range(3, 18):
+        words = [f"{value:.{digits}g}" for value in values]
+        shown = len(set(words)) == len(set(values))
+        if shown and all("e" not in word for word in words):
+            break
+        if shown and digits >= 6:
+            break
+    return words
+
+
+def cut(words: str, letters: float) -> str:
+    """Return words that fit; what is longer ends in dots.
+
+    Example:
+        >>> cut("above 1.75", 6)
+        'above…'
+    """
+    most = max(int(letters), 2)
+    return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
+
+
+def svg(
+    width: float, height: float, title: str, desc: str, *children: Content, name: str
+) -> Markup:
+    """Return a picture with its title and description.
+
+    Args:
+        width: In points of its own.
+        height: The same.
+        title: What it shows, in a few words.
+        desc: The same in a sentence, for who does not see it.
+        children: What is drawn.
+        name: A word that only this picture of the page has.
+    """
+    return tag(
+        "svg",
+        tag("title", title, id=f"{name}-t"),
+        tag("desc", desc, id=f"{name}-d"),
+        *children,
+        viewBox=f"0 0 {trimmed(width)} {trimmed(height)}",
+        width=width,
+        height=height,
+        role="img",
+        aria_labelledby=f"{name}-t {name}-d",
+    )
+
+
+def words(
+    x: float,
+    y: float,
+    said: str,
+    class_: str | None = None,
+    anchor: str | None = None,
+    **attributes: Attribute,
+) -> Markup:
+    """Return words in a picture.
+
+    Args:
+        x: Where they stand.
+        y: Their base line.
+        said: The words.
+        class_: How they look.
+        anchor: `middle` or `end`, if `x` is not where they begin.
+        attributes: Others.
+    """
+    return tag("text", said, x=x, y=y, class_=class_, text_anchor=anchor, **attributes)
+
+
+def axis_marks(x: Scale, base: float, *, most: int = 4) -> Iterator[Markup]:
+    """Yield the ticks of an axis with their numbers."""
+    values = ticks(x.low, x.high, most)
+    previous = -math.inf
+    for value, word in zip(values, tick_words(values), strict=True):
+        at = x.at(value)
+        half = 0.5 * LETTER * 10 * len(word)
+        yield tag("line", x1=at, x2=at, y1=base, y2=base + 4, class_="tick")
+        left = min(max(at, x.start - 6 + half), x.end + 6 - half)
+        if left - half > previous + 4:
+            previous = left + half
+            yield words(left, base + 15, word, "small", "middle")
+
+
+def spread(values: Sequence[float], share: float = 0.03) -> tuple[float, float]:
+    """Return ends around values with some room; never an empty range.
+
+    Example:
+        >>> spread([0.0, 10.0], 0.1)
+        (-1.0, 11.0)
+    """
+    low, high = min(values), max(values)
+    room = share * (high - low)
+    if not room > 0.0:
+        room = max(abs(low), 1.0) * share
+    ends = low - room, high + room
+    return ends if all(map(math.isfinite, ends)) else (low, high)

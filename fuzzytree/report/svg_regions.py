@@ -1,0 +1,275 @@
+"""Where a finding holds, as pictures: a bar for a variable, a map for two."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from fuzzytree.proving.states import Span
+from fuzzytree.report.decision_map import decisions
+from fuzzytree.report.drawing import (
+    LETTER,
+    Axis,
+    Scale,
+    axis_marks,
+    cut,
+    polyline,
+    svg,
+    tick_words,
+    ticks,
+    words,
+)
+from fuzzytree.report.markup import Markup, tag, trimmed
+from fuzzytree.report.svg_terms import DASHES, MOST_CURVES, outside, scale_of
+from fuzzytree.report.svg_tree import class_mark
+from fuzzytree.report.text import number
+from fuzzytree.rulebase import RuleBase
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import IntArray
+
+_WIDE, _HIGH = 340.0, 92.0
+_LEFT, _RIGHT, _TOP, _BASE = 8.0, 332.0, 22.0, 70.0
+_SLIVER = 3.0  # points: a region is drawn at least so wide
+
+_MAP_WIDE, _MAP_HIGH = 340.0, 288.0
+_MAP = (44.0, 332.0, 8.0, 248.0)  # left, right, top, base
+_CELLS = 48
+_FONT = 12.0
+
+
+class Window(NamedTuple):
+    """Which part of two axes a map shows."""
+
+    across: tuple[float, float]
+    down: tuple[float, float]
+
+
+def span_text(span: Span, unit: str = "") -> str:
+    """Return a side of a region in words.
+
+    Example:
+        >>> span_text(Span("force", 0.5, None), "N")
+        'from 0.5 N'
+    """
+    after = f" {unit}" if unit else ""
+    if span.low is None and span.high is None:
+        return "anywhere"
+    if span.low is None:
+        return f"up to {number(span.high or 0.0)}{after}"
+    if span.high is None:
+        return f"from {number(span.low)}{after}"
+    if span.low == span.high:
+        return f"at {number(span.low)}{after}"
+    return f"{number(span.low)} to {number(span.high)}{after}"
+
+
+def bar_picture(
+    axis: Axis,
+    span: Span | None,
+    value: float | None,
+    name: str,
+    named: Collection[str] = (),
+) -> Markup:
+    """Return a variable with its terms, a part of it, and a point on it.
+
+    Args:
+        axis: The variable.
+        span: Where it holds on this variable; None if that is not known.
+        value: Of a witness.
+        name: A word that only this picture of the page has.
+        named: The terms that it is about.
+    """
+    x = scale_of(axis, None, _LEFT, _RIGHT)
+    y = Scale(0.0, 1.0, _BASE, _TOP)
+    parts: list[Markup] = [*outside(axis, x, _TOP - 4, _BASE)]
+    if span is not None:
+        start, end = _ends(span, x)
+        parts.append(_box(start, end, _TOP - 4, _BASE))
+    for place, curve in enumerate(axis.curves[:MOST_CURVES]):
+        way, dashes = polyline(curve, x, y), DASHES[place % len(DASHES)]
+        look = "curve" if curve.name in named else "curve faint"
+        title = tag("title", curve.name)
+        parts.append(tag("path", title, d=way, class_=look, stroke_dasharray=dashes))
+    parts.append(tag("line", x1=_LEFT, x2=_RIGHT, y1=_BASE, y2=_BASE, class_="axis"))
+    said = span_text(span, axis.unit) if span else ""
+    if value is not None:
+        parts += _pin(x.at(value), _TOP - 4, _BASE)
+        said += f"{'; ' if said else ''}witness {value:.4g}"
+    said = cut(said, 38)
+    room = (_RIGHT - _LEFT - 5.6 * len(said)) / (LETTER * 13.5)
+    parts.append(words(_LEFT, 12.0, cut(axis.name, room), "strong"))
+    parts.append(words(_RIGHT, 12.0, said, "small", "end"))
+    parts += axis_marks(x, _BASE)
+    return svg(_WIDE, _HIGH, f"{axis.title}: {said}", said, *parts, name=name)
+
+
+def _ends(span: Span, x: Scale) -> tuple[float, float]:
+    start = x.start if span.low is None else x.at(span.low)
+    end = x.end if span.high is None else x.at(span.high)
+    if abs(end - start) < _SLIVER:
+        middle = (start + end) / 2.0
+        return middle - _SLIVER / 2.0, middle + _SLIVER / 2.0
+    return start, end
+
+
+def _box(start: float, end: float, top: float, base: float) -> Markup:
+    return tag(
+        "rect",
+        x=start,
+        y=top,
+        width=end - start,
+        height=base - top,
+        class_="region",
+    )
+
+
+def _pin(at: float, top: float, base: float) -> Iterator[Markup]:
+    yield tag("line", x1=at, x2=at, y1=top, y2=base, class_="pin")
+    yield tag("path", d=_diamond(at, base), class_="witness")
+
+
+def _diamond(x: float, y: float) -> str:
+    return f"M{x:.1f} {y - 5.5:.1f}l5.5 5.5l-5.5 5.5l-5.5 -5.5z"
+
+
+def windows(
+    across: Axis, down: Axis, region: Mapping[str, Span]
+) -> list[tuple[str, Window]]:
+    """Return what maps show, with a word for it: the domain, and near a sliver.
+
+    There is none if an axis has no domain, or one without width.
+    """
+    whole: list[tuple[float, float]] = []
+    near: list[tuple[float, float]] = []
+    is_sliver = False
+    for axis in (across, down):
+        if axis.low is None or axis.high is None or not axis.low < axis.high:
+            return []
+        low, high = axis.low, axis.high
+        whole.append((low, high))
+        span = region.get(axis.name)
+        start = low if span is None or span.low is None else max(span.low, low)
+        end = high if span is None or span.high is None else min(span.high, high)
+        is_sliver |= 0.0 < end - start < 0.04 * (high - low)
+        room = 1.5 * (end - start)
+        near.append((max(start - room, low), min(end + room, high)))
+    found = [("on the domain", Window(whole[0], whole[1]))]
+    if is_sliver and all(a < b for a, b in near):
+        found.append(("near the region", Window(near[0], near[1])))
+    return found
+
+
+def map_picture(
+    rules: RuleBase,
+    axes: tuple[Axis, Axis],
+    window: Window,
+    region: Mapping[str, Span],
+    values: Mapping[str, Fraction],
+    name: str,
+) -> Markup:
+    """Return the classes on two variables, the others being those of a point.
+
+    Args:
+        rules: Which decide.
+        axes: The variable across and the one upwards.
+        window: What is shown of them.
+        region: The part of each variable where something holds.
+        values: Of every variable at the point.
+        name: A word that only this picture of the page has.
+    """
+    across, down = axes
+    left, right, top, base = _MAP
+    x = Scale(*window.across, left, right)
+    y = Scale(*window.down, base, top)
+    codes = decisions(
+        rules,
+        (across.name, _middles(window.across)),
+        (down.name, _middles(window.down)),
+        values,
+    )
+    parts = [*_cells(codes), *_class_names(codes, rules.classes)]
+    spans = [region.get(axis.name) or Span(axis.name, None, None) for axis in axes]
+    if any(axis.name in region for axis in axes):
+        start, end = _ends(spans[0], x)
+        low, high = _ends(spans[1], y)
+        parts.append(_box(start, end, min(low, high), max(low, high)))
+    point = float(values[across.name]), float(values[down.name])
+    parts.append(
+        tag("path", d=_diamond(x.at(point[0]), y.at(point[1])), class_="witness")
+    )
+    parts += axis_marks(x, base)
+    parts += _marks_upwards(y, left)
+    parts.append(words((left + right) / 2, base + 33, across.title, "small", "middle"))
+    turned = f"rotate(-90 11 {(top + base) / 2:.0f})"
+    parts.append(
+        words(11, (top + base) / 2, down.title, "small", "middle", transform=turned)
+    )
+    title = f"The classes on {across.title} and {down.title}"
+    desc = "Each part has the name of its class; the hatched part is the region, the "
+    desc += "diamond the witness; all other variables are those of the witness"
+    return svg(_MAP_WIDE, _MAP_HIGH, title, desc, *parts, name=name)
+
+
+def _middles(ends: tuple[float, float]) -> list[float]:
+    low, high = ends
+    step = high / _CELLS - low / _CELLS
+    return [low + (k + 0.5) * step for k in range(_CELLS)]
+
+
+def _cells(codes: IntArray) -> Iterator[Markup]:
+    """Yield the part of each class as one path, made of runs of cells in a line."""
+    left, right, top, base = _MAP
+    wide, high = (right - left) / _CELLS, (base - top) / _CELLS
+    ways: dict[int, list[str]] = {}
+    for row, line in enumerate(codes.tolist()):
+        start = 0
+        for place in range(1, _CELLS + 1):
+            if place < _CELLS and line[place] == line[start]:
+                continue
+            x, y = left + start * wide, base - (row + 1) * high
+            run = f"M{trimmed(x)} {trimmed(y)}h{trimmed((place - start) * wide)}"
+            run += f"v{trimmed(high)}H{trimmed(x)}z"
+            ways.setdefault(line[start], []).append(run)
+            start = place
+    for code, runs in sorted(ways.items()):
+        mark = "none" if code < 0 else class_mark(code)
+        yield tag("path", d=Markup("".join(runs)), class_=f"cell {mark}")
+
+
+def _class_names(codes: IntArray, classes: tuple[str, ...]) -> Iterator[Markup]:
+    """Yield the name of each class where there is most room for it."""
+    left, right, top, base = _MAP
+    wide, high = (right - left) / _CELLS, (base - top) / _CELLS
+    for code in np.unique(codes).tolist():
+        row, place = _innermost(codes == code)
+        said = cut("no class" if code < 0 else classes[code], 18)
+        half = LETTER * _FONT * len(said) / 2.0
+        middle = min(max(left + (place + 0.5) * wide, left + half), right - half)
+        yield words(middle, base - (row + 0.5) * high + 4, said, "on-map", "middle")
+
+
+def _innermost(is_here: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> list[int]:
+    """Return a cell of a set that is far from all that is not in it."""
+    kept = np.pad(is_here, 1)
+    while True:
+        inner = kept.copy()
+        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            inner &= np.roll(kept, step, axis)
+        if not inner.any():
+            break
+        kept = inner
+    found = np.argwhere(kept)
+    row, place = found[len(found) // 2].tolist()
+    return [row - 1, place - 1]
+
+
+def _marks_upwards(y: Scale, left: float) -> Iterator[Markup]:
+    values = ticks(y.low, y.high)
+    for value, said in zip(values, tick_words(values), strict=True):
+        at = y.at(value)
+        yield tag("line", x1=left - 4, x2=left, y1=at, y2=at, class_="tick")
+        yield words(left - 6, at + 3.5, cut(said, 5), "small", "end")

@@ -1,0 +1,208 @@
+"""A tree as a picture of the page: questions, branches, and the rows that pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from fuzzytree.report.audit_rows import Counts, Passing
+from fuzzytree.report.drawing import LETTER, cut, svg, words
+from fuzzytree.report.markup import Markup, tag
+from fuzzytree.report.text import counted, number
+from fuzzytree.tree import FuzzyTree, Node, intervals
+
+MOST_LEAVES = 120
+"""Of a tree that is drawn; a larger one is told as an outline."""
+
+_WIDE, _HIGH = 176.0, 52.0  # of a box
+_ACROSS, _DOWN = 60.0, 26.0  # between boxes
+_EDGE = 8.0
+_LEAST, _MOST = 1.5, 9.0  # points: how thick a branch is
+_PALETTE = 10
+
+
+class _Box(msgspec.Struct):
+    """A node or a leaf, its branch, and where it stands."""
+
+    level: int
+    title: str
+    note: str
+    branch: str = ""
+    code: int | None = None  # of the class of a leaf
+    counts: Counts = ()
+    middle: float = 0.0
+    above: _Box | None = None
+    below: list[_Box] = msgspec.field(default_factory=lambda: [])
+
+    @property
+    def left(self) -> float:
+        return _EDGE + self.level * (_WIDE + _ACROSS)
+
+
+def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
+    """Return a tree from left to right.
+
+    A box holds a bar: the rows that pass, by their class; without rows the training
+    rows of the leaves behind it, by the leaves' class. A branch is the thicker the
+    more of them take it.
+
+    Args:
+        tree: At most `MOST_LEAVES` leaves.
+        rows: How rows go through it.
+    """
+    boxes = _boxes(tree, rows)
+    high = _placed(boxes)
+    wide = max(box.left for box in boxes) + _WIDE + _EDGE
+    whole = sum(boxes[0].counts)
+    drawn = [_branch(box, whole) for box in boxes if box.above is not None]
+    drawn += [_drawn(box) for box in boxes]
+    nodes = counted(len(tree.nodes), "node")
+    leaves = counted(len(tree.leaves), "leaf", "leaves")
+    return svg(
+        wide,
+        high,
+        f"The tree {tree.name}: {nodes}, {leaves}",
+        "From left to right: each box asks one variable, each branch takes a part of "
+        "its values, and each rounded box is a class; the same as an outline follows",
+        *drawn,
+        name="tree",
+    )
+
+
+def class_mark(code: int) -> str:
+    """Return the name of a class's colour in the page's style."""
+    return f"k{code % _PALETTE}"
+
+
+def _boxes(tree: FuzzyTree, rows: Passing | None) -> list[_Box]:
+    """Return all nodes and leaves, depth first."""
+    codes = {label: code for code, label in enumerate(tree.classes)}
+    found: list[_Box] = []
+    todo: list[tuple[int | None, int | None, str, _Box | None]]
+    todo = [(1, None, "", None) if tree.nodes else (None, 1, "", None)]
+    while todo:
+        node, leaf, branch, above = todo.pop()
+        level = above.level + 1 if above else 0
+        if node is not None:
+            asked = tree.nodes[node - 1]
+            cuts = ", ".join(map(number, asked.cuts))
+            box = _Box(level, f"{asked.variable}?", f"cut at {cuts}", branch)
+            box.counts = rows.nodes[node - 1] if rows else ()
+            todo += [
+                (one.node, one.leaf, _branch_words(asked, place), box)
+                for place, one in reversed([*enumerate(asked.branches)])
+            ]
+        else:
+            position = leaf or 1
+            end = tree.leaves[position - 1]
+            box = _Box(level, end.pattern or end.label, "", branch, codes[end.label])
+            if rows:
+                box.counts = rows.leaves[position - 1]
+            elif end.support is not None:
+                box.counts = tuple(
+                    end.support * (code == box.code) for code in codes.values()
+                )
+            told = counted(sum(box.counts), "row") if box.counts else ""
+            box.note = f"rule {position}" + (f", {told}" if told else "")
+        box.above = above
+        if above:
+            above.below.append(box)
+        found.append(box)
+    _add_up(found)
+    return found
+
+
+def _add_up(boxes: Sequence[_Box]) -> None:
+    """Give each node without counts those of the leaves behind it."""
+    for box in reversed(boxes):
+        if not box.counts and box.below and all(one.counts for one in box.below):
+            columns = zip(*(one.counts for one in box.below), strict=True)
+            box.counts = tuple(map(sum, columns))
+
+
+def _branch_words(node: Node, place: int) -> str:
+    taken: list[str] = []
+    for (low, high), owner in zip(intervals(node), node.owners, strict=True):
+        if owner != place:
+            continue
+        if low is None:
+            taken.append(f"≤ {number(high)}" if high is not None else "any")
+        elif high is None:
+            taken.append(f"> {number(low)}")
+        else:
+            taken.append(f"> {number(low)} to {number(high)}")
+    names = " or ".join(node.branches[place].terms)
+    return f"{names}: {' or '.join(taken)}"
+
+
+def _placed(boxes: Sequence[_Box]) -> float:
+    """Put leaves below one another and nodes in their middle; return the height."""
+    down = _EDGE + 14.0
+    for box in boxes:
+        if not box.below:
+            box.middle = down + _HIGH / 2.0
+            down += _HIGH + _DOWN
+    for box in reversed(boxes):
+        if box.below:
+            box.middle = (box.below[0].middle + box.below[-1].middle) / 2.0
+    return down - _DOWN + _EDGE
+
+
+def _branch(box: _Box, whole: int) -> Markup:
+    above = box.above
+    assert above is not None  # the root has no branch
+    share = sum(box.counts) / whole if whole else 0.0
+    start, end = above.left + _WIDE, box.left
+    bend = (start + end) / 2.0
+    way = f"M{start:.1f} {above.middle:.1f}C{bend:.1f} {above.middle:.1f} "
+    way += f"{bend:.1f} {box.middle:.1f} {end:.1f} {box.middle:.1f}"
+    thick = _LEAST + (_MOST - _LEAST) * share
+    return tag("path", d=way, class_="branch", stroke_width=thick)
+
+
+def _drawn(box: _Box) -> Markup:
+    left, top = box.left, box.middle - _HIGH / 2.0
+    is_leaf = box.code is not None
+    mark = class_mark(box.code or 0) if is_leaf else ""
+    room = (_WIDE - 20.0) / (LETTER * 13.0)
+    said = [box.branch, box.title, box.note, _told(box.counts)]
+    return tag(
+        "g",
+        tag("title", "; ".join(filter(None, said))),
+        tag(
+            "rect",
+            x=left,
+            y=top,
+            width=_WIDE,
+            height=_HIGH,
+            rx=14.0 if is_leaf else 4.0,
+            class_=f"box {mark}".rstrip(),
+        ),
+        words(left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
+        words(left + 10, top + 18, cut(box.title, room), f"strong {mark}".rstrip()),
+        words(left + 10, top + 33, cut(box.note, _WIDE / 6.4), "small"),
+        *_bar(box.counts, left + 10, top + 40, _WIDE - 20),
+    )
+
+
+def _told(counts: Counts) -> str:
+    return f"rows by class: {', '.join(map(str, counts))}" if counts else ""
+
+
+def _bar(counts: Counts, left: float, top: float, wide: float) -> Iterator[Markup]:
+    """Yield the parts of a bar, the rows of each class."""
+    whole = sum(counts)
+    yield tag("rect", x=left, y=top, width=wide, height=6.0, class_="track")
+    for code, count in enumerate(counts):
+        if count:
+            part = wide * count / whole
+            yield tag(
+                "rect",
+                x=left,
+                y=top,
+                width=max(part - 0.6, 0.6),
+                height=6.0,
+                class_=f"bar {class_mark(code)}",
+            )
+            left += part
