@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.metadata
+import importlib.util
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final, cast
 
@@ -24,8 +25,8 @@ from fuzzytree.auditing.records import (
 )
 from fuzzytree.auditing.selecting import check_settings, chosen_codes
 from fuzzytree.auditing.subject import Rows, Subject
+from fuzzytree.auditing.views import View, view
 from fuzzytree.contracts import Document
-from fuzzytree.lowering import rules_from_tree
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.domain import Domain
 from fuzzytree.rulebase import RuleBase, fingerprint
@@ -46,11 +47,26 @@ class Family(msgspec.Struct, frozen=True):
     codes: tuple[str, ...]
 
 
-FAMILIES: Final[tuple[Family, ...]] = ()
+_PLANNED: Final = (
+    Family("terms", ("FT401", "FT402", "FT403", "FT404")),
+    Family("complexity", ("FT501",)),
+    Family("support", ("FT701",)),
+    Family("gaps", ("FT301",)),
+    Family("deciding", ("FT101", "FT102", "FT103", "FT202")),
+    Family("pairs", ("FT104", "FT105", "FT106", "FT107", "FT201")),
+    Family("trees", ("FT101", "FT203", "FT205")),
+    Family("robustness", ("FT204",)),
+    Family("carriers", ("FT601", "FT602")),
+)
+FAMILIES: Final = tuple(
+    one
+    for one in _PLANNED
+    if importlib.util.find_spec(f"fuzzytree.auditing.{one.module}")
+)
 """In the order in which they are asked: the quick ones first, so that a spent budget
 costs as few answers as it can. Each takes at most half of the time that is left."""
 
-ASKED: Final = tuple(code for family in FAMILIES for code in family.codes)
+ASKED: Final = frozenset(code for family in FAMILIES for code in family.codes)
 """The codes that an audit asks; the others belong to a comparison, or say why not."""
 
 
@@ -101,15 +117,14 @@ def audit(
     wanted = chosen_codes(select, ignore)
     domain = domain or domain_of(model)
     clock = clock or Clock(settings.budget_s)
-    subject = _subject(model, domain, settings, clock, rows)
-    asked = _Asked([*subject.declined])
-    _ask_all(subject, wanted, clock, asked)
+    viewed = view(model, domain)
+    asked = _ask_view(viewed, rows, row, settings, clock, wanted)
     kept = sorted(
         (one for one in asked.answers if one.code in wanted), key=lambda one: one.code
     )
-    carriers = [subject.rules, *([subject.raw] if subject.raw else [])]
+    carriers = [rules for rules in (viewed.rules, viewed.raw) if rules is not None]
     answers = tuple(
-        _placed(one, model, file, repeat) for one in with_ids(kept, *carriers)
+        _placed(one, viewed, model, file, repeat) for one in with_ids(kept, carriers)
     )
     ids = {one.id for one in answers if one.is_finding}
     found = Audit(
@@ -120,11 +135,11 @@ def audit(
         file=source_of(file.name, file.content) if file else None,
         data=data,
         rows=0 if rows is None else rows.values.shape[1],
-        policy=subject.policy,
-        domain=domain,
+        policy=viewed.policy,
+        domain=viewed.domain,
         settings=settings,
         answers=answers,
-        unasked=tuple(_unasked(subject.policy, wanted, asked)),
+        unasked=tuple(_unasked(viewed.policy, wanted, asked)),
         limits=LIMITS,
         is_complete=not asked.cut,
         accepted=tuple(sorted(ids.intersection(accepted))),
@@ -132,23 +147,34 @@ def audit(
     return msgspec.structs.replace(found, digest=digest_of(found))
 
 
-def _subject(
-    model: Document,
-    domain: Domain,
+def _ask_view(
+    found: View,
+    rows: Rows | None,
+    row: Mapping[str, float] | None,
     settings: Settings,
     clock: Clock,
-    rows: Rows | None,
-) -> Subject:
-    if isinstance(model, RuleBase):
-        rules, tree, raw = model, None, None
-    elif isinstance(model, FuzzyTree):
-        tree, rules = model, rules_from_tree(model)
-        raw = rules_from_tree(model, "raw") if model.sets else None
-    else:
-        raise NotImplementedError
-    meant = rules.semantics
-    policy = Policy(meant.conjunction, "strongest", meant.uncovered, meant.missing)
-    return Subject(rules, policy, domain, settings, clock, tree, raw, rows=rows)
+    wanted: set[str],
+) -> _Asked:
+    """Ask all families about a view; nothing if it holds no rule."""
+    asked = _Asked([*found.declined])
+    if found.rules is None:
+        return asked
+    subject = Subject(
+        rules=found.rules,
+        policy=found.policy,
+        domain=found.domain,
+        settings=settings,
+        clock=clock,
+        tree=found.tree,
+        raw=found.raw,
+        system=found.system,
+        rows=rows,
+        places=found.places,
+        declined=found.declined,
+        is_whole=found.is_whole,
+    )
+    _ask_all(subject, wanted, clock, asked)
+    return asked
 
 
 def source_of(name: str, content: bytes) -> Source:
@@ -222,12 +248,17 @@ def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
 
 
 def _placed(
-    answer: Answer, model: Document, file: ModelFile | None, repeat: str
+    answer: Answer,
+    viewed: View,
+    model: Document,
+    file: ModelFile | None,
+    repeat: str,
 ) -> Answer:
     """Return an answer with its places and the command that finds it again."""
+    numbers = [viewed.numbers[number - 1] for number in answer.rules]
     return msgspec.structs.replace(
         answer,
-        places=places_of(answer, model, file, answer.rules),
+        places=places_of(answer, model, file, numbers),
         repeat=f"{repeat} --select {answer.code}" if repeat else "",
     )
 

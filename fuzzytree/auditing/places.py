@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import PurePath
 
 import msgspec
@@ -124,7 +124,9 @@ def places_of(
 # --- ids
 
 
-def with_ids(answers: Iterable[Answer], *carriers: RuleBase) -> Iterator[Answer]:
+def with_ids(
+    answers: Iterable[Answer], carriers: Sequence[RuleBase]
+) -> Iterator[Answer]:
     """Yield answers with ids: the code and a hash of what it is about.
 
     The hash is taken over the sentences and curves of the rules and the terms
@@ -133,13 +135,13 @@ def with_ids(answers: Iterable[Answer], *carriers: RuleBase) -> Iterator[Answer]
 
     Args:
         answers: The answers.
-        carriers: The rules that their numbers mean; then rules that share the
-            variables, whose terms may be concerned as well.
+        carriers: The rules that their numbers mean, if there are any; then others
+            whose terms may be concerned as well.
     """
     shapes: dict[tuple[str, str], Shape] = {}
     for carrier in reversed(carriers):
         shapes |= shapes_of(carrier.variables)
-    rules = carriers[0].rules
+    rules = carriers[0].rules if carriers else ()
     counts: dict[str, int] = {}
     for answer in answers:
         known = [_rule_facts(rules[k - 1], shapes) for k in answer.rules]

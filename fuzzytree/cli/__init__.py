@@ -28,6 +28,8 @@ VERBS = (
     "convert",
     "run",
     "check",
+    "audit",
+    "explain",
     "bench",
     "needs",
     "stability",

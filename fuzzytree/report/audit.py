@@ -1,0 +1,326 @@
+"""An audit as plain text: findings at their places, a table by code, its limits."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Final
+
+from fuzzytree.auditing.codes import CODES, Code
+from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Severity
+from fuzzytree.proving.states import (
+    Bracket,
+    Coordinate,
+    Declined,
+    Proved,
+    Sampled,
+    State,
+    Witness,
+)
+from fuzzytree.report.audit_states import claim_text, sampled_text, state_word
+from fuzzytree.report.svg_regions import span_text
+from fuzzytree.report.text import aligned, counted, number
+
+WIDTH: Final = 100
+MOST_FINDINGS: Final = 200
+"""That are told one by one."""
+
+_MOST_INPUTS = 12  # of a point or region on the terminal
+_SHOWN = 84  # characters of a source line
+_COLOURS: Mapping[str, str] = {
+    "error": "31;1",
+    "warning": "33;1",
+    "info": "36",
+    "PROVED": "32;1",
+    "WITNESS": "35;1",
+    "BRACKET": "34;1",
+    "SAMPLED": "36;1",
+    "DECLINED": "2",
+}
+_ORIGINS: Mapping[str, str] = {
+    "model": "the model's range",
+    "data": "the rows",
+    "spreads": "spreads around the fitted sets",
+    "curves": "the span of the curves",
+    "limits": "given",
+}
+_STATE_WORDS = ("PROVED", "WITNESS", "BRACKET", "SAMPLED", "DECLINED")
+_Paint = Callable[[str, str], str]
+_SUMMARY = (
+    *("code", "question", "asked", "found"),
+    *("proved", "witness", "bracket", "sampled", "declined"),
+)
+
+
+def audit_lines(
+    audit: Audit,
+    source: Sequence[str] = (),
+    *,
+    is_coloured: bool = False,
+) -> Iterator[str]:
+    """Yield an audit: what was asked where, the findings, the table, the limits.
+
+    Args:
+        audit: The audit.
+        source: The lines of the model's file, for the line that a finding is about.
+        is_coloured: Whether codes, severities and states have colours.
+    """
+    paint = _painted if is_coloured else _plain
+    yield from _head(audit)
+    yield ""
+    told = audit.open_findings
+    for answer in told[:MOST_FINDINGS]:
+        yield from _finding(answer, audit, source, paint)
+        yield ""
+    if len(told) > MOST_FINDINGS:
+        rest = counted(len(told) - MOST_FINDINGS, "more finding")
+        yield f"and {rest}; --output-format json has all"
+        yield ""
+    if audit.accepted:
+        yield f"{counted(len(audit.accepted), 'accepted finding')} of the baseline"
+        yield ""
+    yield from summary_lines(audit)
+    if audit.unasked:
+        yield ""
+        yield "not asked, or not to the end:"
+        yield from (line for text in audit.unasked for line in _item(text))
+    yield ""
+    yield "this audit does not establish"
+    yield from (line for text in audit.limits for line in _item(text))
+
+
+def summary_lines(audit: Audit) -> Iterator[str]:
+    """Yield how many questions of each code were asked, and how each is known."""
+    rows: list[Sequence[str]] = [_SUMMARY]
+    codes = dict.fromkeys(answer.code for answer in audit.answers)
+    for code in codes:
+        answers = [one for one in audit.answers if one.code == code]
+        title = CODES[code].title if code in CODES else ""
+        rows.append((code, title, *_counts(answers)))
+    rows.append(("all", "", *_counts(audit.answers)))
+    yield from aligned(rows)
+
+
+def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
+    """Return what an audit found, in a sentence, and what one might do next.
+
+    Args:
+        audit: The audit.
+        gone: Accepted ids that are no longer found.
+    """
+    found = audit.open_findings
+    said = "no findings" if not found else _by_severity(found)
+    if audit.accepted:
+        said += f", and {len(audit.accepted)} accepted"
+    if audit.was_interrupted:
+        said += "; interrupted: what is proved is kept, the rest is not asked"
+    elif not audit.is_complete:
+        said += "; not complete: the budget is spent (--budget SECONDS)"
+    if gone:
+        ids = counted(len(gone), "accepted finding")
+        said += f"; {ids} no longer found, which --write-baseline forgets"
+    if found:
+        said += f"; `fuzzytree explain {found[0].code}` tells what to do"
+    elif audit.is_complete:
+        said += f" in {counted(len(audit.answers), 'answer')}"
+    return said
+
+
+def explanation_lines(code: Code) -> Iterator[str]:
+    """Yield what a code means, why it matters, a case, and what to do."""
+    asked = "" if code.decision == "any" else ", asked where the strongest rule decides"
+    yield f"{code.code}  {code.title} ({code.severity}{asked})"
+    for title, text in (
+        ("what", code.what),
+        ("why", code.why),
+        ("example", code.example),
+        ("what to do", code.remedy),
+    ):
+        yield ""
+        yield title
+        for line in text.splitlines():
+            yield from textwrap.wrap(
+                line, WIDTH - 4, initial_indent="  ", subsequent_indent="  "
+            ) or [""]
+
+
+def code_lines() -> Iterator[str]:
+    """Yield every code with its severity and title."""
+    rows = [("code", "severity", "a finding says")]
+    yield from aligned(
+        [*rows, *((c.code, c.severity, c.title) for c in CODES.values())]
+    )
+
+
+# --- parts
+
+
+def _head(audit: Audit) -> Iterator[str]:
+    policy = audit.policy
+    decides = "the strongest rule decides"
+    if policy.decision == "all":
+        decides = "every rule takes part"
+    means = f"AND is {policy.conjunction}, {decides}"
+    yield f"{audit.model}: audited as {audit.form}; {means}"
+    if audit.data is not None:
+        yield f"rows     {audit.rows} of {audit.data.name}"
+    sides = audit.domain.sides
+    rows = [
+        (
+            f"  {one.variable}",
+            f"{number(one.low)} to {number(one.high)}",
+            _ORIGINS[one.origin],
+        )
+        for one in sides[:_MOST_INPUTS]
+    ]
+    yield "domain"
+    yield from aligned(rows) if rows else ["  none: the model has no inputs"]
+    if len(sides) > _MOST_INPUTS:
+        yield f"  and {counted(len(sides) - _MOST_INPUTS, 'more variable')}"
+
+
+def _finding(
+    answer: Answer, audit: Audit, source: Sequence[str], paint: _Paint
+) -> Iterator[str]:
+    place = answer.places[0] if answer.places else None
+    where = _where(place, audit)
+    name = f"{answer.code} {answer.severity}:"
+    lead = f"{where}: {name}" if where else name
+    first, *rest = _wrapped(f"{lead} {answer.sentence}", WIDTH, "  ")
+    yield first.replace(name, paint(name, answer.severity), 1)
+    yield from rest
+    if place is not None:
+        yield from _quoted(place, source)
+    for title, text in _facts(answer):
+        begin, *rest = _wrapped(text, WIDTH - 11) or [""]
+        yield f"  {paint(f'{title:8}', title)} {begin}".rstrip()
+        yield from (f"           {line}" for line in rest)
+
+
+def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    """Return a text in lines; what a terminal might obey is written as an escape."""
+    shown = "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
+    return textwrap.wrap(
+        shown,
+        width,
+        subsequent_indent=indent,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+
+
+def _painted(text: str, key: str) -> str:
+    code = _COLOURS.get(key)
+    return text if code is None else f"\x1b[{code}m{text}\x1b[0m"
+
+
+def _plain(text: str, _: str) -> str:
+    return text
+
+
+def _facts(answer: Answer) -> Iterator[tuple[str, str]]:
+    """Yield how an answer is known, where, and how to find it again."""
+    yield state_word(answer.state), state_text(answer.state)
+    match answer.state:
+        case Witness(point=point) | Bracket(point=point) if point:
+            yield "at", _point_text(point)
+        case _:
+            pass
+    if answer.region:
+        shown = [f"{s.variable} {span_text(s)}" for s in answer.region[:_MOST_INPUTS]]
+        if len(answer.region) > _MOST_INPUTS:
+            shown.append(f"{len(answer.region) - _MOST_INPUTS} more")
+        yield "region", "; ".join(shown)
+    if answer.measures:
+        yield "measured", "; ".join(map(_measure_text, answer.measures[:8]))
+    others = [f"{one.line}:{one.column}" for one in answer.places[1:]]
+    if others:
+        yield "see also", ", ".join(others[:_MOST_INPUTS])
+    if answer.id:
+        yield "id", answer.id
+    if answer.repeat:
+        yield "again", answer.repeat
+
+
+def state_text(state: State) -> str:
+    """Return how an answer is known, in words.
+
+    Example:
+        >>> state_text(Bracket("the largest lead", 0.1, 0.2, "the budget is spent"))
+        'the largest lead lies between 0.1 and 0.2; the budget is spent'
+    """
+    match state:
+        case Proved(how=how):
+            return how
+        case Witness(claims=claims):
+            return "; ".join(map(claim_text, claims)) or "it happens here"
+        case Bracket(of=of, low=low, high=high, why=why):
+            return f"{of} lies between {number(low)} and {number(high)}; {why}"
+        case Sampled():
+            return sampled_text(state)
+        case Declined(code=code, reason=reason):
+            return f"{code}: {reason}"
+
+
+def _point_text(point: Sequence[Coordinate]) -> str:
+    shown = [
+        f"{one.input} = {one.decimal} ({one.hex or one.exact})"
+        for one in point[:_MOST_INPUTS]
+    ]
+    if len(point) > _MOST_INPUTS:
+        shown.append(f"{len(point) - _MOST_INPUTS} more inputs")
+    return ", ".join(shown)
+
+
+def _measure_text(measure: Measure) -> str:
+    unit = f" {measure.unit}" if measure.unit else ""
+    return f"{measure.name} {number(measure.value)}{unit}"
+
+
+def _where(place: Place | None, audit: Audit) -> str:
+    if place is not None:
+        return f"{place.file}:{place.line}:{place.column}"
+    return audit.file.name if audit.file else ""
+
+
+def _quoted(place: Place, source: Sequence[str]) -> Iterator[str]:
+    """Yield the line of the file that a place is in, and a caret below it."""
+    if not 0 < place.line <= len(source):
+        return
+    line = source[place.line - 1].replace("\t", " ")
+    begin = max(0, place.column - 1 - _SHOWN // 2) if len(line) > _SHOWN else 0
+    shown = "".join(c if c.isprintable() else "?" for c in line[begin : begin + _SHOWN])
+    margin = " " * len(str(place.line))
+    yield f"  {margin} |"
+    yield f"  {place.line} | {shown}".rstrip()
+    yield f"  {margin} | {' ' * (place.column - 1 - begin)}^"
+
+
+def _counts(answers: Sequence[Answer]) -> Iterator[str]:
+    words = [state_word(answer.state) for answer in answers]
+    found = sum(answer.is_finding for answer in answers)
+    counts = [len(answers), found]
+    counts += [words.count(word) for word in _STATE_WORDS]
+    yield from (str(count) if count else "-" for count in counts)
+
+
+def _by_severity(found: Sequence[Answer]) -> str:
+    names: Mapping[Severity, tuple[str, str]] = {
+        "error": ("error", "errors"),
+        "warning": ("warning", "warnings"),
+        "info": ("note", "notes"),
+    }
+    counts = [
+        counted(sum(one.severity == severity for one in found), *names[severity])
+        for severity in names
+        if any(one.severity == severity for one in found)
+    ]
+    return f"{counted(len(found), 'finding')}: {', '.join(counts)}"
+
+
+def _item(text: str) -> Iterator[str]:
+    first, *rest = _wrapped(text, WIDTH - 2)
+    yield f"- {first}"
+    yield from (f"  {line}" for line in rest)

@@ -1,0 +1,164 @@
+"""An audit as SARIF 2.1.0, the format of static analysis that code hosts read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Final
+from urllib.parse import quote
+
+import msgspec
+
+from fuzzytree.auditing.baselines import gone
+from fuzzytree.auditing.codes import CODES, Code
+from fuzzytree.auditing.records import Answer, Audit, Place, Severity
+from fuzzytree.report.audit import state_text
+from fuzzytree.report.audit_states import state_word
+
+SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
+
+_LEVELS: Mapping[Severity, str] = {
+    "error": "error",
+    "warning": "warning",
+    "info": "note",
+}
+_Json = dict[str, object]
+
+
+def sarif(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
+    """Return an audit as SARIF.
+
+    Each code is a rule, each finding a result with its id as a fingerprint. With a
+    baseline a result is `unchanged` if it is accepted (and suppressed for that),
+    otherwise `new`; what is accepted and no longer found is `absent`.
+
+    Args:
+        audit: The audit.
+        baseline: What accepted findings say, by id.
+    """
+    codes = [*CODES]
+    results = [_result(one, audit, baseline, codes) for one in audit.findings]
+    results += _absent(audit, baseline or {}, codes)
+    run: _Json = {
+        "tool": {
+            "driver": {
+                "name": "fuzzytree",
+                "version": audit.version,
+                "rules": [_rule(code) for code in CODES.values()],
+            }
+        },
+        "columnKind": "unicodeCodePoints",
+        "invocations": [_invocation(audit)],
+        "artifacts": [*_artifacts(audit)],
+        "results": results,
+        "properties": {
+            "model": audit.model,
+            "form": audit.form,
+            "fingerprint": audit.fingerprint,
+            "digest": audit.digest,
+            "domain": msgspec.to_builtins(audit.domain),
+            "settings": msgspec.to_builtins(audit.settings),
+            "notEstablished": [*audit.limits],
+        },
+    }
+    whole = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
+    return json.dumps(whole, indent=2, ensure_ascii=False)
+
+
+def _rule(code: Code) -> _Json:
+    return {
+        "id": code.code,
+        "name": "".join(word.capitalize() for word in _words(code.title)),
+        "shortDescription": {"text": code.title},
+        "fullDescription": {"text": code.what or code.title},
+        "help": {"text": f"{code.why}\n\n{code.remedy}".strip() or code.title},
+        "defaultConfiguration": {"level": _LEVELS[code.severity]},
+    }
+
+
+def _words(title: str) -> list[str]:
+    return "".join(c if c.isalnum() else " " for c in title).split()
+
+
+def _result(
+    answer: Answer,
+    audit: Audit,
+    baseline: Mapping[str, str] | None,
+    codes: list[str],
+) -> _Json:
+    said = f"{answer.sentence} ({state_word(answer.state)}: {state_text(answer.state)})"
+    result: _Json = {
+        "ruleId": answer.code,
+        "ruleIndex": codes.index(answer.code),
+        "level": _LEVELS[answer.severity],
+        "message": {"text": said},
+        "locations": [*_locations(answer.places[:1], audit)],
+        "partialFingerprints": {"fuzzytree/v1": answer.id},
+        "properties": {
+            "subject": answer.subject,
+            "state": msgspec.to_builtins(answer.state),
+            "region": msgspec.to_builtins(answer.region),
+            "measures": msgspec.to_builtins(answer.measures),
+            "repeat": answer.repeat,
+        },
+    }
+    others = [*_locations(answer.places[1:], None)]
+    if others:
+        result["relatedLocations"] = others
+    if baseline is not None:
+        is_known = answer.id in audit.accepted
+        result["baselineState"] = "unchanged" if is_known else "new"
+        result["suppressions"] = (
+            [{"kind": "external", "status": "accepted"}] if is_known else []
+        )
+    return result
+
+
+def _absent(
+    audit: Audit, baseline: Mapping[str, str], codes: list[str]
+) -> Iterator[_Json]:
+    """Yield accepted findings that are no longer there."""
+    for name in gone(baseline, audit):
+        code = name.partition("-")[0]
+        if code in codes:
+            yield {
+                "ruleId": code,
+                "ruleIndex": codes.index(code),
+                "level": "none",
+                "kind": "pass",
+                "message": {"text": baseline[name] or code},
+                "partialFingerprints": {"fuzzytree/v1": name},
+                "baselineState": "absent",
+            }
+
+
+def _locations(places: tuple[Place, ...], audit: Audit | None) -> Iterator[_Json]:
+    """Yield places; without one, the file that was audited."""
+    for place in places:
+        spot = {"startLine": place.line, "startColumn": place.column}
+        where = {"artifactLocation": {"uri": _uri(place.file)}, "region": spot}
+        yield {"physicalLocation": where}
+    if not places and audit is not None and audit.file is not None:
+        yield {"physicalLocation": {"artifactLocation": {"uri": _uri(audit.file.name)}}}
+
+
+def _uri(path: str) -> str:
+    """Return a path as the reference that it is in a repository."""
+    return quote(path.encode("utf-8", "surrogateescape"), safe="/")
+
+
+def _artifacts(audit: Audit) -> Iterator[_Json]:
+    for source in (audit.file, audit.data):
+        if source is not None:
+            yield {
+                "location": {"uri": _uri(source.name)},
+                "hashes": {"sha-256": source.sha256},
+            }
+
+
+def _invocation(audit: Audit) -> _Json:
+    notes = [{"level": "note", "message": {"text": text}} for text in audit.unasked]
+    return {
+        "executionSuccessful": audit.is_complete,
+        "toolExecutionNotifications": notes,
+    }
