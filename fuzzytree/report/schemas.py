@@ -13,6 +13,7 @@ from typing import Final
 
 import msgspec
 
+from fuzzytree.auditing.records import Audit
 from fuzzytree.criteria.results import Stability
 from fuzzytree.recognition.experiment import Study as Experiment
 from fuzzytree.recognition.timing import FramesStudy
@@ -22,6 +23,7 @@ from fuzzytree.timing.records import Study
 
 FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
     {
+        "audit.schema.json": Audit,
         "bench.schema.json": Study,
         "experiment.schema.json": Experiment,
         "needs.schema.json": Report,
