@@ -624,7 +624,8 @@ def audited_rows(
         delimiter: Of a CSV file, if its first line does not tell.
 
     Raises:
-        TableError: If a column is absent or holds text, or the table has no row.
+        TableError: If a column is absent or holds text, or the table has no row, or
+            none of a class of the model.
     """
     from fuzzytree.auditing.subject import Rows
 
@@ -657,6 +658,11 @@ def audited_rows(
     classes = () if isinstance(model, FuzzySystem) else model.classes
     numbers = {label: number for number, label in enumerate(classes)}
     codes = np.array([numbers.get(label or "", -1) for label in labels], np.int64)
+    if classes and not np.any(codes >= 0):
+        raise TableError(
+            f"{name}: no row has in column {target!r} a class of the model; "
+            f"{name_choice(str(labels[0]), classes)}"
+        )
     return Rows(name, values, codes)
 
 

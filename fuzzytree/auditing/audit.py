@@ -6,13 +6,14 @@ import hashlib
 import importlib
 import importlib.metadata
 import importlib.util
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final, cast
 
 import msgspec
 
 from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.domains import domain_of
+from fuzzytree.auditing.domains import domain_of, inputs_of
 from fuzzytree.auditing.limits import LIMITS, digest_of
 from fuzzytree.auditing.places import ModelFile, places_of, with_ids
 from fuzzytree.auditing.records import (
@@ -29,7 +30,7 @@ from fuzzytree.auditing.views import View, view
 from fuzzytree.contracts import Document
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.domain import Domain
-from fuzzytree.rulebase import RuleBase, fingerprint
+from fuzzytree.rulebase import RuleBase, fingerprint, name_choice
 from fuzzytree.tree import FuzzyTree
 
 Asking = Callable[[Subject], Iterator[Answer]]
@@ -117,6 +118,8 @@ def audit(
     wanted = chosen_codes(select, ignore)
     domain = domain or domain_of(model)
     clock = clock or Clock(settings.budget_s)
+    if row is not None:
+        _check_row(row, inputs_of(model))
     viewed = view(model, domain)
     asked = _ask_view(viewed, rows, row, settings, clock, wanted)
     kept = sorted(
@@ -145,6 +148,25 @@ def audit(
         accepted=tuple(sorted(ids.intersection(accepted))),
     )
     return msgspec.structs.replace(found, digest=digest_of(found))
+
+
+def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
+    """Refuse a row without a finite value for each input.
+
+    Raises:
+        ValueError: If it is one.
+    """
+    for name, value in row.items():
+        if name not in inputs:
+            raise ValueError(
+                f"the row has a value of {name!r}, which is no input; "
+                f"{name_choice(name, inputs)}"
+            )
+        if not math.isfinite(value):
+            raise ValueError(f"the row's {name!r} must be finite, not {value!r}")
+    absent = [name for name in inputs if name not in row]
+    if absent:
+        raise ValueError(f"the row has no value of {', '.join(map(repr, absent))}")
 
 
 def _ask_view(

@@ -72,6 +72,8 @@ def check_settings(settings: Settings) -> None:
 def changed(settings: Settings, texts: Mapping[str, str]) -> Settings:
     """Return settings with others for some names, as a user writes them.
 
+    The budget is not among them.
+
     Raises:
         ValueError: If there is no such setting, or its value is none.
 
@@ -79,7 +81,7 @@ def changed(settings: Settings, texts: Mapping[str, str]) -> Settings:
         >>> changed(Settings(), {"epsilon": "0.2"}).epsilon
         0.2
     """
-    known = [*_RANGES, *_COUNTS]
+    known = [name for name in (*_RANGES, *_COUNTS) if name != "budget_s"]
     found: dict[str, float] = {}
     for name, text in texts.items():
         if name not in known:

@@ -158,7 +158,9 @@ def _usage_text(error: click.ClickException) -> str:
     message = error.format_message().strip()
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         return message
-    message = message[:1].lower() + message[1:].removesuffix(".")
+    message = message[:1].lower() + message[1:]
+    if not message.endswith("..."):
+        message = message.removesuffix(".")
     context = error.ctx if isinstance(error, click.UsageError) else None
     hint = f"\n  {context.command_path} --help tells more" if context else ""
     return message + hint

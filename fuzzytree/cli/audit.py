@@ -197,7 +197,8 @@ def command(
     _tell_domain(found, quiet=quiet)
     text = _told(found, "json" if as_json else form, model, accepted if path else None)
     if output is None:
-        answer(text)
+        if text:  # no finding is no annotation
+            answer(text)
     else:
         write_atomically(output, f"{text}\n".encode())
         say(f"wrote    {output}", quiet=quiet)
@@ -206,7 +207,8 @@ def command(
         say(f"wrote    {page}", quiet=quiet)
     if write_baseline is not None:
         write_atomically(write_baseline, baseline_of(found))
-        say(f"wrote    {write_baseline}", quiet=quiet)
+        said = f"{len(found.findings)} accepted with --baseline {write_baseline}"
+        say(f"wrote    {write_baseline} {said}", quiet=quiet)
     lost = [*gone(accepted, found)]
     for name in lost:
         say(f"gone     {name} {accepted[name]}", quiet=quiet)

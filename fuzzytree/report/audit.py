@@ -26,6 +26,7 @@ MOST_FINDINGS: Final = 200
 """That are told one by one."""
 
 _MOST_INPUTS = 12  # of a point or region on the terminal
+_LEFT_OUT = ": left out by the user"
 _SHOWN = 84  # characters of a source line
 _COLOURS: Mapping[str, str] = {
     "error": "31;1",
@@ -82,8 +83,8 @@ def audit_lines(
     yield from summary_lines(audit)
     if audit.unasked:
         yield ""
-        yield "not asked, or not to the end:"
-        yield from (line for text in audit.unasked for line in _item(text))
+        yield "not asked, or not to the end"
+        yield from (line for text in _gathered(audit.unasked) for line in _item(text))
     yield ""
     yield "this audit does not establish"
     yield from (line for text in audit.limits for line in _item(text))
@@ -109,9 +110,9 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
         gone: Accepted ids that are no longer found.
     """
     found = audit.open_findings
-    said = "no findings" if not found else _by_severity(found)
+    said = _by_severity(found) if found else "nothing found"
     if audit.accepted:
-        said += f", and {len(audit.accepted)} accepted"
+        said += f" beside {len(audit.accepted)} accepted"
     if audit.was_interrupted:
         said += "; interrupted: what is proved is kept, the rest is not asked"
     elif not audit.is_complete:
@@ -122,7 +123,7 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
     if found:
         said += f"; `fuzzytree explain {found[0].code}` tells what to do"
     elif audit.is_complete:
-        said += f" in {counted(len(audit.answers), 'answer')}"
+        said += f"; {counted(len(audit.answers), 'question')} asked and answered"
     return said
 
 
@@ -318,6 +319,14 @@ def _by_severity(found: Sequence[Answer]) -> str:
         if any(one.severity == severity for one in found)
     ]
     return f"{counted(len(found), 'finding')}: {', '.join(counts)}"
+
+
+def _gathered(unasked: Sequence[str]) -> Iterator[str]:
+    """Yield sentences, those of codes that the user left out as one."""
+    left_out = [text.split()[0] for text in unasked if text.endswith(_LEFT_OUT)]
+    if left_out:
+        yield f"{', '.join(left_out)}{_LEFT_OUT}"
+    yield from (text for text in unasked if not text.endswith(_LEFT_OUT))
 
 
 def _item(text: str) -> Iterator[str]:
