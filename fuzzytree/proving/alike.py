@@ -1,0 +1,377 @@
+"""Do two rule bases decide alike everywhere on a box? Branch and bound in fractions.
+
+A box is a product of stretches of the axes that either model asks; combinations count
+as axes of their own, which only makes more boxes. On a box the strength of each rule
+has bounds, and a rule is *beaten* if another one is preferred to it at every point:
+certainly stronger, or as strong and before it. What is left of a model are the rules
+that may win there. The box is settled
+
+- if both models answer one and the same class on it, or
+- if the same rules are left of both in the same order, for which their forms count and
+  not their names: then whichever wins in one wins in the other.
+
+If what the two may answer has nothing in common, any point of the box is a witness. All
+other boxes are halved, best where a curve changes its formula or crosses another.
+"""
+
+from __future__ import annotations
+
+import heapq
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.contenders import Box, Contender, Left, left_on, same
+from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.ground import span
+from fuzzytree.proving.linear import ZERO
+from fuzzytree.proving.points import Places, Point, middle
+from fuzzytree.proving.states import (
+    Bracket,
+    Claim,
+    Proved,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.proving.stretches import Key, Numbered, Stretch, laid
+from fuzzytree.rulebase import Part, RuleBase, Variable, shapes_of
+
+MOST_BOXES = 4_000
+"""Boxes that are looked at, unless the clock ends before."""
+
+TOUCHING = 2.0**-40
+"""Where classes are no further apart than this, boxes are not halved any more."""
+
+_OF = "the smaller of both margins where the two answer otherwise"
+_DEEP = 12  # halvings, before which no box is taken for a touching tie
+_DEEPEST = 60  # halvings of a box in which both answer otherwise, but no double is met
+
+
+class Answered(NamedTuple):
+    """What a rule base says at a point, exactly.
+
+    Attributes:
+        label: The class, or None for no class.
+        rule: The number of the winning rule, 0 if none fires.
+        is_tie: Whether another rule is as strong.
+        margin: How far the strongest class is ahead of the next; not firing counts as
+            a class of strength 0.
+    """
+
+    label: str | None
+    rule: int
+    is_tie: bool
+    margin: Fraction
+
+
+def answer_at(rules: RuleBase, point: Point) -> Answered:
+    """Return what a rule base says at a point that need not be of doubles.
+
+    Example:
+        >>> from fuzzytree.rulebase import Rule
+        >>> answer_at(RuleBase("a", ("x",), (), (Rule((), "x"),)), {}).label
+        'x'
+    """
+    shapes = shapes_of(rules.variables)
+    values = {v.name: _value(v, point) for v in rules.variables}
+    strengths: list[Fraction] = []
+    for rule in rules.rules:
+        strength = Fraction(1)
+        for clause in rule.when:
+            value = values[clause.variable]
+            degree = max(
+                exact_degree(shapes[clause.variable, t], value) for t in clause.terms
+            )
+            degree = 1 - degree if clause.negated else degree
+            if rules.semantics.conjunction == "product":
+                strength *= degree
+            else:
+                strength = min(strength, degree)
+        strengths.append(strength)
+    best = max(strengths)
+    if best == 0:
+        return Answered(rules.semantics.uncovered, 0, False, ZERO)
+    winner = strengths.index(best)
+    label = rules.rules[winner].then
+    others = [
+        s for s, rule in zip(strengths, rules.rules, strict=True) if rule.then != label
+    ]
+    margin = best - max(others, default=ZERO)
+    return Answered(label, winner + 1, strengths.count(best) > 1, margin)
+
+
+def _value(variable: Variable, point: Point) -> Fraction:
+    if not variable.parts:
+        return point[variable.name]
+    return sum((_share(part, point) for part in variable.parts), ZERO)
+
+
+def _share(part: Part, point: Point) -> Fraction:
+    return Fraction(part.weight) * (point[part.input] - Fraction(part.centre))
+
+
+def difference_at(old: RuleBase, new: RuleBase, point: Point) -> Witness | None:
+    """Return a point as a witness that two rule bases answer otherwise there, if so."""
+    one, other = answer_at(old, point), answer_at(new, point)
+    if one.label == other.label:
+        return None
+    return Witness(
+        coordinates(point),
+        (
+            Claim("decides", of="old", label=one.label),
+            Claim("decides", of="new", label=other.label),
+        ),
+    )
+
+
+def alike(
+    old: RuleBase,
+    new: RuleBase,
+    domain: Domain,
+    clock: Clock,
+    *,
+    most: int = MOST_BOXES,
+) -> State:
+    """Decide whether two rule bases answer alike on all of a domain.
+
+    Args:
+        old: A rule base.
+        new: Another one.
+        domain: A side for each input of either.
+        clock: How much time is left.
+        most: The most boxes that are looked at.
+
+    Returns:
+        `Proved`: they answer alike. `Witness`: they do not, here. `Bracket`: they can
+        differ only where the margin of one of them is at most so large.
+
+    Example:
+        >>> from fuzzytree.rulebase import Rule
+        >>> one = RuleBase("one", ("a", "b"), (), (Rule((), "a"),))
+        >>> two = RuleBase("two", ("a", "b"), (), (Rule((), "b"),))
+        >>> alike(one, one, Domain(()), Clock()).how
+        'both answer alike in every box: 1 box settled'
+        >>> alike(one, two, Domain(()), Clock()).claims[1].label
+        'b'
+    """
+    return _Search(old, new, domain).run(clock, most)
+
+
+class _Open(NamedTuple):
+    """A box that is open: at most its margin, and how often it was halved."""
+
+    margin: float
+    box: Box
+    depth: int
+
+
+class _Found(NamedTuple):
+    """What keeps a box open: the margin on it, and where to halve it, if anywhere."""
+
+    margin: float
+    cut: tuple[int, Fraction] | None
+
+
+class _Todo:
+    """The boxes that are open, in two orders."""
+
+    def __init__(self, first: _Open) -> None:
+        self._open: dict[int, _Open] = {}
+        self._by_margin: list[tuple[float, int]] = []
+        self._by_age: deque[int] = deque()
+        self._count = 0
+        self.put(first)
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    @property
+    def margin(self) -> float:
+        """The largest margin of an open box."""
+        while self._by_margin[0][1] not in self._open:
+            heapq.heappop(self._by_margin)
+        return -self._by_margin[0][0]
+
+    @property
+    def is_touching(self) -> bool:
+        """Whether all open boxes are small, and classes as good as tie on them."""
+        return self.margin <= TOUCHING and self._oldest.depth > _DEEP
+
+    @property
+    def _oldest(self) -> _Open:
+        while self._by_age[0] not in self._open:
+            self._by_age.popleft()
+        return self._open[self._by_age[0]]
+
+    def put(self, box: _Open) -> None:
+        """Add a box."""
+        self._open[self._count] = box
+        heapq.heappush(self._by_margin, (-box.margin, self._count))
+        self._by_age.append(self._count)
+        self._count += 1
+
+    def take(self) -> _Open:
+        """Remove the oldest box, or the one with the largest margin, by turns."""
+        margin, number = -self.margin, self._by_margin[0][1]
+        if self._count % 4 or not margin:
+            box = self._oldest
+            del self._open[self._by_age.popleft()]
+            return box
+        return self._open.pop(number)
+
+
+class _Search:
+    """Two rule bases on common axes, and the boxes that are open."""
+
+    def __init__(self, old: RuleBase, new: RuleBase, domain: Domain) -> None:
+        self.models = (old, new)
+        asked = _asked(old, new)
+        ends = [
+            (key, Stretch(*span(variable, domain), True))
+            for key, variable in asked.items()
+        ]
+        self.is_empty = any(whole.low > whole.high for _, whole in ends)
+        self.axes, self.rules = laid((old, new), ends)
+        self.places = Places(self.models, list(asked), domain)
+
+    def run(self, clock: Clock, most: int) -> State:
+        """Settle boxes: by turns the largest, and where the margin may be largest."""
+        if self.is_empty:
+            return Proved("no point of the inputs is within the domain")
+        whole = tuple(axis.whole for axis in self.axes)
+        todo = _Todo(_Open(1.0, whole, 0))
+        settled, stuck = 0, -1.0
+        while todo:
+            margin = max(todo.margin, stuck)
+            if settled + len(todo) > most or clock.is_over or todo.is_touching:
+                return self._open(margin, settled, len(todo), clock)
+            box = todo.take()
+            found = self._look(box)
+            if isinstance(found, Witness):
+                return found
+            if found is None or found.cut is None:
+                settled += 1
+                stuck = stuck if found is None else max(stuck, found.margin)
+                continue
+            for half in _halves(box.box, *found.cut):
+                todo.put(_Open(min(found.margin, 1.0), half, box.depth + 1))
+        if stuck >= 0.0:
+            why = "no double is known that reaches what is open"
+            return Bracket(_OF, 0.0, stuck, why)
+        noun = "box" if settled == 1 else "boxes"
+        return Proved(f"both answer alike in every box: {settled} {noun} settled")
+
+    def _open(self, margin: float, settled: int, left: int, clock: Clock) -> Bracket:
+        why = "enough boxes were halved"
+        if margin <= TOUCHING:
+            why = "only ties are left, or nearly so"
+        elif clock.is_over:
+            why = "the budget was spent"
+        return Bracket(
+            _OF,
+            0.0,
+            margin,
+            f"{why}: {settled} boxes are settled, and {left} are open",
+        )
+
+    def _look(self, given: _Open) -> Witness | _Found | None:
+        """Settle a box (None), find a witness in it, or say how to halve it."""
+        _, box, depth = given
+        one, other = (
+            left_on(model, asked, self.axes, box)
+            for model, asked in zip(self.models, self.rules, strict=True)
+        )
+        first, second = self._answers(0, one), self._answers(1, other)
+        if len(first) == 1 and first == second:
+            return None
+        old, new = (model.semantics for model in self.models)
+        if (one.is_sure or old.uncovered == new.uncovered) and same(
+            one, other, (old.conjunction, new.conjunction)
+        ):
+            return None
+        is_apart = first.isdisjoint(second)
+        points = self._points(box, is_wanted=is_apart or depth % 4 == 0)
+        if points is None:
+            return None
+        for point in points:
+            near = self.places.in_doubles(point)
+            witness = None if near is None else difference_at(*self.models, near)
+            if witness is not None:
+                return witness
+        is_beyond = is_apart and (depth > _DEEPEST or not self.places.has_sums)
+        cut = None if is_beyond else self._cut(box, [*one.rules, *other.rules])
+        return _Found(min(one.margin, other.margin), cut)
+
+    def _answers(self, model: int, left: Left) -> set[str | None]:
+        found: set[str | None] = {rule.then for rule in left.rules}
+        if not left.is_sure:
+            found.add(self.models[model].semantics.uncovered)
+        return found
+
+    def _points(self, box: Box, *, is_wanted: bool) -> list[Point] | None:
+        """Return points of a box to try; None if no input reaches it."""
+        if not self.places.has_sums:
+            return self.places.some(box)
+        if not is_wanted:
+            return []
+        point = self.places.solved(box)
+        return None if point is None else [point]
+
+    def _cut(self, box: Box, rules: Sequence[Contender]) -> tuple[int, Fraction] | None:
+        """Return the axis and the place where halving a box promises most."""
+        is_min = all(m.semantics.conjunction == "min" for m in self.models)
+        common: set[Numbered] = set()
+        if rules and not is_min:
+            common = set.intersection(*({*rule.form} for rule in rules))
+        doubt: dict[int, tuple[float, float]] = {}
+        for rule in rules:
+            for clause, form in zip(rule.clauses, rule.form, strict=True):
+                low, high = rule.bounds[clause]
+                high = min(high, rule.high) if is_min else high
+                stretch, whole = box[clause[0]], self.axes[clause[0]].whole
+                if stretch.low == stretch.high or low > high:
+                    continue
+                # A factor of all rules says nothing of who is stronger.
+                width = 0.0 if form in common else high - low
+                length = float((stretch.high - stretch.low) / (whole.high - whole.low))
+                known = doubt.get(clause[0], (0.0, length))
+                doubt[clause[0]] = max(known, (width, length))
+        if not doubt:
+            return None
+        axis = max(doubt, key=lambda one: (doubt[one], -one))
+        return axis, _cut_at(self.axes[axis].marks, box[axis])
+
+
+def _cut_at(marks: Sequence[Fraction], stretch: Stretch) -> Fraction:
+    """Return the mark nearest to the middle of a stretch, or the middle."""
+    low, high, is_closed = stretch
+    centre = middle(stretch)
+    place = bisect_left(marks, centre)
+    near = [
+        mark
+        for mark in marks[max(place - 1, 0) : place + 1]
+        if low < mark < high or (is_closed and mark == low)
+    ]
+    return min(near, key=lambda mark: abs(mark - centre), default=centre)
+
+
+def _asked(old: RuleBase, new: RuleBase) -> dict[Key, Variable]:
+    """Return the variables that some rule of either model asks, by their keys."""
+    found: dict[Key, Variable] = {}
+    for model in (old, new):
+        asked = {clause.variable for rule in model.rules for clause in rule.when}
+        for variable in model.variables:
+            if variable.name in asked:
+                found.setdefault(variable.parts or variable.name, variable)
+    return found
+
+
+def _halves(box: Box, axis: int, at: Fraction) -> Iterator[Box]:
+    low, high, is_closed = box[axis]
+    for part in (Stretch(low, at, is_closed), Stretch(at, high)):
+        yield (*box[:axis], part, *box[axis + 1 :])
