@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Measure, Place, Severity
+from fuzzytree.auditing.views import View
 from fuzzytree.proving.states import Bracket, Span, Witness, point_of
+from fuzzytree.report.audit_model import MOST_RULES, sentence_of
 from fuzzytree.report.audit_states import (
     SEVERITIES,
     evidence,
@@ -41,17 +43,21 @@ _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
 
 
 class Scene(NamedTuple):
-    """What pictures of findings are drawn from.
+    """What findings are told and drawn with.
 
     Attributes:
         axes: Every variable, by name.
-        rules: What decides, if the strongest rule does.
-        sentences: Every rule as markup.
+        viewed: The rules as they are audited.
     """
 
     axes: Mapping[str, Axis]
-    rules: RuleBase | None
-    sentences: Sequence[Markup]
+    viewed: View
+
+    @property
+    def deciding(self) -> RuleBase | None:
+        """The rules, if the strongest of them decides."""
+        is_strongest = self.viewed.policy.decision == "strongest"
+        return self.viewed.rules if is_strongest else None
 
 
 def anchors(findings: Sequence[Answer]) -> list[str]:
@@ -117,10 +123,21 @@ def _group(code: str, shown: Sequence[Markup]) -> Markup:
         pairs: list[Markup] = []
         for name, said in named:
             if said:
-                lines = (tag("span", line, class_="line") for line in said.splitlines())
+                lines = (
+                    tag("span", _with_code(line), class_="line")
+                    for line in said.splitlines()
+                )
                 pairs += [tag("dt", name), tag("dd", *lines)]
         parts.append(folded("What this means and what to do", tag("dl", *pairs)))
     return tag("section", *parts, *shown, class_="group")
+
+
+def _with_code(line: str) -> Markup:
+    """Return a line in which what stands between backticks is code."""
+    parts = line.split("`")
+    return joined(
+        tag("code", part) if place % 2 else part for place, part in enumerate(parts)
+    )
 
 
 def _slug(code: str) -> str:
@@ -171,17 +188,13 @@ def _region_text(region: Sequence[Span], scene: Scene) -> str:
 
 def _concerned(answer: Answer, scene: Scene) -> Markup | None:
     """Return the rules and terms that a finding is about, in words."""
-    rules = [k for k in answer.rules if 0 < k <= len(scene.sentences)]
-    items: list[Content] = [
-        joined(
-            [
-                tag("a", f"rule {k}", href=f"#rule-{k}"),
-                text(": "),
-                scene.sentences[k - 1],
-            ]
-        )
-        for k in rules[:6]
-    ]
+    viewed = scene.viewed
+    whole = viewed.rules
+    items: list[Content] = []
+    rules: list[int] = []
+    if whole is not None:
+        rules = [k for k in answer.rules if 0 < k <= len(whole.rules)]
+        items += [_named(k, viewed, whole) for k in rules[:6]]
     if len(rules) > 6:
         items.append(f"and {counted(len(rules) - 6, 'more rule')}")
     if not rules:
@@ -189,6 +202,13 @@ def _concerned(answer: Answer, scene: Scene) -> Markup | None:
         if len(answer.terms) > 6:
             items.append(f"and {counted(len(answer.terms) - 6, 'more term')}")
     return listed(items, class_="concerned") if items else None
+
+
+def _named(number: int, viewed: View, rules: RuleBase) -> Markup:
+    name = viewed.places[number - 1] if viewed.places else f"rule {number}"
+    href = f"#rule-{number}" if number <= MOST_RULES else None
+    said = sentence_of(rules.rules[number - 1], rules)
+    return joined([tag("a", name, href=href), text(": "), said])
 
 
 def _measures(measures: Sequence[Measure]) -> Markup | None:
@@ -230,7 +250,9 @@ def _pictures(answer: Answer, name: str, scene: Scene) -> Markup | None:
     if len(shown) > _MOST_BARS:
         others = ", ".join(axis.name for axis in shown[_MOST_BARS:])
         parts.append(tag("p", f"not drawn: {others}", class_="left-out"))
-    maps = [*_maps(shown, region, values, name, scene)]
+    maps: list[Markup] = []
+    for whose, rules in _deciding(answer, scene):
+        maps += _maps(shown, region, values, f"{name}-{len(maps)}", whose, rules)
     if not parts and not maps:
         return None
     return tag(
@@ -243,9 +265,10 @@ def _pictures(answer: Answer, name: str, scene: Scene) -> Markup | None:
 
 def _values(point: Mapping[str, Fraction], scene: Scene) -> dict[str, Fraction]:
     """Return the value of every variable at a point, as far as it is known."""
-    if scene.rules is None or not point:
+    rules = scene.viewed.rules
+    if rules is None or not point:
         return dict(point)
-    return exact_axes(scene.rules, point) or dict(point)
+    return exact_axes(rules, point) or dict(point)
 
 
 def _near(values: Mapping[str, Fraction], axis: Axis) -> float | None:
@@ -263,13 +286,23 @@ def _concerning(
     names = dict.fromkeys(region)
     if not names:
         names = dict.fromkeys(one.variable for one in answer.terms)
-    if not names and scene.rules is not None and values:
+    rules = scene.viewed.rules
+    if not names and rules is not None and values:
         for k in answer.rules[:2]:
-            if 0 < k <= len(scene.rules.rules):
-                names |= dict.fromkeys(
-                    c.variable for c in scene.rules.rules[k - 1].when
-                )
+            if 0 < k <= len(rules.rules):
+                names |= dict.fromkeys(c.variable for c in rules.rules[k - 1].when)
     return [scene.axes[one] for one in names if one in scene.axes]
+
+
+def _deciding(answer: Answer, scene: Scene) -> list[tuple[str, RuleBase]]:
+    """Return whose decisions maps show: those of the tree and of its raw rules."""
+    if scene.deciding is None:
+        return []
+    claims = answer.state.claims if isinstance(answer.state, Witness) else ()
+    raw = scene.viewed.raw
+    if raw is not None and any(claim.of == "raw rules" for claim in claims):
+        return [("the tree", scene.deciding), ("the raw rules", raw)]
+    return [("", scene.deciding)]
 
 
 def _maps(
@@ -277,11 +310,11 @@ def _maps(
     region: Mapping[str, Span],
     values: Mapping[str, Fraction],
     name: str,
-    scene: Scene,
+    whose: str,
+    rules: RuleBase,
 ) -> Iterator[Markup]:
     """Yield maps of the decision on the two variables that a region limits most."""
-    rules = scene.rules
-    if rules is None or len(shown) < 2:
+    if len(shown) < 2:
         return
     asked = {clause.variable for rule in rules.rules for clause in rule.when}
     drawn = [axis for axis in shown if axis.name in asked]
@@ -291,13 +324,14 @@ def _maps(
         return
     across, down = drawn[:2]
     for k, (where, window) in enumerate(windows(across, down, region)):
-        picture = map_picture(
-            rules, (across, down), window, region, values, f"{name}-m{k}"
+        axes = (across, down)
+        picture = map_picture(rules, axes, window, region, values, f"{name}-m{k}")
+        said = (
+            f"What {whose or 'the rules'} decide{'s' * (whose == 'the tree')} {where}"
         )
-        said = f"The decision {where}"
-        others = asked - {across.name, down.name}
+        others = len(asked - {across.name, down.name})
         if others:
-            said += f", with {counted(len(others), 'other variable')} as at the witness"
+            said += f", with {counted(others, 'other variable')} as at the witness"
         if across.parts or down.parts:
             said += "; a combination is drawn as if it were free"
         yield tag("figure", picture, tag("figcaption", said))

@@ -6,11 +6,21 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.auditing.records import Answer
+from fuzzytree.auditing.views import View
 from fuzzytree.proving.states import Sampled
 from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
 from fuzzytree.report.drawing import Axis
-from fuzzytree.report.markup import Content, Markup, folded, joined, table, tag, text
+from fuzzytree.report.markup import (
+    Content,
+    Markup,
+    folded,
+    joined,
+    listed,
+    table,
+    tag,
+    text,
+)
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, class_mark, tree_picture
 from fuzzytree.report.systems import curve_text, rule_text
@@ -39,16 +49,14 @@ def legend(classes: Sequence[str]) -> Markup:
     return tag("p", "Classes: ", joined(shown, " "), class_="legend")
 
 
-def rule_sentences(model: RuleBase | FuzzySystem) -> list[Markup]:
+def rule_sentences(rules: RuleBase) -> list[Markup]:
     """Return every rule as a person reads it."""
-    if isinstance(model, FuzzySystem):
-        return [text(rule_text(rule)) for rule in model.rules]
-    codes = {label: code for code, label in enumerate(model.classes)}
-    return [_sentence(rule, codes) for rule in model.rules]
+    return [sentence_of(rule, rules) for rule in rules.rules]
 
 
-def _sentence(rule: Rule, codes: Mapping[str, int]) -> Markup:
-    then = class_name(rule.then, codes[rule.then])
+def sentence_of(rule: Rule, rules: RuleBase) -> Markup:
+    """Return a rule of a rule base as a person reads it."""
+    then = class_name(rule.then, rules.classes.index(rule.then))
     if not rule.when:
         return joined([_word("ALWAYS"), then], " ")
     clauses = [
@@ -193,56 +201,66 @@ def _terms_in_words(
 
 
 def rules_section(
-    sentences: Sequence[Markup],
-    model: RuleBase | FuzzySystem,
-    answers: Sequence[Answer],
-    links: Mapping[int, Sequence[Markup]],
+    viewed: View, answers: Sequence[Answer], links: Mapping[int, Sequence[Markup]]
 ) -> Markup:
     """Return the rules as a table, with what the rows say of each.
 
     Args:
-        sentences: Every rule.
-        model: The rules.
+        viewed: The rules as they are audited.
         answers: All answers; those of FT701 tell about rows.
         links: The findings about each rule, by its number.
     """
-    support = _support(model)
+    notes = [*_notes(viewed)]
+    if viewed.rules is None:
+        return joined(notes)
+    rules = viewed.rules.rules
+    is_supported = any(rule.support is not None for rule in rules)
     told = {k: answer for answer in answers for k in _of_rows(answer)}
-    head = ["rule", "sentence"]
-    if support:
-        head.append("training rows")
     names = [*dict.fromkeys(m.name for one in told.values() for m in one.measures)]
-    head += names
     is_shared = any(isinstance(one.state, Sampled) for one in told.values())
-    if is_shared:
-        head.append("confidence")
-    head.append("findings")
+    head = ["rule", "sentence", *(["training rows"] if is_supported else []), *names]
+    head += [*(["confidence"] if is_shared else []), "findings"]
     rows: list[list[Content]] = []
-    for place, said in enumerate(sentences[:MOST_RULES]):
-        answer = told.get(place + 1)
-        row: list[Content] = [tag("span", str(place + 1), id=f"rule-{place + 1}"), said]
-        if support:
-            row.append(_or_dash(support[place]))
+    shown = zip(rules[:MOST_RULES], rule_sentences(viewed.rules), strict=False)
+    for k, (rule, said) in enumerate(shown, 1):
+        answer = told.get(k)
+        name = viewed.places[k - 1] if viewed.places else str(k)
+        row: list[Content] = [tag("span", name, id=f"rule-{k}"), said]
+        if is_supported:
+            row.append("-" if rule.support is None else str(rule.support))
         row += _measured(answer, names)
         if is_shared:
             row.append(_confidence(answer))
-        row.append(joined(links.get(place + 1, ()), " ") or text("-"))
+        row.append(joined(links.get(k, ()), " ") or "-")
         rows.append(row)
     right = tuple(range(2, len(head) - 1))
-    caption = f"{counted(len(sentences), 'rule')}, in the order of the model"
-    shown = table(head, rows, caption=caption, right=right, sorts=True)
-    more = len(sentences) - MOST_RULES
-    if more <= 0:
-        return shown
-    note = tag("p", f"{counted(more, 'more rule')} not shown", class_="left-out")
-    return joined([shown, note])
+    caption = f"{counted(len(rules), 'rule')}, in the order of the model"
+    return joined([table(head, rows, caption=caption, right=right, sorts=True), *notes])
 
 
-def _support(model: RuleBase | FuzzySystem) -> list[int | None]:
-    if isinstance(model, FuzzySystem):
-        return []
-    found = [rule.support for rule in model.rules]
-    return found if any(one is not None for one in found) else []
+def _notes(viewed: View) -> Iterator[Markup]:
+    """Yield what a reader must know of rules that are not in the table."""
+    system, rules = viewed.system, viewed.rules
+    if rules is None:
+        said = "None of the rules has an exact counterpart; why is told below"
+        yield tag("p", said, class_="left-out")
+    elif len(rules.rules) > MOST_RULES:
+        more = counted(len(rules.rules) - MOST_RULES, "more rule")
+        yield tag("p", f"{more} not shown", class_="left-out")
+    if system is None or not viewed.places:
+        return
+    if rules is not None:
+        said = "These are the system's conditions as they are audited: one that says "
+        yield tag("p", f"{said}'or' is asked as several rules", class_="caption")
+    known = set(viewed.numbers)
+    others = [
+        joined([text(f"rule {k}: "), text(rule_text(rule))])
+        for k, rule in enumerate(system.rules, 1)
+        if k not in known
+    ]
+    if others:
+        some = f"{counted(len(others), 'rule')} of {len(system.rules)} not audited"
+        yield folded(some, listed(others[:MOST_RULES]))
 
 
 def _of_rows(answer: Answer) -> Iterator[int]:
@@ -263,7 +281,3 @@ def _confidence(answer: Answer | None) -> Content:
     ends = f"{percent(state.low)} to {percent(state.high)}"
     sure = tag("span", f" ({ends})", class_="interval", title="95 % sure")
     return joined([f"{percent(state.hits / state.rows)} %", sure])
-
-
-def _or_dash(value: int | None) -> str:
-    return "-" if value is None else str(value)

@@ -19,6 +19,8 @@ from fuzzytree.agreement import Agreement
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Audit
 from fuzzytree.auditing.subject import Rows
+from fuzzytree.auditing.views import view
+from fuzzytree.proving.states import Declined
 from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
     Scene,
@@ -28,7 +30,6 @@ from fuzzytree.report.audit_findings import (
 )
 from fuzzytree.report.audit_model import (
     class_name,
-    rule_sentences,
     rules_section,
     terms_section,
     tree_section,
@@ -40,6 +41,7 @@ from fuzzytree.report.audit_states import (
     icon,
     known_as,
     state_badge,
+    state_note,
     state_word,
 )
 from fuzzytree.report.drawing import axes_of
@@ -53,7 +55,7 @@ from fuzzytree.report.markup import (
     tag,
     text,
 )
-from fuzzytree.report.text import as_rules, counted, number
+from fuzzytree.report.text import counted, number
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
@@ -65,6 +67,8 @@ MOST_QUESTIONS = 1000
 """That are listed one by one."""
 
 _MOST_URGENT = 12  # findings that the verdict names
+
+_MOST_DECLINED = 100  # reasons that are listed
 
 _Section = tuple[str, str, Markup]  # its anchor, its title, its content
 
@@ -152,21 +156,17 @@ def _sections(
 ) -> Iterator[_Section]:
     axes = axes_of(model, audit.domain)
     data = data_of(model, rows) if rows is not None else None
-    rules = model if isinstance(model, FuzzySystem) else as_rules(model)
-    sentences = rule_sentences(rules)
+    viewed = view(model, audit.domain)
     findings = gravest_first(audit.findings)
-    decides = rules if isinstance(rules, RuleBase) else None
-    if audit.policy.decision != "strongest":
-        decides = None
     if isinstance(model, FuzzyTree):
         passed = passing(model, data) if data is not None else None
         yield "tree", "The tree", tree_section(model, passed)
     yield "terms", "Variables and terms", terms_section(model, axes, data)
     linked = _links(findings)
-    shown = rules_section(sentences, rules, audit.answers, linked)
-    yield "rules", "Rules", shown
-    scene = Scene(axes, decides, sentences)
-    yield "findings", "Findings", findings_section(findings, scene, audit.accepted)
+    yield "rules", "Rules", rules_section(viewed, audit.answers, linked)
+    scene = Scene(axes, viewed)
+    shown = findings_section(findings, scene, audit.accepted)
+    yield "findings", "Findings", shown
     yield "questions", "Everything that was asked", _questions(audit)
     if agreement is not None:
         yield "agreement", "Agreement", agreement_section(agreement)
@@ -269,7 +269,7 @@ def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | Non
     items: list[Content] = [
         joined(
             [
-                icon(one.severity),
+                tag("span", icon(one.severity), class_=one.severity),
                 tag("a", one.sentence, href=f"#{name}"),
                 " ",
                 tag("span", one.code, class_="code"),
@@ -311,13 +311,21 @@ def _questions(audit: Audit) -> Markup:
     parts: list[Content] = [summary]
     if audit.unasked:
         parts += [tag("h3", "Not asked"), listed(audit.unasked, class_="unasked")]
-    each = [
+    declined = [one for one in audit.answers if isinstance(one.state, Declined)]
+    if declined:
+        lines = (f"{one.subject}: {state_note(one.state)}" for one in declined)
+        told: list[Content] = [*dict.fromkeys(lines)]
+        if len(told) > _MOST_DECLINED:
+            more = len(told) - _MOST_DECLINED
+            told[_MOST_DECLINED:] = [f"and {more} more, of which the JSON tells"]
+        parts += [tag("h3", "Declined"), listed(told)]
+    each: list[Sequence[Content]] = [
         (
             answer.code,
             answer.subject,
             state_badge(state_word(answer.state)),
             "yes" if answer.is_finding else "no",
-            answer.sentence,
+            joined([answer.sentence, tag("small", state_note(answer.state))]),
         )
         for answer in audit.answers[:MOST_QUESTIONS]
     ]
@@ -331,8 +339,7 @@ def _questions(audit: Audit) -> Markup:
 
 
 def _limits(audit: Audit) -> Markup:
-    said = tag("p", "This audit does not establish")
-    return tag("div", said, listed(audit.limits), class_="panel")
+    return tag("div", listed(audit.limits), class_="panel")
 
 
 def _repeat(audit: Audit) -> Markup:
@@ -376,5 +383,5 @@ def _command(answers: Sequence[Answer]) -> str:
 
     The command of an answer is that of the audit with `--select` and its code.
     """
-    found = {one.repeat.replace(f" --select {one.code}", "") for one in answers}
+    found = {one.repeat.removesuffix(f" --select {one.code}") for one in answers}
     return found.pop() if len(found) == 1 else ""

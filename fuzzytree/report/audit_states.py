@@ -20,6 +20,7 @@ from fuzzytree.report.markup import Markup, folded, joined, table, tag
 from fuzzytree.report.text import counted, number
 
 _MOST_UNFOLDED = 6  # inputs of a witness that are shown at once
+_SOME = 4  # inputs of a witness that a table has room for
 
 STATES: dict[str, str] = {
     "PROVED": "holds on all of the domain",
@@ -87,9 +88,36 @@ def evidence(state: State) -> Markup:
             )
         case Sampled():
             return tag("p", sampled_text(state), class_="how")
-        case Declined(code=code, reason=reason):
-            title = CODES[code].title if code in CODES else code
-            return tag("p", f"{code}, {title}: {reason}", class_="how")
+        case Declined():
+            return tag("p", declined_text(state), class_="how")
+
+
+def declined_text(state: Declined) -> str:
+    """Return why something was not decided.
+
+    Example:
+        >>> declined_text(Declined("FTD06", "no table was given"))
+        'FTD06, declined: needs rows: no table was given'
+    """
+    title = CODES[state.code].title if state.code in CODES else "declined"
+    return f"{state.code}, {title}: {state.reason}"
+
+
+def state_note(state: State) -> str:
+    """Return how an answer is known in a line: what a table has room for."""
+    match state:
+        case Proved(how=how):
+            return how
+        case Witness(point=point):
+            told = ", ".join(f"{one.input} = {one.decimal}" for one in point[:_SOME])
+            more = len(point) - _SOME
+            return f"at {told}{f' and {more} more' if more > 0 else ''}"
+        case Bracket(of=of, low=low, high=high):
+            return f"{of}: {number(low)} to {number(high)}"
+        case Sampled():
+            return sampled_text(state)
+        case Declined():
+            return declined_text(state)
 
 
 def sampled_text(state: Sampled) -> str:

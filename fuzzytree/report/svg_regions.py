@@ -36,7 +36,7 @@ _LEFT, _RIGHT, _TOP, _BASE = 8.0, 332.0, 22.0, 70.0
 _SLIVER = 3.0  # points: a region is drawn at least so wide
 
 _MAP_WIDE, _MAP_HIGH = 340.0, 288.0
-_MAP = (44.0, 332.0, 8.0, 248.0)  # left, right, top, base
+_MAP = (56.0, 332.0, 8.0, 248.0)  # left, right, top, base
 _CELLS = 48
 _FONT = 12.0
 
@@ -99,8 +99,8 @@ def bar_picture(
     if value is not None:
         parts += _pin(x.at(value), _TOP - 4, _BASE)
         said += f"{'; ' if said else ''}witness {value:.4g}"
-    said = cut(said, 38)
-    room = (_RIGHT - _LEFT - 5.6 * len(said)) / (LETTER * 13.5)
+    said = cut(said, 34)
+    room = (_RIGHT - _LEFT - 6.6 * len(said)) / (LETTER * 14.5)
     parts.append(words(_LEFT, 12.0, cut(axis.name, room), "strong"))
     parts.append(words(_RIGHT, 12.0, said, "small", "end"))
     parts += axis_marks(x, _BASE)
@@ -198,9 +198,9 @@ def map_picture(
         low, high = _ends(spans[1], y)
         parts.append(_box(start, end, min(low, high), max(low, high)))
     point = float(values[across.name]), float(values[down.name])
-    parts.append(
-        tag("path", d=_diamond(x.at(point[0]), y.at(point[1])), class_="witness")
-    )
+    if x.low <= point[0] <= x.high and y.low <= point[1] <= y.high:
+        way = _diamond(x.at(point[0]), y.at(point[1]))
+        parts.append(tag("path", d=way, class_="witness"))
     parts += axis_marks(x, base)
     parts += _marks_upwards(y, left)
     parts.append(words((left + right) / 2, base + 33, across.title, "small", "middle"))

@@ -1,0 +1,309 @@
+"""The page of an audit: all of it is there, nothing of a name becomes markup."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import itertools
+import re
+from html.parser import HTMLParser
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from fuzzytree.agreement import Agreement, Comparison
+from fuzzytree.auditing.records import Answer
+from fuzzytree.auditing.subject import Rows
+from fuzzytree.criteria.results import Stability, judged
+from fuzzytree.proving.states import Proved
+from fuzzytree.report import audit_findings, audit_page
+from fuzzytree.report.audit_page import page
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.testing import random_system, random_tree
+from tests.report.audits import EVIL, answers, audit_of, rows_of, rule_base
+
+_VOID = {"meta", "br"}
+
+
+class Outline(HTMLParser):
+    """What a browser would make of a page: elements, words, links and ids."""
+
+    def __init__(self, content: str) -> None:
+        super().__init__()
+        self.counts: dict[str, int] = {}
+        self.attributes: set[str] = set()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.headings: list[int] = []
+        self.words: list[str] = []
+        self._open: list[str] = []
+        self.feed(content)
+        self.close()
+        assert not self._open, self._open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        for name, value in attrs:
+            self.attributes.add(name)
+            if name == "id":
+                self.ids.append(value or "")
+            if name == "href":
+                self.links.append(value or "")
+        if re.fullmatch("h[1-6]", tag):
+            self.headings.append(int(tag[1]))
+        if tag not in _VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        assert self._open.pop() == tag
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if not self._open or self._open[-1] not in ("style", "script"):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        """All words, one space between them."""
+        return " ".join(" ".join(self.words).split())
+
+
+def shown(model: RuleBase | None = None, **fields: Any) -> Outline:
+    rules = rule_base() if model is None else model
+    return Outline(page(audit_of(rules, **fields), rules, rows=rows_of(rules)))
+
+
+def test_the_verdict_counts_findings_by_severity() -> None:
+    text = shown().text
+    assert "1 error, 1 warning and 2 notes were found" in text
+    assert "The audit is complete: 10 questions asked" in text
+
+
+def test_an_audit_without_findings_says_so() -> None:
+    clean = tuple(one for one in answers() if not one.is_finding)
+    rules = rule_base()
+    text = Outline(page(audit_of(rules, clean), rules)).text
+    assert "Nothing was found" in text
+    assert "There is no finding" in text
+
+
+def test_an_audit_that_was_cut_short_says_so_and_what_was_not_asked() -> None:
+    unasked = ("FT501 complexity: not asked: the budget of 1 s is spent",)
+    text = shown(is_complete=False, unasked=unasked).text
+    assert "The audit was cut short by its budget: 10 questions asked" in text
+    assert unasked[0] in text
+    by_hand = ("FT501 complexity: not asked: interrupted",)
+    text = shown(is_complete=False, unasked=by_hand).text
+    assert "The audit was cut short by hand" in text
+
+
+def test_an_accepted_finding_is_shown_but_not_counted() -> None:
+    text = shown(accepted=("FT101-9f2c11ab",)).text
+    assert "1 warning and 2 notes were found; 1 other is accepted" in text
+    assert "rule 4 never wins" in text
+
+
+def test_every_part_of_a_finding_is_on_the_page() -> None:
+    text = shown().text
+    for said in (
+        "rule 4 never wins: wherever it fires rule 2 is at least as strong",
+        "grip.yaml:58:5",
+        "17 levels and 96 cells",
+        "fuzzytree audit grip.yaml --select FT101",
+        "FT101-9f2c11ab",
+        "the common level lies between 0.3 and 0.4; the budget was spent",
+        "rules 1, 2, 3, 4 are below 1/10",
+        "26/3",
+        "8.666666666666666",
+        "0x1.6800000000000p+6",
+        "rows in both: 3 of 40 rows, 7.5 % (95 % sure: 2 to 20 %)",
+        "FTD06, declined: needs rows: no rows were given",
+        "from 7.7 kPa; witness 8.667",
+    ):
+        assert said in text, said
+
+
+@pytest.mark.parametrize("state", ["PROVED", "WITNESS", "BRACKET", "SAMPLED"])
+def test_a_state_has_its_word_its_sign_and_its_frame(state: str) -> None:
+    content = page(audit_of(rule_base()), rule_base())
+    badge = f'<span class="state {state.lower()}"><svg class="icon"'
+    assert f'{badge} aria-hidden="true" viewBox="0 0 16 16">' in content
+    assert f'<use href="#i-{state.lower()}"/></svg>{state}</span>' in content
+    assert f'<symbol id="i-{state.lower()}"' in content
+    assert f".state.{state.lower()} {{" in content
+
+
+def test_every_question_and_every_limit_is_on_the_page() -> None:
+    audit = audit_of(rule_base())
+    text = Outline(page(audit, rule_base())).text
+    for answer in audit.answers:
+        assert answer.sentence in text
+    for limit in audit.limits:
+        assert limit in text
+
+
+def test_the_page_tells_how_to_repeat_the_audit() -> None:
+    audit = audit_of(rule_base())
+    text = Outline(page(audit, rule_base())).text
+    for said in (
+        "command fuzzytree audit grip.yaml fuzzytree 0.1.0 the model grip its content",
+        audit.fingerprint,
+        audit.digest,
+        "ab" * 32,
+        "cd" * 32,
+        "epsilon 0.1",
+        "budget 60 s",
+        "area 0.0 100.0 the model's range",
+    ):
+        assert said in text, said
+
+
+def test_the_rules_say_how_often_they_fired_and_link_to_their_findings() -> None:
+    found = shown()
+    assert "19 85.7 % (50 to 90)" in found.text
+    assert "#FT101-9f2c11ab" in found.links
+    assert "rule-4" in found.ids
+
+
+def test_links_lead_somewhere_and_no_id_stands_twice() -> None:
+    found = shown()
+    assert len(set(found.ids)) == len(found.ids)
+    assert {link.removeprefix("#") for link in found.links} <= set(found.ids)
+
+
+def test_headings_skip_no_level() -> None:
+    levels = shown().headings
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    steps = itertools.pairwise(levels)
+    assert all(after <= before + 1 for before, after in steps)
+
+
+def test_no_name_becomes_markup() -> None:
+    plain, evil = shown(), shown(rule_base(EVIL, EVIL + "2"))
+    assert evil.counts.keys() == plain.counts.keys()
+    assert evil.counts["script"] == 1
+    assert "img" not in evil.counts
+    assert evil.attributes == plain.attributes
+    assert "<script>alert(1)</script>" in evil.text
+    assert "\x1b" not in "".join(evil.words)
+    assert "\u202e" not in "".join(evil.words)
+    assert r"\x1b\u202e" in evil.text
+
+
+def test_sentences_places_and_ids_of_a_hostile_audit_do_not_become_markup() -> None:
+    evil = Answer(
+        EVIL,
+        EVIL,
+        EVIL,
+        Proved(EVIL),
+        is_finding=True,
+        severity="error",
+        rules=(999, -3, 0),
+        repeat=EVIL,
+        id=EVIL,
+    )
+    found = shown(found=(evil, evil))
+    assert found.counts["script"] == 1
+    assert "img" not in found.counts
+    assert len(set(found.ids)) == len(found.ids)
+
+
+def test_a_long_name_is_cut_and_its_length_told() -> None:
+    rules = rule_base("p" * 5000)
+    content = page(audit_of(rules), rules, rows=rows_of(rules))
+    assert "p" * 401 not in content
+    assert f"{'p' * 400}… (5000 characters)" in content
+
+
+def test_only_the_pages_own_style_and_script_may_run() -> None:
+    content = page(audit_of(rule_base()), rule_base())
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', content)
+    assert policy is not None
+    assert policy[1].startswith("default-src 'none'; ")
+    for kind in ("script", "style"):
+        inner = re.search(f"<{kind}>(.*?)</{kind}>", content, re.DOTALL)
+        assert inner is not None
+        digest = hashlib.sha256(inner[1].encode()).digest()
+        assert f"{kind}-src 'sha256-{base64.b64encode(digest).decode()}'" in policy[1]
+    assert not re.search(r'\s(style|onclick|onload)="', content)
+    assert "http:" not in content
+    assert "https:" not in content
+
+
+def test_the_same_audit_gives_the_same_bytes() -> None:
+    rules = rule_base()
+    first = page(audit_of(rules), rules, rows=rows_of(rules))
+    assert page(audit_of(rules), rules, rows=rows_of(rules)) == first
+
+
+def test_a_tree_is_drawn_with_the_rows_that_pass() -> None:
+    tree = random_tree(3, leaves=5)
+    rules = rule_base()
+    values = np.random.default_rng(1).normal(size=(len(tree.inputs), 30))
+    values[0, 0] = np.nan
+    rows = Rows("rows", values, np.zeros(30, np.int64))
+    audit = audit_of(rules, (), form="tree")
+    text = Outline(page(audit, tree, rows=rows)).text
+    assert f"The tree {tree.name}: {len(tree.nodes)} nodes, 5 leaves" in text
+    assert "1 row with a missing value left out" in text
+    assert "rows by class: 29" in text
+
+
+def test_a_tree_of_many_leaves_is_told_as_an_outline() -> None:
+    tree = random_tree(3, leaves=130)
+    text = Outline(page(audit_of(rule_base(), ()), tree)).text
+    assert "A picture shows at most 120 leaves, and this tree has 130" in text
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_system_has_its_terms_and_the_rules_as_they_are_audited(seed: int) -> None:
+    system = random_system(seed)
+    audit = audit_of(rule_base(), (), form="system")
+    text = Outline(page(audit, system)).text
+    assert "fuzzytree audit of a fuzzy system" in text
+    for one in system.inputs:
+        assert one.name in text
+
+
+def test_agreement_and_stability_are_on_the_page_where_they_are_given() -> None:
+    rules = rule_base()
+    compared = Comparison("onnx", "rules", "rows", 40, "DISAGREES", 1, 0.25, 1e-12)
+    agreement = Agreement("grip", "", (compared,), skipped=("no C compiler",))
+    criteria = (judged("N3", 12, ["row 3 differs"], advice="sort"),)
+    stability = Stability("grip", "", 40, 0, 0, (), criteria)
+    found = page(
+        audit_of(rules), rules, rows=None, agreement=agreement, stability=stability
+    )
+    text = Outline(found).text
+    assert "1 of 1 comparison disagrees" in text
+    assert "no C compiler" in text
+    assert "1 of 1 criterion fails; tried on 40 probes and 0 rows" in text
+    assert "N3: row 3 differs" in text
+    assert "Agreement" not in Outline(page(audit_of(rules), rules)).text
+
+
+def test_what_is_too_much_is_left_out_and_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(audit_findings, "MOST_FINDINGS", 3)
+    monkeypatch.setattr(audit_findings, "MOST_PICTURED", 2)
+    monkeypatch.setattr(audit_page, "MOST_QUESTIONS", 4)
+    found = shown()
+    assert "1 more finding: the JSON has all of them" in found.text
+    assert "Only the first 2 findings have pictures" in found.text
+    assert "Every question, 10 in all; the first 4 are here" in found.text
+    assert {link.removeprefix("#") for link in found.links} <= set(found.ids)
+
+
+def test_a_page_of_many_findings_is_bounded() -> None:
+    rules = rule_base()
+    some = [msgspec.structs.replace(one, id="") for one in answers() if one.is_finding]
+    small = len(page(audit_of(rules, tuple(some * 100)), rules))
+    large = len(page(audit_of(rules, tuple(some * 1000)), rules))
+    assert large < small + 500_000 < 3_000_000
