@@ -1,0 +1,182 @@
+"""Rules and terms are found in files, and ids say what they are about."""
+
+from __future__ import annotations
+
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.auditing.places import (
+    ModelFile,
+    model_file,
+    places_of,
+    rule_path,
+    term_path,
+    with_ids,
+)
+from fuzzytree.auditing.records import Answer, Label, Place
+from fuzzytree.contracts import Document
+from fuzzytree.proving.states import Proved, Span
+from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.system import FuzzySystem
+from fuzzytree.testing import random_system, random_tree
+from fuzzytree.tree import FuzzyTree
+
+
+def written(model: Document) -> ModelFile:
+    """Return a model's YAML file."""
+    return model_file("model.yaml", ft.export(model, "yaml").content)
+
+
+def text_at(file: ModelFile, place: Place | None) -> str:
+    """Return what begins at a place."""
+    assert place is not None
+    line = file.content.decode().split("\n")[place.line - 1]
+    return line[place.column - 1 :]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_each_rule_and_term_of_a_rule_base_is_found(seed: int) -> None:
+    rules = ft.rules_from_tree(random_tree(seed))
+    file = written(rules)
+    for number in range(1, len(rules.rules) + 1):
+        found = text_at(file, file.place(rule_path(rules, number)))
+        assert found.lstrip("{").startswith("if:")
+    check_terms(rules, file)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_each_leaf_and_term_of_a_tree_is_found(seed: int) -> None:
+    tree = random_tree(seed)
+    file = written(tree)
+    for number in range(1, len(tree.leaves) + 1):
+        found = text_at(file, file.place(rule_path(tree, number)))
+        assert found.lstrip("{").startswith(f"leaf: {number}")
+    check_terms(tree, file)
+    for group in tree.sets:
+        for term in group.terms:
+            path = term_path(tree, Label(group.variable, term.name))
+            assert path[0] == "sets"
+            assert "name:" in text_at(file, file.place(path))
+
+
+def check_terms(model: RuleBase | FuzzyTree, file: ModelFile) -> None:
+    """Find every term's name where it is said to be."""
+    for variable in model.variables:
+        for term in variable.terms:
+            path = term_path(model, Label(variable.name, term.name))
+            assert path[:1] == ("variables",)
+            assert "name:" in text_at(file, file.place(path))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_each_rule_of_a_system_is_found_over_all_blocks(seed: int) -> None:
+    system: FuzzySystem = random_system(seed)
+    file = written(system)
+    lines = set[int]()
+    for number in range(1, len(system.rules) + 1):
+        place = file.place(rule_path(system, number))
+        assert place is not None
+        lines.add(place.line)
+        assert text_at(file, place).lstrip("{").startswith(("name:", "if:"))
+    assert len(lines) == len(system.rules)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_each_label_of_a_system_is_found(seed: int) -> None:
+    system: FuzzySystem = random_system(seed)
+    file = written(system)
+    for one in system.variables:
+        for label in one.labels:
+            path = term_path(system, Label(one.name, label.name))
+            assert "name:" in text_at(file, file.place(path))
+
+
+def test_other_formats_have_no_places() -> None:
+    rules = ft.rules_from_tree(random_tree(1))
+    file = model_file("rules.fll", ft.export(rules, "fll", allow_loss=True).content)
+    assert file.place(rule_path(rules, 1)) is None
+
+
+def test_a_damaged_yaml_file_has_no_places() -> None:
+    assert model_file("x.yaml", b"a: [").place(("rules", 0)) is None
+
+
+def test_places_are_told_once_each_rules_first() -> None:
+    rules = ft.rules_from_tree(random_tree(1))
+    file = written(rules)
+    first = rules.variables[0]
+    label = Label(first.name, first.terms[0].name)
+    answer = found("FT401", rules=(2,), terms=(label, label))
+    places = places_of(answer, rules, file, (2,))
+    assert places == (
+        file.place(("rules", 1)),
+        file.place(("variables", 0, "terms", 0)),
+    )
+    assert places_of(answer, rules, None, (2,)) == ()
+
+
+# --- ids
+
+
+def found(
+    code: str,
+    *,
+    subject: str = "it",
+    rules: tuple[int, ...] = (),
+    terms: tuple[Label, ...] = (),
+    region: tuple[Span, ...] = (),
+) -> Answer:
+    """Return an answer about some rules and terms."""
+    state = Proved("read off")
+    return Answer(code, subject, "so", state, True, "info", rules, terms, region)
+
+
+def base(**changed: float) -> RuleBase:
+    """Return two rules, whose cut can be moved."""
+    cut = changed.get("cut", 1.0)
+    terms = (Term("low", Band(high=cut)), Term("high", Band(low=cut)))
+    one, other = Clause("x", ("low",)), Clause("y", ("high",))
+    clauses = (other, one) if changed.get("turned") else (one, other)
+    rules = (Rule(clauses, "a", support=int(changed.get("rows", 1))), Rule((one,), "b"))
+    return RuleBase(
+        "base", ("a", "b"), (Variable("x", terms), Variable("y", terms)), rules
+    )
+
+
+def ids(rules: RuleBase, *answers: Answer) -> list[str]:
+    """Return the ids of answers about rules."""
+    return [one.id for one in with_ids(answers, [rules])]
+
+
+def test_an_id_stays_when_clauses_are_turned_and_supports_change() -> None:
+    about = found("FT101", rules=(1,))
+    assert ids(base(), about) == ids(base(turned=1), about) == ids(base(rows=9), about)
+
+
+def test_an_id_changes_with_a_curve_a_rule_or_a_code() -> None:
+    about = found("FT101", rules=(1,))
+    known = {
+        *ids(base(), about),
+        *ids(base(cut=2.0), about),
+        *ids(base(), found("FT101", rules=(2,))),
+        *ids(base(), found("FT102", rules=(1,))),
+    }
+    assert len(known) == 4
+
+
+def test_equal_ids_are_told_apart_in_order() -> None:
+    about = found("FT201", rules=(1, 2))
+    first, second, third = ids(base(), about, about, about)
+    assert second == f"{first}-2"
+    assert third == f"{first}-3"
+
+
+def test_without_rules_and_terms_an_id_is_of_the_subject_and_the_region() -> None:
+    one = found("FT301", region=(Span("x", 0.0, 1.0),))
+    other = found("FT301", region=(Span("x", 0.0, 2.0),))
+    (first,), (second,), (third,) = (ids(base(), about) for about in (one, other, one))
+    assert first == third != second
+
+
+def test_an_id_is_the_same_in_every_version() -> None:
+    assert ids(base(), found("FT101", rules=(1,))) == ["FT101-5d4fb4a9"]
