@@ -344,6 +344,38 @@ def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
     return Root(low, high, root.is_sure)
 
 
+def common_factor(one: Polynomial, other: Polynomial) -> Polynomial:
+    """Return the largest polynomial that divides two others, by Euclid's algorithm.
+
+    Its coefficients are whole numbers without a common divisor.
+
+    Example:
+        >>> common_factor(*(tuple(map(Fraction, p)) for p in ((-1, 0, 1), (-2, 1, 1))))
+        (Fraction(-1, 1), Fraction(1, 1))
+    """
+    a, b = _primitive(integers(one)[0]), _primitive(integers(other)[0])
+    while b:
+        if len(a) < len(b):
+            a, b = b, a
+        while a and len(a) >= len(b):
+            scale, shift = a[-1], len(a) - len(b)
+            a = [b[-1] * number for number in a]
+            for place, number in enumerate(b):
+                a[place + shift] -= scale * number
+            a = _primitive(a)
+        a, b = b, a
+    return tuple(map(Fraction, a))
+
+
+def _primitive(numbers: Sequence[int]) -> list[int]:
+    """Return coefficients without zeros at the end and without a common divisor."""
+    found = list(numbers)
+    while found and not found[-1]:
+        found.pop()
+    common = math.gcd(*found) * (1 if not found or found[-1] > 0 else -1)
+    return [number // common for number in found]
+
+
 def integral(polynomial: Polynomial, low: Fraction, high: Fraction) -> Fraction:
     """Return the exact integral from `low` to `high`.
 

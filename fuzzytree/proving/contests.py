@@ -1,0 +1,196 @@
+"""What a rule can reach and which rivals it can leave below, axis by axis.
+
+Under the minimum, a rule is stronger than its rivals at a point exactly if some level t
+lies above all of their strengths and not above its own. At such a level every axis must
+keep the rule at t or above, and every rival must be below t on some axis. In a cell the
+elements are in strict order, so what a value of the axis leaves below t is nested: as
+far as it is below the rule's element, an element is left below at exactly the levels
+above its least value in the cell and up to the rule's largest. So a cell is one option,
+told by bands: `top` of the rule, and `floor` of each rival.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import msgspec
+import numpy as np
+
+from fuzzytree.proving.covering import maximal
+from fuzzytree.proving.ground import Bands, Ground, Laid
+from fuzzytree.proving.parts import START
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import IntArray
+
+NEVER = np.iinfo(np.int64).max
+
+
+class Options(NamedTuple):
+    """The options on one axis.
+
+    Attributes:
+        where: Of each option its cell; `START` for the axis's lower end; `-2 - zone`
+            for a zone that may hold several places, which counts within bands only.
+        top: The band of the rule's largest value.
+        floor: Shape (options, rivals): the band of each rival's least value; `NEVER`
+            where it is not below the rule.
+    """
+
+    where: IntArray
+    top: IntArray
+    floor: IntArray
+
+    def masks(self, is_open: npt.NDArray[np.bool_], band: int) -> tuple[int, ...]:
+        """Return the largest sets of rivals that open options leave below a band."""
+        below = self.floor[is_open] <= band
+        packed = np.packbits(below, axis=1, bitorder="little")
+        return maximal(int.from_bytes(row.tobytes(), "little") for row in packed)
+
+    def at_gap(self, band: int) -> tuple[int, ...]:
+        """Return what is left below at levels between a band and the next one."""
+        return self.masks((self.top > band) & (self.where >= START), band)
+
+    def at_band(self, band: int) -> tuple[int, ...]:
+        """Return what may be left below somewhere within a band: never too little."""
+        return self.masks(self.top >= band, band)
+
+
+class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
+    """Some rules, taken together as their minimum, against rivals.
+
+    Attributes:
+        ground: Where.
+        ours: The positions of the rules.
+        rivals: The positions of the rivals.
+    """
+
+    ground: Ground
+    ours: tuple[int, ...]
+    rivals: tuple[int, ...]
+
+    @property
+    def full(self) -> int:
+        """All rivals as bits."""
+        return (1 << len(self.rivals)) - 1
+
+    @property
+    def bands(self) -> Bands:
+        """The critical levels."""
+        return self.ground.laid[1]
+
+    @functools.cached_property
+    def options(self) -> tuple[Options, ...]:
+        """The options on each axis, without those that another one makes useless."""
+        return tuple(map(_undominated, self.all_options))
+
+    @functools.cached_property
+    def all_options(self) -> tuple[Options, ...]:
+        """The options on each axis."""
+        return tuple(_options(self, laid) for laid in self.ground.laid[0])
+
+    @functools.cached_property
+    def events(self) -> tuple[int, ...]:
+        """The bands at which options come or go, the highest first."""
+        return _events(self.options)
+
+    @functools.cached_property
+    def all_events(self) -> tuple[int, ...]:
+        """The same for all options, the useless ones too."""
+        return _events(self.all_options)
+
+
+def _events(every: Iterable[Options]) -> tuple[int, ...]:
+    found: set[int] = set()
+    for options in every:
+        found.update(options.top.tolist())
+        found.update(options.floor[options.floor < NEVER].tolist())
+    return tuple(sorted(found, reverse=True))
+
+
+def weakest(laid: Laid, rules: Sequence[int], cell: int) -> int:
+    """Return the element that is the least of some rules' degrees in a cell."""
+    rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
+    of = laid.of_start if cell == START else laid.of[:, cell]
+    return min((int(of[rule]) for rule in rules), key=lambda one: int(rank[one]))
+
+
+def _options(contest: Contest, laid: Laid) -> Options:
+    cells = laid.cells
+    count = len(cells.rank)
+    columns = np.arange(count)
+    rivals = np.array(contest.rivals, dtype=np.int64)
+    mine = laid.of[contest.ours[0]]
+    for rule in contest.ours[1:]:
+        other = laid.of[rule]
+        mine = np.where(
+            cells.rank[columns, other] < cells.rank[columns, mine], other, mine
+        )
+    theirs = laid.of[rivals]
+    is_below = cells.rank[columns, theirs] < cells.rank[columns, mine]
+    floor = np.where(is_below, laid.least[theirs, columns], NEVER).T
+    top = laid.most[mine, columns]
+    parts = [(columns, top, floor)]
+    if not contest.ground.opens(laid.axis.variable.name):
+        parts.append(_start(contest, laid, rivals))
+    parts.append(_zones(contest, laid))
+    where, tops, floors = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Options(where, tops, floors)
+
+
+def _start(
+    contest: Contest, laid: Laid, rivals: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the option of the axis's lower end, which no cell holds."""
+    mine = weakest(laid, contest.ours, START)
+    theirs = laid.of_start[rivals]
+    rank = laid.cells.start_rank
+    floor = np.where(rank[theirs] < rank[mine], laid.at[theirs, 0], NEVER)
+    return np.array([START]), laid.at[mine, :1], floor[np.newaxis]
+
+
+def _zones(contest: Contest, laid: Laid) -> tuple[IntArray, IntArray, IntArray]:
+    """Return options of places with more than one in them: whatever may be there."""
+    vague = np.flatnonzero(laid.cells.is_vague)
+
+    def bands_of(rule: int) -> tuple[IntArray, IntArray]:
+        groups = laid.axis.asked[rule]
+        at = laid.at[:, vague]
+        low = high = np.full(len(vague), np.iinfo(np.int64).max - 1)
+        if not groups:
+            low = high = at[0]
+        for group in groups:
+            low = np.minimum(low, at[list(group)].max(axis=0))
+            high = np.minimum(high, at[list(group)].max(axis=0))
+        return low, high
+
+    top = np.min([bands_of(rule)[1] for rule in contest.ours], axis=0)
+    floor = np.array([bands_of(rule)[0] for rule in contest.rivals], dtype=np.int64)
+    floor = floor.reshape(len(contest.rivals), len(vague)).T
+    return -2 - vague, top, floor
+
+
+def _undominated(options: Options) -> Options:
+    """Leave out options that another one is at least as good as at every level."""
+    if len(options.where) > 400:  # the comparison takes its square
+        return options
+    kept: list[int] = []
+    # An option of a vague place must not make one of a cell useless.
+    order = sorted(
+        range(len(options.where)),
+        key=lambda n: (options.where[n] < START, -options.top[n]),
+    )
+    for number in order:
+        top, floor = options.top[number], options.floor[number]
+        others = np.array(kept, dtype=np.int64)
+        is_worse = (options.top[others] >= top) & np.all(
+            options.floor[others] <= floor, axis=1
+        )
+        if not is_worse.any():
+            kept.append(number)
+    chosen = np.array(kept, dtype=np.int64)
+    return Options(options.where[chosen], options.top[chosen], options.floor[chosen])

@@ -1,0 +1,356 @@
+"""A rule base on a box, made ready for exact questions under the minimum.
+
+Every axis is cut into cells (`fuzzytree.proving.axes`). The values that elements have
+at the cells' ends are the *critical levels*; known as intervals, they are joined where
+they touch into *bands*, in order. Between two neighbouring bands the picture is the
+same at every level, and inside a cell all that matters of an element is the band of its
+least and of its largest value.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
+
+import msgspec
+import numpy as np
+
+from fuzzytree.proving.axes import ALWAYS, Cells, Element, Place, cut, places
+from fuzzytree.proving.domain import Domain
+from fuzzytree.rulebase import Clause, RuleBase, Variable, shapes_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import IntArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+
+class Axis(msgspec.Struct, frozen=True, eq=False):
+    """What the rules ask of one variable.
+
+    Attributes:
+        variable: The variable.
+        elements: The distinct curves; the first is that of a rule that asks nothing.
+        asked: For each rule its clauses here, each as the elements of which it takes
+            the largest; the rule takes the least of its clauses.
+        found: All places where something changes.
+    """
+
+    variable: Variable
+    elements: tuple[Element, ...]
+    asked: tuple[tuple[tuple[int, ...], ...], ...]
+    found: tuple[Place, ...]
+
+
+class Laid(NamedTuple):
+    """An axis on the box.
+
+    Attributes:
+        axis: The axis.
+        cells: Its cells.
+        of: Shape (rules, cells): the element that is a rule's degree in each cell.
+        of_start: Shape (rules,): the same at the lower end itself.
+        least: Shape (elements, cells): the band of the least value.
+        most: Shape (elements, cells): the band of the largest value.
+        at: Shape (elements, zones): the band of the value at each zone.
+        after: The same, of the limit from above.
+        is_zero: Shape (elements, cells): whether an element is 0 throughout.
+        is_zero_at: Shape (elements, zones): whether it is 0 there, for sure.
+        may_be_zero_at: The same, as far as it can be told.
+    """
+
+    axis: Axis
+    cells: Cells
+    of: IntArray
+    of_start: IntArray
+    least: IntArray
+    most: IntArray
+    at: IntArray
+    after: IntArray
+    is_zero: BoolArray
+    is_zero_at: BoolArray
+    may_be_zero_at: BoolArray
+
+
+class Bands(NamedTuple):
+    """The critical levels, joined where they touch, in ascending order.
+
+    Attributes:
+        low: The lower ends.
+        high: The upper ends.
+        is_sharp: Whether a band is one level that is known exactly.
+    """
+
+    low: list[Fraction]
+    high: list[Fraction]
+    is_sharp: BoolArray
+
+    def between(self, band: int) -> Fraction:
+        """Return a level above a band and below the next one."""
+        low, high = self.high[band], self.low[band + 1]
+        middle = (low + high) / 2
+        near = Fraction(float(middle))
+        return near if low < near < high else middle
+
+
+class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
+    """A rule base on a box.
+
+    Attributes:
+        rules: The rules.
+        domain: The box.
+        axes: What the rules ask, variable by variable.
+        ends: The two ends of each axis on the box, of combinations too; None where
+            no point of the box is within the sides of a combination.
+        is_fine: Whether levels are known as fractions, narrow without limit.
+    """
+
+    rules: RuleBase
+    domain: Domain
+    axes: tuple[Axis, ...]
+    ends: tuple[tuple[Fraction, Fraction], ...] | None
+    is_fine: bool = False
+
+    @functools.cached_property
+    def laid(self) -> tuple[tuple[Laid, ...], Bands]:
+        """The axes on the box, and the critical levels of all of them."""
+        assert self.ends is not None  # of a box that is not empty
+        cells = [
+            cut(axis.elements, axis.found, low, high, is_fine=self.is_fine)
+            for axis, (low, high) in zip(self.axes, self.ends, strict=True)
+        ]
+        return _laid(self.axes, cells)
+
+    @functools.cached_property
+    def fine(self) -> Ground:
+        """The same ground with levels known as fractions."""
+        return Ground(self.rules, self.domain, self.axes, self.ends, is_fine=True)
+
+    def opens(self, variable: str) -> bool:
+        """Return whether the lower end of a variable is left out."""
+        side = self.domain.side(variable)
+        return side is not None and side.is_open
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no point of the inputs' box is within all sides."""
+        return self.ends is None
+
+
+def ground(rules: RuleBase, domain: Domain) -> Ground:
+    """Return a rule base made ready for questions on a box.
+
+    Args:
+        rules: The rules.
+        domain: A side for each input, and for combinations that are limited besides.
+
+    Raises:
+        ValueError: If an input has no side.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.proving.domain import Side
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))
+        >>> ground(rules, box).is_empty
+        False
+    """
+    missing = [name for name in rules.inputs if domain.side(name) is None]
+    if missing:
+        raise ValueError(f"the domain has no side for {missing[0]!r}")
+    axes = _axes(rules)
+    return Ground(rules, domain, axes, _ends(axes, domain))
+
+
+def narrowed(given: Ground, domain: Domain) -> Ground:
+    """Return the same rules on another box; the axes' places are kept."""
+    return Ground(given.rules, domain, given.axes, _ends(given.axes, domain))
+
+
+def _ends(
+    axes: Sequence[Axis], domain: Domain
+) -> tuple[tuple[Fraction, Fraction], ...] | None:
+    ends: list[tuple[Fraction, Fraction]] = []
+    for axis in axes:
+        low, high = span(axis.variable, domain)
+        if low > high:
+            return None
+        ends.append((low, high))
+    return tuple(ends)
+
+
+def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
+    """Return the least and largest exact value of a variable on a box.
+
+    A combination is linear, so both are reached at corners; its own side, if it has
+    one, cuts them. The first is above the second if nothing is left.
+    """
+    side = domain.side(variable.name)
+    if not variable.parts:
+        assert side is not None  # checked when the ground was made
+        return Fraction(side.low), Fraction(side.high)
+    low = high = Fraction(0)
+    for part in variable.parts:
+        of = domain.side(part.input)
+        assert of is not None
+        weight, centre = Fraction(part.weight), Fraction(part.centre)
+        ends = [weight * (Fraction(end) - centre) for end in (of.low, of.high)]
+        low, high = low + min(ends), high + max(ends)
+    if side is not None:
+        low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
+    return low, high
+
+
+@functools.lru_cache(maxsize=64)
+def _axes(rules: RuleBase) -> tuple[Axis, ...]:
+    shapes = shapes_of(rules.variables)
+    made: list[Axis] = []
+    for variable in rules.variables:
+        elements: dict[Element, int] = {Element(ALWAYS): 0}
+        asked = tuple(
+            _asked(variable.name, rule.when, shapes, elements) for rule in rules.rules
+        )
+        if any(asked):
+            of = tuple(elements)
+            made.append(Axis(variable, of, asked, places(of)))
+    return tuple(made)
+
+
+def _asked(
+    variable: str,
+    when: Sequence[Clause],
+    shapes: Mapping[tuple[str, str], object],
+    elements: dict[Element, int],
+) -> tuple[tuple[int, ...], ...]:
+    """Return what a rule asks of a variable: the least of the largest of elements."""
+    groups: list[tuple[int, ...]] = []
+    for clause in when:
+        if clause.variable != variable:
+            continue
+        of = [
+            elements.setdefault(
+                Element(shapes[variable, term], clause.negated),  # type: ignore[arg-type]
+                len(elements),
+            )
+            for term in clause.terms
+        ]
+        # 1 - max(a, b) is the least of 1 - a and 1 - b
+        groups += [(one,) for one in of] if clause.negated else [tuple(of)]
+    return tuple(groups)
+
+
+def _laid(
+    axes: Sequence[Axis], cells: Sequence[Cells]
+) -> tuple[tuple[Laid, ...], Bands]:
+    ends = [side for of in cells for side in (of.left, of.right)]
+    low = np.concatenate([side[0].ravel() for side in ends])
+    high = np.concatenate([side[1].ravel() for side in ends])
+    band, bands = _bands(low, high)
+    made: list[Laid] = []
+    start = 0
+    for axis, of in zip(axes, cells, strict=True):
+        size = of.left[0].size
+        left, right = (
+            band[at : at + size].reshape(of.left[0].shape)
+            for at in (start, start + size)
+        )
+        start += 2 * size
+        ends_of_cells = right[:, :-1], left[:, 1:]
+        made.append(
+            Laid(
+                axis,
+                of,
+                _chosen(axis, of.rank),
+                _chosen(axis, of.start_rank[np.newaxis])[:, 0],
+                np.minimum(*ends_of_cells),
+                np.maximum(*ends_of_cells),
+                left,
+                right,
+                (of.right[1][:, :-1] == 0) & (of.left[1][:, 1:] == 0),
+                of.left[1] == 0,
+                of.left[0] == 0,
+            )
+        )
+    return tuple(made), bands
+
+
+def _bands(
+    low: npt.NDArray[np.float64] | npt.NDArray[np.object_],
+    high: npt.NDArray[np.float64] | npt.NDArray[np.object_],
+) -> tuple[IntArray, Bands]:
+    """Return the band of each interval, and the bands."""
+    order = np.argsort(low, kind="stable")
+    reach = np.maximum.accumulate(high[order])
+    starts = np.concatenate([[True], low[order][1:] > reach[:-1]])
+    numbers = np.cumsum(starts) - 1
+    band = np.empty(len(low), dtype=np.int64)
+    band[order] = numbers
+    first = np.flatnonzero(starts)
+    last = np.append(first[1:], len(order)) - 1
+    lows = [Fraction(one) for one in low[order][first]]
+    highs = [Fraction(one) for one in reach[last]]
+    sharp = np.array([a == b for a, b in zip(lows, highs, strict=True)])
+    return band, Bands(lows, highs, sharp)
+
+
+def _chosen(axis: Axis, rank: IntArray) -> IntArray:
+    """Return which element is each rule's degree, given the order in some cells."""
+    chosen = np.zeros((len(axis.asked), len(rank)), dtype=np.int64)
+    every = np.arange(len(rank))
+    for number, groups in enumerate(axis.asked):
+        best: IntArray | None = None
+        for group in groups:
+            of = np.array(group)
+            top = of[rank[:, of].argmax(axis=1)]
+            best = (
+                top
+                if best is None
+                else np.where(rank[every, top] < rank[every, best], top, best)
+            )
+        if best is not None:
+            chosen[number] = best
+    return chosen
+
+
+def variable_value(variable: Variable, point: Mapping[str, Fraction]) -> Fraction:
+    """Return the exact value of a variable at a point of the inputs."""
+    if not variable.parts:
+        return point[variable.name]
+    total = Fraction(0)
+    for part in variable.parts:
+        total += Fraction(part.weight) * (point[part.input] - Fraction(part.centre))
+    return total
+
+
+def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]:
+    """Return every rule's exact strength at a point of the inputs.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.proving.domain import Side
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))
+        >>> point = dict.fromkeys(rules.inputs, Fraction(1, 3))
+        >>> max(strengths_at(ground(rules, box), point))
+        Fraction(1, 1)
+    """
+    is_product = given.rules.semantics.conjunction == "product"
+    strengths = [Fraction(1)] * len(given.rules.rules)
+    for axis in given.axes:
+        value = variable_value(axis.variable, point)
+        degrees: dict[int, Fraction] = {}
+        for number, groups in enumerate(axis.asked):
+            for group in groups:
+                for one in group:
+                    if one not in degrees:
+                        degrees[one] = axis.elements[one].degree(value)
+                found = max(degrees[one] for one in group)
+                before = strengths[number]
+                strengths[number] = before * found if is_product else min(before, found)
+    return strengths

@@ -1,0 +1,138 @@
+"""Look for a point in floats: quick, and no answer before fractions confirm it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzytree.numerics.enclosures import axis_value, clause_enclosure, degree_enclosure
+from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.ground import Ground, strengths_at
+from fuzzytree.proving.linear import simple
+from fuzzytree.proving.witnesses import Point, is_within
+from fuzzytree.rulebase import RuleBase, shapes_of
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+_FIRST = 4096  # points drawn in the whole domain
+_NEXT = 512  # points drawn around the best one, in each round
+_ROUNDS = 24
+
+
+def near_strengths(rules: RuleBase, values: FloatArray) -> FloatArray:
+    """Return about how strong each rule is at some points.
+
+    Args:
+        rules: The rules.
+        values: Shape (inputs, points), finite.
+
+    Returns:
+        Shape (rules, points): lower bounds, short by rounding only.
+    """
+    shapes = shapes_of(rules.variables)
+    columns = dict(zip(rules.inputs, values, strict=True))
+    variables = {variable.name: variable for variable in rules.variables}
+    known: dict[object, FloatArray] = {}
+    strengths = np.ones((len(rules.rules), values.shape[1]))
+    for number, rule in enumerate(rules.rules):
+        for clause in rule.when:
+            if clause not in known:
+                value = axis_value(variables[clause.variable], columns)
+                of = [
+                    degree_enclosure(shapes[clause.variable, term], value)
+                    for term in clause.terms
+                ]
+                known[clause] = clause_enclosure(clause, of).low
+            if rules.semantics.conjunction == "product":
+                strengths[number] *= known[clause]
+            else:
+                np.minimum(strengths[number], known[clause], out=strengths[number])
+    return strengths
+
+
+def ends_of(rules: RuleBase, domain: Domain) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper ends of the inputs, each of shape (inputs, 1)."""
+    sides = [domain.side(name) for name in rules.inputs]
+    low = np.array([[0.0 if side is None else side.low] for side in sides])
+    high = np.array([[0.0 if side is None else side.high] for side in sides])
+    return low, high
+
+
+def leader(given: Ground, rule: int, rivals: Sequence[int], seed: int = 0) -> Point:
+    """Return a point of the inputs' box at which a rule leads others by much.
+
+    It is the best of some thousand points that were drawn, and nothing is claimed.
+
+    Args:
+        given: Where.
+        rule: The number of the rule, from 1.
+        rivals: The numbers of the others.
+        seed: Of what is drawn.
+    """
+    chance = np.random.default_rng([seed, rule])
+    low, high = ends_of(given.rules, given.domain)
+    others = [number - 1 for number in rivals]
+
+    def leads(points: FloatArray) -> FloatArray:
+        found = near_strengths(given.rules, points)
+        mine = found[rule - 1]
+        if not others:
+            return mine
+        best: FloatArray = found[others].max(axis=0)
+        return mine - best
+
+    width = high - low
+    points = low + width * chance.random((len(low), _FIRST))
+    best, lead, reach = points[:, :1], -np.inf, 1.0
+    for _ in range(_ROUNDS):
+        found = leads(points)
+        top = int(found.argmax())
+        if found[top] > lead:
+            best, lead = points[:, top : top + 1], float(found[top])
+        else:
+            reach *= 0.6
+        steps = chance.standard_normal((len(low), _NEXT)) * width * reach * 0.2
+        steps *= chance.random(steps.shape) < chance.random((1, _NEXT))
+        points = np.clip(best + steps, low, high)
+    return {
+        name: Fraction(float(value))
+        for name, value in zip(given.rules.inputs, best[:, 0], strict=True)
+    }
+
+
+def plainer(given: Ground, point: Point, rule: int, rivals: Sequence[int]) -> Point:
+    """Return a point of fewer digits at which a rule still leads by nearly as much.
+
+    Args:
+        given: Where.
+        point: A point of the domain at which the rule leads.
+        rule: The number of the rule, from 1.
+        rivals: The numbers of the others.
+    """
+    goal = _lead(given, point, rule, rivals) / 2
+    found = dict(point)
+    for name in given.rules.inputs:
+        side = given.domain.side(name)
+        assert side is not None  # checked when the ground was made
+        width = Fraction(side.high) - Fraction(side.low)
+        for share in (Fraction(1, 50), Fraction(1, 1000), Fraction(1, 10**5)):
+            low = max(found[name] - width * share, Fraction(side.low))
+            high = min(found[name] + width * share, Fraction(side.high))
+            if not low < high:
+                break
+            tried = {**found, name: simple(low, high)}
+            is_good = _lead(given, tried, rule, rivals) > max(goal, Fraction(0))
+            if is_good and is_within(given, tried):
+                found = tried
+                break
+    return found
+
+
+def _lead(given: Ground, point: Point, rule: int, rivals: Sequence[int]) -> Fraction:
+    strengths = strengths_at(given, point)
+    best = max((strengths[number - 1] for number in rivals), default=Fraction(0))
+    return strengths[rule - 1] - best

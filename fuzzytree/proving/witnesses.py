@@ -1,0 +1,129 @@
+"""From values of the axes to a point of the inputs, checked in fractions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from fuzzytree.proving.ground import Ground, variable_value
+from fuzzytree.proving.linear import Row, feasible, simple
+from fuzzytree.proving.parts import Stretch
+
+Point = dict[str, Fraction]
+
+
+def coupled(given: Ground) -> tuple[tuple[int, ...], ...]:
+    """Return the groups of axes that share inputs, so that they are not free.
+
+    An axis alone is free: an input takes every value of its side, and a combination
+    every value between its least and its largest. Where the domain limits a
+    combination, it is in a group with the axes that it shares inputs with.
+    """
+    inputs = [
+        {part.input for part in axis.variable.parts} or {axis.variable.name}
+        for axis in given.axes
+    ]
+    limited = [
+        {part.input for part in variable.parts}
+        for variable in given.rules.variables
+        if variable.parts and given.domain.side(variable.name) is not None
+    ]
+    groups: list[tuple[set[int], set[str]]] = []
+    for axis, names in [*enumerate(inputs), *((-1, names) for names in limited)]:
+        members, joined = {axis} - {-1}, set(names)
+        apart: list[tuple[set[int], set[str]]] = []
+        for other in groups:
+            if other[1] & joined:
+                members |= other[0]
+                joined |= other[1]
+            else:
+                apart.append(other)
+        groups = [*apart, (members, joined)]
+    return tuple(tuple(sorted(members)) for members, _ in groups if len(members) > 1)
+
+
+def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
+    """Return a point of the box whose axes have wanted values; None if there is none.
+
+    Inputs on which nothing is wanted get a plain value near the middle of their side.
+
+    Args:
+        given: Where.
+        wanted: For axes, by position, what they must be between.
+    """
+    names = given.rules.inputs
+    number = {name: place for place, name in enumerate(names)}
+    ranges: list[tuple[Fraction, Fraction]] = []
+    rows: list[Row] = []
+    for name in names:
+        side = given.domain.side(name)
+        assert side is not None  # checked when the ground was made
+        ranges.append((Fraction(side.low), Fraction(side.high)))
+        if side.is_open:
+            start = ranges[-1][0]
+            rows.append(Row({number[name]: Fraction(1)}, start, is_open_low=True))
+    for variable in given.rules.variables:
+        side = given.domain.side(variable.name)
+        if variable.parts and side is not None:
+            weights, constant = linear_form(given, variable.name, number)
+            low, high = Fraction(side.low) - constant, Fraction(side.high) - constant
+            rows.append(Row(weights, low, high, is_open_low=side.is_open))
+    for axis, part in wanted.items():
+        weights, constant = linear_form(given, given.axes[axis].variable.name, number)
+        low, high = part.low - constant, part.high - constant
+        rows.append(Row(weights, low, high, part.is_open, part.is_open))
+    joined = {place for row in rows if len(row.weights) > 1 for place in row.weights}
+    point: list[Fraction] = []
+    for place, (low, high) in enumerate(ranges):
+        if place in joined:
+            point.append(low)
+            continue
+        for row in rows:
+            if place in row.weights:  # of weight 1
+                low = low if row.low is None else max(low, row.low)
+                high = high if row.high is None else min(high, row.high)
+        if low > high:
+            return None
+        point.append(simple(low, high))
+    if joined:
+        asked = sorted(joined)
+        inner = {place: at for at, place in enumerate(asked)}
+        kept = [
+            row._replace(weights={inner[p]: w for p, w in row.weights.items()})
+            for row in rows
+            if joined.issuperset(row.weights)
+        ]
+        found = feasible([ranges[place] for place in asked], kept)
+        if found is None:
+            return None
+        for place, at in inner.items():
+            point[place] = found[at]
+    return dict(zip(names, point, strict=True))
+
+
+def linear_form(
+    given: Ground, name: str, number: Mapping[str, int]
+) -> tuple[dict[int, Fraction], Fraction]:
+    """Return a variable as weights of inputs, by number, and a constant."""
+    variable = next(v for v in given.rules.variables if v.name == name)
+    if not variable.parts:
+        return {number[name]: Fraction(1)}, Fraction(0)
+    weights: dict[int, Fraction] = {}
+    constant = Fraction(0)
+    for part in variable.parts:
+        weight, place = Fraction(part.weight), number[part.input]
+        weights[place] = weights.get(place, Fraction(0)) + weight
+        constant -= weight * Fraction(part.centre)
+    return weights, constant
+
+
+def is_within(given: Ground, point: Mapping[str, Fraction]) -> bool:
+    """Return whether a point of the inputs lies in the domain."""
+    for variable in given.rules.variables:
+        side = given.domain.side(variable.name)
+        if side is None:
+            continue
+        value = variable_value(variable, point)
+        if not side.low <= value <= side.high or (side.is_open and value == side.low):
+            return False
+    return True
