@@ -30,6 +30,7 @@ VERBS = (
     "check",
     "audit",
     "explain",
+    "recheck",
     "bench",
     "needs",
     "stability",

@@ -1,0 +1,28 @@
+"""`fuzzytree recheck`: does an audit hold, seen without what made it?"""
+
+from __future__ import annotations
+
+import click
+
+from fuzzytree.cli.talk import answer
+
+
+@click.command("recheck", short_help="Check an audit again, on its own.")
+@click.argument("audit", metavar="AUDIT")
+@click.argument("model", metavar="MODEL")
+def command(audit: str, model: str) -> int:
+    """Check AUDIT, the JSON of an audit, against MODEL, the YAML file that it is of.
+
+    Everything is read, evaluated and decided again by one file of Python that imports
+    nothing of fuzzytree and runs alone; `python -m fuzzytree.rechecking` is the same.
+    Exit 1 if something does not hold.
+    """
+    from fuzzytree.errors import ReadError
+    from fuzzytree.rechecking import CannotRunError, recheck_files
+
+    try:
+        report = recheck_files(audit, model)
+    except CannotRunError as error:
+        raise ReadError(str(error)) from error
+    answer("\n".join(report.lines()))
+    return 1 if report.wrong else 0
