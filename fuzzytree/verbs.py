@@ -590,6 +590,7 @@ def _bytes_of(path: str | os.PathLike[str]) -> bytes:
 def _source_of(data: object) -> Source | None:
     """Return the name and the hash of a table that is a file, None for another."""
     from fuzzytree.auditing.audit import source_of
+    from fuzzytree.auditing.places import writable
     from fuzzytree.auditing.records import Source
 
     if isinstance(data, io.BytesIO):
@@ -602,7 +603,7 @@ def _source_of(data: object) -> Source | None:
             raise TableError(
                 f"{os.fspath(data)}: cannot be read: {reason(error)}"
             ) from error
-        return Source(os.fspath(data), digest)
+        return Source(writable(os.fspath(data)), digest)
     return None
 
 

@@ -15,7 +15,7 @@ import msgspec
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.domains import domain_of, inputs_of
 from fuzzytree.auditing.limits import LIMITS, digest_of
-from fuzzytree.auditing.places import ModelFile, places_of, with_ids
+from fuzzytree.auditing.places import ModelFile, places_of, with_ids, writable
 from fuzzytree.auditing.records import (
     INTERRUPTED,
     Answer,
@@ -201,7 +201,7 @@ def _ask_view(
 
 def source_of(name: str, content: bytes) -> Source:
     """Return the name of a file and the SHA-256 of its bytes."""
-    return Source(name, hashlib.sha256(content).hexdigest())
+    return Source(writable(name), hashlib.sha256(content).hexdigest())
 
 
 class _Asked:

@@ -38,7 +38,17 @@ class ModelFile(msgspec.Struct, frozen=True, eq=False):
         if self.root is None:
             return None
         node = find(self.root, path)
-        return Place(self.name, node.line, node.column)
+        return Place(writable(self.name), node.line, node.column)
+
+
+def writable(name: str) -> str:
+    """Return a file's name as UTF-8 holds it: bytes that are no text as escapes.
+
+    Example:
+        >>> print(writable("a\\udcff.yaml"))
+        a\\udcff.yaml
+    """
+    return name.encode("utf-8", "backslashreplace").decode()
 
 
 def model_file(name: str, content: bytes) -> ModelFile:

@@ -25,6 +25,7 @@ WIDTH: Final = 100
 MOST_FINDINGS: Final = 200
 """That are told one by one."""
 
+_MOST_DECLINED = 40
 _MOST_INPUTS = 12  # of a point or region on the terminal
 _LEFT_OUT = ": left out by the user"
 _SHOWN = 84  # characters of a source line
@@ -81,6 +82,7 @@ def audit_lines(
         yield f"{counted(len(audit.accepted), 'accepted finding')} of the baseline"
         yield ""
     yield from summary_lines(audit)
+    yield from _declined(audit)
     if audit.unasked:
         yield ""
         yield "not asked, or not to the end"
@@ -319,6 +321,24 @@ def _by_severity(found: Sequence[Answer]) -> str:
         if any(one.severity == severity for one in found)
     ]
     return f"{counted(len(found), 'finding')}: {', '.join(counts)}"
+
+
+def _declined(audit: Audit) -> Iterator[str]:
+    """Yield what was declined and why; the findings among it were told before."""
+    states = [(one, one.state) for one in audit.answers if not one.is_finding]
+    texts = [
+        f"{answer.code} {answer.subject}: {state_text(state)}"
+        for answer, state in states
+        if isinstance(state, Declined)
+    ]
+    if not texts:
+        return
+    yield ""
+    yield "declined"
+    for text in texts[:_MOST_DECLINED]:
+        yield from _item(text)
+    if len(texts) > _MOST_DECLINED:
+        yield f"- and {len(texts) - _MOST_DECLINED} more; --output-format json has all"
 
 
 def _gathered(unasked: Sequence[str]) -> Iterator[str]:

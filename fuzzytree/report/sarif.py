@@ -144,7 +144,7 @@ def _locations(places: tuple[Place, ...], audit: Audit | None) -> Iterator[_Json
 
 def _uri(path: str) -> str:
     """Return a path as the reference that it is in a repository."""
-    return quote(path.encode("utf-8", "surrogateescape"), safe="/")
+    return quote(path, safe="/")
 
 
 def _artifacts(audit: Audit) -> Iterator[_Json]:

@@ -1,12 +1,10 @@
-"""An audit made by hand: one answer of each state, about a small rule base."""
+"""An audit by hand, with an answer of every state and a finding of every severity."""
 
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
 
-import msgspec
-import numpy as np
+from msgspec.structs import replace
 
 from fuzzytree.auditing.limits import LIMITS, digest_of
 from fuzzytree.auditing.records import (
@@ -19,7 +17,6 @@ from fuzzytree.auditing.records import (
     Settings,
     Source,
 )
-from fuzzytree.auditing.subject import Rows
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import (
     Bracket,
@@ -31,161 +28,95 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.rulebase import (
-    Clause,
-    Points,
-    Rule,
-    RuleBase,
-    Semantics,
-    Term,
-    Variable,
-    fingerprint,
+
+LINES = (
+    "rules:",
+    "- if: [force is low]",
+    "  then: soft",
+    "- if: [force is high]",
+    "  then: firm",
 )
+"""The file that the places are in."""
 
-EVIL = '"/><script>alert(1)</script><img src=x onerror=alert(1)>&\x1b\u202e'
-"""A name that would break out of a page, a picture or an attribute."""
-
-
-def rule_base(pressure: str = "pressure", firm: str = "firm") -> RuleBase:
-    """Return rules about two inputs, of which the last never wins."""
-    low = Term("low", Points((2.0, 5.0), (1.0, 0.0)))
-    medium = Term("medium", Points((2.0, 5.0, 8.0), (0.0, 1.0, 0.0)))
-    small = Term("small", Points((40.0, 60.0), (1.0, 0.0)))
-    large = Term("large", Points((45.0, 70.0), (0.0, 1.0)))
-    inputs = (
-        Variable(pressure, (low, medium), "kPa", 0.0, 10.0),
-        Variable("area", (small, large), "mm²", 0.0, 100.0),
-    )
-    is_medium, is_small = Clause(pressure, ("medium",)), Clause("area", ("small",))
-    rules = (
-        Rule((Clause(pressure, ("low",)),), "loose", 40),
-        Rule((is_medium, is_small), firm, 31),
-        Rule((is_medium, Clause("area", ("large",))), "hard", 22),
-        Rule((is_medium, is_small), "loose", 3),
-    )
-    return RuleBase("grip", ("loose", firm, "hard"), inputs, rules, Semantics())
+POINT = coordinates({"force": Fraction(5, 2), "slip": Fraction(1, 3)})
+AGAIN = "fuzzytree audit grip.yaml --select "
 
 
-def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
-    """Return one answer of each state, five of them findings, and rows of each rule."""
-    half = coordinates({pressure: Fraction(5), "area": Fraction(50)})
-    third = coordinates({pressure: Fraction(26, 3), "area": Fraction(90)})
-    return (
+def every_state(name: str = "grip.yaml", said: str = "rule 2 never wins") -> Audit:
+    """Return an audit with all five states, of a file of any name."""
+    answers = (
         Answer(
             "FT101",
-            "rule 4",
-            "rule 4 never wins: wherever it fires rule 2 is at least as strong",
-            Proved("17 levels and 96 cells"),
-            is_finding=True,
-            severity="error",
-            rules=(4, 2),
-            measures=(Measure("largest lead", 0.0, "0"),),
-            places=(Place("grip.yaml", 58, 5),),
-            repeat="fuzzytree audit grip.yaml --select FT101",
-            id="FT101-9f2c11ab",
+            "rule 2",
+            said,
+            Proved("12 levels and 40 cells were visited"),
+            True,
+            "error",
+            rules=(2,),
+            places=(Place(name, 4, 3), Place(name, 2, 3)),
+            repeat=f"{AGAIN}FT101",
+            id="FT101-00000001",
         ),
         Answer(
-            "FT101",
-            "rule 3",
-            "rule 3 wins somewhere",
-            Witness(half, (Claim("beats", rules=(3,), rivals=(1, 2)),)),
-            is_finding=False,
-            rules=(3,),
-            repeat="fuzzytree audit grip.yaml --select FT101",
-        ),
-        Answer(
-            "FT201",
-            "rules 2 and 3",
-            "rules 2 and 3 both reach about a third",
-            Bracket("the common level", 0.3, 0.4, "the budget was spent", half),
-            is_finding=True,
-            rules=(2, 3),
-            repeat="fuzzytree audit grip.yaml --select FT201",
-            id="FT201-00000001",
+            "FT202",
+            "rules 1 and 2",
+            "rules 1 and 2 are equally strong on a part of the domain",
+            Witness(POINT, (Claim("ties", rules=(1, 2)),)),
+            True,
+            "warning",
+            rules=(1, 2),
+            region=(Span("force", 2.0, 3.0), Span("slip", None, 0.5)),
+            measures=(Measure("width", 0.25, "1/4", "N"),),
+            id="FT202-00000002",
         ),
         Answer(
             "FT301",
-            "the domain",
-            f"no rule reaches 0.1 where {pressure!r} is high",
-            Witness(third, (Claim("below", rules=(1, 2, 3, 4), level="1/10"),)),
-            is_finding=True,
-            severity="warning",
-            region=(Span(pressure, 7.7, None), Span("area", 88.0, 90.5)),
-            repeat="fuzzytree audit grip.yaml --select FT301",
-            id="FT301-00000002",
+            "coverage",
+            "how weak the weakest cover is was not settled",
+            Bracket("the least cover", 0.1, 0.2, "the budget was spent", POINT[:1]),
+            True,
+            "info",
+            id="FT301-00000003",
         ),
         Answer(
-            "FT403",
-            pressure,
-            f"'low' and 'medium' of {pressure!r} are hard to tell apart",
-            Sampled("rows in both", 3, 40, 0.02, 0.2, 0.95, "the rows of the table"),
-            is_finding=True,
-            terms=(Label(pressure, "low"), Label(pressure, "medium")),
-            repeat="fuzzytree audit grip.yaml --select FT403",
-            id="FT403-00000003",
+            "FT401",
+            "term 'low' of 'force'",
+            "the term 'low' of 'force' is not decided",
+            Declined("FTD02", "its curve (gaussian) has no exact method"),
+            False,
+            terms=(Label("force", "low"),),
+            id="FT401-00000004",
         ),
         Answer(
-            "FT601",
-            "the ONNX graph",
-            "the rules were not held against their graph",
-            Declined("FTD06", "no rows were given"),
-            is_finding=False,
-            repeat="fuzzytree audit grip.yaml --select FT601",
-        ),
-        *(
-            Answer(
-                "FT701",
-                f"rule {k}",
-                f"rule {k} won {7 * k} rows",
-                Sampled("rows of its class", 6 * k, 7 * k, 0.5, 0.9, 0.95, "the rows"),
-                is_finding=False,
-                rules=(k,),
-                measures=(Measure("rows fired", 19.0 * k),),
-                repeat="fuzzytree audit grip.yaml --select FT701",
-            )
-            for k in range(1, 5)
+            "FT701",
+            "rule 1",
+            "rule 1 wins 3 of 4 rows",
+            Sampled("rows it wins", 3, 4, 0.3, 0.95, 0.95, "the rows of grasps.csv"),
+            False,
+            rules=(1,),
+            id="FT701-00000005",
         ),
     )
-
-
-def audit_of(
-    model: RuleBase, found: tuple[Answer, ...] | None = None, **fields: Any
-) -> Audit:
-    """Return an audit with the given answers, or with those of `answers`.
-
-    Args:
-        model: The rules.
-        found: The answers.
-        fields: Others of the audit.
-    """
-    sides = [
-        Side(v.name, v.low or 0.0, v.high or 1.0, "model") for v in model.variables
-    ]
-    made = Audit(
+    found = Audit(
         version="0.1.0",
-        model=model.name,
+        model="grip",
         form="rules",
-        fingerprint=fingerprint(model),
-        file=Source("grip.yaml", "ab" * 32),
-        data=Source("grasps.csv", "cd" * 32),
-        rows=40,
+        fingerprint="f" * 64,
+        file=Source(name, "a" * 64),
+        data=Source("grasps.csv", "b" * 64),
+        rows=4,
         policy=Policy("min", "strongest"),
-        domain=Domain(tuple(sides)),
+        domain=Domain((Side("force", 0.0, 5.0, "model"), Side("slip", 0.0, 1.0))),
         settings=Settings(),
-        answers=answers(model.variables[0].name) if found is None else found,
-        unasked=(),
+        answers=answers,
+        unasked=(
+            "FT102 marginal rule: cut short: the budget of 60 s is spent",
+            "FT103 redundant rule: left out by the user",
+            "FT104 subsumed rule: left out by the user",
+            "FT107 irrelevant clause: not asked: the budget of 60 s is spent",
+        ),
         limits=LIMITS,
-        is_complete=True,
+        is_complete=False,
+        accepted=("FT301-00000003",),
     )
-    made = msgspec.structs.replace(made, **fields)
-    return msgspec.structs.replace(made, digest=digest_of(made))
-
-
-def rows_of(model: RuleBase) -> Rows:
-    """Return 40 rows: one outside of the domain, one missing, one without a class."""
-    random = np.random.default_rng(0)
-    values = random.uniform([[0.0], [0.0]], [[10.0], [100.0]], (2, 40))
-    values[0, 0], values[1, 1] = 13.0, np.nan
-    codes = random.integers(0, len(model.classes), 40)
-    codes[2] = -1
-    return Rows("grasps.csv", values, codes)
+    return replace(found, digest=digest_of(found))

@@ -1,0 +1,146 @@
+"""An audit in the terminal: every state looks like itself, and nothing is left out."""
+
+from __future__ import annotations
+
+import re
+
+from msgspec.structs import replace
+
+from fuzzytree.auditing.codes import CODES
+from fuzzytree.auditing.limits import LIMITS
+from fuzzytree.report.audit import (
+    MOST_FINDINGS,
+    WIDTH,
+    audit_lines,
+    code_lines,
+    explanation_lines,
+    verdict_text,
+)
+from tests.report.audits import LINES, every_state
+
+WHOLE = """\
+grip: audited as rules; AND is min, the strongest rule decides
+rows     4 of grasps.csv
+domain
+  force  0 to 5  the model's range
+  slip   0 to 1  given
+
+grip.yaml:4:3: FT101 error: rule 2 never wins
+    |
+  4 | - if: [force is high]
+    |   ^
+  PROVED   12 levels and 40 cells were visited
+  see also 2:3
+  id       FT101-00000001
+  again    fuzzytree audit grip.yaml --select FT101
+
+grip.yaml: FT202 warning: rules 1 and 2 are equally strong on a part of the domain
+  WITNESS  rules 1, 2 are equally strong
+  at       force = 2.5 (0x1.4000000000000p+1), slip = 0.3333333333333333 (1/3)
+  region   force 2 to 3; slip up to 0.5
+  measured width 0.25 N
+  id       FT202-00000002
+
+1 accepted finding of the baseline
+
+code   question      asked  found  proved  witness  bracket  sampled  declined
+FT101  dead rule     1      1      1       -        -        -        -
+FT202  ambiguity     1      1      -       1        -        -        -
+FT301  coverage gap  1      1      -       -        1        -        -
+FT401  empty term    1      -      -       -        -        -        1
+FT701  data support  1      -      -       -        -        1        -
+all                  5      3      1       1        1        1        1
+
+declined
+- FT401 term 'low' of 'force': FTD02: its curve (gaussian) has no exact method
+
+not asked, or not to the end
+- FT103, FT104: left out by the user
+- FT102 marginal rule: cut short: the budget of 60 s is spent
+- FT107 irrelevant clause: not asked: the budget of 60 s is spent
+
+"""
+
+
+def shown() -> str:
+    return "\n".join(audit_lines(every_state(), LINES))
+
+
+def test_an_audit_is_told_as_it_is() -> None:
+    assert shown().partition("this audit does not establish")[0] == WHOLE
+
+
+def test_the_panel_is_told_whole() -> None:
+    panel = shown().partition("this audit does not establish\n")[2]
+    assert panel.replace("\n  ", " ").splitlines() == [f"- {text}" for text in LIMITS]
+
+
+def test_no_line_is_wider_than_a_terminal() -> None:
+    assert max(map(len, shown().splitlines())) <= WIDTH
+
+
+def test_colour_changes_nothing_but_colour() -> None:
+    coloured = "\n".join(audit_lines(every_state(), LINES, is_coloured=True))
+    assert "\x1b[" in coloured
+    assert re.sub(r"\x1b\[[0-9;]*m", "", coloured) == shown()
+    assert "\x1b" not in shown()
+
+
+def test_what_a_terminal_would_obey_is_written_as_an_escape() -> None:
+    lines = [*audit_lines(every_state("a\x1b[2J\nb.yaml", "rule '\x1b[31m\x07' never"))]
+    assert not any("\x1b" in line or "\x07" in line for line in lines)
+    assert any(r"rule '\x1b[31m\x07' never" in line for line in lines)
+
+
+def test_a_place_beyond_the_file_has_no_caret() -> None:
+    lines = [*audit_lines(every_state(), LINES[:1])]
+    assert not any(line.endswith("^") for line in lines)
+
+
+def test_a_long_line_is_shown_around_its_place() -> None:
+    audit = every_state()
+    place = replace(audit.answers[0].places[0], line=1, column=500)
+    first = replace(audit.answers[0], places=(place,))
+    audit = replace(audit, answers=(first, *audit.answers[1:]))
+    source = "x" * 499 + "HERE" + "y" * 500
+    lines = [*audit_lines(audit, [source])]
+    caret = next(line for line in lines if line.endswith("^"))
+    assert lines[lines.index(caret) - 1][len(caret) - 1 :].startswith("HERE")
+    assert max(map(len, lines)) <= WIDTH
+
+
+def test_findings_beyond_the_most_are_counted() -> None:
+    audit = every_state()
+    many = tuple(
+        replace(audit.answers[0], id=f"FT101-{k:08x}") for k in range(MOST_FINDINGS + 2)
+    )
+    lines = [*audit_lines(replace(audit, answers=many), LINES)]
+    assert "and 2 more findings; --output-format json has all" in lines
+
+
+def test_the_verdict_counts_and_says_what_next() -> None:
+    audit = every_state()
+    assert verdict_text(audit, ["FT101-0"]) == (
+        "2 findings: 1 error, 1 warning beside 1 accepted; not complete: the budget is "
+        "spent (--budget SECONDS); 1 accepted finding no longer found, which "
+        "--write-baseline forgets; `fuzzytree explain FT101` tells what to do"
+    )
+    calm = replace(audit, answers=audit.answers[3:], accepted=(), is_complete=True)
+    assert verdict_text(calm) == "nothing found; 2 questions asked and answered"
+    cut = replace(calm, unasked=("FT101 dead rule: cut short: interrupted",))
+    assert verdict_text(replace(cut, is_complete=False)) == (
+        "nothing found; interrupted: what is proved is kept, the rest is not asked"
+    )
+
+
+def test_every_code_is_explained_within_the_width() -> None:
+    for code in CODES.values():
+        lines = [*explanation_lines(code)]
+        assert lines[0].startswith(f"{code.code}  {code.title} (")
+        for title in ("what", "why", "example", "what to do"):
+            assert lines[lines.index(title) + 1].strip()
+        assert max(map(len, lines)) <= WIDTH
+
+
+def test_the_list_of_codes_has_each_of_them() -> None:
+    assert [line.split()[0] for line in code_lines()] == ["code", *CODES]
