@@ -1395,6 +1395,20 @@ class Line(NamedTuple):
     is_open: bool
 
 
+def line_cells(functions: list[Function], line: Line, levels: Levels) -> list[Cell]:
+    """Return the cells of a line, and its lower end as a cell of its own."""
+    found = (
+        cells(functions, line.low, line.high, levels) if line.low < line.high else []
+    )
+    if not line.is_open:
+        here = {s: _piece_at(s, line.low) for group, _ in functions for s in group}
+        values = [at(_chosen(f, here, line.low), line.low) for f in functions]
+        rank = [sorted(set(values)).index(value) for value in values]
+        ends = [levels.add((value,), ZERO) for value in values]
+        found.append(Cell(rank, ends, ends))
+    return found
+
+
 class Axis(NamedTuple):
     """A variable: each rule's functions as bits, and each cell's functions."""
 
@@ -1421,21 +1435,11 @@ class Grid:
                         key = tuple(shapes[t] for t in clause.terms), clause.negated
                         of[number] |= 1 << functions.setdefault(key, len(functions))
             if functions:
-                found = self._cells(list(functions), lines[variable.name])
+                found = line_cells([*functions], lines[variable.name], self.levels)
                 self.axes.append(Axis(of, found))
         self.levels.sort()
         self.count = len(rules.rules)
         self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
-
-    def _cells(self, functions: list[Function], line: Line) -> list[Cell]:
-        found = cells(functions, line.low, line.high, self.levels)
-        if not line.is_open:  # the lower end itself
-            here = {s: _piece_at(s, line.low) for group, _ in functions for s in group}
-            values = [at(_chosen(f, here, line.low), line.low) for f in functions]
-            rank = [sorted(set(values)).index(value) for value in values]
-            ends = [self.levels.add((value,), ZERO) for value in values]
-            found.append(Cell(rank, ends, ends))
-        return found
 
     def _sets(self, band: int, is_gap: bool) -> list[set[int]]:
         """Return per axis which sets of functions can be at a level or above.
@@ -1571,12 +1575,13 @@ LIMITS = (
 """What every audit says that it does not establish, word for word."""
 
 SEVERITIES = {
-    **dict.fromkeys(("FT101", "FT105", "FT401", "FT601", "FT602"), "error"),
+    **dict.fromkeys(("FT101", "FT105", "FT601", "FT602"), "error"),
     **dict.fromkeys(("FT102", "FT104", "FT202", "FT203", "FT301", "FT402"), "warning"),
     **dict.fromkeys(("FT103", "FT107", "FT201", "FT204", "FT205", "FT403"), "info"),
     **dict.fromkeys(("FT404", "FT501", "FT701"), "info"),
     **dict.fromkeys([f"FTD0{n}" for n in range(1, 8)], "info"),
     "FT106": "warning error",  # of another class: a contradiction
+    "FT401": "warning error",  # never reached at all
 }
 """Every code, and the severities that a finding of it can have."""
 
@@ -2150,9 +2155,96 @@ def _covered(checks: _Checks, answer: Answer) -> None:
     _never(gap, checks, "there are points at which every rule is below epsilon")
 
 
+def _heights(checks: _Checks, answer: Answer) -> None:
+    """Ask every term whether it reaches the level, and compare with what is told."""
+    level = Fraction(checks.audit.settings.level)
+    low: dict[Label, Fraction] = {}
+    for variable in checks.rules.variables:
+        for term in variable.terms:
+            height = _height(term.shape, _line(checks, variable), level)
+            if height < level:
+                low[Label(variable.name, term.name)] = height
+    told = [one for one in checks.audit.answers if one.code == "FT401" and one.terms]
+    _require([one.terms[0] for one in told] == list(low), "other terms are too low")
+    for label in answer.terms:
+        is_empty = answer.severity == "error"
+        _require(is_empty == (not low[label]), f"{label.term!r} is empty, or is not")
+        value = next((m.value for m in answer.measures if m.name == "height"), -1.0)
+        _require(abs(value - low[label]) <= 2.0**-30, f"the height of {label.term!r}")
+
+
+def _height(shape: Shape, line: Line, level: Fraction) -> Fraction:
+    """Return the largest degree on a line, from below; exactly whether it is a level."""
+    levels = Levels()
+    mark = levels.add((level,), ZERO)
+    found = line_cells([((shape,), False)], line, levels)
+    levels.sort()
+    most = max(levels.band[end] for cell in found for end in (*cell.left, *cell.right))
+    bounds = levels.bands[most]
+    if most == levels.band[mark] and bounds[0] < bounds[1]:
+        raise UndecidedError("a height is too near to the level to tell")
+    return bounds[0] if most <= levels.band[mark] else max(bounds[0], level)
+
+
+def _unused(checks: _Checks, answer: Answer) -> None:
+    rules = checks.rules
+    asked = {
+        (c.variable, t) for rule in rules.rules for c in rule.when for t in c.terms
+    }
+    needed = {variable for variable, _ in asked}
+    for variable in rules.variables:
+        if variable.name in needed:
+            needed |= {part.input for part in variable.parts}
+    idle = [f"variable {v.name!r}" for v in rules.variables if v.name not in needed]
+    for v in rules.variables:
+        free = [
+            t.name
+            for t in v.terms
+            if v.name in needed and (v.name, t.name) not in asked
+        ]
+        idle += [f"term {name!r} of {v.name!r}" for name in free]
+    told = [
+        one for one in checks.audit.answers if one.code == "FT404" and one.is_finding
+    ]
+    _require(
+        [one.subject for one in told] == idle, "other terms or variables are unused"
+    )
+    counts = {"variables in use": len(needed), "terms in use": len(asked)}
+    _counted(answer, counts, 0 if answer.is_finding else 2)
+
+
+def _complexity(checks: _Checks, answer: Answer) -> None:
+    rules, lengths = checks.rules.rules, [len(r.when) for r in checks.rules.rules]
+    asked = {(c.variable, t) for rule in rules for c in rule.when for t in c.terms}
+    counts: dict[str, float] = {
+        "rules": len(rules),
+        "clauses": sum(lengths),
+        "most clauses of a rule": max(lengths),
+        "clauses per rule": sum(lengths) / len(rules),
+        "distinct terms in use": len(asked),
+        "variables in use": len({variable for variable, _ in asked}),
+    }
+    if isinstance(checks.model, Tree):
+        counts["depth of the tree"] = max(len(path) for _, path in paths(checks.model))
+    _counted(answer, counts, len(counts))
+    raise UndecidedError(
+        "its counts are right; the index of Nauck is not worked out here"
+    )
+
+
+def _counted(answer: Answer, counts: Mapping[str, float], number: int) -> None:
+    told = {m.name: m.value for m in answer.measures if m.name in counts}
+    _require(len(told) == number, "a count is missing")
+    wrong = [name for name, value in told.items() if value != counts[name]]
+    _require(not wrong, f"counted otherwise here: {', '.join(wrong)}")
+
+
 _AGAIN: dict[str, Callable[[_Checks, Answer], None]] = {
     "FT101": _dead,
     "FT301": _covered,
+    "FT401": _heights,
+    "FT404": _unused,
+    "FT501": _complexity,
 }
 
 
