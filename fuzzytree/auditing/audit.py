@@ -281,7 +281,7 @@ def _placed(
     return msgspec.structs.replace(
         answer,
         places=places_of(answer, model, file, numbers),
-        repeat=f"{repeat} --select {answer.code}" if repeat else "",
+        repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
     )
 
 

@@ -41,14 +41,9 @@ class ModelFile(msgspec.Struct, frozen=True, eq=False):
         return Place(writable(self.name), node.line, node.column)
 
 
-def writable(name: str) -> str:
-    """Return a file's name as UTF-8 holds it: bytes that are no text as escapes.
-
-    Example:
-        >>> print(writable("a\\udcff.yaml"))
-        a\\udcff.yaml
-    """
-    return name.encode("utf-8", "backslashreplace").decode()
+def writable(text: str) -> str:
+    """Return a text as UTF-8 holds it: bytes of a path that are no text as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def model_file(name: str, content: bytes) -> ModelFile:
