@@ -343,5 +343,5 @@ def _share(axis: Axis, span: Span | None) -> float:
         return 1.0
     low = axis.low if span.low is None else span.low
     high = axis.high if span.high is None else span.high
-    width = axis.high - axis.low
-    return (high - low) / width if width > 0.0 else 1.0
+    width = axis.high / 2 - axis.low / 2  # halves: no range overflows
+    return (high / 2 - low / 2) / width if width > 0.0 else 1.0

@@ -247,7 +247,7 @@ def _notes(viewed: View) -> Iterator[Markup]:
     elif len(rules.rules) > MOST_RULES:
         more = counted(len(rules.rules) - MOST_RULES, "more rule")
         yield tag("p", f"{more} not shown", class_="left-out")
-    if system is None or not viewed.places:
+    if system is None or (rules is not None and not viewed.places):
         return
     if rules is not None:
         said = "These are the system's conditions as they are audited: one that says "

@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from string import Template
 from typing import TYPE_CHECKING
@@ -204,9 +204,9 @@ def _head(audit: Audit, model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
 
 def _policy_text(audit: Audit) -> str:
     policy = audit.policy
-    who = "the first of the strongest rules wins"
     if policy.decision == "all":
-        who = "every rule that fires takes part"
+        return f"AND is {policy.conjunction}; every rule that fires takes part"
+    who = "the first of the strongest rules wins"
     none = [
         f"{what}: {'no class' if label is None else label}"
         for what, label in (
@@ -220,15 +220,8 @@ def _policy_text(audit: Audit) -> str:
 def _verdict(audit: Audit) -> Markup:
     """Return what was found, in words, and how it is known."""
     findings = gravest_first(audit.open_findings)
-    counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
-    told = [counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]]
-    worst = next((one for one, n in counts.items() if n), "calm")
-    said = "Nothing was found"
-    if told:
-        verb = "was" if len(findings) == 1 else "were"
-        listing = ", ".join(told[:-1])
-        said = f"{listing} and {told[-1]}" if listing else told[-1]
-        said += f" {verb} found"
+    states = known_as(audit.answers)
+    sign, said = _result(findings, states)
     accepted = len(audit.findings) - len(findings)
     if accepted:
         said += f"; {counted(accepted, 'other')} {'is' if accepted == 1 else 'are'} "
@@ -238,20 +231,35 @@ def _verdict(audit: Audit) -> Markup:
     if not audit.is_complete:
         by = "by hand" if audit.was_interrupted else "by its budget"
         whole = f"The audit was cut short {by}: {asked} asked, others were not"
-    mark = icon("calm" if worst == "calm" else worst)
-    states = known_as(audit.answers)
     shown = [
         tag("li", state_badge(word), tag("b", str(states[word])), f" {meaning}")
         for word, meaning in STATES.items()
     ]
     return joined(
         [
-            tag("p", mark, said, class_=f"said {worst}"),
+            tag("p", icon(sign), said, class_=f"said {sign}"),
             tag("p", whole, class_="whole" if audit.is_complete else "whole cut"),
             _urgent(findings, gravest_first(audit.findings)),
             tag("ul", *shown, class_="known"),
         ]
     )
+
+
+def _result(findings: Sequence[Answer], states: Mapping[str, int]) -> tuple[str, str]:
+    """Return a sign and a sentence: what was found, and what that is worth."""
+    counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
+    told = [counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]]
+    if told:
+        worst = next(one for one in SEVERITIES if counts[one])
+        verb = "was" if len(findings) == 1 else "were"
+        others = ", ".join(told[:-1])
+        return worst, f"{others}{' and ' if others else ''}{told[-1]} {verb} found"
+    whole, declined = sum(states.values()), states["DECLINED"]
+    if not declined:
+        return "calm", "Nothing was found"
+    if declined == whole:
+        return "declined", "Nothing was decided: every question was declined"
+    return "info", f"Nothing was found; {declined} of {whole} questions were declined"
 
 
 def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | None:

@@ -97,7 +97,9 @@ def histogram(
     width = high / bins - low / bins
     if not width > 0.0:
         return []
-    place = np.clip(((values[inside] - low) / width).astype(np.int64), 0, bins - 1)
+    place = np.clip(
+        ((values[inside] / 2 - low / 2) / (width / 2)).astype(np.int64), 0, bins - 1
+    )
     flat = place * data.groups + data.codes[inside]
     counts = np.bincount(flat, minlength=bins * data.groups)
     return [tuple(one) for one in counts.reshape(bins, data.groups).tolist()]

@@ -97,10 +97,10 @@ def declined_text(state: Declined) -> str:
 
     Example:
         >>> declined_text(Declined("FTD06", "no table was given"))
-        'FTD06, declined: needs rows: no table was given'
+        'FTD06, needs rows: no table was given'
     """
     title = CODES[state.code].title if state.code in CODES else "declined"
-    return f"{state.code}, {title}: {state.reason}"
+    return f"{state.code}, {title.removeprefix('declined: ')}: {state.reason}"
 
 
 def state_note(state: State) -> str:

@@ -189,12 +189,21 @@ def polyline(curve: Curve, x: Scale, y: Scale) -> Markup:
     """
     corners = [one for one in curve.corners if x.low <= one <= x.high]
     corners = corners[:: 1 + len(corners) // _CORNERS]
-    width = x.high / _STEPS - x.low / _STEPS
-    values = {x.low, x.high, *(x.low + k * width for k in range(1, _STEPS))}
+    values = {between(x.low, x.high, k / _STEPS) for k in range(_STEPS + 1)}
     for corner in corners:
         values |= {corner, math.nextafter(corner, math.inf)}
     dots = [(x.at(v), y.at(curve.degree(v))) for v in sorted(values)]
     return path_of(thinned(dots))
+
+
+def between(low: float, high: float, part: float) -> float:
+    """Return a value a part of the way from one to another; no range overflows.
+
+    Example:
+        >>> between(2.0, 4.0, 0.25), between(-1.5e308, 1.5e308, 0.5)
+        (2.5, 0.0)
+    """
+    return min(max(low * (1.0 - part) + high * part, low), high)
 
 
 def thinned(dots: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -15,6 +15,7 @@ from fuzzytree.report.drawing import (
     Axis,
     Scale,
     axis_marks,
+    between,
     cut,
     polyline,
     svg,
@@ -215,9 +216,7 @@ def map_picture(
 
 
 def _middles(ends: tuple[float, float]) -> list[float]:
-    low, high = ends
-    step = high / _CELLS - low / _CELLS
-    return [low + (k + 0.5) * step for k in range(_CELLS)]
+    return [between(*ends, (k + 0.5) / _CELLS) for k in range(_CELLS)]
 
 
 def _cells(codes: IntArray) -> Iterator[Markup]:

@@ -11,6 +11,7 @@ from fuzzytree.report.drawing import (
     Curve,
     Scale,
     axis_marks,
+    between,
     cut,
     polyline,
     spread,
@@ -161,9 +162,9 @@ def _labels(curves: tuple[Curve, ...], x: Scale) -> Iterator[Markup]:
 def _top(curve: Curve, x: Scale) -> float:
     """Return the point in the middle of where a curve is highest."""
     steps = 60
-    values = [x.low + (x.high - x.low) * k / steps for k in range(steps + 1)]
+    values = [between(x.low, x.high, k / steps) for k in range(steps + 1)]
     values += [corner for corner in curve.corners if x.low <= corner <= x.high]
     degrees = [curve.degree(value) for value in values]
     highest = max(degrees)
     tops = [v for v, d in zip(values, degrees, strict=True) if d == highest]
-    return x.at((min(tops) + max(tops)) / 2.0)
+    return x.at(between(min(tops), max(tops), 0.5))

@@ -17,12 +17,12 @@ from fuzzytree.agreement import Agreement, Comparison
 from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.criteria.results import Stability, judged
-from fuzzytree.proving.states import Proved
+from fuzzytree.proving.states import Declined, Proved
 from fuzzytree.report import audit_findings, audit_page
 from fuzzytree.report.audit_page import page
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.testing import random_system, random_tree
-from tests.report.audits import EVIL, answers, audit_of, rows_of, rule_base
+from tests.report.page_audits import EVIL, answers, audit_of, rows_of, rule_base
 
 _VOID = {"meta", "br"}
 
@@ -87,9 +87,19 @@ def test_the_verdict_counts_findings_by_severity() -> None:
 def test_an_audit_without_findings_says_so() -> None:
     clean = tuple(one for one in answers() if not one.is_finding)
     rules = rule_base()
-    text = Outline(page(audit_of(rules, clean), rules)).text
-    assert "Nothing was found" in text
+    text = Outline(page(audit_of(rules, clean[:1]), rules)).text
+    assert "Nothing was found The audit is complete" in text
     assert "There is no finding" in text
+    text = Outline(page(audit_of(rules, clean), rules)).text
+    assert "Nothing was found; 1 of 6 questions were declined" in text
+
+
+def test_an_audit_that_decided_nothing_does_not_look_calm() -> None:
+    declined = tuple(one for one in answers() if isinstance(one.state, Declined))
+    rules = rule_base()
+    content = page(audit_of(rules, declined), rules)
+    assert "Nothing was decided: every question was declined" in content
+    assert 'class="said calm"' not in content
 
 
 def test_an_audit_that_was_cut_short_says_so_and_what_was_not_asked() -> None:
@@ -122,7 +132,7 @@ def test_every_part_of_a_finding_is_on_the_page() -> None:
         "8.666666666666666",
         "0x1.6800000000000p+6",
         "rows in both: 3 of 40 rows, 7.5 % (95 % sure: 2 to 20 %)",
-        "FTD06, declined: needs rows: no rows were given",
+        "FTD06, needs rows: no rows were given",
         "from 7.7 kPa; witness 8.667",
     ):
         assert said in text, said

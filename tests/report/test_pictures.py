@@ -1,0 +1,223 @@
+"""The pictures of the page show what the model means, exactly."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from fractions import Fraction
+
+import msgspec
+import numpy as np
+import pytest
+
+from fuzzytree.auditing.subject import Rows
+from fuzzytree.lowering import rules_from_tree
+from fuzzytree.numerics.exact import exact_answer, exact_axis, exact_degree
+from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.states import Span
+from fuzzytree.reference import descend
+from fuzzytree.report.audit_rows import data_of, histogram, passing
+from fuzzytree.report.decision_map import decisions, exact_axes
+from fuzzytree.report.drawing import (
+    Axis,
+    Scale,
+    axes_of,
+    curve_of,
+    polyline,
+    spread,
+    thinned,
+    tick_words,
+    ticks,
+)
+from fuzzytree.report.svg_regions import bar_picture, map_picture, windows
+from fuzzytree.report.svg_terms import terms_picture
+from fuzzytree.report.svg_tree import tree_picture
+from fuzzytree.rulebase import (
+    Band,
+    Flank,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Variable,
+)
+from fuzzytree.testing import random_tree
+from tests.report.page_audits import rows_of, rule_base
+
+HUGE = 1.7e308
+ALWAYS = (Rule((), "k"),)
+
+
+def axis(low: float | None = 0.0, high: float | None = 10.0) -> Axis:
+    triangle = curve_of("medium", Points((2.0, 5.0, 8.0), (0.0, 1.0, 0.0)))
+    return Axis("force", "N", (triangle,), (), low, high)
+
+
+def _force(low: float, high: float) -> RuleBase:
+    return RuleBase("r", ("k",), (Variable("force", (), "", low, high),), ALWAYS)
+
+
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+@pytest.mark.parametrize("kind", ["relative", "raw"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_map_shows_the_exact_decision(seed: int, kind: str, conjunction: str) -> None:
+    tree = random_tree(seed, leaves=5)
+    rules = rules_from_tree(tree, "raw" if kind == "raw" else "relative")
+    meant = Semantics("product" if conjunction == "product" else "min")
+    free = [Variable(v.name, v.terms) for v in rules.variables]
+    rules = msgspec.structs.replace(
+        rules, variables=tuple(free), semantics=meant, columns=()
+    )
+    across, down, *others = rules.inputs
+    xs, ys = np.linspace(-3, 3, 9).tolist(), np.linspace(-2, 2, 7).tolist()
+    still = dict.fromkeys(others, 0.25)
+    fixed = {name: Fraction(value) for name, value in still.items()}
+    found = decisions(rules, (across, xs), (down, ys), fixed)
+    for (i, y), (j, x) in itertools.product(enumerate(ys), enumerate(xs)):
+        label = exact_answer(rules, {across: x, down: y, **still}).label
+        code = -1 if label is None else rules.classes.index(label)
+        assert found[i, j] == code
+
+
+def test_a_map_decides_what_products_of_doubles_cannot() -> None:
+    rules = rule_base()
+    rules = msgspec.structs.replace(rules, semantics=Semantics("product"))
+    tiny = 2.0 + 2.0**-51
+    found = decisions(rules, ("pressure", [tiny]), ("area", [60.0 - 2.0**-47]), {})
+    label = exact_answer(rules, {"pressure": tiny, "area": 60.0 - 2.0**-47}).label
+    assert rules.classes[found[0, 0]] == label
+
+
+def test_where_no_rule_fires_a_map_shows_the_answer_for_that() -> None:
+    rules = rule_base()
+    assert decisions(rules, ("pressure", [9.0]), ("area", [50.0]), {}).tolist() == [
+        [-1]
+    ]
+    hard = msgspec.structs.replace(rules, semantics=Semantics(uncovered="hard"))
+    assert decisions(hard, ("pressure", [9.0]), ("area", [50.0]), {}).tolist() == [[2]]
+
+
+def test_the_axes_of_a_point_are_exact() -> None:
+    mix = Variable("mix", parts=(Part("a", 0.1, 0.3), Part("b", -1.7)))
+    rules = RuleBase("r", ("k",), (Variable("a"), Variable("b"), mix), ALWAYS)
+    point = {"a": Fraction(0.7), "b": Fraction(1e-9)}
+    found = exact_axes(rules, point)
+    assert found is not None
+    assert found["mix"] == exact_axis(mix, {"a": 0.7, "b": 1e-9})
+    assert exact_axes(rules, {"a": Fraction(1)}) is None
+
+
+def test_a_drawn_curve_goes_through_the_exact_degrees_and_its_steps() -> None:
+    band = Band(low=1.0, high=2.0, right=Flank(2.0, 4.0, (0.25, 0.75)))
+    x, y = Scale(0.0, 5.0, 0.0, 500.0), Scale(0.0, 1.0, 100.0, 0.0)
+    way = polyline(curve_of("on", band), x, y)
+    dots = [tuple(map(float, one.split())) for one in way[1:].split("L")]
+    for at, high in dots:
+        near = (
+            exact_degree(band, Fraction(at + step) / 100) for step in (-0.2, 0, 0.2)
+        )
+        assert min(abs(high - 100 * (1 - float(one))) for one in near) < 0.6
+    assert (100.0, 100.0) in dots
+    assert (100.0, 0.0) in dots
+
+
+def test_a_curve_of_many_points_is_drawn_with_a_bounded_path() -> None:
+    values = tuple(float(k) for k in range(4096))
+    points = Points(values, tuple(float(k % 2) for k in range(4096)))
+    way = polyline(
+        curve_of("comb", points), Scale(0, 4096, 0, 300), Scale(0, 1, 100, 0)
+    )
+    assert len(way) < 10_000
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [(0.0, 1.0), (-HUGE, HUGE), (5.0, 5.0), (8e12, 8e12 + 1), (-1e-300, 1e-300)],
+)
+def test_ticks_and_pictures_are_finite_whatever_the_range(
+    low: float, high: float
+) -> None:
+    start, end = spread([low, high])
+    found = ticks(start, end)
+    assert 1 <= len(found) <= 5
+    assert len(set(tick_words(found))) == len(set(found))
+    data = data_of(_force(low, high), Rows("", np.array([[low, high, low]])))
+    for drawn in (
+        terms_picture(axis(low, high), data, "p"),
+        bar_picture(axis(low, high), Span("force", low, high), low, "q"),
+    ):
+        assert not re.search("nan|inf", drawn)
+
+
+def test_the_thinned_dots_of_a_line_keep_its_corners() -> None:
+    dots = [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (2.0, 5.0), (9.0, 5.0)]
+    assert thinned(dots) == [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (9.0, 5.0)]
+
+
+def test_rows_pass_a_tree_as_it_decides() -> None:
+    tree = random_tree(7, leaves=9)
+    values = np.random.default_rng(2).normal(size=(len(tree.inputs), 200))
+    codes = np.arange(200) % len(tree.classes)
+    found = passing(tree, data_of(tree, Rows("rows", values, codes)))
+    leaves = [
+        descend(tree, dict(zip(tree.inputs, r, strict=True))).rule for r in values.T
+    ]
+    for number, counts in enumerate(found.leaves, 1):
+        mine = [
+            code for code, leaf in zip(codes, leaves, strict=True) if leaf == number
+        ]
+        assert counts == (
+            *(sum(one == k for one in mine) for k in range(len(tree.classes))),
+            0,
+        )
+    assert sum(found.nodes[0]) == 200
+
+
+def test_a_histogram_counts_the_rows_inside() -> None:
+    rules = rule_base()
+    data = data_of(rules, rows_of(rules))
+    bins = histogram(data, "pressure", 0.0, 10.0, 7)
+    values = data.axes["pressure"]
+    inside = values[(values >= 0.0) & (values <= 10.0)]
+    expected = np.histogram(inside, bins=7, range=(0.0, 10.0))[0]
+    assert [sum(counts) for counts in bins] == expected.tolist()
+    assert len(bins[0]) == 4
+
+
+def test_a_combination_reaches_what_its_inputs_allow() -> None:
+    mix = Variable("mix", parts=(Part("a", 2.0, 1.0), Part("b", -1.0)))
+    rules = RuleBase("r", ("k",), (Variable("a"), Variable("b"), mix), ALWAYS)
+    domain = Domain((Side("a", 0.0, 2.0), Side("b", 0.0, 3.0)))
+    found = axes_of(rules, domain)["mix"]
+    assert (found.low, found.high) == (-5.0, 2.0)
+    assert axes_of(rules, Domain(()))["mix"].low is None
+
+
+def test_a_sliver_has_a_second_map_near_it() -> None:
+    pair = axis(), axis()._replace(name="slip")
+    wide = {"force": Span("force", 1.0, 4.0)}
+    thin = {"force": Span("force", 1.0, 1.001)}
+    assert [where for where, _ in windows(*pair, wide)] == ["on the domain"]
+    found = windows(*pair, thin)
+    assert [where for where, _ in found] == ["on the domain", "near the region"]
+    assert found[1][1].across == pytest.approx((0.9985, 1.0025))
+    assert windows(axis(None, None), pair[1], thin) == []
+
+
+def test_a_witness_outside_of_a_map_is_not_drawn_on_its_edge() -> None:
+    rules = rule_base()
+    axes = axes_of(rules, Domain((Side("pressure", 0, 10), Side("area", 0, 100))))
+    pair = axes["pressure"], axes["area"]
+    window = windows(*pair, {})[0][1]
+    for at, count in ((Fraction(5), 1), (Fraction(11), 0)):
+        point = {"pressure": at, "area": Fraction(50)}
+        drawn = map_picture(rules, pair, window, {}, point, "m")
+        assert drawn.count('class="witness"') == count
+
+
+def test_a_tree_without_nodes_or_with_many_classes_is_drawn() -> None:
+    for tree in (random_tree(0, leaves=1), random_tree(4, leaves=12)):
+        drawn = tree_picture(tree, None)
+        assert drawn.count('class="box') == len(tree.nodes) + len(tree.leaves)
+        assert drawn.count('class="branch"') == len(tree.nodes) + len(tree.leaves) - 1
