@@ -31,6 +31,7 @@ class Comparison(msgspec.Struct, frozen=True):
             row that flipped; None without a flip or without strengths.
         verdict: The result.
         detail: What differed, worst first, in sentences.
+        told: The numbers of the rows in `detail`, from 0 in the whole of the rows.
     """
 
     carrier: str
@@ -45,6 +46,7 @@ class Comparison(msgspec.Struct, frozen=True):
     flips: int = 0
     largest_flip_margin: float | None = None
     detail: tuple[str, ...] = ()
+    told: tuple[int, ...] = ()
 
 
 class Certified(msgspec.Struct, frozen=True):

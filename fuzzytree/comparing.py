@@ -243,6 +243,7 @@ def _compared(
             float(margin[flips].max()) if margin is not None and flips.any() else None
         ),
         detail=tuple(detail),
+        told=tuple(rows.numbers[told].tolist()),
     )
 
 
