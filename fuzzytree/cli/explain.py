@@ -13,7 +13,7 @@ from fuzzytree.cli.talk import answer, answer_json, json_option
 def command(code: str | None, as_json: bool) -> None:
     """Say what CODE means, why it matters, and what to do; list all codes without."""
     from fuzzytree.auditing.codes import CODES
-    from fuzzytree.report.audit import code_lines, explanation_lines
+    from fuzzytree.report.explanations import code_lines, explanation_lines
     from fuzzytree.rulebase import name_choice
 
     if code is None:

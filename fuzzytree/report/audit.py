@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final
 
-from fuzzytree.auditing.codes import CODES, Code
+from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Severity
 from fuzzytree.proving.states import (
     Bracket,
@@ -127,32 +127,6 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
     elif audit.is_complete:
         said += f"; {counted(len(audit.answers), 'question')} asked and answered"
     return said
-
-
-def explanation_lines(code: Code) -> Iterator[str]:
-    """Yield what a code means, why it matters, a case, and what to do."""
-    asked = "" if code.decision == "any" else ", asked where the strongest rule decides"
-    yield f"{code.code}  {code.title} ({code.severity}{asked})"
-    for title, text in (
-        ("what", code.what),
-        ("why", code.why),
-        ("example", code.example),
-        ("what to do", code.remedy),
-    ):
-        yield ""
-        yield title
-        for line in text.splitlines():
-            yield from textwrap.wrap(
-                line, WIDTH - 4, initial_indent="  ", subsequent_indent="  "
-            ) or [""]
-
-
-def code_lines() -> Iterator[str]:
-    """Yield every code with its severity and title."""
-    rows = [("code", "severity", "a finding says")]
-    yield from aligned(
-        [*rows, *((c.code, c.severity, c.title) for c in CODES.values())]
-    )
 
 
 # --- parts

@@ -6,14 +6,11 @@ import re
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.limits import LIMITS
 from fuzzytree.report.audit import (
     MOST_FINDINGS,
     WIDTH,
     audit_lines,
-    code_lines,
-    explanation_lines,
     verdict_text,
 )
 from tests.report.audits import LINES, every_state
@@ -131,16 +128,3 @@ def test_the_verdict_counts_and_says_what_next() -> None:
     assert verdict_text(replace(cut, is_complete=False)) == (
         "nothing found; interrupted: what is proved is kept, the rest is not asked"
     )
-
-
-def test_every_code_is_explained_within_the_width() -> None:
-    for code in CODES.values():
-        lines = [*explanation_lines(code)]
-        assert lines[0].startswith(f"{code.code}  {code.title} (")
-        for title in ("what", "why", "example", "what to do"):
-            assert lines[lines.index(title) + 1].strip()
-        assert max(map(len, lines)) <= WIDTH
-
-
-def test_the_list_of_codes_has_each_of_them() -> None:
-    assert [line.split()[0] for line in code_lines()] == ["code", *CODES]
