@@ -927,7 +927,7 @@ def compact(value: Any) -> str:
     """Return records, tuples and scalars as JSON without blanks."""
     if isinstance(value, float):
         return _digits(value)
-    if not isinstance(value, tuple):
+    if not isinstance(value, tuple | list):
         return json.dumps(value, ensure_ascii=False)
     names: tuple[str, ...] = getattr(value, "_fields", ())
     if not names:
@@ -1134,7 +1134,7 @@ def answer_of(model: Model, point: Point) -> str | None:
 # Which clauses can be at t or above together is told per axis, and then combined.
 
 MOST_ROOTS, MOST_CRITICAL, MOST_SETS = 4_000, 4_000, 50_000
-FINE = Fraction(1, 2**70)
+FINE = Fraction(1, 2**50)
 
 
 class Root:
@@ -1314,31 +1314,37 @@ class Levels:
         return low, high
 
 
+def stretches(
+    functions: Sequence[Function], low: Fraction, high: Fraction
+) -> Iterator[tuple[End, End, list[Poly]]]:
+    """Yield the parts of an axis, from left to right, and what functions are there."""
+    shapes = dict.fromkeys(shape for group, _ in functions for shape in group)
+    ends = {e for s in shapes for p in pieces(s) for e in p[:2] if e is not None}
+    cuts = [low, *sorted(e for e in ends if low < e < high), high]
+    for a, b in itertools.pairwise(cuts):
+        here = {shape: _piece_at(shape, (a + b) / 2) for shape in shapes}
+        met: list[End] = [a, *_crossings(_curves(functions, here), a, b), b]
+        for left, right in itertools.pairwise(met):
+            inside = _between(left, right)
+            yield left, right, [_chosen(one, here, inside) for one in functions]
+
+
+def _between(left: End, right: End) -> Fraction:
+    """Return a fraction between two ends."""
+    low = left.high if isinstance(left, Root) else left
+    return (low + (right.low if isinstance(right, Root) else right)) / 2
+
+
 def cells(
     functions: Sequence[Function], low: Fraction, high: Fraction, levels: Levels
 ) -> list[Cell]:
     """Return the cells of an axis between two values, from left to right."""
-    shapes = dict.fromkeys(shape for group, _ in functions for shape in group)
-    ends = {
-        e for s in shapes for p in pieces(s) for e in (p.low, p.high) if e is not None
-    }
-    cuts = [low, *sorted(e for e in ends if low < e < high), high]
     found: list[Cell] = []
-    for a, b in itertools.pairwise(cuts):
-        middle = (a + b) / 2
-        here = {shape: _piece_at(shape, middle) for shape in shapes}
-        met = _crossings(_curves(functions, here), a, b)
-        between: list[End] = [a, *met, b]
-        for left, right in itertools.pairwise(between):
-            start = left.high if isinstance(left, Root) else left
-            inside = (start + (right.low if isinstance(right, Root) else right)) / 2
-            chosen = [_chosen(function, here, inside) for function in functions]
-            values = sorted({at(poly, inside) for poly in chosen})
-            rank = [values.index(at(poly, inside)) for poly in chosen]
-            lefts = [levels.add(poly, left) for poly in chosen]
-            found.append(
-                Cell(rank, lefts, [levels.add(poly, right) for poly in chosen])
-            )
+    for left, right, chosen in stretches(functions, low, high):
+        heights = [at(poly, _between(left, right)) for poly in chosen]
+        rank = [sorted(set(heights)).index(height) for height in heights]
+        ends = [[levels.add(poly, end) for poly in chosen] for end in (left, right)]
+        found.append(Cell(rank, ends[0], ends[1]))
     return found
 
 
@@ -1579,7 +1585,7 @@ SEVERITIES = {
     **dict.fromkeys(("FT102", "FT104", "FT202", "FT203", "FT301", "FT402"), "warning"),
     **dict.fromkeys(("FT103", "FT107", "FT201", "FT204", "FT205", "FT403"), "info"),
     **dict.fromkeys(("FT404", "FT501", "FT701"), "info"),
-    **dict.fromkeys([f"FTD0{n}" for n in range(1, 8)], "info"),
+    **dict.fromkeys([f"FTD0{n}" for n in range(1, 9)], "info"),
     "FT106": "warning error",  # of another class: a contradiction
     "FT401": "warning error",  # never reached at all
 }
@@ -1675,6 +1681,7 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
         checks.report.expect(found.file.sha256 == sha, text)
     checks.head()
     checks.asked()
+    checks.ids()
     for number, answer in enumerate(found.answers, 1):
         checks.answer(answer, f"answer {number} ({answer.code}, {answer.subject:.60})")
     return checks.report
@@ -1715,6 +1722,27 @@ class _Checks:
             Fraction(self.audit.settings.level),
         ]
         return Grid(self.rules, lines, extra)
+
+    @cached_property
+    def heights(self) -> dict[Label, Fraction]:
+        """The largest degree of each term on the domain."""
+        level = Fraction(self.audit.settings.level)
+        return {
+            Label(v.name, term.name): _height(term.shape, _line(self, v), level)
+            for v in self.rules.variables
+            for term in v.terms
+        }
+
+    @cached_property
+    def shares(self) -> dict[tuple[Label, ...], tuple[Fraction, Fraction] | None]:
+        """The shared area of each pair of terms of a variable; None without area."""
+        return {
+            (Label(v.name, a.name), Label(v.name, b.name)): _shared(
+                a.shape, b.shape, _line(self, v)
+            )
+            for v in self.rules.variables
+            for a, b in itertools.combinations(v.terms, 2)
+        }
 
     # what the audit says of itself
 
@@ -1802,6 +1830,31 @@ class _Checks:
                 not is_both, f"{text.split(' ')[0]} was asked, and told to be left out"
             )
 
+    def ids(self) -> None:
+        """Check each id: its code and a hash of what the rules and terms say."""
+        carriers = [c for c in self.carriers.values() if isinstance(c, Rules)]
+        shapes: dict[tuple[str, str], Shape] = {}
+        for carrier in (*carriers, self.rules):  # the rules' own terms come last
+            shapes |= {
+                (v.name, t.name): t.shape for v in carrier.variables for t in v.terms
+            }
+        counts: dict[str, int] = {}
+        for number, answer in enumerate(self.audit.answers, 1):
+            if not all(1 <= k <= len(self.rules.rules) for k in answer.rules):
+                continue
+            known = [_said(self.rules.rules[k - 1], shapes) for k in answer.rules]
+            known += [
+                [*label, shapes.get((label[0], label[1]))] for label in answer.terms
+            ]
+            other = [] if known else [answer.subject, answer.region]
+            content = compact([answer.code, known, other]).encode()
+            name = f"{answer.code}-{hashlib.sha256(content).hexdigest()[:8]}"
+            counts[name] = counts.get(name, 0) + 1
+            name += f"-{counts[name]}" if counts[name] > 1 else ""
+            self.report.expect(
+                answer.id == name, f"the id of answer {number} is {name}"
+            )
+
     # one answer
 
     def answer(self, answer: Answer, where: str) -> None:
@@ -1838,6 +1891,8 @@ class _Checks:
             self._state(answer, where)
         except DoesNotHoldError as error:
             wrong.append(f"{where}: {error}")
+        except (LookupError, ArithmeticError, StopIteration):
+            wrong.append(f"{where}: it names what there is not")
         except UndecidedError as error:
             self.report.undecided.append(f"{where}: {error}")
 
@@ -2010,6 +2065,20 @@ class _Checks:
                 return level is not None and min(ours) >= level
 
 
+def _said(rule: Rule, shapes: Mapping[tuple[str, str], Shape]) -> list[Any]:
+    """Return what a rule says and with which curves, in an order of its own."""
+    clauses = sorted(rule.when, key=str)
+    texts = [
+        f"{c.variable} is {'not ' * c.negated}{' or '.join(c.terms)}" for c in clauses
+    ]
+    curves = [
+        [c.variable, c.negated, sorted(compact(shapes[c.variable, t]) for t in c.terms)]
+        for c in clauses
+    ]
+    said = f"IF {' AND '.join(texts)} THEN" if texts else "ALWAYS"
+    return [f"{said} {rule.then}", sorted(curves, key=str)]
+
+
 def wilson(hits: int, rows: int, confidence: float) -> tuple[float, float]:
     """Return Wilson's interval of a share."""
     _require(0.0 < confidence < 1.0, "a confidence outside (0, 1)")
@@ -2050,7 +2119,7 @@ def _cannot(checks: _Checks, answer: Answer) -> None:
     raise UndecidedError(f"{answer.code} is not decided again here")
 
 
-# --- Deciding again ------------------------------------------------------------------
+# --- Deciding again -----------------------------------------------------------------
 
 
 def _line(checks: _Checks, variable: Variable) -> Line:
@@ -2156,14 +2225,9 @@ def _covered(checks: _Checks, answer: Answer) -> None:
 
 
 def _heights(checks: _Checks, answer: Answer) -> None:
-    """Ask every term whether it reaches the level, and compare with what is told."""
-    level = Fraction(checks.audit.settings.level)
-    low: dict[Label, Fraction] = {}
-    for variable in checks.rules.variables:
-        for term in variable.terms:
-            height = _height(term.shape, _line(checks, variable), level)
-            if height < level:
-                low[Label(variable.name, term.name)] = height
+    """Compare the terms that do not reach the level with what is told."""
+    level = checks.audit.settings.level
+    low = {label: height for label, height in checks.heights.items() if height < level}
     told = [one for one in checks.audit.answers if one.code == "FT401" and one.terms]
     _require([one.terms[0] for one in told] == list(low), "other terms are too low")
     for label in answer.terms:
@@ -2239,10 +2303,54 @@ def _counted(answer: Answer, counts: Mapping[str, float], number: int) -> None:
     _require(not wrong, f"counted otherwise here: {', '.join(wrong)}")
 
 
+def _overlaps(checks: _Checks, answer: Answer) -> None:
+    """Compare the shared areas of pairs of terms with what is told of them."""
+    near = {
+        labels: share
+        for labels, share in checks.shares.items()
+        if share is not None and share[1] >= Fraction(checks.audit.settings.overlap)
+    }
+    if any(low < checks.audit.settings.overlap for low, _ in near.values()):
+        raise UndecidedError("a shared area is too near to the limit to tell")
+    told = [a for a in checks.audit.answers if a.code == "FT403" and a.terms]
+    _require({a.terms for a in told} <= near.keys(), "two terms are easy to tell apart")
+    if not answer.terms:
+        bare = sum(share is None for share in checks.shares.values())
+        counts = {"pairs not told one by one": len(near) - len(told)}
+        counts |= {"pairs apart": len(checks.shares) - len(near) - bare}
+        _counted(answer, counts | {"pairs without area": bare}, 3)
+        return
+    low, high = near[answer.terms]
+    value = next(m.value for m in answer.measures if m.name.startswith("shared area"))
+    _require(low - FINE <= Fraction(value) <= high + FINE, "the share is another one")
+
+
+def _shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] | None:
+    """Return between which numbers the integral of min by that of max lies."""
+    least = most = slack = ZERO
+    if line.low == line.high:
+        return None
+    both = [((one,), False), ((other,), False)]
+    for left, right, curves in stretches(both, line.low, line.high):
+        inside = _between(left, right)
+        for root in (end for end in (left, right) if isinstance(end, Root)):
+            while root.high - root.low > FINE * (line.high - line.low):
+                root.halve()
+            slack += root.high - root.low
+        a = left.high if isinstance(left, Root) else left
+        b = right.low if isinstance(right, Root) else right
+        order = sorted(curves, key=lambda poly: at(poly, inside))
+        wholes = [(ZERO, *(c / n for n, c in enumerate(p, 1))) for p in order]
+        areas = [at(whole, b) - at(whole, a) for whole in wholes]
+        least, most = least + areas[0], most + areas[1]
+    return (least / (most + slack), (least + slack) / most) if most else None
+
+
 _AGAIN: dict[str, Callable[[_Checks, Answer], None]] = {
     "FT101": _dead,
     "FT301": _covered,
     "FT401": _heights,
+    "FT403": _overlaps,
     "FT404": _unused,
     "FT501": _complexity,
 }
