@@ -1,0 +1,415 @@
+"""Heights, areas and distances of curves on an axis, between exact bounds.
+
+An axis is cut (`fuzzytree.proving.axes`) so that within a cell every curve is one
+polynomial. What is asked of a curve is then asked of polynomials, in fractions. Only
+where a cell ends at an irrational place is the answer a narrow interval.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.proving.axes import Cells, Element, cut, places
+from fuzzytree.proving.curves import ONE, ZERO, piece_at, pieces
+from fuzzytree.proving.polynomials import (
+    Polynomial,
+    composed,
+    derivative,
+    difference,
+    integers,
+    integral,
+    roots,
+    value_at,
+)
+from fuzzytree.rulebase import Shape
+
+
+class Bounds(NamedTuple):
+    """Two numbers between which one lies; it is known exactly if they are equal."""
+
+    low: Fraction
+    high: Fraction
+
+    @property
+    def nearest(self) -> float:
+        """The double nearest to the middle."""
+        return float((self.low + self.high) / 2)
+
+    @property
+    def exact(self) -> str | None:
+        """The number as `p/q`, None if it is not known exactly."""
+        return str(self.low) if self.low == self.high else None
+
+
+Seen = tuple[Bounds, Fraction]
+"""A value, and a point where a curve has it or comes near it."""
+
+
+class Line(NamedTuple):
+    """Curves on an axis between two ends, cut into cells.
+
+    Attributes:
+        elements: The curves.
+        cells: The cells.
+        is_open: Whether the lower end itself is left out.
+    """
+
+    elements: tuple[Element, ...]
+    cells: Cells
+    is_open: bool = False
+
+    @property
+    def ends(self) -> tuple[Fraction, Fraction]:
+        """The lower and the upper end."""
+        return self.cells.zones[0][0], self.cells.zones[-1][1]
+
+
+def line(
+    shapes: Sequence[Shape], low: Fraction, high: Fraction, *, is_open: bool = False
+) -> Line:
+    """Return shapes on an axis, cut where something changes.
+
+    Raises:
+        ValueError: If `low` is above `high`.
+
+    Example:
+        >>> from fuzzytree.rulebase import Points
+        >>> ramp = Points((0.0, 2.0), (0.0, 1.0))
+        >>> found = line([ramp], Fraction(-1), Fraction(1))
+        >>> tuple(map(int, found.ends))
+        (-1, 1)
+    """
+    if low > high:
+        raise ValueError(f"no axis from {low} to {high}")
+    elements = tuple(Element(shape) for shape in shapes)
+    cells = cut(elements, places(elements), low, high)
+    return Line(elements, cells, is_open)
+
+
+def local(element: Element, at: Fraction) -> Polynomial:
+    """Return the polynomial that a curve is in the cell of a point, clipped or not.
+
+    Example:
+        >>> from fuzzytree.rulebase import Points
+        >>> local(Element(Points((0.0, 2.0), (0.0, 1.0)), True), Fraction(1))
+        (Fraction(1, 1), Fraction(-1, 2))
+    """
+    piece = piece_at(pieces(element.shape), at)
+    degree = piece.degree(at)
+    clipped = degree in (ZERO, piece.cap)
+    polynomial = (degree,) if clipped else piece.polynomial
+    return difference((ONE,), polynomial) if element.is_complement else polynomial
+
+
+def multiplied(one: Polynomial, other: Polynomial) -> Polynomial:
+    """Return the product of two polynomials.
+
+    Example:
+        >>> multiplied((Fraction(1), Fraction(1)), (Fraction(0), Fraction(2)))
+        (Fraction(0, 1), Fraction(2, 1), Fraction(2, 1))
+    """
+    found = [ZERO] * (len(one) + len(other) - 1)
+    for i, a in enumerate(one):
+        for j, b in enumerate(other):
+            found[i + j] += a * b
+    return tuple(found)
+
+
+def values_near(polynomial: Polynomial, low: Fraction, high: Fraction) -> Bounds:
+    """Return bounds of a polynomial's values on a narrow closed interval."""
+    if low == high:
+        value = value_at(polynomial, low)
+        return Bounds(value, value)
+    numbers, common = integers(composed(polynomial, (low + high) / 2, (high - low) / 2))
+    middle = Fraction(numbers[0], common)
+    off = Fraction(sum(map(abs, numbers[1:])), common)
+    return Bounds(middle - off, middle + off)
+
+
+def extremes(
+    polynomial: Polynomial, low: Fraction, high: Fraction
+) -> Iterator[tuple[Fraction, Bounds]]:
+    """Yield the ends and the turning points of a polynomial, with its values there.
+
+    The largest and the least value on `low <= x <= high` are among them.
+
+    Example:
+        >>> bump = (Fraction(0), Fraction(1), Fraction(-1))
+        >>> [float(b.high) for _, b in extremes(bump, Fraction(0), Fraction(1))]
+        [0.0, 0.25, 0.0]
+    """
+    yield low, values_near(polynomial, low, low)
+    if low < high:
+        if len(polynomial) > 2:
+            for root in roots(derivative(polynomial), low, high):
+                yield root.low, values_near(polynomial, root.low, root.high)
+        yield high, values_near(polynomial, high, high)
+
+
+def area(of: Line, chosen: Callable[[int, Fraction], Polynomial]) -> Bounds:
+    """Return the area under a curve with degrees in [0, 1] on a line.
+
+    Args:
+        of: The line.
+        chosen: Given a cell's number and a point of it, the curve's polynomial there.
+
+    Example:
+        >>> from fuzzytree.rulebase import Points
+        >>> ramp = line([Points((0.0, 2.0), (0.0, 1.0))], Fraction(0), Fraction(3))
+        >>> area(ramp, lambda cell, at: local(ramp.elements[0], at)).exact
+        '2'
+    """
+    total = sum(
+        (
+            integral(chosen(number, (low + high) / 2), low, high)
+            for number, (low, high) in enumerate(of.cells.between)
+        ),
+        start=ZERO,
+    )
+    # On the narrow places between cells a degree may be anything.
+    slack = sum((b - a for a, b in of.cells.zones), start=ZERO)
+    return Bounds(total, total + slack)
+
+
+def heights(of: Line) -> tuple[Seen, ...]:
+    """Return the supremum of each curve on a line, and a point where it is near.
+
+    Example:
+        >>> from fuzzytree.rulebase import Points
+        >>> ramp = line([Points((0.0, 2.0), (0.0, 1.0))], Fraction(0), Fraction(1))
+        >>> heights(ramp)[0][0].exact
+        '1/2'
+    """
+    return tuple(_height(of, one) for one in range(len(of.elements)))
+
+
+def _height(of: Line, one: int) -> Seen:
+    found = [(bounds, at) for bounds, at in walk(of, one)]
+    most = max(bounds.high for bounds, _ in found)
+    low = max(bounds.low for bounds, _ in found)
+    at = next(at for bounds, at in found if bounds.low == low)
+    return Bounds(low, most), at
+
+
+def walk(of: Line, one: int) -> Iterator[Seen]:
+    """Yield a curve's values from left to right; it is monotone between neighbours.
+
+    At a step both its values are yielded, each with a point where it is reached or
+    approached.
+    """
+    zones = of.cells.zones
+    for number, (a, b) in enumerate(zones):
+        at = (a + b) / 2
+        has_here = number > 0 or not of.is_open or len(zones) == 1
+        if has_here:
+            yield _seen(of, one, number), at
+        if number + 1 < len(zones):
+            after = _seen(of, one, number, is_after=True)
+            if not has_here or after != _seen(of, one, number):
+                yield after, at
+
+
+def _seen(of: Line, one: int, zone: int, *, is_after: bool = False) -> Bounds:
+    """Return a curve's value at a place, or its limit from above."""
+    low, high = of.cells.zones[zone]
+    if low == high:
+        element = of.elements[one]
+        value = element.degree_after(low) if is_after else element.degree(low)
+        return Bounds(value, value)
+    values = (of.cells.right if is_after else of.cells.left)[:, one, zone]
+    return Bounds(Fraction(values[0]), Fraction(values[1]))
+
+
+class Overlap(NamedTuple):
+    """How much two curves share on a line.
+
+    Attributes:
+        shared: The area under both, the integral of their minimum.
+        joined: The area under either, the integral of their maximum.
+        possibility: The supremum of their minimum.
+        at: A point near where it is reached.
+        crossings: Points at which they cross, each with the degree there.
+        is_within: Whether the first is nowhere above the second.
+        is_around: Whether the first is nowhere below the second.
+    """
+
+    shared: Bounds
+    joined: Bounds
+    possibility: Bounds
+    at: Fraction
+    crossings: tuple[tuple[Fraction, Bounds], ...]
+    is_within: bool
+    is_around: bool
+
+    @property
+    def jaccard(self) -> Bounds | None:
+        """The shared area over the joined area; None if that may be 0."""
+        if self.joined.low <= 0:
+            return None
+        high = self.shared.high / self.joined.low
+        return Bounds(self.shared.low / self.joined.high, min(high, ONE))
+
+
+def overlap(of: Line) -> Overlap:
+    """Return how much the two curves of a line share, exactly but for slivers.
+
+    Raises:
+        ValueError: If the line has not two curves.
+
+    Example:
+        >>> from fuzzytree.rulebase import Points
+        >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
+        >>> found = overlap(line([down, up], Fraction(0), Fraction(1)))
+        >>> found.jaccard.exact, found.possibility.exact
+        ('1/3', '1/2')
+    """
+    if len(of.elements) != 2:
+        raise ValueError(f"two curves overlap, not {len(of.elements)}")
+    rank = of.cells.rank
+    lower = [int(a > b) for a, b in rank]
+    shared = area(of, lambda cell, at: local(of.elements[lower[cell]], at))
+    joined = area(of, lambda cell, at: local(of.elements[1 - lower[cell]], at))
+    met = [
+        (
+            Bounds(min(a.low, b.low), min(a.high, b.high)),
+            at,
+        )
+        for (a, at), (b, _) in _both(of)
+    ]
+    low = max(bounds.low for bounds, _ in met)
+    high = max(bounds.high for bounds, _ in met)
+    start = of.cells.start_rank
+    orders = [] if of.is_open and len(rank) else [int(start[0]) - int(start[1])]
+    orders += [int(a) - int(b) for a, b in rank]
+    return Overlap(
+        shared,
+        joined,
+        Bounds(low, high),
+        next(at for bounds, at in met if bounds.low == low),
+        tuple(_crossings(of)),
+        all(order <= 0 for order in orders),
+        all(order >= 0 for order in orders),
+    )
+
+
+def _both(
+    of: Line,
+) -> Iterator[tuple[tuple[Bounds, Fraction], tuple[Bounds, Fraction]]]:
+    """Yield the values of two curves at the same places, seen from both sides."""
+    zones = of.cells.zones
+    for number, (a, b) in enumerate(zones):
+        at = (a + b) / 2
+        for is_after, is_asked in (
+            (False, number > 0 or not of.is_open or len(zones) == 1),
+            (True, number + 1 < len(zones)),
+        ):
+            if is_asked:
+                one, other = (
+                    _seen(of, which, number, is_after=is_after) for which in (0, 1)
+                )
+                yield (one, at), (other, at)
+
+
+def _crossings(of: Line) -> Iterator[tuple[Fraction, Bounds]]:
+    before = 0
+    since = 0
+    for cell, (a, b) in enumerate(of.cells.rank):
+        order = int(a > b) - int(a < b)
+        if order and before and order != before:
+            low, high = of.cells.zones[since]
+            yield (low + high) / 2, _seen(of, 0, since)
+        if order:
+            before, since = order, cell + 1
+
+
+def dips(values: Sequence[Seen], least: Fraction) -> Iterator[tuple[Seen, Seen, Seen]]:
+    """Yield where a walk falls and rises again by at least some amount.
+
+    Args:
+        values: A walk.
+        least: The least depth that counts, above 0.
+
+    Yields:
+        The peak before, the valley, and the peak behind it.
+
+    Example:
+        >>> walked = [(Bounds(Fraction(v), Fraction(v)), Fraction(k))
+        ...           for k, v in enumerate((0, 3, 1, 2, 0))]
+        >>> [[int(at) for _, at in dip] for dip in dips(walked, Fraction(1, 2))]
+        [[1, 2, 3]]
+    """
+    before: Seen | None = None
+    peak = valley = bottom = values[0]
+    is_rising = True
+    for value in values:
+        height = value[0].low
+        if is_rising:
+            if height > peak[0].low:
+                peak = value
+            elif peak[0].low - height >= least:
+                if before is not None:
+                    yield before, bottom, peak
+                before, valley, is_rising = peak, value, False
+        elif height < valley[0].low:
+            valley = value
+        elif height - valley[0].low >= least:
+            bottom, peak, is_rising = valley, value, True
+    if is_rising and before is not None:
+        yield before, bottom, peak
+
+
+def outside(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
+    """Yield where a shape's polynomials leave [0, 1] before they are clipped.
+
+    Example:
+        >>> from fuzzytree.rulebase import Band, Flank
+        >>> bulge = Band(0.0, 1.0, right=Flank(1.0, 2.0, (4.0, -3.0)))
+        >>> [(round(float(e.depth), 3), e.is_above)
+        ...  for e in outside(bulge, Fraction(0), Fraction(3))]
+        [(0.333, True)]
+    """
+    for piece in pieces(shape):
+        if piece.low is None or piece.high is None or len(piece.polynomial) < 2:
+            continue
+        a, b = max(piece.low, low), min(piece.high, high)
+        if a >= b or _is_inside(piece.polynomial, a, b):
+            continue
+        for goal, sign in ((ONE, 1), (ZERO, -1)):
+            over = difference(piece.polynomial, (goal,))
+            ends = [a, *((r.low + r.high) / 2 for r in roots(over, a, b)), b]
+            for start, end in itertools.pairwise(ends):
+                if sign * value_at(over, (start + end) / 2) <= 0:
+                    continue
+                found = [*extremes(over, start, end)]
+                at, depth = max(
+                    ((at, sign * (v.low + v.high) / 2) for at, v in found),
+                    key=lambda one: one[1],
+                )
+                yield Excess(start, end, at, depth, sign > 0)
+
+
+def _is_inside(polynomial: Polynomial, low: Fraction, high: Fraction) -> bool:
+    """Return whether a polynomial is a line within [0, 1]."""
+    ends = value_at(polynomial, low), value_at(polynomial, high)
+    return len(polynomial) == 2 and all(ZERO <= end <= ONE for end in ends)
+
+
+class Excess(NamedTuple):
+    """A stretch on which a polynomial leaves [0, 1].
+
+    Attributes:
+        low: From where.
+        high: To where.
+        at: Where it is farthest outside.
+        depth: How far.
+        is_above: Whether it is above 1, otherwise below 0.
+    """
+
+    low: Fraction
+    high: Fraction
+    at: Fraction
+    depth: Fraction
+    is_above: bool
