@@ -21,25 +21,17 @@ from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.proving.answers import difference_at
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.contenders import Box, Contender, Left, left_on, same
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.ground import span
-from fuzzytree.proving.linear import ZERO
 from fuzzytree.proving.points import Places, Point, middle
-from fuzzytree.proving.states import (
-    Bracket,
-    Claim,
-    Proved,
-    State,
-    Witness,
-    coordinates,
-)
+from fuzzytree.proving.states import Bracket, Proved, Span, State, Witness
 from fuzzytree.proving.stretches import Key, Numbered, Stretch, laid
-from fuzzytree.rulebase import Part, RuleBase, Variable, shapes_of
+from fuzzytree.rulebase import RuleBase, Variable
 
 MOST_BOXES = 4_000
 """Boxes that are looked at, unless the clock ends before."""
@@ -49,84 +41,8 @@ TOUCHING = 2.0**-40
 
 _OF = "the smaller of both margins where the two answer otherwise"
 _DEEP = 12  # halvings, before which no box is taken for a touching tie
+_HALVINGS = 60  # of what a region may still grow by
 _DEEPEST = 60  # halvings of a box in which both answer otherwise, but no double is met
-
-
-class Answered(NamedTuple):
-    """What a rule base says at a point, exactly.
-
-    Attributes:
-        label: The class, or None for no class.
-        rule: The number of the winning rule, 0 if none fires.
-        is_tie: Whether another rule is as strong.
-        margin: How far the strongest class is ahead of the next; not firing counts as
-            a class of strength 0.
-    """
-
-    label: str | None
-    rule: int
-    is_tie: bool
-    margin: Fraction
-
-
-def answer_at(rules: RuleBase, point: Point) -> Answered:
-    """Return what a rule base says at a point that need not be of doubles.
-
-    Example:
-        >>> from fuzzytree.rulebase import Rule
-        >>> answer_at(RuleBase("a", ("x",), (), (Rule((), "x"),)), {}).label
-        'x'
-    """
-    shapes = shapes_of(rules.variables)
-    values = {v.name: _value(v, point) for v in rules.variables}
-    strengths: list[Fraction] = []
-    for rule in rules.rules:
-        strength = Fraction(1)
-        for clause in rule.when:
-            value = values[clause.variable]
-            degree = max(
-                exact_degree(shapes[clause.variable, t], value) for t in clause.terms
-            )
-            degree = 1 - degree if clause.negated else degree
-            if rules.semantics.conjunction == "product":
-                strength *= degree
-            else:
-                strength = min(strength, degree)
-        strengths.append(strength)
-    best = max(strengths)
-    if best == 0:
-        return Answered(rules.semantics.uncovered, 0, False, ZERO)
-    winner = strengths.index(best)
-    label = rules.rules[winner].then
-    others = [
-        s for s, rule in zip(strengths, rules.rules, strict=True) if rule.then != label
-    ]
-    margin = best - max(others, default=ZERO)
-    return Answered(label, winner + 1, strengths.count(best) > 1, margin)
-
-
-def _value(variable: Variable, point: Point) -> Fraction:
-    if not variable.parts:
-        return point[variable.name]
-    return sum((_share(part, point) for part in variable.parts), ZERO)
-
-
-def _share(part: Part, point: Point) -> Fraction:
-    return Fraction(part.weight) * (point[part.input] - Fraction(part.centre))
-
-
-def difference_at(old: RuleBase, new: RuleBase, point: Point) -> Witness | None:
-    """Return a point as a witness that two rule bases answer otherwise there, if so."""
-    one, other = answer_at(old, point), answer_at(new, point)
-    if one.label == other.label:
-        return None
-    return Witness(
-        coordinates(point),
-        (
-            Claim("decides", of="old", label=one.label),
-            Claim("decides", of="new", label=other.label),
-        ),
-    )
 
 
 def alike(
@@ -307,6 +223,16 @@ class _Search:
         cut = None if is_beyond else self._cut(box, [*one.rules, *other.rules])
         return _Found(min(one.margin, other.margin), cut)
 
+    def answers(self, box: Box) -> tuple[set[str | None], set[str | None]] | None:
+        """Return the one answer of each model on all of a box, None if one has more."""
+        one, other = (
+            self._answers(number, left_on(model, asked, self.axes, box))
+            for number, (model, asked) in enumerate(
+                zip(self.models, self.rules, strict=True)
+            )
+        )
+        return (one, other) if len(one) == len(other) == 1 else None
+
     def _answers(self, model: int, left: Left) -> set[str | None]:
         found: set[str | None] = {rule.then for rule in left.rules}
         if not left.is_sure:
@@ -375,3 +301,69 @@ def _halves(box: Box, axis: int, at: Fraction) -> Iterator[Box]:
     low, high, is_closed = box[axis]
     for part in (Stretch(low, at, is_closed), Stretch(at, high)):
         yield (*box[:axis], part, *box[axis + 1 :])
+
+
+def region(
+    old: RuleBase, new: RuleBase, domain: Domain, point: Point
+) -> tuple[Span, ...]:
+    """Return a closed box around a point on which both answer as they do there.
+
+    Variables of which any value on the domain will do are left out. It is found by
+    stretching one side after the other, so a larger box may exist.
+
+    Args:
+        old: A rule base.
+        new: Another one.
+        domain: A side for each input of either.
+        point: Where they answer otherwise.
+
+    Returns:
+        Nothing where a combination is asked, or the point is not on the domain.
+    """
+    search = _Search(old, new, domain)
+    if search.places.has_sums or search.places.in_doubles(point) != point:
+        return ()
+    at = [point[str(axis.key)] for axis in search.axes]
+    box = tuple(Stretch(x, x, True) for x in at)
+    wanted = search.answers(box)
+    spans: list[Span] = []
+    for place, axis in enumerate(search.axes):
+        whole = Stretch(axis.whole.low, axis.whole.high, True)
+        wide = (*box[:place], whole, *box[place + 1 :])
+        if search.answers(wide) == wanted:
+            box = wide
+            continue
+        for field in ("low", "high"):
+            box = _stretched(search, box, place, field, wanted)
+        low, high, _ = box[place]
+        spans.append(Span(str(axis.key), float(low), float(high)))
+    return tuple(spans)
+
+
+def _stretched(
+    search: _Search,
+    box: Box,
+    place: int,
+    field: Literal["low", "high"],
+    wanted: object,
+) -> Box:
+    """Return a box with one end moved outwards as far as the answers stay."""
+
+    def moved(end: Fraction) -> Box:
+        stretch = box[place]._replace(**{field: end})
+        return (*box[:place], stretch, *box[place + 1 :])
+
+    best, beyond = (
+        getattr(one, field) for one in (box[place], search.axes[place].whole)
+    )
+    if search.answers(moved(beyond)) == wanted:
+        return moved(beyond)
+    for _ in range(_HALVINGS):
+        near = Fraction(float((best + beyond) / 2))
+        if near in (best, beyond):
+            break
+        if search.answers(moved(near)) == wanted:
+            best = near
+        else:
+            beyond = near
+    return moved(best)

@@ -13,7 +13,8 @@ from msgspec.structs import replace
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.numerics.oracle import decide
-from fuzzytree.proving.alike import alike, answer_at
+from fuzzytree.proving.alike import alike, region
+from fuzzytree.proving.answers import answer_at
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Bracket, Proved, State, Witness, point_of
@@ -246,3 +247,19 @@ def test_bounds_hold_a_polynomial() -> None:
         for k in range(13):
             x = Fraction(k, 4) - 1
             assert low <= sum(c * x**n for n, c in enumerate(curve)) <= high
+
+
+def test_a_region_is_a_box_on_which_both_answer_so() -> None:
+    old, new = crisp(0.25), crisp(0.75)
+    idle = Rule((Clause("y", ("t",)),), "b")
+    second = Variable("y", (Term("t", Points((0.0, 1.0), (0.0, 0.01))),))
+    old, new = (
+        replace(m, variables=(*m.variables, second), rules=(*m.rules, idle))
+        for m in (old, new)
+    )
+    found = alike(old, new, box(old), Clock())
+    assert isinstance(found, Witness)
+    (span,) = region(old, new, box(old), point_of(found.point))
+    assert span.variable == "x"
+    assert span.low == math.nextafter(0.25, 1.0)
+    assert span.high == 0.75
