@@ -65,7 +65,7 @@ class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     Attributes:
         ground: Where.
-        ours: The positions of the rules.
+        ours: The positions of the rules; without any it is a rule that asks nothing.
         rivals: The positions of the rivals.
     """
 
@@ -105,7 +105,7 @@ class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
 
 
 def _events(every: Iterable[Options]) -> tuple[int, ...]:
-    found: set[int] = set()
+    found = {0}  # without rivals nothing happens down to the lowest level
     for options in every:
         found.update(options.top.tolist())
         found.update(options.floor[options.floor < NEVER].tolist())
@@ -116,7 +116,8 @@ def weakest(laid: Laid, rules: Sequence[int], cell: int) -> int:
     """Return the element that is the least of some rules' degrees in a cell."""
     rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
     of = laid.of_start if cell == START else laid.of[:, cell]
-    return min((int(of[rule]) for rule in rules), key=lambda one: int(rank[one]))
+    chosen = [int(of[rule]) for rule in rules] or [0]
+    return min(chosen, key=lambda one: int(rank[one]))
 
 
 def _options(contest: Contest, laid: Laid) -> Options:
@@ -124,8 +125,8 @@ def _options(contest: Contest, laid: Laid) -> Options:
     count = len(cells.rank)
     columns = np.arange(count)
     rivals = np.array(contest.rivals, dtype=np.int64)
-    mine = laid.of[contest.ours[0]]
-    for rule in contest.ours[1:]:
+    mine = np.zeros(count, dtype=np.int64)  # the curve that is always 1
+    for rule in contest.ours:
         other = laid.of[rule]
         mine = np.where(
             cells.rank[columns, other] < cells.rank[columns, mine], other, mine
@@ -168,7 +169,8 @@ def _zones(contest: Contest, laid: Laid) -> tuple[IntArray, IntArray, IntArray]:
             high = np.minimum(high, at[list(group)].max(axis=0))
         return low, high
 
-    top = np.min([bands_of(rule)[1] for rule in contest.ours], axis=0)
+    tops = [laid.at[0, vague], *(bands_of(rule)[1] for rule in contest.ours)]
+    top = np.min(tops, axis=0)
     floor = np.array([bands_of(rule)[0] for rule in contest.rivals], dtype=np.int64)
     floor = floor.reshape(len(contest.rivals), len(vague)).T
     return -2 - vague, top, floor

@@ -89,12 +89,9 @@ class Bands(NamedTuple):
     high: list[Fraction]
     is_sharp: BoolArray
 
-    def between(self, band: int) -> Fraction:
-        """Return a level above a band and below the next one."""
-        low, high = self.high[band], self.low[band + 1]
-        middle = (low + high) / 2
-        near = Fraction(float(middle))
-        return near if low < near < high else middle
+    def low_after(self, band: int) -> Fraction:
+        """Return the lower end of the next band, 1 if there is none."""
+        return self.low[band + 1] if band + 1 < len(self.low) else Fraction(1)
 
 
 class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):

@@ -62,37 +62,40 @@ def ends_of(rules: RuleBase, domain: Domain) -> tuple[FloatArray, FloatArray]:
     return low, high
 
 
-def leader(given: Ground, rule: int, rivals: Sequence[int], seed: int = 0) -> Point:
-    """Return a point of the inputs' box at which a rule leads others by much.
+def leader(
+    given: Ground, ours: Sequence[int], rivals: Sequence[int], seed: int = 0
+) -> Point:
+    """Return a point of the inputs' box at which some rules lead others by much.
 
     It is the best of some thousand points that were drawn, and nothing is claimed.
 
     Args:
         given: Where.
-        rule: The number of the rule, from 1.
+        ours: The numbers of the rules, from 1; without any, the others shall be weak.
         rivals: The numbers of the others.
         seed: Of what is drawn.
     """
-    chance = np.random.default_rng([seed, rule])
+    chance = np.random.default_rng([seed, *ours])
     low, high = ends_of(given.rules, given.domain)
-    others = [number - 1 for number in rivals]
+    mine, others = [n - 1 for n in ours], [n - 1 for n in rivals]
 
     def leads(points: FloatArray) -> FloatArray:
         found = near_strengths(given.rules, points)
-        mine = found[rule - 1]
-        if not others:
-            return mine
-        best: FloatArray = found[others].max(axis=0)
-        return mine - best
+        lead: FloatArray = np.ones(points.shape[1])
+        if mine:
+            lead = found[mine].min(axis=0)
+        if others:
+            lead = lead - found[others].max(axis=0)
+        return lead
 
     width = high - low
     points = low + width * chance.random((len(low), _FIRST))
-    best, lead, reach = points[:, :1], -np.inf, 1.0
+    best, most, reach = points[:, :1], -np.inf, 1.0
     for _ in range(_ROUNDS):
         found = leads(points)
         top = int(found.argmax())
-        if found[top] > lead:
-            best, lead = points[:, top : top + 1], float(found[top])
+        if found[top] > most:
+            best, most = points[:, top : top + 1], float(found[top])
         else:
             reach *= 0.6
         steps = chance.standard_normal((len(low), _NEXT)) * width * reach * 0.2
@@ -104,16 +107,18 @@ def leader(given: Ground, rule: int, rivals: Sequence[int], seed: int = 0) -> Po
     }
 
 
-def plainer(given: Ground, point: Point, rule: int, rivals: Sequence[int]) -> Point:
-    """Return a point of fewer digits at which a rule still leads by nearly as much.
+def plainer(
+    given: Ground, point: Point, ours: Sequence[int], rivals: Sequence[int]
+) -> Point:
+    """Return a point of fewer digits at which rules still lead by half as much.
 
     Args:
         given: Where.
-        point: A point of the domain at which the rule leads.
-        rule: The number of the rule, from 1.
+        point: A point of the domain at which they lead.
+        ours: The numbers of the rules, from 1.
         rivals: The numbers of the others.
     """
-    goal = _lead(given, point, rule, rivals) / 2
+    goal = _lead(given, point, ours, rivals) / 2
     found = dict(point)
     for name in given.rules.inputs:
         side = given.domain.side(name)
@@ -125,14 +130,16 @@ def plainer(given: Ground, point: Point, rule: int, rivals: Sequence[int]) -> Po
             if not low < high:
                 break
             tried = {**found, name: simple(low, high)}
-            is_good = _lead(given, tried, rule, rivals) > max(goal, Fraction(0))
+            is_good = _lead(given, tried, ours, rivals) > max(goal, Fraction(0))
             if is_good and is_within(given, tried):
                 found = tried
                 break
     return found
 
 
-def _lead(given: Ground, point: Point, rule: int, rivals: Sequence[int]) -> Fraction:
+def _lead(
+    given: Ground, point: Point, ours: Sequence[int], rivals: Sequence[int]
+) -> Fraction:
     strengths = strengths_at(given, point)
-    best = max((strengths[number - 1] for number in rivals), default=Fraction(0))
-    return strengths[rule - 1] - best
+    mine = min((strengths[number - 1] for number in ours), default=Fraction(1))
+    return mine - max((strengths[n - 1] for n in rivals), default=Fraction(0))

@@ -1,0 +1,299 @@
+"""Is there an input that no rule covers, or none well? How little is the least?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.contests import Contest
+from fuzzytree.proving.covering import cover, maximal
+from fuzzytree.proving.ground import Ground, Laid, strengths_at, variable_value
+from fuzzytree.proving.parts import Stretch
+from fuzzytree.proving.questions import Question, searched
+from fuzzytree.proving.seeking import leader
+from fuzzytree.proving.states import (
+    Bracket,
+    Claim,
+    Proved,
+    Span,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.proving.witnesses import Point, coupled, is_within, point_with
+
+_MOST_CHOICES = 2_000  # of values for axes that share inputs
+_MOST_FINE = 2_000  # levels that are worth knowing as fractions
+
+
+def below(given: Ground, epsilon: Fraction, clock: Clock | None = None) -> State:
+    """Return whether all rules are somewhere weaker than a level.
+
+    Args:
+        given: The rules and the box.
+        epsilon: The level, in (0, 1].
+        clock: How much time there is; no limit unless given.
+
+    Returns:
+        `Proved`: some rule reaches the level everywhere. `Witness`: here none does.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.proving.domain import Domain, Side
+        >>> from fuzzytree.proving.ground import ground
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
+        >>> below(ground(rules, box), Fraction(1, 2)).how.split(" with ")[0]
+        '1 levels'
+    """
+    clock = clock or Clock()
+    if given.is_empty:
+        return Proved("the domain has no point")
+    if given.rules.semantics.conjunction == "product":
+        from fuzzytree.proving.bounding import below_by_boxes
+
+        return below_by_boxes(given.rules, given.domain, epsilon, clock)
+    every = tuple(range(1, len(given.rules.rules) + 1))
+    return searched(
+        given, Question((), every, epsilon, "how far all stay below the level"), clock
+    )
+
+
+def least_cover(given: Ground, clock: Clock | None = None) -> Bracket:
+    """Return bounds of the least strength that the strongest rule has anywhere.
+
+    Under the minimum the bounds are those of one critical level; where inputs depend on
+    each other the lower one treats them as free, and the upper one is of a point.
+    """
+    clock = clock or Clock()
+    if given.rules.semantics.conjunction == "product":
+        from fuzzytree.proving.bounding import least_cover as by_boxes
+
+        return by_boxes(given.rules, given.domain, clock)
+    contest = Contest(given, (), tuple(range(len(given.rules.rules))))
+    bands = contest.bands
+    if not given.is_fine and len(bands.low) < _MOST_FINE:
+        return least_cover(given.fine, clock)
+    low, high = -1, len(bands.low) - 1  # open at the lower one, closed at the upper
+    name = "the strength of the strongest rule where it is least"
+    try:
+        while high - low > 1:
+            middle = (low + high) // 2
+            families = [options.at_gap(middle) for options in contest.options]
+            if cover(families, contest.full, clock) is None:
+                low = middle
+            else:
+                high = middle
+    except OutOfTimeError:
+        ends = float(bands.low[low + 1]), float(bands.high[high])
+        return Bracket(name, *ends, "the budget was spent")
+    ends = outwards(bands.low[high])[0], outwards(bands.high[high])[1]
+    if coupled(given):
+        every = range(1, len(given.rules.rules) + 1)
+        point = leader(given, (), tuple(every))
+        top = (
+            max(strengths_at(given, point)) if is_within(given, point) else Fraction(1)
+        )
+        return Bracket(
+            name, ends[0], outwards(top)[1], "its inputs depend on each other"
+        )
+    return Bracket(name, *ends, "these are bounds of one critical level")
+
+
+def uncovered(given: Ground, clock: Clock | None = None) -> State:
+    """Return whether every rule is somewhere exactly 0; for any conjunction.
+
+    Returns:
+        `Proved`: some rule fires everywhere. `Witness`: here none does. `Bracket`: the
+        budget or inputs that depend on each other leave it open.
+    """
+    clock = clock or Clock()
+    if given.is_empty:
+        return Proved("the domain has no point")
+    every = tuple(range(len(given.rules.rules)))
+    contest = Contest(given, (), every)
+    sure = [
+        [*_bare(laid, every, is_open=given.opens(laid.axis.variable.name))]
+        for laid in given.laid[0]
+    ]
+    cells = sum(map(len, sure))
+    how = f"{cells} parts of {len(sure)} axes where rules are 0 visited"
+    try:
+        if cover([maximal(m for m, _ in of) for of in sure], contest.full, clock):
+            point = _bare_point(given, sure, contest.full, clock)
+            if point is not None:
+                return _bare_witness(given, point)
+            return Bracket(
+                "how many rules fire at least", 0.0, 1.0,
+                "the inputs of its variables depend on each other",
+            )  # fmt: skip
+        vague = [
+            [*of, *_maybe_bare(laid)]
+            for of, laid in zip(sure, given.laid[0], strict=True)
+        ]
+        if cover([maximal(m for m, _ in of) for of in vague], contest.full, clock):
+            why = "a curve may touch 0 where it is not known exactly"
+            return Bracket("how many rules fire at least", 0.0, 1.0, why)
+    except OutOfTimeError:
+        why = "the budget was spent"
+        return Bracket("how many rules fire at least", 0.0, 1.0, why)
+    return Proved(how)
+
+
+def _mask(bits: object) -> int:
+    packed = np.packbits(np.asarray(bits, dtype=bool), bitorder="little")
+    return int.from_bytes(packed.tobytes(), "little")
+
+
+def _bare(
+    laid: Laid, rules: tuple[int, ...], *, is_open: bool
+) -> Iterator[tuple[int, Stretch]]:
+    """Yield the rules that are 0 on parts of an axis, with the part."""
+    of = np.array(rules)
+    zones = laid.cells.zones
+    columns = np.arange(len(laid.cells.between))
+    is_zero = laid.is_zero[laid.of[of], columns].T
+    for cell, (low, high) in enumerate(laid.cells.between):
+        yield _mask(is_zero[cell]), Stretch(low, high)
+    for place, (low, high) in enumerate(zones):
+        if low == high and not (is_open and place == 0):
+            at = _zero_at(laid, laid.is_zero_at[:, place])
+            yield _mask(at), Stretch(low, high, is_open=False)
+
+
+def _maybe_bare(laid: Laid) -> Iterator[tuple[int, Stretch]]:
+    for place, (low, high) in enumerate(laid.cells.zones):
+        if low != high:
+            at = _zero_at(laid, laid.may_be_zero_at[:, place])
+            yield _mask(at), Stretch(low, high, is_open=False)
+
+
+def _zero_at(laid: Laid, is_zero: object) -> list[bool]:
+    """Return which rules are 0 where some elements are: a clause all of whose are."""
+    zero = np.asarray(is_zero)
+    return [
+        any(all(bool(zero[one]) for one in group) for group in groups)
+        for groups in laid.axis.asked
+    ]
+
+
+def _bare_point(
+    given: Ground, options: list[list[tuple[int, Stretch]]], full: int, clock: Clock
+) -> Point | None:
+    """Return a point at which all rules are 0, if one is found."""
+    groups = coupled(given)
+    joined = {axis for group in groups for axis in group}
+    # Open parts first: a point there has others around it.
+    ways = [
+        sorted(of, key=lambda one: (not one[1].is_open, -one[0].bit_count()))
+        for of in options
+    ]
+    reach = [0] * (len(ways) + 1)
+    for place in range(len(ways) - 1, -1, -1):
+        reach[place] = reach[place + 1]
+        for mask, _ in ways[place]:
+            reach[place] |= mask
+    todo: list[tuple[dict[int, Stretch], int]] = [({}, 0)]
+    tried = 0
+    dead: set[tuple[int, int]] = set()
+    while todo:
+        wanted, covered = todo.pop()
+        place = len(wanted)
+        if covered | reach[place] != full or (not joined and (place, covered) in dead):
+            continue
+        dead.add((place, covered))
+        clock.check()
+        if place == len(ways) or (joined and place - 1 in joined):
+            point = point_with(given, wanted)
+            if place == len(ways) and point is not None:
+                return point
+            tried += 1
+            if point is None:
+                continue
+            if tried > _MOST_CHOICES:
+                return None
+        seen: set[int] = set()
+        for mask, part in reversed(ways[place]):
+            if joined or mask not in seen:
+                todo.append(({**wanted, place: part}, covered | mask))
+            seen.add(mask)
+    return None
+
+
+def _bare_witness(given: Ground, point: Point) -> State:
+    strengths = strengths_at(given, point)
+    if any(strengths) or not is_within(given, point):
+        why = "a point that should be uncovered is not"
+        return Bracket("how many rules fire at least", 0.0, 1.0, why)
+    every = tuple(range(1, len(strengths) + 1))
+    claims = (
+        Claim("below", rules=every, level="0"),
+        Claim("decides", label=given.rules.semantics.uncovered),
+    )
+    return Witness(coordinates(point), claims, _bare_region(given, point))
+
+
+def _bare_region(given: Ground, point: Point) -> tuple[Span, ...]:
+    """Return the box around a point on which what is 0 at the point is 0."""
+    left = set(range(len(given.rules.rules)))
+    at = [variable_value(axis.variable, point) for axis in given.axes]
+    zero: list[set[int]] = []
+    for axis, value in zip(given.axes, at, strict=True):
+        bare = [element.degree(value) == 0 for element in axis.elements]
+        zero.append(
+            {
+                rule
+                for rule, groups in enumerate(axis.asked)
+                if any(all(bare[one] for one in group) for group in groups)
+            }
+        )
+    spans: list[Span] = []
+    while left:
+        best = max(range(len(zero)), key=lambda place: len(zero[place] & left))
+        span = _bare_span(given.laid[0][best], at[best], sorted(zero[best] & left))
+        if span is not None:
+            spans.append(span)
+        left -= zero[best]
+    return tuple(spans)
+
+
+def _bare_span(laid: Laid, x: Fraction, rules: list[int]) -> Span | None:
+    """Return from where to where some rules are 0 along an axis; None if all along."""
+    zones, cells = laid.cells.zones, laid.cells.between
+    low = high = x
+    place = next((n for n, (a, b) in enumerate(zones) if a <= x <= b), None)
+
+    def is_bare(cell: int) -> bool:
+        return all(bool(laid.is_zero[laid.of[rule, cell], cell]) for rule in rules)
+
+    def is_bare_at(zone: int) -> bool:
+        at = _zero_at(laid, laid.is_zero_at[:, zone])
+        return all(at[rule] for rule in rules)
+
+    up = place if place is not None else _cell_of(laid, x)
+    down = (place if place is not None else _cell_of(laid, x) + 1) - 1
+    while up < len(cells) and is_bare(up):
+        high = cells[up][1]
+        up += 1
+        if not is_bare_at(up):
+            break
+        high = zones[up][1]
+    while down >= 0 and is_bare(down):
+        low = cells[down][0]
+        if not is_bare_at(down):
+            break
+        low = zones[down][0]
+        down -= 1
+    if low <= zones[0][0] and high >= zones[-1][1]:
+        return None
+    first, last = outwards(low)[1], outwards(high)[0]
+    return Span(laid.axis.variable.name, min(first, float(x)), max(last, float(x)))
+
+
+def _cell_of(laid: Laid, x: Fraction) -> int:
+    return next(n for n, (a, b) in enumerate(laid.cells.between) if a < x < b)
