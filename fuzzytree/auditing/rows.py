@@ -1,0 +1,180 @@
+"""The user's rows as exact points, and how far they are from a box."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.records import Answer, Measure
+from fuzzytree.auditing.subject import Rows, Subject
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.regions import contains
+from fuzzytree.proving.states import Span, Witness, point_of
+
+OF_RANGES = "of each input's range"
+"""The unit of distances: the largest difference of an input, in its range's width."""
+
+_MOST_DIGITS = 80  # of an exact number beside a double
+
+
+class Points(msgspec.Struct, frozen=True, eq=False):
+    """Rows that lie in the domain.
+
+    Attributes:
+        at: The row's number, from 1, and its values; equal rows stand once.
+        looked_at: How many rows were looked at.
+        left_out: How many different ones have a value that is missing, or outside the
+            domain.
+        total: How many rows there are.
+    """
+
+    at: tuple[tuple[int, dict[str, Fraction]], ...]
+    looked_at: int
+    left_out: int
+    total: int
+
+    @property
+    def text(self) -> str:
+        """Which rows these are, as sentences show it."""
+        text = f"{self.looked_at} of {self.total} rows"
+        if self.looked_at == self.total:
+            text = f"{self.total} rows"
+        if self.left_out:
+            text += f" ({self.left_out} incomplete or outside the domain)"
+        return text
+
+
+def points_of(subject: Subject, rows: Rows, most: int) -> Points:
+    """Return the user's rows as points of the domain.
+
+    Args:
+        subject: The model.
+        rows: The rows.
+        most: If there are more, so many are taken at even distances.
+    """
+    names = subject.rules.inputs
+    total = rows.values.shape[1]
+    taken = range(total)
+    if total > most:
+        taken = range(0, total, -(-total // most))
+    seen: dict[tuple[float, ...], int] = {}
+    for row in taken:
+        seen.setdefault(tuple(rows.values[:, row].tolist()), row + 1)
+    found = [
+        (number, dict(zip(names, map(Fraction, values), strict=True)))
+        for values, number in seen.items()
+        if all(map(math.isfinite, values))
+    ]
+    at = tuple(
+        (number, point)
+        for number, point in found
+        if contains(subject.domain, subject.rules.variables, point)
+    )
+    return Points(at, len(taken), len(seen) - len(at), total)
+
+
+def measure(name: str, value: Fraction, *, unit: str = OF_RANGES) -> Measure:
+    """Return a number of an answer: at most the number itself, as a double."""
+    exact = str(value)
+    return Measure(
+        name, outwards(value)[0], exact if len(exact) <= _MOST_DIGITS else None, unit
+    )
+
+
+def ranked(
+    gaps: Sequence[Answer], rows: Rows, domain: Domain, inputs: Sequence[str]
+) -> tuple[Answer, ...]:
+    """Return answers in order of how near they are to a row, with the distance.
+
+    A gap far from all that was ever seen matters less than one among the rows. Answers
+    that name no place stand last, as they are.
+
+    Args:
+        gaps: Answers about places: with a region, or else the point of a witness.
+        rows: The rows.
+        domain: In whose widths distance is measured.
+        inputs: The names of the rows' values.
+
+    Example:
+        >>> from fuzzytree.proving.domain import Side
+        >>> from fuzzytree.proving.states import Proved
+        >>> box = Domain((Side("x", 0.0, 4.0),))
+        >>> where = (Span("x", 3.0, 4.0),)
+        >>> gap = Answer("FT301", "gap", "", Proved(""), True, region=where)
+        >>> rows = Rows("rows", np.array([[0.0, 1.0]]))
+        >>> ranked([gap], rows, box, ["x"])[0].measures[0].exact
+        '1/2'
+    """
+    known: list[tuple[Fraction, int, Answer]] = []
+    unknown: list[Answer] = []
+    for place, gap in enumerate(gaps):
+        found = _nearest_row(_spans(gap, inputs), rows, domain, inputs)
+        if found is None:
+            unknown.append(gap)
+            continue
+        away, number = found
+        added = (
+            measure("distance to the nearest row", away),
+            Measure("nearest row", number),
+        )
+        measures = (*gap.measures, *added)
+        known.append((away, place, msgspec.structs.replace(gap, measures=measures)))
+    ordered = sorted(known, key=lambda one: one[:2])
+    return (*(gap for _, _, gap in ordered), *unknown)
+
+
+def _spans(gap: Answer, inputs: Sequence[str]) -> tuple[Span, ...]:
+    """Return where a gap is: its region, or the point where that needs more."""
+    if gap.region and all(span.variable in inputs for span in gap.region):
+        return gap.region
+    if not isinstance(gap.state, Witness):
+        return ()
+    point = point_of(gap.state.point)
+    return tuple(Span(name, *outwards(value)) for name, value in point.items())
+
+
+def _nearest_row(
+    spans: Sequence[Span], rows: Rows, domain: Domain, inputs: Sequence[str]
+) -> tuple[Fraction, int] | None:
+    """Return the least distance of a row from a box, and the row's number."""
+    column = {name: place for place, name in enumerate(inputs)}
+    away = np.zeros(rows.values.shape[1])
+    for span in spans:
+        side = domain.side(span.variable)
+        if side is None or side.low == side.high:
+            continue
+        x = rows.values[column[span.variable]]
+        below = -np.inf if span.low is None else span.low
+        above = np.inf if span.high is None else span.high
+        width = side.high - side.low
+        away = np.maximum(away, np.maximum(below - x, x - above) / width)
+    away[~np.isfinite(rows.values).all(axis=0)] = np.inf
+    if not spans or not np.isfinite(away).any():
+        return None
+    row = int(np.argmin(away))
+    values = {
+        name: Fraction(float(rows.values[at, row])) for name, at in column.items()
+    }
+    return box_distance(spans, values, domain), row + 1
+
+
+def box_distance(
+    spans: Sequence[Span], point: Mapping[str, Fraction], domain: Domain
+) -> Fraction:
+    """Return how far a point is from a box, in shares of the domain's widths."""
+    away = Fraction(0)
+    for span in spans:
+        side = domain.side(span.variable)
+        if side is None or side.low == side.high:
+            continue
+        width, x = Fraction(side.high) - Fraction(side.low), point[span.variable]
+        if span.low is not None:
+            away = max(away, (Fraction(span.low) - x) / width)
+        if span.high is not None:
+            away = max(away, (x - Fraction(span.high)) / width)
+    return away
