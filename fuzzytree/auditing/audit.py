@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import importlib
 import importlib.metadata
 import importlib.util
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import Final, cast
+from typing import Final, NamedTuple, cast
 
 import msgspec
 
@@ -69,6 +70,8 @@ costs as few answers as it can. Each takes at most half of the time that is left
 
 ASKED: Final = frozenset(code for family in FAMILIES for code in family.codes)
 """The codes that an audit asks; the others belong to a comparison, or say why not."""
+
+_OF_A_ROW = "FT204"
 
 
 def audit(
@@ -195,7 +198,7 @@ def _ask_view(
         declined=found.declined,
         is_whole=found.is_whole,
     )
-    _ask_all(subject, wanted, clock, asked)
+    _ask_all([*_tasks(wanted, row)], subject, clock, asked)
     return asked
 
 
@@ -217,33 +220,55 @@ class _Asked:
         self.cut: dict[str, str] = {}
 
 
-def _ask_all(subject: Subject, wanted: set[str], clock: Clock, asked: _Asked) -> None:
-    """Ask each family, within its part of the budget, until all are asked."""
-    todo = [family for family in FAMILIES if wanted.intersection(family.codes)]
-    for position, family in enumerate(todo):
+class _Task(NamedTuple):
+    """Questions that are asked together, and what asks them."""
+
+    codes: Sequence[str]
+    ask: Asking
+
+
+def _tasks(wanted: set[str], row: Mapping[str, float] | None) -> Iterator[_Task]:
+    """Yield what is asked, in order: the user's row first, then the families."""
+    if row is not None and _OF_A_ROW in wanted:
+        yield _Task([_OF_A_ROW], functools.partial(_row_answers, row))
+    for family in FAMILIES:
         codes = [code for code in family.codes if code in wanted]
-        part = 1.0 if position == len(todo) - 1 else 0.5
-        own = clock.share(part, tell=_telling(clock, position, len(todo)))
+        if codes:
+            yield _Task(codes, functools.partial(_answers, family.module))
+
+
+def _answers(module: str, subject: Subject) -> Iterator[Answer]:
+    """Return what a family answers; it is imported when it is asked."""
+    found = importlib.import_module(f"fuzzytree.auditing.{module}")
+    # Every module of the table has a function of this type; a test asks each.
+    return cast("Asking", found.answers)(subject)
+
+
+def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[Answer]:
+    from fuzzytree.auditing.robustness import row_answers
+
+    return row_answers(subject, row)
+
+
+def _ask_all(
+    tasks: Sequence[_Task], subject: Subject, clock: Clock, asked: _Asked
+) -> None:
+    """Ask everything, each task within its part of the budget."""
+    for position, task in enumerate(tasks):
+        part = 1.0 if position == len(tasks) - 1 else 0.5
+        own = clock.share(part, tell=_telling(clock, position, len(tasks)))
         try:
             clock.check()
-            own.tell(CODES[codes[0]].title, 0.0)
-            _ask(family, msgspec.structs.replace(subject, clock=own), asked)
+            own.tell(CODES[task.codes[0]].title, 0.0)
+            for answer in task.ask(msgspec.structs.replace(subject, clock=own)):
+                asked.answers.append(answer)
         except OutOfTimeError:
             why = f"the budget of {subject.settings.budget_s:g} s is spent"
-            asked.cut |= dict.fromkeys(codes, why)
+            asked.cut |= dict.fromkeys(task.codes, why)
         except KeyboardInterrupt:
-            rest = [code for one in todo[position:] for code in one.codes]
-            asked.cut |= {code: INTERRUPTED for code in rest if code in wanted}
+            rest = [code for one in tasks[position:] for code in one.codes]
+            asked.cut |= dict.fromkeys(rest, INTERRUPTED)
             return
-
-
-def _ask(family: Family, subject: Subject, asked: _Asked) -> None:
-    """Ask one family; what it answered before it is stopped is kept."""
-    module = importlib.import_module(f"fuzzytree.auditing.{family.module}")
-    # Every module of the table has a function of this type; a test asks each.
-    asking = cast("Asking", module.answers)
-    for answer in asking(subject):
-        asked.answers.append(answer)
 
 
 def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:

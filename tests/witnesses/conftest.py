@@ -41,6 +41,12 @@ def library() -> Need:
     return find
 
 
+@pytest.fixture
+def missing() -> Callable[[str], None]:
+    """Return a function that skips, or fails, a test for what is not installed."""
+    return _missing
+
+
 def _missing(text: str) -> None:
     if os.environ.get("FUZZYTREE_WITNESSES") == "all":
         pytest.fail(text)
