@@ -37,6 +37,9 @@ MOST_FINDINGS = 300
 MOST_PICTURED = 30
 """That have pictures: the first, and the gravest stand first."""
 
+MOST_FACTS = 12
+"""Of a code, beside the findings, that are told."""
+
 _MOST_BARS = 6  # of one finding
 _MOST_MAP_WORK = 60_000  # rules times terms of a map, which is slow beyond
 _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
@@ -106,11 +109,45 @@ def findings_section(
     return joined(parts)
 
 
+def facts_section(answers: Sequence[Answer]) -> Markup | None:
+    """Return what else is known: answers that are no findings and have numbers.
+
+    What rows say of single rules is not among them: it stands in the table of rules.
+    """
+    groups: dict[str, list[Answer]] = {}
+    for answer in answers:
+        has_numbers = bool(answer.measures or answer.region)
+        is_of_rule = answer.code == "FT701" and answer.rules
+        if has_numbers and not answer.is_finding and not is_of_rule:
+            groups.setdefault(answer.code, []).append(answer)
+    parts: list[Markup] = []
+    for code, known in groups.items():
+        head = tag("h3", tag("span", code, class_="code"), f" {_title(code)}")
+        shown = [_fact(answer) for answer in known[:MOST_FACTS]]
+        if len(known) > MOST_FACTS:
+            more = f"{counted(len(known) - MOST_FACTS, 'more answer')} below"
+            shown.append(tag("p", more, class_="left-out"))
+        parts.append(tag("section", head, *shown))
+    return tag("div", *parts, class_="facts-of") if parts else None
+
+
+def _fact(answer: Answer) -> Markup:
+    said = tag("div", tag("p", answer.sentence), _measures(answer.measures))
+    badge = state_badge(state_word(answer.state))
+    return tag("div", badge, said, class_="fact")
+
+
+def _title(code: str) -> str:
+    return CODES[code].title if code in CODES else "a finding"
+
+
 def _group(code: str, shown: Sequence[Markup]) -> Markup:
     known = CODES.get(code)
-    title = known.title if known else "a finding"
     head = tag(
-        "h3", tag("span", code, class_="code"), f" {title}", id=f"code-{_slug(code)}"
+        "h3",
+        tag("span", code, class_="code"),
+        f" {_title(code)}",
+        id=f"code-{_slug(code)}",
     )
     parts: list[Content] = [head]
     if known and (known.what or known.why or known.example or known.remedy):

@@ -25,6 +25,7 @@ from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
     Scene,
     anchors,
+    facts_section,
     findings_section,
     gravest_first,
 )
@@ -167,6 +168,9 @@ def _sections(
     scene = Scene(axes, viewed)
     shown = findings_section(findings, scene, audit.accepted)
     yield "findings", "Findings", shown
+    facts = facts_section(audit.answers)
+    if facts is not None:
+        yield "facts", "What else is known", facts
     yield "questions", "Everything that was asked", _questions(audit)
     if agreement is not None:
         yield "agreement", "Agreement", agreement_section(agreement)

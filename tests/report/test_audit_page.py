@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.agreement import Agreement, Comparison
-from fuzzytree.auditing.records import Answer
+from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.criteria.results import Stability, judged
 from fuzzytree.proving.states import Declined, Proved
@@ -178,6 +178,22 @@ def test_the_rules_say_how_often_they_fired_and_link_to_their_findings() -> None
     assert "19 85.7 % (50 to 90)" in found.text
     assert "#FT101-9f2c11ab" in found.links
     assert "rule-4" in found.ids
+
+
+def test_what_else_is_known_is_told_with_its_numbers() -> None:
+    size = Answer(
+        "FT501",
+        "the rule base",
+        "4 rules with 7 clauses",
+        Proved("all were counted"),
+        is_finding=False,
+        measures=(Measure("clauses", 7.0), Measure("index", 0.5, "1/2")),
+    )
+    found = shown(found=(size,) * 20)
+    assert "4 rules with 7 clauses clauses 7 index 0.5 = 1/2" in found.text
+    assert "8 more answers below" in found.text
+    assert "facts" in found.ids
+    assert "facts" not in shown(found=()).ids
 
 
 def test_links_lead_somewhere_and_no_id_stands_twice() -> None:
