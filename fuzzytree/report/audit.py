@@ -25,6 +25,7 @@ WIDTH: Final = 100
 MOST_FINDINGS: Final = 200
 """That are told one by one."""
 
+_MOST_CALM = 40
 _MOST_DECLINED = 40
 _MOST_INPUTS = 12  # of a point or region on the terminal
 _LEFT_OUT = ": left out by the user"
@@ -81,6 +82,7 @@ def audit_lines(
     if audit.accepted:
         yield f"{counted(len(audit.accepted), 'accepted finding')} of the baseline"
         yield ""
+    yield from _calm(audit, paint)
     yield from summary_lines(audit)
     yield from _declined(audit)
     if audit.unasked:
@@ -295,6 +297,23 @@ def _by_severity(found: Sequence[Answer]) -> str:
         if any(one.severity == severity for one in found)
     ]
     return f"{counted(len(found), 'finding')}: {', '.join(counts)}"
+
+
+def _calm(audit: Audit, paint: _Paint) -> Iterator[str]:
+    """Yield the answers that are no findings and were not declined, a line each."""
+    answers = [one for one in audit.answers if not one.is_finding]
+    answers = [one for one in answers if not isinstance(one.state, Declined)]
+    if not answers:
+        return
+    yield "answers that are no findings"
+    for answer in answers[:_MOST_CALM]:
+        word = state_word(answer.state)
+        first, *rest = _wrapped(answer.sentence, WIDTH - 17) or [""]
+        yield f"  {answer.code} {paint(f'{word:8}', word)} {first}".rstrip()
+        yield from (f"{' ' * 17}{line}" for line in rest)
+    if len(answers) > _MOST_CALM:
+        yield f"  and {len(answers) - _MOST_CALM} more; --output-format json has all"
+    yield ""
 
 
 def _declined(audit: Audit) -> Iterator[str]:

@@ -40,6 +40,9 @@ grip.yaml: FT202 warning: rules 1 and 2 are equally strong on a part of the doma
 
 1 accepted finding of the baseline
 
+answers that are no findings
+  FT701 SAMPLED  rule 1 wins 3 of 4 rows
+
 code   question      asked  found  proved  witness  bracket  sampled  declined
 FT101  dead rule     1      1      1       -        -        -        -
 FT202  ambiguity     1      1      -       1        -        -        -
