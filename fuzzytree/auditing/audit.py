@@ -31,6 +31,7 @@ from fuzzytree.auditing.views import View, view
 from fuzzytree.contracts import Document
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.states import Declined
 from fuzzytree.rulebase import RuleBase, fingerprint, name_choice
 from fuzzytree.tree import FuzzyTree
 
@@ -72,6 +73,7 @@ ASKED: Final = frozenset(code for family in FAMILIES for code in family.codes)
 """The codes that an audit asks; the others belong to a comparison, or say why not."""
 
 _OF_A_ROW = "FT204"
+_LATE = "FTD03"
 
 
 def audit(
@@ -150,6 +152,8 @@ def audit(
         is_complete=not asked.cut,
         accepted=tuple(sorted(ids.intersection(accepted))),
     )
+    # A count among doubles is one of them from here on, as it is for who reads the file.
+    found = msgspec.json.decode(msgspec.json.encode(found), type=Audit)
     return msgspec.structs.replace(found, digest=digest_of(found))
 
 
@@ -254,6 +258,7 @@ def _ask_all(
     tasks: Sequence[_Task], subject: Subject, clock: Clock, asked: _Asked
 ) -> None:
     """Ask everything, each task within its part of the budget."""
+    why = f"the budget of {subject.settings.budget_s:g} s is spent"
     for position, task in enumerate(tasks):
         part = 1.0 if position == len(tasks) - 1 else 0.5
         own = clock.share(part, tell=_telling(clock, position, len(tasks)))
@@ -262,8 +267,9 @@ def _ask_all(
             own.tell(CODES[task.codes[0]].title, 0.0)
             for answer in task.ask(msgspec.structs.replace(subject, clock=own)):
                 asked.answers.append(answer)
+                if isinstance(answer.state, Declined) and answer.state.code == _LATE:
+                    asked.cut[answer.code] = why
         except OutOfTimeError:
-            why = f"the budget of {subject.settings.budget_s:g} s is spent"
             asked.cut |= dict.fromkeys(task.codes, why)
         except KeyboardInterrupt:
             rest = [code for one in tasks[position:] for code in one.codes]
