@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Measure, Place, Severity
@@ -37,12 +37,20 @@ MOST_FINDINGS = 300
 MOST_PICTURED = 30
 """That have pictures: the first, and the gravest stand first."""
 
+MOST_MAPPED = 10
+"""That have maps of the decision: one takes up to a second."""
+
 MOST_FACTS = 12
 """Of a code, beside the findings, that are told."""
 
+_SHORT = 16  # characters of a fraction that a reader may want to see
 _MOST_BARS = 6  # of one finding
-_MOST_MAP_WORK = 60_000  # rules times terms of a map, which is slow beyond
+_MOST_MAP_RULES = 200
 _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
+
+
+Drawn = Literal["nothing", "bars", "maps"]
+"""Which pictures a finding has: maps stand beside bars."""
 
 
 class Scene(NamedTuple):
@@ -95,16 +103,20 @@ def findings_section(
     groups: dict[tuple[Severity, str], list[Markup]] = {}
     for place, (answer, name) in enumerate(told):
         known = answer.id in accepted
-        is_pictured = place < MOST_PICTURED
-        shown = _finding(answer, name, scene, is_pictured=is_pictured, is_known=known)
+        drawn: Drawn = "nothing" if place >= MOST_PICTURED else "bars"
+        if place < MOST_MAPPED:
+            drawn = "maps"
+        shown = _finding(answer, name, scene, drawn, is_known=known)
         groups.setdefault((answer.severity, answer.code), []).append(shown)
     parts = [_group(code, shown) for (_, code), shown in groups.items()]
     more = len(findings) - len(told)
     if more > 0:
         said = f"{counted(more, 'more finding')}: the JSON has all of them"
         parts.append(tag("p", said, class_="left-out"))
-    if len(told) > MOST_PICTURED:
-        said = f"Only the first {MOST_PICTURED} findings have pictures"
+    if len(told) > MOST_MAPPED:
+        said = f"Only the first {MOST_MAPPED} findings have maps"
+        if len(told) > MOST_PICTURED:
+            said += f", and the first {MOST_PICTURED} pictures of variables"
         parts.append(tag("p", said, class_="left-out"))
     return joined(parts)
 
@@ -122,19 +134,20 @@ def facts_section(answers: Sequence[Answer]) -> Markup | None:
             groups.setdefault(answer.code, []).append(answer)
     parts: list[Markup] = []
     for code, known in groups.items():
-        head = tag("h3", tag("span", code, class_="code"), f" {_title(code)}")
-        shown = [_fact(answer) for answer in known[:MOST_FACTS]]
+        parts += [_fact(answer) for answer in known[:MOST_FACTS]]
         if len(known) > MOST_FACTS:
-            more = f"{counted(len(known) - MOST_FACTS, 'more answer')} below"
-            shown.append(tag("p", more, class_="left-out"))
-        parts.append(tag("section", head, *shown))
+            more = f"{code}: {counted(len(known) - MOST_FACTS, 'more answer')} below"
+            parts.append(tag("p", more, class_="left-out"))
     return tag("div", *parts, class_="facts-of") if parts else None
 
 
 def _fact(answer: Answer) -> Markup:
-    said = tag("div", tag("p", answer.sentence), _measures(answer.measures))
+    code = tag("span", answer.code, class_="code", title=_title(answer.code))
+    said = tag("p", answer.sentence, " ", code)
     badge = state_badge(state_word(answer.state))
-    return tag("div", badge, said, class_="fact")
+    return tag(
+        "div", badge, tag("div", said, _measures(answer.measures)), class_="fact"
+    )
 
 
 def _title(code: str) -> str:
@@ -182,7 +195,7 @@ def _slug(code: str) -> str:
 
 
 def _finding(
-    answer: Answer, name: str, scene: Scene, *, is_pictured: bool, is_known: bool
+    answer: Answer, name: str, scene: Scene, drawn: Drawn, *, is_known: bool
 ) -> Markup:
     places = joined((tag("code", _place(one)) for one in answer.places[:6]), ", ")
     facts: list[Content] = [
@@ -199,8 +212,8 @@ def _finding(
         tag("p", *facts, class_="facts"),
         _concerned(answer, scene),
     ]
-    if is_pictured:
-        parts.append(_pictures(answer, name, scene))
+    if drawn != "nothing":
+        parts.append(_pictures(answer, name, scene, drawn))
     elif answer.region:
         parts.append(tag("p", f"Where: {_region_text(answer.region, scene)}"))
     parts += [evidence(answer.state), _measures(answer.measures)]
@@ -253,7 +266,7 @@ def _measures(measures: Sequence[Measure]) -> Markup | None:
         return None
     pairs: list[Markup] = []
     for one in measures:
-        exact = one.exact if one.exact and 0 < len(one.exact) <= 40 else None
+        exact = one.exact if one.exact and len(one.exact) <= _SHORT else None
         unit = f" {one.unit}" if one.unit else ""
         is_told = exact is not None and exact != number(one.value)
         note = tag("span", f" = {exact}", class_="exact") if is_told else None
@@ -263,7 +276,7 @@ def _measures(measures: Sequence[Measure]) -> Markup | None:
     return tag("dl", *pairs, class_="measures")
 
 
-def _pictures(answer: Answer, name: str, scene: Scene) -> Markup | None:
+def _pictures(answer: Answer, name: str, scene: Scene, drawn: Drawn) -> Markup | None:
     """Return the region as pictures: a bar for each variable, a map of two."""
     point: dict[str, Fraction] = {}
     if isinstance(answer.state, (Witness, Bracket)):
@@ -288,7 +301,7 @@ def _pictures(answer: Answer, name: str, scene: Scene) -> Markup | None:
         others = ", ".join(axis.name for axis in shown[_MOST_BARS:])
         parts.append(tag("p", f"not drawn: {others}", class_="left-out"))
     maps: list[Markup] = []
-    for whose, rules in _deciding(answer, scene):
+    for whose, rules in _deciding(answer, scene) if drawn == "maps" else ():
         maps += _maps(shown, region, values, f"{name}-{len(maps)}", whose, rules)
     if not parts and not maps:
         return None
@@ -356,8 +369,11 @@ def _maps(
     asked = {clause.variable for rule in rules.rules for clause in rule.when}
     drawn = [axis for axis in shown if axis.name in asked]
     drawn.sort(key=lambda axis: _share(axis, region.get(axis.name)))
-    work = len(rules.rules) * sum(len(v.terms) for v in rules.variables)
-    if len(drawn) < 2 or asked - values.keys() or work > _MOST_MAP_WORK:
+    if len(drawn) < 2 or asked - values.keys():
+        return
+    if len(rules.rules) > _MOST_MAP_RULES:
+        said = f"not drawn: a map of more than {_MOST_MAP_RULES} rules"
+        yield tag("p", said, class_="left-out")
         return
     across, down = drawn[:2]
     for k, (where, window) in enumerate(windows(across, down, region)):

@@ -77,8 +77,8 @@ def decisions(
         [[0, -1], [-1, -1]]
     """
     shapes = shapes_of(rules.variables)
-    columns = [_along(rule.when, across, shapes, rules) for rule in rules.rules]
-    lines = [_along(rule.when, down, shapes, rules) for rule in rules.rules]
+    columns = _along(rules, across, shapes)
+    lines = _along(rules, down, shapes)
     named = (across[0], down[0])
     fixed = [
         _folded(
@@ -102,18 +102,22 @@ def decisions(
 
 
 def _along(
-    when: Sequence[Clause],
+    rules: RuleBase,
     axis: tuple[str, Sequence[float]],
     shapes: Mapping[tuple[str, str], Shape],
-    rules: RuleBase,
-) -> Degrees:
-    """Return what a rule's clauses about an axis make, at each of its values."""
+) -> list[Degrees]:
+    """Return what each rule's clauses about an axis make, at each of its values."""
     name, values = axis
-    clauses = [clause for clause in when if clause.variable == name]
-    return [
-        _folded([_clause_degree(c, shapes, Fraction(value)) for c in clauses], rules)
-        for value in values
-    ]
+    asked = [[c for c in rule.when if c.variable == name] for rule in rules.rules]
+    found: list[Degrees] = [[] for _ in rules.rules]
+    for value in map(Fraction, values):
+        known: dict[Clause, Fraction] = {}  # rules of a tree share clauses
+        for when, degrees in zip(asked, found, strict=True):
+            for clause in when:
+                if clause not in known:
+                    known[clause] = _clause_degree(clause, shapes, value)
+            degrees.append(_folded([known[clause] for clause in when], rules))
+    return found
 
 
 def _clause_degree(

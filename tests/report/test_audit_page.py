@@ -190,8 +190,8 @@ def test_what_else_is_known_is_told_with_its_numbers() -> None:
         measures=(Measure("clauses", 7.0), Measure("index", 0.5, "1/2")),
     )
     found = shown(found=(size,) * 20)
-    assert "4 rules with 7 clauses clauses 7 index 0.5 = 1/2" in found.text
-    assert "8 more answers below" in found.text
+    assert "4 rules with 7 clauses FT501 clauses 7 index 0.5 = 1/2" in found.text
+    assert "FT501: 8 more answers below" in found.text
     assert "facts" in found.ids
     assert "facts" not in shown(found=()).ids
 
@@ -319,10 +319,13 @@ def test_what_is_too_much_is_left_out_and_counted(
 ) -> None:
     monkeypatch.setattr(audit_findings, "MOST_FINDINGS", 3)
     monkeypatch.setattr(audit_findings, "MOST_PICTURED", 2)
+    monkeypatch.setattr(audit_findings, "MOST_MAPPED", 1)
     monkeypatch.setattr(audit_page, "MOST_QUESTIONS", 4)
     found = shown()
     assert "1 more finding: the JSON has all of them" in found.text
-    assert "Only the first 2 findings have pictures" in found.text
+    assert (
+        "Only the first 2 findings have pictures, and the first 10 maps" in found.text
+    )
     assert "Every question, 10 in all; the first 4 are here" in found.text
     assert {link.removeprefix("#") for link in found.links} <= set(found.ids)
 
