@@ -152,7 +152,7 @@ def audit(
         is_complete=not asked.cut,
         accepted=tuple(sorted(ids.intersection(accepted))),
     )
-    # A count among doubles is one of them from here on, as it is for who reads the file.
+    # A count among doubles is a double from here on, as it is for who reads the file.
     found = msgspec.json.decode(msgspec.json.encode(found), type=Audit)
     return msgspec.structs.replace(found, digest=digest_of(found))
 

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import io
 import os
-import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import click
 import msgspec
 
+from fuzzytree.cli.audit_options import (
+    Options,
+    codes_of,
+    configured,
+    limits_of,
+    repeating,
+    row_of,
+    settings_of,
+    table_of,
+    with_options,
+)
 from fuzzytree.cli.talk import (
     allow_loss_option,
     answer,
@@ -21,91 +30,20 @@ from fuzzytree.cli.talk import (
     progress_bar,
     quiet_option,
     say,
-    setting,
-    standard_input,
     wrong_options,
 )
 from fuzzytree.files import check_place, read_bounded, write_atomically
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.configuration import Configuration, FailOn
-    from fuzzytree.auditing.records import Audit, Settings
+    from fuzzytree.auditing.configuration import FailOn
+    from fuzzytree.auditing.records import Audit
 
 Form = Literal["text", "json", "sarif", "github"]
 
 
-class Options(msgspec.Struct, frozen=True):
-    """The options of the command line, as they were written.
-
-    Attributes:
-        within: `model` or `data`.
-        spreads: So many spreads around the fitted sets, if given.
-        limits: NAME=LOW:HIGH, each.
-        row: NAME=VALUE, joined by commas, if given.
-        select: Beginnings of codes, joined by commas, each.
-        ignore: The same.
-        budget: In seconds, if given.
-        settings: NAME=VALUE, each.
-    """
-
-    within: Literal["model", "data"]
-    spreads: float | None
-    limits: tuple[str, ...]
-    row: str | None
-    select: tuple[str, ...]
-    ignore: tuple[str, ...]
-    budget: float | None
-    settings: tuple[str, ...]
-
-
-_OPTIONS = (
-    click.option("--data", metavar="TABLE", help="Rows of your own."),
-    click.option("--target", metavar="COLUMN", help="The classes in TABLE."),
-    click.option(
-        "--within",
-        type=click.Choice(["model", "data"]),
-        default="model",
-        show_default=True,
-        help="Ask on the model's ranges, or on those of TABLE.",
-    ),
-    click.option(
-        "--spreads", type=float, metavar="K", help="Ask K spreads around the sets."
-    ),
-    click.option(
-        "--limits",
-        metavar="NAME=LOW:HIGH",
-        multiple=True,
-        help="Ask about these values of a variable (repeat).",
-    ),
-    click.option(
-        "--row", metavar="NAME=VALUE,...", help="How far is another decision from here?"
-    ),
-    click.option(
-        "--select", metavar="CODES", multiple=True, help="Ask these only, as FT1,FT301."
-    ),
-    click.option("--ignore", metavar="CODES", multiple=True, help="Leave these out."),
-    click.option(
-        "--budget", type=float, metavar="SECONDS", help="Begin nothing after; 60."
-    ),
-    click.option(
-        "--set",
-        "settings",
-        metavar="NAME=VALUE",
-        multiple=True,
-        help="epsilon, margin, lead, level, overlap, rows or seed (repeat).",
-    ),
-)
-
-
-def _with_options(function: Callable[..., int]) -> Callable[..., int]:
-    for option in reversed(_OPTIONS):
-        function = option(function)
-    return function
-
-
 @click.command("audit", short_help="Find what is odd in a rule base, and prove it.")
 @click.argument("model", metavar="MODEL")
-@_with_options
+@with_options
 @click.option(
     "--config",
     metavar="FILE",
@@ -172,10 +110,10 @@ def command(
             "--target names a column of a table; give it with --data"
         )
     asked = Options(within, spreads, limits, row, select, ignore, budget, settings)
-    known = _configuration(config, quiet=quiet)
+    known = configured(config, quiet=quiet)
     path = baseline or known.baseline
     accepted: Mapping[str, str] = {} if path is None else read_baseline(path)
-    table = _table(data)
+    table = table_of(data)
     with wrong_options(), progress_bar(quiet=quiet) as tell:
         found = verbs.audit(
             model,
@@ -184,14 +122,14 @@ def command(
             delimiter=delimiter,
             within=within,
             spreads=spreads,
-            limits={**{n: (a, b) for n, a, b in known.limits}, **_limits(limits)},
-            row=_row(row),
-            select=_codes(select) or known.select,
-            ignore=_codes(ignore) or known.ignore,
-            settings=_settings(asked, known),
+            limits={**{n: (a, b) for n, a, b in known.limits}, **limits_of(limits)},
+            row=row_of(row),
+            select=codes_of(select) or known.select,
+            ignore=codes_of(ignore) or known.ignore,
+            settings=settings_of(asked, known),
             accepted=accepted,
             allow_loss=allow_loss,
-            repeat=_repeat(model, data, target, config, asked),
+            repeat=repeating(model, data, target, config, asked),
             progress=tell,
         )
     _tell_domain(found, quiet=quiet)
@@ -215,117 +153,6 @@ def command(
     fails = write_baseline is None and _fails(found, fail_on or known.fail_on)
     _tell_verdict(found, lost, quiet=quiet and not fails)
     return 130 if found.was_interrupted else int(fails)
-
-
-# --- options to values
-
-
-def _configuration(path: str | None, *, quiet: bool) -> Configuration:
-    """Return the configuration of a file: the named one, or one that is here."""
-    from fuzzytree.auditing.configuration import (
-        FILE,
-        Configuration,
-        read_configuration,
-    )
-
-    if path is None and not Path(FILE).is_file():
-        return Configuration()
-    found = read_configuration(path or FILE)
-    say(f"read     {path or FILE}", quiet=quiet)
-    return found
-
-
-def _codes(texts: Sequence[str]) -> tuple[str, ...]:
-    return tuple(code.strip() for text in texts for code in text.split(","))
-
-
-def _limits(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the ends of variables.
-
-    Raises:
-        click.UsageError: If one is not NAME=LOW:HIGH.
-    """
-    found: dict[str, tuple[float, float]] = {}
-    for text in texts:
-        name, _, ends = text.rpartition("=")
-        low, mark, high = ends.partition(":")
-        if not name or not mark:
-            raise click.UsageError(f"--limits {text}: must be NAME=LOW:HIGH")
-        if name in found:
-            raise click.UsageError(f"--limits {text}: {name!r} has limits already")
-        found[name] = _number(low, text), _number(high, text)
-    return found
-
-
-def _row(text: str | None) -> dict[str, float] | None:
-    """Return a row.
-
-    Raises:
-        click.UsageError: If it is not NAME=VALUE,...
-    """
-    if text is None:
-        return None
-    found: dict[str, float] = {}
-    for part in text.split(","):
-        name, _, value = part.rpartition("=")
-        if not name.strip():
-            raise click.UsageError(f"--row {text}: must be NAME=VALUE,NAME=VALUE,...")
-        found[name.strip()] = _number(value, text, option="--row")
-    return found
-
-
-def _number(text: str, whole: str, *, option: str = "--limits") -> float:
-    try:
-        return float(text)
-    except ValueError:
-        what = f"{option} {whole}: {text!r} is no number"
-        raise click.UsageError(what) from None
-
-
-def _settings(asked: Options, known: Configuration) -> Settings:
-    """Return the settings of the configuration with those of the command line.
-
-    Raises:
-        ValueError: If one is out of its range.
-    """
-    from fuzzytree.auditing.selecting import changed, check_settings
-
-    found = changed(known.settings, dict(map(setting, asked.settings)))
-    if asked.budget is not None:
-        found = msgspec.structs.replace(found, budget_s=asked.budget)
-        check_settings(found)
-    return found
-
-
-def _table(data: str | None) -> str | io.BytesIO | None:
-    """Return a table by its path; standard input is read whole, to name its bytes."""
-    if data != "-":
-        return data
-    return io.BytesIO(standard_input().read())
-
-
-def _repeat(
-    model: str,
-    data: str | None,
-    target: str | None,
-    config: str | None,
-    asked: Options,
-) -> str:
-    """Return the command that asks the same, but for the choice of codes."""
-    words = ["fuzzytree", "audit", model]
-    for name, value in (
-        ("--data", data),
-        ("--target", target),
-        ("--config", config),
-        ("--spreads", asked.spreads),
-        ("--budget", asked.budget),
-        ("--row", asked.row),
-    ):
-        words += [] if value is None else [name, str(value)]
-    words += [] if asked.within == "model" else ["--within", asked.within]
-    for name, values in (("--limits", asked.limits), ("--set", asked.settings)):
-        words += [word for value in values for word in (name, value)]
-    return shlex.join(words)
 
 
 # --- what is told
