@@ -397,6 +397,16 @@ _CODES = (
         example="IF force is very high THEN power is low",
         remedy="Write the hedged curve as a term of its own, as points.",
     ),
+    Code(
+        "FTD08",
+        "declined: a runtime that is not at hand",
+        "info",
+        what="A runtime is not installed, or cannot run this model, so its answers "
+        "were not compared.",
+        why="Nothing is known about it, and that is said.",
+        example="onnxruntime float64 is not installed (extra 'onnx')",
+        remedy="Install the extra or the program that the reason names.",
+    ),
 )
 
 CODES: Final = MappingProxyType({code.code: code for code in _CODES})

@@ -126,10 +126,10 @@ def drawn(rules: RuleBase, domain: Domain, rows: int, seed: int) -> FloatArray:
         table[position] = np.clip(
             side.low * (1.0 - u) + side.high * u, side.low, side.high
         )
-    return table[:, ~_outside(rules, domain, table)]
+    return table[:, ~outside(rules, domain, table)]
 
 
-def _outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
+def outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
     """Return which rows have a finite value beyond a side; combinations exactly."""
     beyond: BoolArray = np.zeros(values.shape[1], np.bool_)
     known = np.isfinite(values).all(axis=0)
@@ -222,7 +222,7 @@ def counted(
         fired=fired,
         won=won,
         right=None if codes is None else right,
-        outside=int(_outside(rules, subject.domain, values).sum()),
+        outside=int(outside(rules, subject.domain, values).sum()),
         **totals,
     )
 
