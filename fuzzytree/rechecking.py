@@ -1115,13 +1115,18 @@ def answer_of(model: Model, point: Point) -> str | None:
         if best == 0:
             return model.semantics.uncovered
         return model.rules[found.index(best)].then
-    variables = {v.name: v for v in model.variables}
-    branch = Branch((), (), 1, None) if model.nodes else Branch((), (), None, 1)
+    return model.leaves[leaf_of(model, point) - 1].label
+
+
+def leaf_of(tree: Tree, point: Point) -> int:
+    """Return the number of the leaf that a point reaches."""
+    variables = {v.name: v for v in tree.variables}
+    branch = Branch((), (), 1, None) if tree.nodes else Branch((), (), None, 1)
     while branch.node is not None:
-        node = model.nodes[branch.node - 1]
+        node = tree.nodes[branch.node - 1]
         x = value_of(variables[node.variable], point)
         branch = node.branches[node.owners[sum(x > cut for cut in node.cuts)]]
-    return model.leaves[(branch.leaf or 0) - 1].label
+    return branch.leaf or 0
 
 
 # --- Cells and levels: how a `never` is decided again, under the minimum --------------
@@ -1724,6 +1729,11 @@ class _Checks:
         return Grid(self.rules, lines, extra)
 
     @cached_property
+    def paths(self) -> dict[int, Path_]:
+        """The path to each leaf."""
+        return dict(paths(self.model)) if isinstance(self.model, Tree) else {}
+
+    @cached_property
     def heights(self) -> dict[Label, Fraction]:
         """The largest degree of each term on the domain."""
         level = Fraction(self.audit.settings.level)
@@ -1787,11 +1797,14 @@ class _Checks:
 
     def _domain(self) -> None:
         expect = self.report.expect
-        expect(len(self.sides) == len(self.audit.domain.sides), "a side stands twice")
+        order = [name for name in self.variables if name in self.sides]
+        is_plain = [side.variable for side in self.audit.domain.sides] == order
+        expect(is_plain, "the domain's sides are not those of variables, in order")
         for name, side in self.sides.items():
             text = f"the side of {name!r}"
             expect(name in self.variables, f"{text} is of no variable")
             expect(side.low <= side.high, f"{text} has swapped ends")
+            expect(not side.is_open, f"{text} is open, as no audit's is")
             variable = self.variables.get(name)
             if variable is not None and side.origin == "model":
                 is_range = (side.low, side.high) == (variable.low, variable.high)
@@ -1806,6 +1819,12 @@ class _Checks:
         expect(
             codes == sorted(codes), "the answers are not in the order of their codes"
         )
+        ends = [f" --select {code}" for code in codes]
+        texts = [one.repeat for one in audit.answers]
+        pairs = list(zip(texts, ends, strict=True))
+        starts = {text.removesuffix(end) for text, end in pairs}
+        is_one = starts <= {""} or all(text.endswith(end) for text, end in pairs)
+        expect(is_one and len(starts) < 2, "the commands that find it again differ")
         told = [text.split(" ")[0] for text in audit.unasked]
         expect(told == sorted(set(told)), "what was not asked is not in order")
         cut = [text for text in audit.unasked if ": cut short: " in text]
@@ -1880,8 +1899,12 @@ class _Checks:
         }
         for label in answer.terms:
             expect(tuple(label) in terms, f"{where}: there is no {label.term!r}")
+        units = {"", *(v.unit for v in self.variables.values())}
         for measure in answer.measures:
             self._measure(measure, where)
+            expect(measure.unit in units, f"{where}: no unit {measure.unit:.60}")
+        is_fact = answer.code in ("FT205", "FT501") or answer.code.startswith("FTD")
+        expect(not (is_fact and answer.is_finding), f"{where}: it can be no finding")
         for place in answer.places:
             is_file = self.audit.file is not None and place.file == self.audit.file.name
             is_one = is_file and place.line >= 1 and place.column >= 1
@@ -1914,7 +1937,7 @@ class _Checks:
             _AGAIN.get(answer.code, _cannot)(self, answer)
             self.report.count("answers PROVED, decided again")
         elif isinstance(state, Witness):
-            self._witness(state)
+            self._witness(answer, state)
             self.report.count("answers with a WITNESS, evaluated again")
         elif isinstance(state, Bracket):
             _require(state.low <= state.high, "the ends of the bracket are swapped")
@@ -1942,8 +1965,11 @@ class _Checks:
 
     # points and what is claimed of them
 
-    def _witness(self, state: Witness) -> None:
+    def _witness(self, answer: Answer, state: Witness) -> None:
         point = self._point(state.point, state.claims)
+        is_same = answer.region in ((), state.region)
+        _require(is_same, "the answer's region is not that of its witness")
+        _SHOWS.get(answer.code, _shows_anything)(self, answer, state)
         _require(bool(state.claims), "a witness of which nothing is claimed")
         self._spans(state.region)
         for span in state.region:
@@ -2025,6 +2051,9 @@ class _Checks:
         """Return whether a claim holds at a point, evaluated in fractions."""
         model = self.carriers.get(claim.of)
         _require(model is not None, f"there are no {claim.of} to claim something of")
+        given = {n for n, one in zip(claim._fields, claim, strict=True) if one}
+        alien = given - {"kind", "of", *_FIELDS[claim.kind].split(" ")}
+        _require(not alien, f"a claim of kind {claim.kind} has no {', '.join(alien)}")
         assert model is not None
         if claim.kind == "decides":
             return answer_of(model, point) == claim.label
@@ -2079,6 +2108,19 @@ def _said(rule: Rule, shapes: Mapping[tuple[str, str], Shape]) -> list[Any]:
     return [f"{said} {rule.then}", sorted(curves, key=str)]
 
 
+_FIELDS = {
+    "strength": "rules level",
+    "beats": "rules rivals",
+    "ties": "rules rivals",
+    "below": "rules level",
+    "reaches": "rules level",
+    "decides": "label",
+    "degree": "level variable term",
+    "covered": "",
+}
+"""What each kind of claim is about."""
+
+
 def wilson(hits: int, rows: int, confidence: float) -> tuple[float, float]:
     """Return Wilson's interval of a share."""
     _require(0.0 < confidence < 1.0, "a confidence outside (0, 1)")
@@ -2119,7 +2161,7 @@ def _cannot(checks: _Checks, answer: Answer) -> None:
     raise UndecidedError(f"{answer.code} is not decided again here")
 
 
-# --- Deciding again -----------------------------------------------------------------
+# --- Deciding again ----------------------------------------------------------------
 
 
 def _line(checks: _Checks, variable: Variable) -> Line:
@@ -2162,23 +2204,22 @@ def _others(checks: _Checks, rule: int) -> list[int]:
 
 def _is_reached(checks: _Checks, tree: Tree, number: int) -> bool:
     """Return whether the intervals on the path to a leaf meet the domain."""
-    path = dict(paths(tree))[number]
-    for variable in tree.variables:
-        line = _line(checks, variable)
-        met = [(line.low, line.high, line.is_open)]
-        for node, way in path:
-            if node.variable == variable.name:
-                ends = zip((None, *node.cuts), (*node.cuts, None), strict=True)
-                branch = node.branches.index(way)
-                mine = [
-                    e
-                    for e, owner in zip(ends, node.owners, strict=True)
-                    if owner == branch
-                ]
-                met = [_met(one, low, high) for one in met for low, high in mine]
-        if not any(low < high or (low == high and not o) for low, high, o in met):
-            return False
-    return True
+    return all(_ways(checks, tree, number, variable) for variable in tree.variables)
+
+
+def _ways(
+    checks: _Checks, tree: Tree, number: int, variable: Variable
+) -> list[tuple[Fraction, Fraction, bool]]:
+    """Return the values of a variable that lead to a leaf; True opens the low end."""
+    line = _line(checks, variable)
+    met = [(line.low, line.high, line.is_open)]
+    for node, way in checks.paths[number]:
+        if node.variable == variable.name:
+            ends = zip((None, *node.cuts), (*node.cuts, None), node.owners, strict=True)
+            place = node.branches.index(way)
+            mine = [(low, high) for low, high, owner in ends if owner == place]
+            met = [_met(one, low, high) for one in met for low, high in mine]
+    return [(a, b, o) for a, b, o in met if a < b or (a == b and not o)]
 
 
 def _met(
@@ -2217,6 +2258,33 @@ def _dead(checks: _Checks, answer: Answer) -> None:
     )
 
 
+def _shows_anything(checks: _Checks, answer: Answer, state: Witness) -> None:
+    """Ask nothing of a witness but that its claims hold."""
+
+
+def _shows_region(checks: _Checks, answer: Answer, state: Witness) -> None:
+    """Compare the region of a leaf with the intervals on the path to it."""
+    tree = checks.model
+    _require(isinstance(tree, Tree) and len(answer.rules) == 1, "it is of no leaf")
+    assert isinstance(tree, Tree)
+    number = answer.rules[0]
+    point = {one.input: _fraction(one.exact) for one in state.point}
+    _require(leaf_of(tree, point) == number, "the witness reaches another leaf")
+    label = tree.leaves[number - 1].label
+    _require([c.label for c in state.claims] == [label], "it is not the leaf's class")
+    asked = {node.variable for node, _ in checks.paths[number]}
+    _require({s.variable for s in state.region} == asked, "not what its path asks")
+    for span in state.region:
+        met = _ways(checks, tree, number, checks.variables[span.variable])
+        ends = [(float(low), float(high)) for low, high, _ in met]
+        is_one = any(
+            math.isclose(span.low or 0.0, low, rel_tol=2.0**-50)
+            and math.isclose(span.high or 0.0, high, rel_tol=2.0**-50)
+            for low, high in ends
+        )
+        _require(is_one, f"the path leads elsewhere in {span.variable!r}")
+
+
 def _covered(checks: _Checks, answer: Answer) -> None:
     if checks.rules.semantics.conjunction != "min":
         raise UndecidedError("gaps under product are not decided again here")
@@ -2238,7 +2306,7 @@ def _heights(checks: _Checks, answer: Answer) -> None:
 
 
 def _height(shape: Shape, line: Line, level: Fraction) -> Fraction:
-    """Return the largest degree on a line, from below; exactly whether it is a level."""
+    """Return the largest degree on a line, from below; exactly at or below a level."""
     levels = Levels()
     mark = levels.add((level,), ZERO)
     found = line_cells([((shape,), False)], line, levels)
@@ -2319,6 +2387,10 @@ def _overlaps(checks: _Checks, answer: Answer) -> None:
         counts = {"pairs not told one by one": len(near) - len(told)}
         counts |= {"pairs apart": len(checks.shares) - len(near) - bare}
         _counted(answer, counts | {"pairs without area": bare}, 3)
+        apart = [one for pair, one in checks.shares.items() if one and pair not in near]
+        low, high = max(apart, default=(ZERO, ZERO))
+        value = Fraction(next(m.value for m in answer.measures if "largest" in m.name))
+        _require(low - FINE <= value <= high + FINE, "the largest share is another one")
         return
     low, high = near[answer.terms]
     value = next(m.value for m in answer.measures if m.name.startswith("shared area"))
@@ -2346,6 +2418,9 @@ def _shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] |
     return (least / (most + slack), (least + slack) / most) if most else None
 
 
+_SHOWS: dict[str, Callable[[_Checks, Answer, Witness], None]] = {
+    "FT205": _shows_region,
+}
 _AGAIN: dict[str, Callable[[_Checks, Answer], None]] = {
     "FT101": _dead,
     "FT301": _covered,
