@@ -323,9 +323,8 @@ def test_what_is_too_much_is_left_out_and_counted(
     monkeypatch.setattr(audit_page, "MOST_QUESTIONS", 4)
     found = shown()
     assert "1 more finding: the JSON has all of them" in found.text
-    assert (
-        "Only the first 2 findings have pictures, and the first 10 maps" in found.text
-    )
+    said = "Only the first 1 findings have maps, and the first 2 pictures of variables"
+    assert said in found.text
     assert "Every question, 10 in all; the first 4 are here" in found.text
     assert {link.removeprefix("#") for link in found.links} <= set(found.ids)
 
