@@ -350,7 +350,9 @@ def _stretched(
     """Return a box with one end moved outwards as far as the answers stay."""
 
     def moved(end: Fraction) -> Box:
-        stretch = box[place]._replace(**{field: end})
+        low, high, _ = box[place]
+        ends = (end, high) if field == "low" else (low, end)
+        stretch = Stretch(*ends, True)
         return (*box[:place], stretch, *box[place + 1 :])
 
     best, beyond = (

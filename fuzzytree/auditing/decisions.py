@@ -1,0 +1,333 @@
+"""Where two models decide otherwise, and how that comes about.
+
+The same operations on the same numbers prove decisions equal on any input. Otherwise
+rows of data, probes of both models, points drawn from the domain and points beside
+decision boundaries are tried, each answered exactly; and where these show no
+difference, boxes prove that there is none on the domain, or find it, or leave a bracket
+(`fuzzytree.proving.alike`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.domains import inputs_of
+from fuzzytree.auditing.drafting import Evidence
+from fuzzytree.auditing.records import Answer, Settings
+from fuzzytree.auditing.structure import answer_text
+from fuzzytree.auditing.subject import Rows
+from fuzzytree.auditing.support import drawn, share
+from fuzzytree.contracts import Document
+from fuzzytree.numerics.oracle import MISSING, TIE, UNCOVERED, Decided, decide
+from fuzzytree.probing import probe_values
+from fuzzytree.proving.alike import alike, region
+from fuzzytree.proving.answers import Answered, answer_at, difference_at
+from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.states import (
+    Bracket,
+    Proved,
+    Span,
+    State,
+    Witness,
+    point_of,
+)
+from fuzzytree.pruning import proof_faults, unguarded
+from fuzzytree.rulebase import Rule, RuleBase, Variable
+from fuzzytree.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, IntArray
+
+_PROBES = 4_000  # of each model
+_SEGMENTS = 64  # between points of different decisions, halved down to doubles
+_HALVINGS = 70
+_MOST_TOLD = 24  # pairs of classes with a witness each
+_MOST_REGIONS = 4  # of which the box is looked for
+
+
+class Pair(msgspec.Struct, frozen=True, eq=False):
+    """Two models as rules, with the points on which they are compared.
+
+    Attributes:
+        old: The old rules.
+        new: The new rules.
+        inputs: The inputs of either, the old ones first.
+        domain: A side for each.
+        trees: The trees that they come from, if both are trees.
+    """
+
+    old: RuleBase
+    new: RuleBase
+    inputs: tuple[str, ...]
+    domain: Domain
+    trees: tuple[FuzzyTree, FuzzyTree] | None = None
+
+    def decided(self, values: FloatArray) -> tuple[Decided, Decided]:
+        """Return the exact answers of both to rows of shape (inputs, rows)."""
+        one, other = (
+            decide(
+                model,
+                values[[self.inputs.index(name) for name in model.inputs]],
+                with_strengths=False,
+            )
+            for model in (self.old, self.new)
+        )
+        return one, other
+
+    def labels(self, found: tuple[Decided, Decided]) -> tuple[IntArray, IntArray]:
+        """Return the classes of both answers, numbered alike; -1 is no class."""
+        known = list(dict.fromkeys((*self.old.classes, *self.new.classes)))
+        one, other = (
+            np.array([*map(known.index, model.classes), -1], np.int64)[decided.label]
+            for model, decided in zip((self.old, self.new), found, strict=True)
+        )
+        return one, other
+
+
+def all_inputs(old: Document, new: Document) -> tuple[str, ...]:
+    """Return the columns that either of two models needs, the old ones first."""
+    return tuple(dict.fromkeys((*inputs_of(old), *inputs_of(new))))
+
+
+def union(old: Document, new: Document) -> RuleBase:
+    """Return rules that ask nothing of the inputs of both models."""
+    inputs = tuple(Variable(name) for name in all_inputs(old, new))
+    return RuleBase("both", ("x",), inputs, (Rule((), "x"),))
+
+
+def decisions(
+    pair: Pair,
+    rows: Rows | None,
+    settings: Settings,
+    clock: Clock,
+) -> tuple[list[Answer], Evidence]:
+    """Return what is known of decisions, and how those that differ come about."""
+    whole = _same_everywhere(pair)
+    if whole is not None:
+        return [whole], Evidence(is_equal=True)
+    found = _Found(pair)
+    answers: list[Answer] = []
+    if rows is not None:
+        answers.append(_on_rows(pair, rows, found))
+    values = drawn(union(pair.old, pair.new), pair.domain, settings.rows, settings.seed)
+    many = found.add(values)
+    found.add(_probes(pair))
+    if not found.witnesses:
+        found.add(_boundaries(pair, values))
+    if found.witnesses:
+        answers = [*_witness_answers(pair, found), *answers]
+    else:
+        clock.tell("proving that decisions are equal", 0.3)
+        state = alike(pair.old, pair.new, pair.domain, clock)
+        if isinstance(state, Witness):
+            found.add_point(point_of(state.point))
+            answers = [*_witness_answers(pair, found), *answers]
+        else:
+            answers.insert(0, _equal_answer(pair, state))
+    is_open = not isinstance(answers[0].state, Proved)
+    if values.shape[1] and is_open:
+        answers.append(_drawn_answer(many, values.shape[1], settings.seed))
+    return answers, found.evidence(is_equal=not is_open)
+
+
+def _same_everywhere(pair: Pair) -> Answer | None:
+    """Return that both perform the same operations on the same numbers, if they do."""
+    old, new = pair.old, pair.new
+    faults = [*proof_faults(old, new), *unguarded(old, new), *unguarded(new, old)]
+    if faults or old.inputs != new.inputs:
+        return None
+    how = "both take the same curves of the same inputs in the same rules, on any input"
+    return Answer("FT801", "decisions", _EQUAL, Proved(how), is_finding=False)
+
+
+_EQUAL = "both models decide alike"
+
+
+def _equal_answer(pair: Pair, state: State) -> Answer:
+    sentence = f"{_EQUAL} everywhere on the domain"
+    old, new = pair.old, pair.new
+    if old.semantics.missing != new.semantics.missing or unguarded(old, new):
+        sentence += ", where no value is missing"
+    if isinstance(state, Bracket):
+        sentence = (
+            "no decision was seen to differ, and where both margins are larger than "
+            f"{state.high:.3g} none does"
+        )
+    return Answer("FT801", "decisions", sentence, state, is_finding=False)
+
+
+def _on_rows(pair: Pair, rows: Rows, found: _Found) -> Answer:
+    count = rows.values.shape[1]
+    hits = found.add(rows.values, name="row")
+    sentence = f"{hits} of {count} rows of {rows.name} are answered otherwise"
+    state = share("rows that are answered otherwise", hits, count, rows.name)
+    return Answer(
+        "FT801", "rows", sentence, state, is_finding=hits > 0, severity="error"
+    )
+
+
+def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
+    how = f"{rows} points drawn evenly from the domain, seed {seed}"
+    state = share("the domain that is answered otherwise", hits, rows, how)
+    sentence = f"{hits} of {rows} points drawn from the domain are answered otherwise"
+    return Answer("FT801", "domain", sentence, state, is_finding=hits > 0)
+
+
+def _witness_answers(pair: Pair, found: _Found) -> Iterator[Answer]:
+    """Yield a witness for each pair of classes, the clearest one that is known."""
+    told = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
+    for number, (labels, (_, name, point)) in enumerate(told[:_MOST_TOLD]):
+        one, other = answer_at(pair.old, point), answer_at(pair.new, point)
+        state = difference_at(pair.old, pair.new, point)
+        assert state is not None  # only such points are kept
+        spans: tuple[Span, ...] = ()
+        if number < _MOST_REGIONS:
+            spans = region(pair.old, pair.new, pair.domain, point)
+        state = msgspec.structs.replace(state, region=spans)
+        sentence = f"the old model answers {_answered(one)}, the new one "
+        sentence += _answered(other)
+        if name:
+            sentence = f"{name}: {sentence}"
+        yield Answer(
+            "FT801",
+            " -> ".join(map(answer_text, labels)),
+            sentence,
+            state,
+            is_finding=True,
+            severity="error",
+            region=spans,
+        )
+    if len(told) > _MOST_TOLD:
+        left = len(told) - _MOST_TOLD
+        sentence = f"{left} more pairs of classes are answered one for the other"
+        known = told[_MOST_TOLD][1][2]
+        state = difference_at(pair.old, pair.new, known)
+        assert state is not None
+        yield Answer("FT801", "more", sentence, state, is_finding=True)
+
+
+def _answered(one: Answered) -> str:
+    if not one.rule:
+        return f"{answer_text(one.label)}, for no rule fires"
+    how = f"rule {one.rule}, the first of equals" if one.is_tie else f"rule {one.rule}"
+    return f"{answer_text(one.label)} by {how}"
+
+
+class _Found:
+    """Points at which two models answer otherwise, and how that comes about."""
+
+    def __init__(self, pair: Pair) -> None:
+        self.pair = pair
+        self.witnesses: dict[
+            tuple[str | None, str | None], tuple[float, str, dict[str, Fraction]]
+        ] = {}
+        self.old_rules: set[int] = set()
+        self.new_rules: set[int] = set()
+        self.has_tie = self.has_none = False
+
+    def add(self, values: FloatArray, name: str = "") -> int:
+        """Compare the answers to some rows, and return how many differ.
+
+        Args:
+            values: Shape (inputs, rows).
+            name: What to call a row, with its number, if it is the user's.
+        """
+        if not values.shape[1]:
+            return 0
+        found = self.pair.decided(values)
+        one, other = self.pair.labels(found)
+        rows = np.flatnonzero(one != other)
+        margins = np.minimum(found[0].margin, found[1].margin)
+        missing = (found[0].status == MISSING) | (found[1].status == MISSING)
+        known = rows[~missing[rows]]
+        self.old_rules |= {*found[0].rule[known].tolist()} - {0}
+        self.new_rules |= {*found[1].rule[known].tolist()} - {0}
+        status = np.concatenate([each.status[known] for each in found])
+        self.has_tie |= bool((status == TIE).any())
+        self.has_none |= bool((status == UNCOVERED).any())
+        for row in _clearest(one[known], other[known], margins[known]):
+            place = int(known[row])
+            x = zip(self.pair.inputs, values[:, place].tolist(), strict=True)
+            point = {key: Fraction(value) for key, value in x}
+            title = f"{name} {place + 1}" if name else ""
+            self.add_point(point, float(margins[place]), title)
+        return int(rows.size)
+
+    def add_point(
+        self, point: dict[str, Fraction], margin: float = 0.0, name: str = ""
+    ) -> None:
+        """Keep a point, if its pair of classes has no clearer one."""
+        one, other = answer_at(self.pair.old, point), answer_at(self.pair.new, point)
+        self.old_rules |= {one.rule} - {0}
+        self.new_rules |= {other.rule} - {0}
+        self.has_tie |= one.is_tie or other.is_tie
+        self.has_none |= not (one.rule and other.rule)
+        kept = self.witnesses.get((one.label, other.label))
+        if kept is None or (margin > kept[0] and not kept[1]):
+            self.witnesses[one.label, other.label] = (margin, name, point)
+
+    def evidence(self, *, is_equal: bool) -> Evidence:
+        """Return how differing decisions come about."""
+        return Evidence(
+            frozenset(self.old_rules),
+            frozenset(self.new_rules),
+            self.has_tie,
+            self.has_none,
+            is_equal,
+        )
+
+
+def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
+    """Return the row with the largest margin for each pair of classes."""
+    best: dict[tuple[int, int], int] = {}
+    for row, key in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
+        if key not in best or margins[row] > margins[best[key]]:
+            best[key] = row
+    return list(best.values())
+
+
+def _probes(pair: Pair) -> FloatArray:
+    """Return the probes of both models that are on the domain."""
+    sides = [pair.domain.side(name) for name in pair.inputs]
+    low = np.array([side.low if side else 0.0 for side in sides])
+    high = np.array([side.high if side else 0.0 for side in sides])
+    made: list[FloatArray] = []
+    for model in (pair.old, pair.new):
+        known = probe_values(model, _PROBES)
+        # An input that this model does not ask stays in the middle of its side.
+        values = np.repeat((low / 2 + high / 2)[:, None], known.shape[1], axis=1)
+        values[[pair.inputs.index(name) for name in model.inputs]] = known
+        made.append(values)
+    values = np.hstack(made)
+    inside = (values >= low[:, None]) & (values <= high[:, None])
+    kept: FloatArray = values[:, inside.all(axis=0)]
+    return kept
+
+
+def _boundaries(pair: Pair, values: FloatArray) -> FloatArray:
+    """Return points beside the old model's decision boundaries, to the last double.
+
+    Points of different decisions are joined, and the line is halved as long as its
+    ends are decided otherwise by the old model.
+    """
+    if not values.shape[1]:
+        return values
+    labels, _ = pair.labels(pair.decided(values))
+    starts, ends = np.arange(values.shape[1] - 1), np.arange(1, values.shape[1])
+    pairs = np.flatnonzero(labels[starts] != labels[ends])[:_SEGMENTS]
+    low, high = values[:, starts[pairs]], values[:, ends[pairs]]
+    known = labels[starts[pairs]]
+    seen = [low, high]
+    for _ in range(_HALVINGS if pairs.size else 0):
+        middle = low / 2 + high / 2
+        found, _ = pair.labels(pair.decided(middle))
+        is_low = found == known
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+        seen.append(middle)
+    return np.hstack(seen)
