@@ -1,4 +1,7 @@
-"""The questions of an audit and the reasons for declining, each with a stable code."""
+"""The questions of an audit and the reasons for declining, each with a stable code.
+
+After a change `python -m fuzzytree.report.explanations docs/audit.md` rewrites the page.
+"""
 
 from __future__ import annotations
 
