@@ -127,7 +127,7 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
     if found:
         said += f"; `fuzzytree explain {found[0].code}` tells what to do"
     elif audit.is_complete:
-        said += f"; {counted(len(audit.answers), 'question')} asked and answered"
+        said += f"; {_asked_text(audit)}"
     return said
 
 
@@ -340,6 +340,15 @@ def _gathered(unasked: Sequence[str]) -> Iterator[str]:
     if left_out:
         yield f"{', '.join(left_out)}{_LEFT_OUT}"
     yield from (text for text in unasked if not text.endswith(_LEFT_OUT))
+
+
+def _asked_text(audit: Audit) -> str:
+    """Return how many questions were asked, and how many of them were declined."""
+    asked = f"{counted(len(audit.answers), 'question')} asked"
+    declined = sum(isinstance(one.state, Declined) for one in audit.answers)
+    return (
+        f"{asked}, {declined} of them declined" if declined else f"{asked} and answered"
+    )
 
 
 def _item(text: str) -> Iterator[str]:

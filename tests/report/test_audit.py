@@ -126,7 +126,9 @@ def test_the_verdict_counts_and_says_what_next() -> None:
         "--write-baseline forgets; `fuzzytree explain FT101` tells what to do"
     )
     calm = replace(audit, answers=audit.answers[3:], accepted=(), is_complete=True)
-    assert verdict_text(calm) == "nothing found; 2 questions asked and answered"
+    assert verdict_text(calm) == "nothing found; 2 questions asked, 1 of them declined"
+    sure = replace(calm, answers=calm.answers[1:])
+    assert verdict_text(sure) == "nothing found; 1 question asked and answered"
     cut = replace(calm, unasked=("FT101 dead rule: cut short: interrupted",))
     assert verdict_text(replace(cut, is_complete=False)) == (
         "nothing found; interrupted: what is proved is kept, the rest is not asked"
