@@ -111,8 +111,8 @@ def places(elements: Sequence[Element]) -> tuple[Place, ...]:
         | {
             level
             for of in laid
-            for piece, _ in of
-            if piece.cap == CAP
+            for piece, polynomial in of
+            if piece.cap == CAP and len(polynomial) > 1
             for level in (CAP, 1 - CAP)
         }
     )

@@ -27,7 +27,7 @@ from fuzzytree.proving.states import (
 from fuzzytree.proving.witnesses import Point, coupled, is_within, point_with
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs
-_MOST_FINE = 2_000  # levels that are worth knowing as fractions
+_MOST_FINE = 300  # levels that are worth knowing as fractions
 
 
 def below(given: Ground, epsilon: Fraction, clock: Clock | None = None) -> State:

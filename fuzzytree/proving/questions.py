@@ -109,7 +109,7 @@ class _Search:
         return Contest(given, tuple(n - 1 for n in ours), tuple(n - 1 for n in rivals))
 
     def _levels(self, contest: Contest) -> Iterator[tuple[int, Fraction]]:
-        """Yield bands between which and the next level of another one nothing changes.
+        """Yield bands from which up to another level nothing changes, and that level.
 
         With a ceiling, what is left below only grows with the level: the highest do.
         """
@@ -120,11 +120,14 @@ class _Search:
             if below:
                 yield below[-1], min(ceiling, bands.low_after(below[-1]))
             return
+        found: list[tuple[int, Fraction]] = []
         above = bands.low[-1]
         for band in events:
             if band + 1 < len(bands.low):
-                yield band, above
+                found.append((band, above))
                 above = bands.low[band]
+        # Between levels far apart the lead is large, and so is the box around it.
+        yield from sorted(found, key=lambda one: float(bands.high[one[0]] - one[1]))
 
     def _doubtful(self, contest: Contest) -> Iterator[int]:
         """Yield bands within which the order of levels is not known and matters."""
@@ -198,7 +201,7 @@ class _Search:
         levels: tuple[Fraction, Fraction],
         chosen: Sequence[int],
     ) -> Witness | None:
-        level = _between(levels[0], min(levels[1], contest.bands.low_after(band)))
+        level = _between(*levels)
         wanted: dict[int, Stretch] = {}
         left = contest.full
         # Axes that leave many rivals below come first: few axes then matter.

@@ -1,0 +1,285 @@
+"""Are rules equally strong on a set with an interior, and nobody stronger?
+
+Under the minimum, rules tie on more than a surface where their weakest clause is the
+same curve on one axis, the *pivot*: there the level is that curve's value, all the
+rules reach it on the other axes, and every rival stays at or below it: on some other
+axis strictly below, or on the pivot as a curve that is below or equal. The level moves
+with the pivot's value, so levels between two critical ones suffice; a curve that is
+constant has its one level, which is then a critical one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.contests import Contest, weakest
+from fuzzytree.proving.covering import cover, maximal
+from fuzzytree.proving.ground import Ground, Laid, strengths_at
+from fuzzytree.proving.linear import simple
+from fuzzytree.proving.parts import START, Stretch, part_of, stretch
+from fuzzytree.proving.states import (
+    Bracket,
+    Claim,
+    Declined,
+    Proved,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.proving.witnesses import Point, is_within, point_with
+
+
+class _Asked(NamedTuple):
+    """Rules that shall tie, rivals that must be below, rivals that may be equal."""
+
+    ours: tuple[int, ...]
+    strict: tuple[int, ...]
+    weak: tuple[int, ...]
+
+    @property
+    def rivals(self) -> tuple[int, ...]:
+        return self.strict + self.weak
+
+
+class _Pivot(NamedTuple):
+    axis: int
+    cell: int
+    element: int
+    mask: int
+
+
+def tie(given: Ground, one: int, other: int, clock: Clock | None = None) -> State:
+    """Return whether two rules tie as the strongest, on a set with an interior.
+
+    Args:
+        given: The rules and the box.
+        one: The number of a rule, from 1.
+        other: The number of another one.
+        clock: How much time there is; no limit unless given.
+
+    Returns:
+        `Proved`: they never do. `Witness`: here they do. `Declined`: the conjunction
+        is not the minimum, or inputs that depend on each other leave it open.
+    """
+    every = range(1, len(given.rules.rules) + 1)
+    rest = tuple(n for n in every if n not in (one, other))
+    return _asked(given, _Asked((one, other), (), rest), clock or Clock())
+
+
+def decides_by_order(
+    given: Ground,
+    rule: int,
+    before: Collection[int],
+    behind: Collection[int],
+    clock: Clock | None = None,
+) -> State:
+    """Return whether a rule is somewhere as strong as any, on a set with an interior.
+
+    Args:
+        given: The rules and the box.
+        rule: The number of the rule, from 1.
+        before: The numbers of the rivals that win ties against it.
+        behind: The numbers of the rivals that lose them.
+        clock: How much time there is; no limit unless given.
+
+    Returns:
+        As `tie`.
+    """
+    asked = _Asked((rule,), tuple(sorted(before)), tuple(sorted(behind)))
+    return _asked(given, asked, clock or Clock())
+
+
+def _asked(given: Ground, asked: _Asked, clock: Clock) -> State:
+    if given.is_empty:
+        return Proved("the domain has no point")
+    if given.rules.semantics.conjunction == "product":
+        reason = "ties under the product are not decided: it has no exact method here"
+        return Declined("FTD01", reason)
+    try:
+        return _searched(given, asked, clock)
+    except OutOfTimeError:
+        names = " and ".join(map(str, asked.ours))
+        what = f"whether rules {names} tie (1) or not (0)"
+        return Bracket(what, 0.0, 1.0, "the budget was spent")
+
+
+def _searched(given: Ground, asked: _Asked, clock: Clock) -> State:
+    contest = Contest(
+        given,
+        tuple(n - 1 for n in asked.ours),
+        tuple(n - 1 for n in asked.rivals),
+    )
+    pivots = [
+        pivot
+        for axis, laid in enumerate(given.laid[0])
+        for pivot in _pivots(contest, asked, axis, laid)
+    ]
+    bands, levels, is_open = contest.bands, 0, False
+    floors = [options.at_gap for options in contest.options]
+    for pivot in pivots:
+        laid = given.laid[0][pivot.axis]
+        least = int(laid.least[pivot.element, pivot.cell])
+        most = int(laid.most[pivot.element, pivot.cell])
+        is_flat = least == most
+        if is_flat and not bands.is_sharp[least]:
+            clock.check()
+            vague = [
+                options.at_band(least)
+                for axis, options in enumerate(contest.options)
+                if axis != pivot.axis
+            ]
+            if cover([(pivot.mask,), *vague], contest.full, clock) is None:
+                continue
+            # What may be there is looked for as at a level that is known exactly.
+            is_open = True
+        tried = [least] if is_flat else _levels(contest, least, most)
+        for band in tried:
+            clock.check()
+            levels += 1
+            families = [
+                _flat_family(contest, axis, band) if is_flat else floors[axis](band)
+                for axis in range(len(floors))
+                if axis != pivot.axis
+            ]
+            chosen = cover([(pivot.mask,), *families], contest.full, clock)
+            if chosen is None:
+                continue
+            found = _witness(contest, asked, pivot, band, chosen[1:], is_flat=is_flat)
+            if found is not None:
+                return found
+            is_open = True
+    if is_open and not given.is_fine:
+        return _searched(given.fine, asked, clock)
+    if is_open:
+        reason = "the inputs of its variables depend on each other, or levels touch"
+        return Declined("FTD04", reason)
+    return Proved(f"{len(pivots)} cells where they share a curve, {levels} levels")
+
+
+def _levels(contest: Contest, least: int, most: int) -> list[int]:
+    """Return bands from which on, up to the next one, nothing changes."""
+    inner = {band for band in contest.events if least < band < most}
+    return sorted({least, *inner})
+
+
+def _pivots(contest: Contest, asked: _Asked, axis: int, laid: Laid) -> list[_Pivot]:
+    """Return the cells of an axis in which all of ours are the same curve, not 0."""
+    rank = laid.cells.rank
+    columns = np.arange(len(rank))
+    ours = rank[columns, laid.of[np.array(contest.ours)]]
+    rivals = rank[columns, laid.of[np.array(contest.rivals, dtype=np.int64)]]
+    mine = laid.of[contest.ours[0]]
+    fits = (ours == ours[0]).all(axis=0) & ~laid.is_zero[mine, columns]
+    limit = np.array([0] * len(asked.strict) + [1] * len(asked.weak))[:, np.newaxis]
+    is_below = rivals < ours[0] + limit
+    found: dict[tuple[int, int, int, int], _Pivot] = {}
+    for cell in np.flatnonzero(fits).tolist():
+        mask = sum(1 << n for n in np.flatnonzero(is_below[:, cell]).tolist())
+        element = int(mine[cell])
+        ends = int(laid.least[element, cell]), int(laid.most[element, cell])
+        found.setdefault((element, mask, *ends), _Pivot(axis, cell, element, mask))
+    return list(found.values())
+
+
+def _flat_family(contest: Contest, axis: int, band: int) -> tuple[int, ...]:
+    """Return what is left strictly below a sharp level where ours reach it."""
+    options, laid = contest.all_options[axis], contest.ground.laid[0][axis]
+    masks: list[int] = []
+    for number in np.flatnonzero(options.where >= START).tolist():
+        cell = int(options.where[number])
+        one = weakest(laid, contest.ours, cell)
+        if options.top[number] > band or (
+            options.top[number] == band
+            and (cell == START or int(laid.least[one, cell]) == band)
+        ):
+            below = options.floor[number] < band
+            masks.append(sum(1 << n for n in np.flatnonzero(below).tolist()))
+    return maximal(masks)
+
+
+def _witness(
+    contest: Contest,
+    asked: _Asked,
+    pivot: _Pivot,
+    band: int,
+    chosen: Sequence[int],
+    *,
+    is_flat: bool,
+) -> Witness | None:
+    """Return a point at which ours tie, if one is found."""
+    given = contest.ground
+    laid = given.laid[0][pivot.axis]
+    low, high = ends = laid.cells.between[pivot.cell]
+    element = laid.axis.elements[pivot.element]
+    if not is_flat:
+        first, last = contest.bands.high[band], contest.bands.low_after(band)
+        room = (last - first) / 4
+        for level, is_high in ((first + room, True), (last - room, False)):
+            part = part_of(element, ends, level, is_high=is_high, bits=64)
+            low, high = max(low, part.low), min(high, part.high)
+        if not low < high:
+            return None
+    at = simple(low, high)
+    level = element.degree(at)
+    wanted = {pivot.axis: Stretch(at, at, is_open=False)}
+    if is_flat:
+        wanted = {pivot.axis: Stretch(low, high)}
+    left = contest.full & ~pivot.mask
+    others = [axis for axis in range(len(given.laid[0])) if axis != pivot.axis]
+    for axis, mask in zip(others, chosen, strict=True):
+        found = _part(contest, axis, level, mask & left)
+        if found is None:
+            return None
+        wanted[axis] = found
+        left &= ~mask
+    point = point_with(given, wanted)
+    return None if point is None else _checked(given, asked, point)
+
+
+def _part(contest: Contest, axis: int, level: Fraction, mask: int) -> Stretch | None:
+    """Return where on an axis ours reach a level and some rivals stay below it."""
+    options, laid = contest.all_options[axis], contest.ground.laid[0][axis]
+    rivals = [n for n in range(len(contest.rivals)) if mask >> n & 1]
+    order = np.argsort(-options.top, kind="stable")
+    for number in order[options.where[order] >= START].tolist():
+        if (options.floor[number, rivals] > options.top[number]).any():
+            continue
+        cell = int(options.where[number])
+        mine = weakest(laid, contest.ours, cell)
+        below = {weakest(laid, [contest.rivals[n]], cell) for n in rivals}
+        found = stretch(laid, cell, level, [mine], below)
+        if found is not None:
+            return found
+    return None
+
+
+def _checked(given: Ground, asked: _Asked, point: Point) -> Witness | None:
+    strengths = strengths_at(given, point)
+    mine = strengths[asked.ours[0] - 1]
+    holds = (
+        all(strengths[n - 1] == mine for n in asked.ours)
+        and all(strengths[n - 1] < mine for n in asked.strict)
+        and all(strengths[n - 1] <= mine for n in asked.weak)
+        and mine > 0
+        and is_within(given, point)
+    )
+    if not holds:
+        return None
+    return Witness(coordinates(point), _claims(asked, strengths, mine))
+
+
+def _claims(
+    asked: _Asked, strengths: Sequence[Fraction], mine: Fraction
+) -> tuple[Claim, ...]:
+    every = asked.ours + asked.rivals
+    level = tuple(sorted(n for n in every if strengths[n - 1] == mine))
+    below = tuple(sorted(n for n in every if strengths[n - 1] < mine))
+    return (
+        Claim("ties", rules=level, rivals=below),
+        Claim("strength", rules=(asked.ours[0],), level=str(mine)),
+    )

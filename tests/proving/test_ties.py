@@ -1,0 +1,110 @@
+"""Ties on sets with an interior are found where rules share their weakest clause."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from fuzzytree.numerics.oracle import TIE, decide
+from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.ground import ground, strengths_at
+from fuzzytree.proving.states import Declined, Proved, Witness, point_of
+from fuzzytree.proving.ties import decides_by_order, tie
+from fuzzytree.rulebase import (
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
+from tests.proving.bases import random_base, unit_domain
+
+UP = Term("up", Points((0.0, 1.0), (0.0, 1.0)))
+DOWN = Term("down", Points((0.0, 1.0), (1.0, 0.0)))
+HALF = Term("half", Points((0.0,), (0.5,)))
+
+
+def _rules(*rules: tuple[str, str, str], conjunction: str = "min") -> RuleBase:
+    variables = (Variable("x", (UP, DOWN, HALF)), Variable("y", (UP, DOWN, HALF)))
+    made = tuple(
+        Rule((Clause("x", (a,)), Clause("y", (b,))), label) for a, b, label in rules
+    )
+    classes = tuple(dict.fromkeys(label for _, _, label in rules))
+    semantics = Semantics(conjunction)  # type: ignore[arg-type]
+    return RuleBase("ties", classes, variables, made, semantics)
+
+
+SQUARE = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
+
+
+def test_rules_that_share_their_weakest_clause_tie() -> None:
+    given = ground(_rules(("up", "up", "a"), ("up", "down", "b")), SQUARE)
+    found = tie(given, 1, 2)
+    assert isinstance(found, Witness)
+    one, two = strengths_at(given, point_of(found.point))
+    assert one == two > 0
+
+
+def test_rules_that_share_nothing_tie_on_a_line_only() -> None:
+    given = ground(_rules(("up", "up", "a"), ("down", "down", "b")), SQUARE)
+    assert isinstance(tie(given, 1, 2), Proved)
+
+
+def test_a_third_rule_that_is_stronger_ends_the_tie() -> None:
+    rules = (("up", "up", "a"), ("up", "down", "b"))
+    above = ("half", "half", "c")
+    given = ground(_rules(*rules, above), SQUARE)
+    found = tie(given, 1, 2)
+    assert isinstance(found, Proved)  # where they tie, x is below 1/2
+
+
+def test_constant_curves_tie_at_their_level() -> None:
+    given = ground(_rules(("half", "up", "a"), ("half", "down", "b")), SQUARE)
+    assert isinstance(tie(given, 1, 2), Proved)  # up and down are both 1/2 on a line
+    wide = _rules(("half", "half", "a"), ("half", "half", "b"))
+    assert isinstance(tie(ground(wide, SQUARE), 1, 2), Witness)
+
+
+def test_the_first_of_two_equal_rules_decides_and_the_second_does_not() -> None:
+    given = ground(_rules(("up", "up", "a"), ("up", "up", "b")), SQUARE)
+    assert isinstance(decides_by_order(given, 1, (), (2,)), Witness)
+    assert isinstance(decides_by_order(given, 2, (1,), ()), Proved)
+
+
+def test_ties_of_products_are_declined() -> None:
+    given = ground(
+        _rules(("up", "up", "a"), ("up", "down", "b"), conjunction="product"), SQUARE
+    )
+    found = tie(given, 1, 2)
+    assert isinstance(found, Declined)
+    assert found.code == "FTD01"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_row_ties_where_a_tie_is_excluded(seed: int) -> None:
+    rules = random_base(seed, 5, 2, kind="mixed", shared=0.6)
+    given = ground(rules, unit_domain(rules))
+    values = np.random.default_rng(seed).random((2, 3000))
+    answers = decide(rules, values)
+    assert answers.strengths is not None
+    best = answers.strengths.max(axis=0)
+    declined = 0
+    for one in range(1, 6):
+        for other in range(one + 1, 6):
+            found = tie(given, one, other)
+            pair = answers.strengths[[one - 1, other - 1]]
+            rows = (pair == best).all(axis=0) & (best > 0) & (answers.status == TIE)
+            if isinstance(found, Proved):
+                assert not rows.any(), (one, other)
+            elif isinstance(found, Declined):
+                declined += 1
+            else:
+                assert isinstance(found, Witness)
+                strengths = strengths_at(given, point_of(found.point))
+                assert strengths[one - 1] == strengths[other - 1] == max(strengths)
+                assert max(strengths) > Fraction(0)
+    assert declined <= 1
