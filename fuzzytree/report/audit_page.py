@@ -23,7 +23,6 @@ from fuzzytree.auditing.views import view
 from fuzzytree.proving.states import Declined
 from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
-    Scene,
     anchors,
     facts_section,
     findings_section,
@@ -35,6 +34,7 @@ from fuzzytree.report.audit_model import (
     terms_section,
     tree_section,
 )
+from fuzzytree.report.audit_pictures import Scene
 from fuzzytree.report.audit_rows import data_of, passing
 from fuzzytree.report.audit_states import (
     SEVERITIES,
@@ -296,15 +296,23 @@ def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | Non
 
 
 def _links(findings: Sequence[Answer]) -> dict[int, list[Markup]]:
-    """Return a link to each finding about a rule, by the rule's number."""
-    links: dict[int, list[Markup]] = {}
+    """Return links to the findings about each rule, by its number: one for a code."""
+    about: dict[int, dict[str, list[str]]] = {}
     for answer, name in zip(findings, anchors(findings), strict=True):
-        link = tag("a", answer.code, href=f"#{name}", title=answer.sentence)
         for k in dict.fromkeys(answer.rules):
-            mine = links.setdefault(k, [])
-            if len(mine) < 12:
-                mine.append(link)
-    return links
+            about.setdefault(k, {}).setdefault(answer.code, []).append(name)
+    return {
+        k: [
+            joined(
+                [
+                    tag("a", code, href=f"#{names[0]}"),
+                    text(f" ({len(names)})") if len(names) > 1 else None,
+                ]
+            )
+            for code, names in codes.items()
+        ]
+        for k, codes in about.items()
+    }
 
 
 def _questions(audit: Audit) -> Markup:

@@ -26,7 +26,6 @@ from fuzzytree.report.drawing import (
 from fuzzytree.report.markup import Markup, tag, trimmed
 from fuzzytree.report.svg_terms import DASHES, MOST_CURVES, outside, scale_of
 from fuzzytree.report.svg_tree import class_mark
-from fuzzytree.report.text import number
 from fuzzytree.rulebase import RuleBase
 
 if TYPE_CHECKING:
@@ -49,23 +48,35 @@ class Window(NamedTuple):
     down: tuple[float, float]
 
 
-def span_text(span: Span, unit: str = "") -> str:
+def span_text(span: Span, unit: str = "", digits: int = 6) -> str:
     """Return a side of a region in words.
+
+    Args:
+        span: The side.
+        unit: Of its variable; may be empty.
+        digits: Of its ends; more where they would look alike.
 
     Example:
         >>> span_text(Span("force", 0.5, None), "N")
         'from 0.5 N'
     """
     after = f" {unit}" if unit else ""
-    if span.low is None and span.high is None:
+    low, high = _ends_text(span, digits)
+    if low is None and high is None:
         return "anywhere"
-    if span.low is None:
-        return f"up to {number(span.high or 0.0)}{after}"
-    if span.high is None:
-        return f"from {number(span.low)}{after}"
-    if span.low == span.high:
-        return f"at {number(span.low)}{after}"
-    return f"{number(span.low)} to {number(span.high)}{after}"
+    if low is None:
+        return f"up to {high}{after}"
+    if high is None:
+        return f"from {low}{after}"
+    return f"at {low}{after}" if low == high else f"{low} to {high}{after}"
+
+
+def _ends_text(span: Span, digits: int) -> tuple[str | None, str | None]:
+    low, high = (
+        None if end is None else f"{end:.{digits}g}" for end in (span.low, span.high)
+    )
+    is_hidden = low is not None and low == high and span.low != span.high
+    return _ends_text(span, digits + 1) if is_hidden else (low, high)
 
 
 def bar_picture(
@@ -96,7 +107,7 @@ def bar_picture(
         title = tag("title", curve.name)
         parts.append(tag("path", title, d=way, class_=look, stroke_dasharray=dashes))
     parts.append(tag("line", x1=_LEFT, x2=_RIGHT, y1=_BASE, y2=_BASE, class_="axis"))
-    said = span_text(span, axis.unit) if span else ""
+    said = span_text(span, axis.unit, 3) if span else ""
     if value is not None:
         parts += _pin(x.at(value), _TOP - 4, _BASE)
         said += f"{'; ' if said else ''}witness {value:.4g}"
@@ -192,12 +203,13 @@ def map_picture(
         (down.name, _middles(window.down)),
         values,
     )
-    parts = [*_cells(codes), *_class_names(codes, rules.classes)]
+    parts = [*_cells(codes)]
     spans = [region.get(axis.name) or Span(axis.name, None, None) for axis in axes]
     if any(axis.name in region for axis in axes):
         start, end = _ends(spans[0], x)
         low, high = _ends(spans[1], y)
         parts.append(_box(start, end, min(low, high), max(low, high)))
+    parts += _class_names(codes, rules.classes)
     point = float(values[across.name]), float(values[down.name])
     if x.low <= point[0] <= x.high and y.low <= point[1] <= y.high:
         way = _diamond(x.at(point[0]), y.at(point[1]))

@@ -191,7 +191,7 @@ def test_what_else_is_known_is_told_with_its_numbers() -> None:
     )
     found = shown(found=(size,) * 20)
     assert "4 rules with 7 clauses FT501 clauses 7 index 0.5 = 1/2" in found.text
-    assert "FT501: 8 more answers below" in found.text
+    assert "FT501: 12 more answers below" in found.text
     assert "facts" in found.ids
     assert "facts" not in shown(found=()).ids
 
