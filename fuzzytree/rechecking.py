@@ -1421,10 +1421,13 @@ def line_cells(functions: list[Function], line: Line, levels: Levels) -> list[Ce
 
 
 class Axis(NamedTuple):
-    """A variable: each rule's functions as bits, and each cell's functions."""
+    """A variable: the numbers of the functions that rules ask, and its cells."""
 
-    of: list[int]
+    numbers: dict[Clause, int]
     cells: list[Cell]
+
+
+Asked = tuple[int, ...]  # what a rule asks of each axis: its functions as bits
 
 
 class Grid:
@@ -1434,25 +1437,34 @@ class Grid:
         self, rules: Rules, lines: Mapping[str, Line], extra: Iterable[Fraction]
     ) -> None:
         self.levels = Levels()
-        self.marks = [self.levels.add((one,), ZERO) for one in (ZERO, ONE, *extra)]
+        self.marks = {one: self.levels.add((one,), ZERO) for one in (ZERO, ONE, *extra)}
         self.axes: list[Axis] = []
+        every = [clause for rule in rules.rules for clause in rule.when]
         for variable in rules.variables:
-            functions: dict[Function, int] = {}
-            shapes = {term.name: term.shape for term in variable.terms}
-            of = [0] * len(rules.rules)
-            for number, rule in enumerate(rules.rules):
-                for clause in rule.when:
-                    if clause.variable == variable.name:
-                        key = tuple(shapes[t] for t in clause.terms), clause.negated
-                        of[number] |= 1 << functions.setdefault(key, len(functions))
-            if functions:
-                found = line_cells([*functions], lines[variable.name], self.levels)
-                self.axes.append(Axis(of, found))
+            clauses = [c for c in dict.fromkeys(every) if c.variable == variable.name]
+            if clauses:
+                functions = _functions(variable, clauses)
+                known = {
+                    one: number for number, one in enumerate(dict.fromkeys(functions))
+                }
+                numbers = {c: known[f] for c, f in zip(clauses, functions, strict=True)}
+                found = line_cells([*known], lines[variable.name], self.levels)
+                self.axes.append(Axis(numbers, found))
         self.levels.sort()
-        self.count = len(rules.rules)
+        self.of = [self.asked(rule.when) for rule in rules.rules]
         self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
 
-    def _sets(self, band: int, is_gap: bool) -> list[set[int]]:
+    def asked(self, when: Iterable[Clause]) -> Asked:
+        """Return what clauses ask of each axis; every one must be of some rule."""
+        bits = [0] * len(self.axes)
+        for clause in when:
+            for place, axis in enumerate(self.axes):
+                bits[place] |= (
+                    1 << axis.numbers[clause] if clause in axis.numbers else 0
+                )
+        return tuple(bits)
+
+    def _sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
         """Return per axis which sets of functions can be at a level or above.
 
         The level is any between a band and the next one, or any within the band.
@@ -1483,8 +1495,8 @@ class Grid:
                 found.add(base)
         return found
 
-    def wins(self, rule: int | None, rivals: Sequence[int]) -> bool:
-        """Return whether a rule is somewhere stronger than each rival, by position.
+    def wins(self, mine: Asked | None, rivals: Sequence[Asked]) -> bool:
+        """Return whether a rule is somewhere stronger than each rival.
 
         Variables are free of each other. Without a rule: whether all rivals are
         somewhere below 1.
@@ -1496,59 +1508,60 @@ class Grid:
         work = len(bands) * sum(len(a.cells) for a in self.axes) * (1 + len(rivals))
         if work > 6_000_000:
             raise UndecidedError(f"too large to decide again here: {work:,} steps")
-        if any(
-            self.leaves_below(rule, rivals, band, True)
-            for band in range(len(bands) - 1)
-        ):
+        if any(self.leaves(mine, rivals, band) for band in range(len(bands) - 1)):
             return True
         for band, (low, high) in enumerate(bands):
-            if low < high and self.leaves_below(rule, rivals, band, False):
-                raise UndecidedError(
-                    "two critical levels are too near to tell apart here"
-                )
+            if low < high and self.leaves(mine, rivals, band, is_gap=False):
+                raise UndecidedError("two critical levels are too near to tell apart")
         return False
 
-    def is_uncovered(self, epsilon: Fraction, rivals: Sequence[int]) -> bool:
-        """Return whether all rules are somewhere below epsilon, an extra level."""
-        number = self.levels.numbers[(epsilon,), ZERO]
-        return self.leaves_below(None, rivals, self.levels.band[number] - 1)
+    def gap(self, level: Fraction, *, is_above: bool) -> int:
+        """Return the band whose gap is just above or just below an extra level."""
+        return self.levels.band[self.marks[level]] - (not is_above)
 
-    def is_below(self, rule: int, rival: int) -> bool:
+    def is_below(self, mine: Asked, theirs: Asked) -> bool:
         """Return whether a rule's degree is nowhere above a rival's, on every axis.
 
         That suffices for min and product alike. A rule of several clauses on one
         variable is not looked at.
         """
-        for axis in self.axes:
-            if max(axis.of[rule].bit_count(), axis.of[rival].bit_count()) > 1:
+        for axis, own, other in zip(self.axes, mine, theirs, strict=True):
+            if max(own.bit_count(), other.bit_count()) > 1:
                 return False
-            mine, theirs = (axis.of[one].bit_length() - 1 for one in (rule, rival))
-            for cell in axis.cells:
-                ends = cell.left[theirs], cell.right[theirs]
-                is_one = theirs < 0 or all(
-                    self.levels.known[e] == ((ONE,), ZERO) for e in ends
-                )
-                if not is_one and (mine < 0 or cell.rank[mine] > cell.rank[theirs]):
+            one, two = own.bit_length() - 1, other.bit_length() - 1
+            for cell in axis.cells if other else ():
+                ends = [self.levels.known[end[two]] for end in (cell.left, cell.right)]
+                is_one = ends == [((ONE,), ZERO)] * 2
+                if not is_one and (not own or cell.rank[one] > cell.rank[two]):
                     return False
         return True
 
-    def leaves_below(
-        self, rule: int | None, rivals: Sequence[int], band: int, is_gap: bool = True
+    def leaves(
+        self,
+        mine: Asked | None,
+        rivals: Sequence[Asked],
+        band: int,
+        *,
+        is_gap: bool = True,
     ) -> bool:
         """Return whether at a level a rule can be there and each rival below."""
         live, full = {0}, (1 << len(rivals)) - 1
-        for axis, sets in zip(self.axes, self._sets(band, is_gap), strict=True):
-            mine = 0 if rule is None else axis.of[rule]
-            theirs = [axis.of[rival] for rival in rivals]
+        for place, sets in enumerate(self._sets(band, is_gap=is_gap)):
+            own = mine[place] if mine else 0
             below = {
-                sum(1 << n for n, bits in enumerate(theirs) if bits & ~reached)
+                sum(1 << n for n, other in enumerate(rivals) if other[place] & ~reached)
                 for reached in sets
-                if reached & mine == mine
+                if reached & own == own
             }
             live = _largest(a | b for a in live for b in _largest(below))
             if len(live) > MOST_SETS:
                 raise UndecidedError(f"more than {MOST_SETS} sets of rivals")
         return full in live
+
+
+def _functions(variable: Variable, clauses: Iterable[Clause]) -> list[Function]:
+    shapes = {term.name: term.shape for term in variable.terms}
+    return [(tuple(shapes[t] for t in c.terms), c.negated) for c in clauses]
 
 
 def _largest(sets: Iterable[int]) -> set[int]:
@@ -1716,7 +1729,7 @@ class _Checks:
         self.variables = {v.name: v for v in model.variables}
         self.sides = {side.variable: side for side in audit.domain.sides}
         self.is_free = not any(v.parts for v in model.variables)
-        self.all = range(len(self.rules.rules))
+        self.numbers = range(1, len(self.rules.rules) + 1)
 
     @cached_property
     def grid(self) -> Grid:
@@ -1732,6 +1745,16 @@ class _Checks:
     def paths(self) -> dict[int, Path_]:
         """The path to each leaf."""
         return dict(paths(self.model)) if isinstance(self.model, Tree) else {}
+
+    def pairs(self, *, alike: bool) -> list[tuple[int, int]]:
+        """Return the pairs of rules of one class, or of two."""
+        every = itertools.combinations(self.numbers, 2)
+        return [p for p in every if (_then(self, p[0]) == _then(self, p[1])) is alike]
+
+    def fire(self, *numbers: int) -> bool:
+        """Return whether each of some rules fires somewhere."""
+        gap = self.grid.gap(ZERO, is_above=True)
+        return all(self.grid.leaves(self.grid.of[n - 1], (), gap) for n in numbers)
 
     @cached_property
     def heights(self) -> dict[Label, Fraction]:
@@ -2188,18 +2211,20 @@ def _never(is_so: bool, checks: _Checks, otherwise: str) -> None:
     _require(not is_so, otherwise)
 
 
-def _beats(checks: _Checks, rule: int, rivals: Sequence[int]) -> bool:
-    """Return whether a rule, by position, is somewhere stronger than each rival."""
+def _beats(checks: _Checks, mine: Asked, rivals: Sequence[Asked]) -> bool:
+    """Return whether a rule is somewhere stronger than each rival."""
     if checks.rules.semantics.conjunction == "min":
-        return checks.grid.wins(rule, rivals)
-    if any(checks.grid.is_below(rule, rival) for rival in rivals):
+        return checks.grid.wins(mine, rivals)
+    if any(checks.grid.is_below(mine, rival) for rival in rivals):
         return False
     raise UndecidedError("under product only one rule that hides another is seen here")
 
 
-def _others(checks: _Checks, rule: int) -> list[int]:
-    then = checks.rules.rules[rule].then
-    return [n for n in checks.all if checks.rules.rules[n].then != then]
+def _others(checks: _Checks, number: int) -> list[Asked]:
+    """Return what the rules of other classes ask."""
+    every = checks.rules.rules
+    pairs = zip(every, checks.grid.of, strict=True)
+    return [of for rule, of in pairs if rule.then != every[number - 1].then]
 
 
 def _is_reached(checks: _Checks, tree: Tree, number: int) -> bool:
@@ -2235,7 +2260,7 @@ def _met(
 def _dead(checks: _Checks, answer: Answer) -> None:
     model = checks.model
     if isinstance(model, Tree):
-        reached = [n + 1 for n in checks.all if _is_reached(checks, model, n + 1)]
+        reached = [n for n in checks.numbers if _is_reached(checks, model, n)]
         if answer.is_finding:
             is_met = any(number in reached for number in answer.rules)
             _never(is_met, checks, "the leaf is reached")
@@ -2245,17 +2270,16 @@ def _dead(checks: _Checks, answer: Answer) -> None:
                 for one in checks.audit.answers
                 if one.code == "FT101" and one.is_finding
             }
-            hidden = [n + 1 for n in checks.all if n + 1 not in reached]
+            hidden = [n for n in checks.numbers if n not in reached]
             missing = [n for n in hidden if (n,) not in dead]
             _require(
                 not missing, f"leaves that are not reached are not told: {missing}"
             )
         return
     _require(len(answer.rules) > 0, "no rule is named")
-    rule = answer.rules[0] - 1
-    _never(
-        _beats(checks, rule, _others(checks, rule)), checks, "the rule wins somewhere"
-    )
+    number = answer.rules[0]
+    wins = _beats(checks, checks.grid.of[number - 1], _others(checks, number))
+    _never(wins, checks, "the rule wins somewhere")
 
 
 def _shows_anything(checks: _Checks, answer: Answer, state: Witness) -> None:
@@ -2288,8 +2312,145 @@ def _shows_region(checks: _Checks, answer: Answer, state: Witness) -> None:
 def _covered(checks: _Checks, answer: Answer) -> None:
     if checks.rules.semantics.conjunction != "min":
         raise UndecidedError("gaps under product are not decided again here")
-    gap = checks.grid.is_uncovered(Fraction(checks.audit.settings.epsilon), checks.all)
-    _never(gap, checks, "there are points at which every rule is below epsilon")
+    grid = checks.grid
+    below = grid.gap(Fraction(checks.audit.settings.epsilon), is_above=False)
+    is_gap = grid.leaves(None, grid.of, below)
+    _never(is_gap, checks, "there are points at which every rule is below epsilon")
+
+
+def _hidden(checks: _Checks, answer: Answer) -> None:
+    """Ask each rule that is told to hide another; or all pairs that are not told."""
+    if answer.rules:
+        weak, *strong = answer.rules
+        for number in strong:
+            is_one = _then(checks, number) == _then(checks, weak)
+            _require(is_one == (answer.code == "FT104"), "the classes are not so")
+            beats = _beats(
+                checks, checks.grid.of[weak - 1], [checks.grid.of[number - 1]]
+            )
+            _never(
+                beats, checks, f"rule {weak} is somewhere stronger than rule {number}"
+            )
+            if answer.code == "FT105" and number > weak:
+                raise UndecidedError(
+                    "that it is always strictly weaker is not asked here"
+                )
+        _counted(answer, {"rules that subsume it": len(strong)}, answer.code == "FT104")
+        _counted(answer, {"rules that mask it": len(strong)}, answer.code == "FT105")
+        return
+    pairs = [p for p in checks.pairs(alike=answer.code == "FT104") if checks.fire(*p)]
+    silent = sum(not checks.fire(number) for number in checks.numbers)
+    _counted(answer, {"pairs": len(pairs), "rules that never fire": silent}, 2)
+    told = {
+        (one.rules[0], n)
+        for one in checks.audit.answers
+        if one.code == answer.code and one.rules
+        for n in one.rules[1:]
+    }
+    copies = {
+        one.rules
+        for one in checks.audit.answers
+        if one.code == "FT106" and any(m.exact == "0" for m in one.measures)
+    }
+    for first, second in (pair for pair in pairs if pair not in copies):
+        if {(first, second), (second, first)} & told:
+            continue
+        of = checks.grid.of[first - 1], checks.grid.of[second - 1]
+        _require(_beats(checks, of[1], [of[0]]), f"rule {second} hides behind {first}")
+        if answer.code == "FT104":
+            _require(
+                _beats(checks, of[0], [of[1]]), f"rule {first} hides behind {second}"
+            )
+
+
+def _copied(checks: _Checks, answer: Answer) -> None:
+    if not answer.rules:
+        count = len(checks.numbers)
+        _counted(answer, {"pairs": count * (count - 1) // 2}, 1)
+        raise UndecidedError(
+            "that no other two rules are nearly alike is not asked here"
+        )
+    one, other = answer.rules
+    is_one = _then(checks, one) == _then(checks, other)
+    _require((answer.severity == "error") != is_one, "the classes are not so")
+    if not any(m.exact == "0" for m in answer.measures):
+        raise UndecidedError("the distance of curves that differ is not measured here")
+    of = checks.grid.of[one - 1], checks.grid.of[other - 1]
+    if of[0] != of[1]:
+        is_more = _beats(checks, of[0], [of[1]]) or _beats(checks, of[1], [of[0]])
+        _require(not is_more, "the two rules are not alike")
+
+
+def _apart(checks: _Checks, answer: Answer) -> None:
+    """Ask of each pair that is not told whether both rules can reach the level."""
+    if checks.rules.semantics.conjunction != "min":
+        raise UndecidedError("conflicts under product are not decided again here")
+    told = {one.rules for one in checks.audit.answers if one.code == "FT201"}
+    level, grid = Fraction(checks.audit.settings.level), checks.grid
+    rest = [pair for pair in checks.pairs(alike=False) if pair not in told]
+    hidden = next((m.value for m in answer.measures if "not told" in m.name), 0)
+    _counted(answer, {"pairs that never do": len(rest) - hidden}, 1)
+    if hidden:
+        raise UndecidedError("which pairs are not told is not known")
+    for pair in rest:
+        both = tuple(
+            a | b for a, b in zip(*(grid.of[n - 1] for n in pair), strict=True)
+        )
+        if not grid.leaves(both, (), grid.gap(level, is_above=False)):
+            continue
+        is_met = level < 1 and grid.leaves(both, (), grid.gap(level, is_above=True))
+        _never(
+            is_met, checks, f"rules {pair[0]} and {pair[1]} reach the level together"
+        )
+        raise UndecidedError(f"rules {pair[0]} and {pair[1]} touch the level")
+
+
+def _needless(checks: _Checks, answer: Answer) -> None:
+    """Ask whether a rule without a clause is anywhere stronger than with it."""
+    _require(len(answer.rules) == 1, "it is of no rule")
+    rest, _ = _without(checks, answer)
+    mine = checks.grid.of[answer.rules[0] - 1]
+    if _beats(checks, checks.grid.asked(rest), [mine]):
+        raise UndecidedError("the rule is stronger without it, if not in its answers")
+
+
+def _without(checks: _Checks, answer: Answer) -> tuple[tuple[Clause, ...], Clause]:
+    """Return a rule's clauses without the one that an answer is about, and that one."""
+    when = checks.rules.rules[answer.rules[0] - 1].when
+    asked = (
+        tuple(label.variable for label in answer.terms[:1]),
+        {t.term for t in answer.terms},
+    )
+    found = [c for c in when if ((c.variable,), set(c.terms)) == asked]
+    _require(len(set(found)) == 1, "it is of no clause of the rule")
+    place = when.index(found[0])
+    return (*when[:place], *when[place + 1 :]), found[0]
+
+
+def _shows_need(checks: _Checks, answer: Answer, state: Witness) -> None:
+    rest, _ = _without(checks, answer)
+    point = {one.input: _fraction(one.exact) for one in state.point}
+    every = list(checks.rules.rules)
+    every[answer.rules[0] - 1] = every[answer.rules[0] - 1]._replace(when=rest)
+    other = answer_of(checks.rules._replace(rules=tuple(every)), point)
+    _require(
+        other != answer_of(checks.rules, point), "the clause does not matter there"
+    )
+
+
+def _shows_conflict(checks: _Checks, answer: Answer, state: Witness) -> None:
+    level = Fraction(checks.audit.settings.level)
+    met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
+    is_high = any(_fraction(claim.level or "0") >= level for claim in met)
+    _require(
+        is_high and answer.is_finding, "it is not claimed that both reach the level"
+    )
+    classes = {_then(checks, number) for number in answer.rules}
+    _require(len(classes) == 2, "the rules are of one class")
+
+
+def _then(checks: _Checks, number: int) -> str:
+    return checks.rules.rules[number - 1].then
 
 
 def _heights(checks: _Checks, answer: Answer) -> None:
@@ -2393,8 +2554,8 @@ def _overlaps(checks: _Checks, answer: Answer) -> None:
         _require(low - FINE <= value <= high + FINE, "the largest share is another one")
         return
     low, high = near[answer.terms]
-    value = next(m.value for m in answer.measures if m.name.startswith("shared area"))
-    _require(low - FINE <= Fraction(value) <= high + FINE, "the share is another one")
+    value = Fraction(next(m.value for m in answer.measures if "shared" in m.name))
+    _require(low - FINE <= value <= high + FINE, "the share is another one")
 
 
 def _shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] | None:
@@ -2419,10 +2580,17 @@ def _shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] |
 
 
 _SHOWS: dict[str, Callable[[_Checks, Answer, Witness], None]] = {
+    "FT107": _shows_need,
+    "FT201": _shows_conflict,
     "FT205": _shows_region,
 }
 _AGAIN: dict[str, Callable[[_Checks, Answer], None]] = {
     "FT101": _dead,
+    "FT104": _hidden,
+    "FT105": _hidden,
+    "FT106": _copied,
+    "FT107": _needless,
+    "FT201": _apart,
     "FT301": _covered,
     "FT401": _heights,
     "FT403": _overlaps,

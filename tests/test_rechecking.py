@@ -127,7 +127,14 @@ def wins_of(base: RuleBase) -> tuple[rechecking.Rules, list[bool]]:
     line = Line(Fraction(0), Fraction(1), False)
     grid = Grid(found, dict.fromkeys((v.name for v in found.variables), line), [])
     return found, [
-        grid.wins(number, [k for k, r in enumerate(found.rules) if r.then != rule.then])
+        grid.wins(
+            grid.of[number],
+            [
+                of
+                for of, r in zip(grid.of, found.rules, strict=True)
+                if r.then != rule.then
+            ],
+        )
         for number, rule in enumerate(found.rules)
     ]
 
