@@ -47,6 +47,13 @@ _ORIGINS: Mapping[str, str] = {
     "curves": "the span of the curves",
     "limits": "given",
 }
+_GRAVE: Mapping[Severity, tuple[str, str]] = {
+    "error": ("error", "errors"),
+    "warning": ("warning", "warnings"),
+    "info": ("note", "notes"),
+}
+"""What people call each severity, the gravest first."""
+
 _STATE_WORDS = ("PROVED", "WITNESS", "BRACKET", "SAMPLED", "DECLINED")
 _Paint = Callable[[str, str], str]
 _SUMMARY = (
@@ -125,7 +132,8 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
         ids = counted(len(gone), "accepted finding")
         said += f"; {ids} no longer found, which --write-baseline forgets"
     if found:
-        said += f"; `fuzzytree explain {found[0].code}` tells what to do"
+        gravest = min(found, key=lambda one: [*_GRAVE].index(one.severity))
+        said += f"; `fuzzytree explain {gravest.code}` tells what to do"
     elif audit.is_complete:
         said += f"; {_asked_text(audit)}"
     return said
@@ -286,14 +294,9 @@ def _counts(answers: Sequence[Answer]) -> Iterator[str]:
 
 
 def _by_severity(found: Sequence[Answer]) -> str:
-    names: Mapping[Severity, tuple[str, str]] = {
-        "error": ("error", "errors"),
-        "warning": ("warning", "warnings"),
-        "info": ("note", "notes"),
-    }
     counts = [
-        counted(sum(one.severity == severity for one in found), *names[severity])
-        for severity in names
+        counted(sum(one.severity == severity for one in found), *_GRAVE[severity])
+        for severity in _GRAVE
         if any(one.severity == severity for one in found)
     ]
     return f"{counted(len(found), 'finding')}: {', '.join(counts)}"
