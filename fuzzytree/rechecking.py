@@ -1647,13 +1647,13 @@ class Report:
     Attributes:
         wrong: What does not hold, a sentence each.
         counts: How often each kind of check was made.
-        undecided: What was not decided again and why, a sentence each.
+        undecided: Which answers were not decided again, by state and reason.
     """
 
     def __init__(self) -> None:
         self.wrong: list[str] = []
         self.counts: dict[str, int] = {}
-        self.undecided: list[str] = []
+        self.undecided: dict[tuple[str, str], list[str]] = {}
 
     def count(self, what: str, number: int = 1) -> None:
         """Note that something was checked."""
@@ -1666,9 +1666,17 @@ class Report:
 
     def lines(self) -> Iterator[str]:
         """Yield the report, line by line."""
-        width = max(map(len, self.counts), default=0)
-        yield from (f"{what:<{width}}  {n}" for what, n in self.counts.items())
-        yield from (f"  not decided again: {text}" for text in self.undecided)
+        counts = dict(sorted(self.counts.items()))
+        for (state, _), codes in self.undecided.items():
+            name = f"answers {state}, not decided again"
+            counts[name] = counts.get(name, 0) + len(codes)
+        width = max(map(len, counts), default=0)
+        yield from (f"{what:<{width}}  {number}" for what, number in counts.items())
+        if self.undecided:
+            yield "not decided again:"
+        for (_, why), codes in self.undecided.items():
+            size = f" ({len(codes)} answers)" if len(codes) > 1 else ""
+            yield f"  {', '.join(dict.fromkeys(codes))}{size}: {why}"
         yield from (f"DOES NOT HOLD: {text}" for text in self.wrong)
         many = len(self.wrong)
         what = f"{many} {'points do' if many != 1 else 'point does'} not hold"
@@ -1940,7 +1948,10 @@ class _Checks:
         except (LookupError, ArithmeticError, StopIteration):
             wrong.append(f"{where}: it names what there is not")
         except UndecidedError as error:
-            self.report.undecided.append(f"{where}: {error}")
+            state = type(answer.state).__name__.upper()
+            self.report.undecided.setdefault((state, str(error)), []).append(
+                answer.code
+            )
 
     def _measure(self, measure: Measure, where: str) -> None:
         if measure.exact is None:
@@ -2181,7 +2192,14 @@ def _shown(claim: Claim) -> str:
 
 
 def _cannot(checks: _Checks, answer: Answer) -> None:
-    raise UndecidedError(f"{answer.code} is not decided again here")
+    raise UndecidedError(_WHY.get(answer.code, "there is no second way for it here"))
+
+
+_WHY = {
+    "FT402": "the turning points of curves are not looked at here",
+    "FT601": "nothing is run here but the model itself",
+    "FT602": "nothing is run here but the model itself",
+}
 
 
 # --- Deciding again ----------------------------------------------------------------
