@@ -1,0 +1,150 @@
+"""Questions about inputs that no rule covers, or none covers well."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Final
+
+from msgspec.structs import replace
+
+from fuzzytree.auditing.records import Answer, Measure, Severity
+from fuzzytree.auditing.rows import ranked
+from fuzzytree.auditing.subject import Subject
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.clock import OutOfTimeError
+from fuzzytree.proving.cover import below, least_cover, uncovered
+from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.ground import Ground, ground, narrowed, span
+from fuzzytree.proving.states import Declined, Proved, Span, State, Witness
+
+MOST_GAPS: Final = 8
+"""The most gaps that are told one by one."""
+
+_MOST_BOXES = 64  # parts of the domain in which a gap is looked for
+_PART = 0.3  # of the time that is left, for one question
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Answer whether some input is covered by no rule, or by less than epsilon."""
+    if not subject.is_whole:
+        reason = "rules that are left out of the view may cover what the others do not"
+        sentence = "whether an input is covered by no rule is not decided"
+        yield Answer("FT301", "cover", sentence, Declined("FTD07", reason), False)
+        return
+    given = ground(subject.rules, subject.domain)
+    if given.is_empty:
+        return
+    bare = uncovered(given, subject.clock.share(_PART))
+    if isinstance(bare, Witness):
+        yield from _gaps(subject, given, bare)
+        return
+    if not isinstance(bare, Proved):
+        sentence = "it is open whether some rule fires everywhere"
+        yield Answer("FT301", "cover", sentence, bare, False)
+    else:
+        sentence = "some rule fires everywhere on the domain"
+        yield Answer("FT301", "cover", sentence, bare, False)
+    yield _weak(subject, given)
+
+
+def _weak(subject: Subject, given: Ground) -> Answer:
+    """Answer whether some rule reaches epsilon everywhere, and how little is least."""
+    epsilon = subject.settings.epsilon
+    state = below(given, Fraction(epsilon), subject.clock.share(_PART))
+    least = least_cover(given, subject.clock.share(_PART))
+    measures = (
+        Measure("strength where it is least, at least", least.low),
+        Measure("strength where it is least, at most", least.high),
+    )
+    subject_of = f"cover of {epsilon:g}"
+    if isinstance(state, Proved):
+        sentence = f"some rule has a strength of at least {epsilon:g} everywhere"
+        return Answer("FT301", subject_of, sentence, state, False, measures=measures)
+    if isinstance(state, Witness):
+        sentence = (
+            f"no rule has a strength of {epsilon:g} here; where it is least, the "
+            f"strongest rule has {least.high:.3g}"
+        )
+        return Answer(
+            "FT301", subject_of, sentence, state, True, "warning",
+            region=state.region, measures=measures,
+        )  # fmt: skip
+    sentence = f"it is open whether some rule reaches {epsilon:g} everywhere"
+    return Answer("FT301", subject_of, sentence, state, False, measures=measures)
+
+
+def _gaps(subject: Subject, given: Ground, first: Witness) -> Iterator[Answer]:
+    """Answer with the gaps that were found, the nearest to a row first."""
+    found, is_all = _separate(subject, given, first)
+    told = [_gap(subject, state) for state in found]
+    if subject.rows is not None:
+        told = [*ranked(told, subject.rows, subject.domain, subject.rules.inputs)]
+    yield from (
+        replace(one, subject=f"gap {place}") for place, one in enumerate(told, 1)
+    )
+    if not is_all:
+        sentence = f"there may be more gaps than the {len(found)} that are told"
+        reason = f"{MOST_GAPS} gaps at most are looked for, within the budget"
+        state = Declined("FTD05", reason)
+        yield Answer("FT301", "more gaps", sentence, state, False)
+
+
+def _gap(subject: Subject, state: Witness) -> Answer:
+    answer = subject.policy.uncovered
+    what = "no class" if answer is None else f"{answer!r}"
+    if subject.policy.decision == "all":
+        what = "what the outputs have by default"
+    sentence = f"no rule fires here: the answer is {what}"
+    severity: Severity = "warning" if answer is None else "info"
+    return Answer("FT301", "gap", sentence, state, True, severity, region=state.region)
+
+
+def _separate(
+    subject: Subject, given: Ground, first: Witness
+) -> tuple[list[Witness], bool]:
+    """Return gaps in separate parts of the domain, and whether these are all."""
+    found = [first]
+    todo = deque(_around(given, subject.domain, first.region))
+    tried = 0
+    clock = subject.clock.share(_PART)
+    while todo:
+        if len(found) == MOST_GAPS or tried == _MOST_BOXES:
+            return found, False
+        box = todo.popleft()
+        tried += 1
+        try:
+            state: State = uncovered(narrowed(given, box), clock)
+            clock.check()
+        except OutOfTimeError:
+            return found, False
+        if isinstance(state, Witness):
+            found.append(state)
+            todo += _around(given, box, state.region)
+        elif not isinstance(state, Proved):
+            return found, False
+    return found, True
+
+
+def _around(given: Ground, box: Domain, region: tuple[Span, ...]) -> Iterator[Domain]:
+    """Yield the parts of a box outside an inner one; together they are all of it."""
+    sides = {side.variable: side for side in box.sides}
+    variables = {axis.variable.name: axis.variable for axis in given.axes}
+    for inner in region:
+        if inner.low is None or inner.high is None:
+            return  # of no region that is told
+        side = sides.get(inner.variable)
+        if side is None:
+            ends = span(variables[inner.variable], box)
+            low, high = outwards(ends[0])[0], outwards(ends[1])[1]
+            side = Side(inner.variable, low, high, "model")
+        for low, high in (
+            (side.low, math.nextafter(inner.low, -math.inf)),
+            (math.nextafter(inner.high, math.inf), side.high),
+        ):
+            if low <= high:
+                part = Side(side.variable, low, high, side.origin)
+                yield Domain(tuple({**sides, side.variable: part}.values()))
+        sides[side.variable] = Side(side.variable, inner.low, inner.high, side.origin)

@@ -1,0 +1,139 @@
+"""Defects in what rules decide are found where they are planted, and gone without."""
+
+from __future__ import annotations
+
+from fuzzytree.auditing.deciding import answers
+from fuzzytree.auditing.records import Answer, Policy, Settings
+from fuzzytree.auditing.subject import Subject
+from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.states import Bracket, Proved, Witness
+from fuzzytree.rulebase import (
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
+
+LOW = Term("low", Points((0.0, 1.0), (1.0, 0.0)))
+HIGH = Term("high", Points((0.0, 1.0), (0.0, 1.0)))
+MIDDLE = Term("middle", Points((0.25, 0.5, 0.75), (0.0, 1.0, 0.0)))
+FLAT = Term("flat", Points((0.25, 0.5, 0.75), (0.0, 0.505, 0.0)))
+SMALL = Term("small", Points((0.25, 0.5, 0.75), (0.0, 0.25, 0.0)))
+NEVER = Term("never", Points((2.0, 3.0, 4.0), (0.0, 1.0, 0.0)))
+TERMS = (LOW, HIGH, MIDDLE, FLAT, SMALL, NEVER)
+
+
+def _base(*rules: tuple[str, str], conjunction: str = "min") -> RuleBase:
+    variables = (Variable("x", TERMS), Variable("y", TERMS))
+    made: list[Rule] = []
+    for terms, label in rules:
+        words = terms.split()
+        clauses = (Clause(v, (w,)) for v, w in zip("xy", words, strict=False))
+        made.append(Rule(tuple(c for c in clauses if c.terms != ("any",)), label))
+    classes = tuple(dict.fromkeys(label for _, label in rules))
+    semantics = Semantics(conjunction)  # type: ignore[arg-type]
+    return RuleBase("base", classes, variables, tuple(made), semantics)
+
+
+def _asked(
+    *rules: tuple[str, str], conjunction: str = "min", decision: str = "strongest"
+) -> list[Answer]:
+    base = _base(*rules, conjunction=conjunction)
+    box = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
+    policy = Policy(conjunction, decision)  # type: ignore[arg-type]
+    return [*answers(Subject(base, policy, box, Settings(), Clock(30.0)))]
+
+
+def _found(given: list[Answer], code: str) -> dict[tuple[int, ...], Answer]:
+    return {one.rules: one for one in given if one.code == code and one.is_finding}
+
+
+CLEAN = (("low", "a"), ("high", "b"))
+
+
+def test_clean_rules_have_no_finding_and_every_question_an_answer() -> None:
+    given = _asked(*CLEAN)
+    assert not [one for one in given if one.is_finding]
+    assert [one.code for one in given].count("FT101") == 2
+    assert {one.code for one in given} == {"FT101", "FT102", "FT103", "FT202"}
+
+
+def test_a_rule_below_another_class_never_wins() -> None:
+    found = _found(_asked(*CLEAN, ("small", "c")), "FT101")
+    assert list(found) == [(3,)]
+    assert isinstance(found[3,].state, Proved)
+    assert found[3,].severity == "error"
+    assert found[3,].sentence == (
+        "rule 3 never wins: wherever it fires, a rule of another class is at least as "
+        "strong"
+    )
+    assert not _found(_asked(*CLEAN, ("middle", "c")), "FT101")
+
+
+def test_a_rule_that_only_a_union_hides_never_wins() -> None:
+    # Where x is in the middle, either y is low or y is high.
+    rules = (("middle low", "a"), ("middle high", "b"), ("small any", "c"))
+    assert list(_found(_asked(*rules), "FT101")) == [(3,)]
+    assert not _found(_asked(rules[0], rules[2]), "FT101")
+
+
+def test_a_rule_out_of_the_domain_never_fires() -> None:
+    found = _found(_asked(*CLEAN, ("never", "c")), "FT101")
+    assert found[3,].sentence == "rule 3 never fires on the domain"
+
+
+def test_a_rule_that_wins_by_its_place_alone_is_told_as_that() -> None:
+    found = _found(_asked(("low", "a"), ("low", "b"), ("high", "b")), "FT101")
+    assert "by its place in the list alone" in found[1,].sentence
+    assert isinstance(found[1,].state, Witness)
+    assert found[2,].sentence.startswith("rule 2 never wins")
+
+
+def test_a_rule_that_leads_by_next_to_nothing_is_marginal() -> None:
+    found = _found(_asked(*CLEAN, ("flat", "c")), "FT102")
+    assert list(found) == [(3,)]
+    state = found[3,].state
+    assert isinstance(state, Bracket)
+    assert 0.004 < state.low <= 0.00500001 <= state.high < 0.01
+    assert not _found(_asked(*CLEAN, ("middle", "c")), "FT102")
+
+
+def test_a_rule_below_its_own_class_is_superfluous() -> None:
+    found = _found(_asked(*CLEAN, ("small", "a"), ("small", "b")), "FT103")
+    assert list(found) == [(3,), (4,)]
+    assert not _found(_asked(*CLEAN, ("middle", "a")), "FT103")
+
+
+def test_a_copy_is_superfluous_and_what_decides_by_place_is_not() -> None:
+    copies = _found(_asked(*CLEAN, ("low", "a")), "FT103")
+    assert (3,) in copies
+    assert (1,) in copies
+    assert (1,) not in _found(_asked(("low", "a"), ("low", "b")), "FT103")
+
+
+def test_rules_that_share_their_weakest_clause_are_ambiguous() -> None:
+    rules = (("low low", "a"), ("low high", "b"), ("small any", "c"))
+    given = _asked(*rules)
+    found = _found(given, "FT202")
+    assert list(found) == [(1, 2)]
+    assert isinstance(found[1, 2].state, Witness)
+    apart = (("low low", "a"), ("high high", "b"), ("high low", "c"))
+    assert (1, 2) not in _found(_asked(*apart), "FT202")
+
+
+def test_products_are_asked_too_and_ties_of_them_declined() -> None:
+    given = _asked(*CLEAN, ("small", "c"), conjunction="product")
+    assert list(_found(given, "FT101")) == [(3,)]
+    (ties,) = [one for one in given if one.code == "FT202"]
+    assert ties.sentence == "whether rules of two classes tie is not decided"
+
+
+def test_where_all_rules_take_part_only_firing_is_asked() -> None:
+    given = _asked(*CLEAN, ("small", "c"), ("never", "c"), decision="all")
+    assert {one.code for one in given} == {"FT101"}
+    (dead,) = [one for one in given if one.is_finding]
+    assert dead.subject == "rule 4"
