@@ -26,7 +26,8 @@ class Points(msgspec.Struct, frozen=True, eq=False):
     """Rows that lie in the domain.
 
     Attributes:
-        at: The row's number, from 1, and its values; equal rows stand once.
+        at: The row's number, from 1, and its values; equal rows stand once. They are
+            shuffled, so that the first of them stand for all.
         looked_at: How many rows were looked at.
         left_out: How many different ones have a value that is missing, or outside the
             domain.
@@ -72,10 +73,15 @@ def points_of(subject: Subject, rows: Rows, most: int) -> Points:
     ]
     at = tuple(
         (number, point)
-        for number, point in found
+        for number, point in sorted(found, key=lambda one: _shuffled(one[0]))
         if contains(subject.domain, subject.rules.variables, point)
     )
     return Points(at, len(taken), len(seen) - len(at), total)
+
+
+def _shuffled(number: int) -> int:
+    """Return a key that spreads numbers evenly: steps of the golden section."""
+    return number * 0x9E3779B97F4A7C15 % 2**64
 
 
 def measure(name: str, value: Fraction, *, unit: str = OF_RANGES) -> Measure:

@@ -9,8 +9,9 @@ rule that is below t on no axis has there the same degree. So for each axis that
 bind, and each level t between two critical ones, a cell in which the rule's degree
 takes the value t leaves behind every rival that is weaker there, and every later one
 that is equal; the other axes leave below t what they can
-(`fuzzytree.proving.contests`). Where a degree is constant, t is that critical level
-itself. Ties at single levels or places, without an interior, are not looked for.
+(`fuzzytree.proving.contests`). Or a later rule's degree stays at a critical level
+throughout a cell: then the rule must reach it, and no more. Ties at single levels or
+places, without an interior, are not looked for.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.proving.witnesses import Point, is_within, point_with
+from fuzzytree.proving.witnesses import is_within, point_with
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -101,6 +102,8 @@ class _Options(NamedTuple):
         most: That of its largest one.
         floor: Shape (options, rivals): the level of each weaker rival's least degree;
             `NEVER` for one that is not weaker.
+        flat: Shape (options, rivals): the level at which a later rival stays; -1 for
+            any other.
         tied: The rivals that are weaker or, being later, equal, as bits; 0 if none is
             equal.
     """
@@ -109,13 +112,16 @@ class _Options(NamedTuple):
     least: IntArray
     most: IntArray
     floor: IntArray
+    flat: IntArray
     tied: tuple[int, ...]
 
     def behind(self, at: int, *, is_vague: bool = False) -> tuple[int, ...]:
-        """Return the largest sets of rivals that are left below a level."""
+        """Return the largest sets of rivals that do not exceed a level."""
         if is_vague:
-            return _largest(self.floor[self.most >= at] <= at)
-        return _largest(self.floor[self._reach(at)] < at)
+            fits, below = self.most >= at, self.floor <= at
+        else:
+            fits, below = self._reach(at), self.floor < at
+        return maximal(map(_bits, (below | (self.flat == at))[fits]))
 
     def _reach(self, at: int) -> npt.NDArray[np.bool_]:
         is_held = (self.least == at) & (self.most == at)
@@ -126,19 +132,15 @@ class _Options(NamedTuple):
         if is_vague:
             fits = (self.least <= at) & (self.most >= at)
         else:
-            is_held = (self.least == at) & (self.most == at)
-            fits = is_held | ((self.least < at) & (self.most > at))
-        fits &= self.where >= START
+            fits = (self.least < at) & (self.most > at)
+        fits &= self.where > START
         return [n for n in fits.nonzero()[0].tolist() if self.tied[n]]
 
     def reaching(self, at: int, rivals: Sequence[int]) -> list[int]:
-        """Return the options that leave some rivals below a level."""
-        fits = self._reach(at) & (self.floor[:, rivals] < at).all(axis=1)
-        return fits.nonzero()[0].tolist()
-
-
-def _largest(is_behind: npt.NDArray[np.bool_]) -> tuple[int, ...]:
-    return maximal(map(_bits, is_behind))
+        """Return the options on which some rivals do not exceed a level."""
+        below = (self.floor < at) | (self.flat == at)
+        fits = self._reach(at) & below[:, rivals].all(axis=1)
+        return [int(number) for number in fits.nonzero()[0]]
 
 
 def _bits(flags: npt.NDArray[np.bool_]) -> int:
@@ -158,6 +160,7 @@ def _options(contest: Contest, laid: Laid, plain: Options, late: int) -> _Option
     rivals = np.array(contest.rivals, dtype=np.int64)
     is_late = np.arange(len(rivals)) >= len(rivals) - late
     least = plain.top.copy()
+    flat = np.full(plain.floor.shape, -1, dtype=np.int64)
     tied: list[int] = []
     for number, cell in enumerate(plain.where.tolist()):
         if cell < START:
@@ -165,15 +168,18 @@ def _options(contest: Contest, laid: Laid, plain: Options, late: int) -> _Option
             continue
         rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
         of = laid.of_start if cell == START else laid.of[:, cell]
+        low = high = laid.at[of[rivals], 0]
         if cell > START:
             least[number] = laid.least[of[rule], cell]
+            low, high = laid.least[of[rivals], cell], laid.most[of[rivals], cell]
+        flat[number] = np.where(is_late & (low == high), 2 * low, -1)
         mine, theirs = rank[of[rule]], rank[of[rivals]]
         equal = is_late & (theirs == mine)
         tied.append(_bits(equal | (theirs < mine)) if equal.any() else 0)
     floor = np.where(
         plain.floor < NEVER, 2 * np.minimum(plain.floor, NEVER // 4), NEVER
     )
-    return _Options(plain.where, 2 * least, 2 * plain.top, floor, tuple(tied))
+    return _Options(plain.where, 2 * least, 2 * plain.top, floor, flat, tuple(tied))
 
 
 class _Search:
@@ -197,6 +203,8 @@ class _Search:
             for laid, plain in zip(self.laid, self.contest.all_options, strict=True)
         )
         self.axes = [n for n, one in enumerate(self.options) if any(one.tied)]
+        flats = np.concatenate([one.flat.ravel() for one in self.options])
+        self.flats = set(flats[flats >= 0].tolist())
         self.levels = 0
         self.is_open = False
 
@@ -228,13 +236,9 @@ class _Search:
 
     def _levels(self) -> list[int]:
         """Return the levels of a tie between which nothing changes, highest first."""
-        found: set[int] = set()
-        for axis in self.axes:
-            options = self.options[axis]
-            tied = np.array(options.tied, dtype=bool)
-            found.update(options.least[tied].tolist(), options.most[tied].tolist())
-        if not found:
+        if not self.axes and not self.flats:
             return []
+        found = set(self.flats)
         for options in self.options:
             ends = (options.least, options.most, options.floor.ravel())
             found.update(at for one in ends for at in one.tolist() if at < NEVER)
@@ -245,65 +249,59 @@ class _Search:
 
     def _choices(
         self, at: int, *, is_vague: bool = False
-    ) -> Iterator[tuple[int, tuple[int, ...]]]:
-        """Yield axes that bind at a level, each with what every axis leaves behind."""
+    ) -> Iterator[tuple[int | None, tuple[int, ...]]]:
+        """Yield which axis binds at a level, if any, and what all leave behind."""
         self.clock.check()
         self.levels += 1
-        binding = {
-            axis: masks
-            for axis in self.axes
-            if (masks := self._tied(axis, at, is_vague=is_vague))
-        }
-        if not binding:
-            return
-        others = [one.behind(at, is_vague=is_vague) for one in self.options]
-        for axis, masks in binding.items():
-            families = [*others[:axis], masks, *others[axis + 1 :]]
+        axes: dict[int | None, tuple[int, ...]] = {None: ()} if at in self.flats else {}
+        if at % 2 or is_vague:
+            for axis in self.axes:
+                options = self.options[axis]
+                numbers = options.binding(at, is_vague=is_vague)
+                if numbers:
+                    axes[axis] = maximal(options.tied[n] for n in numbers)
+        others = [one.behind(at, is_vague=is_vague) for one in self.options if axes]
+        for bound, masks in axes.items():
+            families = [masks if n == bound else one for n, one in enumerate(others)]
             chosen = cover(families, self.contest.full, self.clock)
             if chosen is not None:
-                yield axis, chosen
-
-    def _tied(self, axis: int, at: int, *, is_vague: bool) -> tuple[int, ...]:
-        options = self.options[axis]
-        return maximal(options.tied[n] for n in options.binding(at, is_vague=is_vague))
+                yield bound, chosen
 
     # --- witnesses
 
-    def _witness(self, axis: int, at: int, chosen: Sequence[int]) -> Witness | None:
+    def _witness(
+        self, axis: int | None, at: int, chosen: Sequence[int]
+    ) -> Witness | None:
         """Return a point at a level where an axis binds, checked in fractions."""
+        if axis is None:
+            return self._checked(self._others({}, at, self.bands.low[at // 2], chosen))
         options = self.options[axis]
         for number in options.binding(at):
             if chosen[axis] & ~options.tied[number]:
                 continue
-            bound = self._bound(axis, int(options.where[number]), at)
-            if bound is None:
-                continue
-            part, level = bound
-            wanted = self._others({axis: part}, at, level, chosen)
-            point = None if wanted is None else point_with(self.given, wanted)
-            if point is not None and (found := self._checked(point)) is not None:
-                return found
+            bound = self._bound(axis, int(options.where[number]), at // 2)
+            if bound is not None:
+                part, level = bound
+                found = self._checked(self._others({axis: part}, at, level, chosen))
+                if found is not None:
+                    return found
         return None
 
-    def _bound(self, axis: int, cell: int, at: int) -> tuple[Stretch, Fraction] | None:
-        """Return a value in a cell at which the degree takes a level, and the level."""
-        laid, band = self.laid[axis], at // 2
+    def _bound(
+        self, axis: int, cell: int, band: int
+    ) -> tuple[Stretch, Fraction] | None:
+        """Return a value in a cell whose degree lies just above a band, and that."""
+        laid = self.laid[axis]
         mine = weakest(laid, self.contest.ours, cell)
-        if cell == START:
-            value = laid.cells.zones[0][0]
-        elif at % 2 == 0:
-            value = simple(*laid.cells.between[cell])
-        else:
-            low, high = self.bands.high[band], self.bands.low[band + 1]
-            inner = low + (high - low) / 4, high - (high - low) / 4
-            above = stretch(laid, cell, inner[0], [mine], [])
-            below = stretch(laid, cell, inner[1], [], [mine])
-            if above is None or below is None:
-                return None
-            ends = max(above.low, below.low), min(above.high, below.high)
-            if ends[0] >= ends[1]:
-                return None
-            value = simple(*ends)
+        low, high = self.bands.high[band], self.bands.low[band + 1]
+        above = stretch(laid, cell, low + (high - low) / 4, [mine], [])
+        below = stretch(laid, cell, high - (high - low) / 4, [], [mine])
+        if above is None or below is None:
+            return None
+        ends = max(above.low, below.low), min(above.high, below.high)
+        if ends[0] >= ends[1]:
+            return None
+        value = simple(*ends)
         level = laid.axis.elements[mine].degree(value)
         return Stretch(value, value, is_open=False), level
 
@@ -315,8 +313,9 @@ class _Search:
         chosen: Sequence[int],
     ) -> dict[int, Stretch] | None:
         """Return values of the other axes that leave behind what they are to leave."""
-        left = self.contest.full & ~chosen[next(iter(wanted))]
-        found = dict(wanted)
+        found, left = dict(wanted), self.contest.full
+        for axis in wanted:
+            left &= ~chosen[axis]
         order = sorted(range(len(chosen)), key=lambda n: -chosen[n].bit_count())
         for axis in order:
             if axis in found:
@@ -337,22 +336,28 @@ class _Search:
             cell = int(options.where[number])
             if cell > START and options.least[number] == options.most[number] == at:
                 return Stretch(*laid.cells.between[cell])
-            lows = {weakest(laid, [self.contest.rivals[n]], cell) for n in bits}
+            lows = {
+                weakest(laid, [self.contest.rivals[n]], cell)
+                for n in bits
+                if options.flat[number, n] != at
+            }
             mine = weakest(laid, self.contest.ours, cell)
             part = stretch(laid, cell, level, [mine], lows)
             if part is not None:
                 return part
         return None
 
-    def _checked(self, point: Point) -> Witness | None:
-        """Return a point as a witness, if it is one in fractions."""
+    def _checked(self, wanted: dict[int, Stretch] | None) -> Witness | None:
+        """Return a point of some values of the axes, if it is one in fractions."""
+        point = None if wanted is None else point_with(self.given, wanted)
+        if point is None or not is_within(self.given, point):
+            return None
         strengths = strengths_at(self.given, point)
         mine = strengths[self.rule - 1]
         is_first = (
             mine > 0
             and all(strengths[n - 1] < mine for n in self.before)
             and all(strengths[n - 1] <= mine for n in self.after)
-            and is_within(self.given, point)
         )
         if not is_first:
             return None
