@@ -43,11 +43,11 @@ _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
 
 def anchors(findings: Sequence[Answer]) -> list[str]:
     """Return a name for each finding by which links find it: its id if it has one."""
-    names: list[str] = []
+    names: dict[str, None] = {}
     for place, answer in enumerate(findings, 1):
         is_plain = _PLAIN.fullmatch(answer.id) and answer.id not in names
-        names.append(answer.id if is_plain else f"finding-{place}")
-    return names
+        names[answer.id if is_plain else f"finding_{place}"] = None
+    return [*names]
 
 
 def gravest_first(findings: Sequence[Answer]) -> list[Answer]:

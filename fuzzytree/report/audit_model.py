@@ -29,9 +29,12 @@ from fuzzytree.rulebase import Rule, RuleBase
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
+Audited = FuzzyTree | RuleBase | FuzzySystem
+
 MOST_RULES = 1000
 MOST_VARIABLES = 60
 _MOST_LINES = 400  # of a tree as an outline
+_MOST_TERMS = 40  # of a variable that are told in words
 _MOST_PARTS = 12  # of a combination that are written
 
 
@@ -47,11 +50,6 @@ def legend(classes: Sequence[str]) -> Markup:
     if len(classes) > len(shown):
         shown.append(text(f"and {len(classes) - len(shown)} more"))
     return tag("p", "Classes: ", joined(shown, " "), class_="legend")
-
-
-def rule_sentences(rules: RuleBase) -> list[Markup]:
-    """Return every rule as a person reads it."""
-    return [sentence_of(rule, rules) for rule in rules.rules]
 
 
 def sentence_of(rule: Rule, rules: RuleBase) -> Markup:
@@ -112,16 +110,15 @@ def _bars_mean(tree: FuzzyTree, passed: Passing | None) -> str:
 
 
 def terms_section(
-    model: FuzzyTree | RuleBase | FuzzySystem,
+    model: Audited,
     axes: Mapping[str, Axis],
     data: Data | None,
 ) -> Markup:
     """Return a picture of each variable; those without terms folded away."""
-    told = _terms_in_words(model)
     with_terms = [a for a in axes.values() if a.curves or a.undrawn]
     others = [axis for axis in axes.values() if not (axis.curves or axis.undrawn)]
     parts: list[Content] = [_lines_mean(data)]
-    parts.append(_grid(with_terms[:MOST_VARIABLES], told, data, "v"))
+    parts.append(_grid(with_terms[:MOST_VARIABLES], model, data, "v"))
     more = len(with_terms) - MOST_VARIABLES
     if more > 0:
         said = f"{counted(more, 'more variable')} not drawn"
@@ -129,7 +126,7 @@ def terms_section(
     if others:
         said = f"{counted(len(others), 'input')} without terms of "
         said += "its own" if len(others) == 1 else "their own"
-        inner: list[Content] = [_grid(others[:MOST_VARIABLES], told, data, "i")]
+        inner: list[Content] = [_grid(others[:MOST_VARIABLES], model, data, "i")]
         if len(others) > MOST_VARIABLES:
             said += f", {MOST_VARIABLES} drawn"
         parts.append(folded(said, *inner))
@@ -145,12 +142,10 @@ def _lines_mean(data: Data | None) -> Markup:
     return tag("p", said, class_="caption")
 
 
-def _grid(
-    axes: Sequence[Axis], told: Mapping[str, list[str]], data: Data | None, name: str
-) -> Markup:
+def _grid(axes: Sequence[Axis], model: Audited, data: Data | None, name: str) -> Markup:
     cards: list[Markup] = []
     for place, axis in enumerate(axes):
-        lines: list[Content] = [*told.get(axis.name, [])]
+        lines: list[Content] = [*_in_words(model, axis.name)]
         if axis.parts:
             lines.append(_sum(axis))
         if axis.undrawn:
@@ -183,21 +178,19 @@ def _sum(axis: Axis) -> str:
     return f"{axis.name} = {' + '.join(parts)}{after}"
 
 
-def _terms_in_words(
-    model: FuzzyTree | RuleBase | FuzzySystem,
-) -> dict[str, list[str]]:
+def _in_words(model: Audited, name: str) -> list[str]:
+    """Return the terms of a variable in words."""
     if isinstance(model, FuzzySystem):
-        return {
-            one.name: [
-                f"{label.name}: {curve_text(label.curve, model.columns)}"
-                for label in one.labels[:40]
-            ]
-            for one in model.inputs
-        }
-    return {
-        one.name: [f"{term.name}: {shape_text(term.shape)}" for term in one.terms[:40]]
-        for one in model.variables
-    }
+        own = next(one for one in model.inputs if one.name == name)
+        return [
+            f"{label.name}: {curve_text(label.curve, model.columns)}"
+            for label in own.labels[:_MOST_TERMS]
+        ]
+    variable = next(one for one in model.variables if one.name == name)
+    return [
+        f"{term.name}: {shape_text(term.shape)}"
+        for term in variable.terms[:_MOST_TERMS]
+    ]
 
 
 def rules_section(
@@ -221,8 +214,8 @@ def rules_section(
     head = ["rule", "sentence", *(["training rows"] if is_supported else []), *names]
     head += [*(["confidence"] if is_shared else []), "findings"]
     rows: list[list[Content]] = []
-    shown = zip(rules[:MOST_RULES], rule_sentences(viewed.rules), strict=False)
-    for k, (rule, said) in enumerate(shown, 1):
+    for k, rule in enumerate(rules[:MOST_RULES], 1):
+        said = sentence_of(rule, viewed.rules)
         answer = told.get(k)
         name = viewed.places[k - 1] if viewed.places else str(k)
         row: list[Content] = [tag("span", name, id=f"rule-{k}"), said]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
@@ -20,9 +21,9 @@ from fuzzytree.report.drawing import (
 )
 from fuzzytree.report.markup import Markup, tag
 from fuzzytree.report.svg_tree import class_mark
-from fuzzytree.report.text import counted, number
+from fuzzytree.report.text import number
 
-WIDE, HIGH = 340.0, 184.0
+WIDE = 340.0
 MOST_CURVES = 24
 """Of one variable that are drawn."""
 
@@ -30,7 +31,9 @@ DASHES = (None, "7 3", "2 2.5", "9 3 2 3")
 """How the lines of neighbouring terms look, in turn."""
 
 _LEFT, _RIGHT = 8.0, 332.0
-_TOP, _BASE = 36.0, 162.0
+_PLOT = 126.0  # high
+_ROW = 14.0  # of names above it
+_MOST_ROWS = 3
 _BINS = 36
 _FONT = 11.0
 
@@ -59,11 +62,15 @@ def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
         name: A word that only this picture of the page has.
     """
     x = scale_of(axis, data, _LEFT, _RIGHT)
-    y = Scale(0.0, 1.0, _BASE, _TOP)
     drawn = axis.curves[:MOST_CURVES]
-    parts = [*_bins(axis, data, x)]
-    parts += outside(axis, x, _TOP - 4, _BASE)
-    parts.append(tag("line", x1=_LEFT, x2=_RIGHT, y1=_BASE, y2=_BASE, class_="axis"))
+    names = _placed(drawn, x)
+    top = 8.0 + _ROW * max((name.row + 1 for name in names), default=0)
+    y = Scale(0.0, 1.0, top + _PLOT, top)
+    parts = [*_bins(axis, data, x, y)]
+    parts += outside(axis, x, top - 4, y.start)
+    parts.append(
+        tag("line", x1=_LEFT, x2=_RIGHT, y1=y.start, y2=y.start, class_="axis")
+    )
     for place, curve in enumerate(drawn):
         parts.append(
             tag(
@@ -74,9 +81,16 @@ def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
                 stroke_dasharray=DASHES[place % len(DASHES)],
             )
         )
-    parts += _labels(drawn, x)
-    parts += axis_marks(x, _BASE)
-    return svg(WIDE, HIGH, f"The terms of {axis.title}", _told(axis), *parts, name=name)
+    parts += _names(names, top)
+    if len(names) < len(axis.curves):
+        said = f"+ {len(drawn) - len(names)} unnamed"
+        if len(drawn) < len(axis.curves):
+            said += f", {len(axis.curves) - len(drawn)} not drawn"
+        parts.append(words(x.end, top + 10.0, said, "small", "end"))
+    parts += axis_marks(x, y.start)
+    high = y.start + 22.0
+    title = f"The terms of {axis.title}"
+    return svg(WIDE, high, title, _told(axis), *parts, name=name)
 
 
 def _told(axis: Axis) -> str:
@@ -84,9 +98,7 @@ def _told(axis: Axis) -> str:
     domain = ""
     if axis.low is not None and axis.high is not None:
         domain = f"; the domain is {number(axis.low)} to {number(axis.high)}"
-    left_out = len(axis.curves) - MOST_CURVES
-    more = f"; {counted(left_out, 'term')} more not drawn" if left_out > 0 else ""
-    return f"Degrees from 0 to 1 over the values; terms: {terms}{more}{domain}"
+    return f"Degrees from 0 to 1 over the values{domain}; terms: {terms}"
 
 
 def outside(axis: Axis, x: Scale, top: float, base: float) -> Iterator[Markup]:
@@ -108,7 +120,7 @@ def outside(axis: Axis, x: Scale, top: float, base: float) -> Iterator[Markup]:
         yield tag("line", x1=at, x2=at, y1=top, y2=base, class_="domain")
 
 
-def _bins(axis: Axis, data: Data | None, x: Scale) -> Iterator[Markup]:
+def _bins(axis: Axis, data: Data | None, x: Scale, y: Scale) -> Iterator[Markup]:
     """Yield the bars of the rows, those of each class upon another."""
     if data is None or axis.name not in data.axes:
         return
@@ -116,14 +128,12 @@ def _bins(axis: Axis, data: Data | None, x: Scale) -> Iterator[Markup]:
     tallest = max(map(sum, bins), default=0)
     wide = (x.end - x.start) / _BINS
     for place, counts in enumerate(bins):
-        base = _BASE
+        base = y.start
         for code, count in enumerate(counts):
             if not count:
                 continue
-            high = (_BASE - _TOP) * 0.86 * count / tallest
-            mark = class_mark(code) if data.classes else "none"
-            if code == len(data.classes) and data.classes:
-                mark = "none"
+            high = _PLOT * 0.86 * count / tallest
+            mark = class_mark(code) if code < len(data.classes) else "none"
             base -= high
             yield tag(
                 "rect",
@@ -135,28 +145,37 @@ def _bins(axis: Axis, data: Data | None, x: Scale) -> Iterator[Markup]:
             )
 
 
-def _labels(curves: tuple[Curve, ...], x: Scale) -> Iterator[Markup]:
-    """Yield the names of the terms above their plateaus, in rows, where they fit."""
-    free = [x.start - 9.0] * 2
-    left_out = 0
-    tops = sorted((_top(curve, x), place) for place, curve in enumerate(curves))
-    for top, place in tops:
+class _Name(NamedTuple):
+    """The name of a term above its curve; row 0 stands lowest."""
+
+    said: str
+    middle: float
+    row: int
+
+
+def _placed(curves: Sequence[Curve], x: Scale) -> list[_Name]:
+    """Return the names that fit above the plateaus, from left to right."""
+    free = [x.start - 9.0] * _MOST_ROWS
+    names: list[_Name] = []
+    for top, place in sorted((_top(curve, x), k) for k, curve in enumerate(curves)):
         said = cut(curves[place].name, 22)
         half = LETTER * _FONT * len(said) / 2.0
         middle = min(max(top, x.start + half), x.end - half)
-        row = next((r for r in (0, 1) if free[r] + 8.0 <= middle - half), None)
-        if row is None:
-            left_out += 1
-            continue
-        free[row] = middle + half
-        base = _TOP - 9.0 - 14.0 * row
+        rows = (row for row, end in enumerate(free) if end + 8.0 <= middle - half)
+        row = next(rows, None)
+        if row is not None:
+            free[row] = middle + half
+            names.append(_Name(said, middle, row))
+    return names
+
+
+def _names(names: Sequence[_Name], top: float) -> Iterator[Markup]:
+    for said, middle, row in names:
+        base = top - 9.0 - _ROW * row
         if row:
-            yield tag(
-                "line", x1=middle, x2=middle, y1=base + 3, y2=_TOP - 4, class_="lead"
-            )
+            ends = {"x1": middle, "x2": middle, "y1": base + 3, "y2": top - 4}
+            yield tag("line", class_="lead", **ends)
         yield words(middle, base, said, "term", "middle")
-    if left_out:
-        yield words(x.end, 10.0, f"+ {left_out} unnamed", "small", "end")
 
 
 def _top(curve: Curve, x: Scale) -> float:

@@ -150,6 +150,19 @@ def test_ticks_and_pictures_are_finite_whatever_the_range(
         assert not re.search("nan|inf", drawn)
 
 
+def test_names_that_do_not_fit_above_their_curves_are_counted() -> None:
+    curves = [
+        curve_of(f"the term number {k}", Points((k - 1.0, k, k + 1.0), (0.0, 1.0, 0.0)))
+        for k in range(30)
+    ]
+    many = Axis("force", "", tuple(curves), (), 0.0, 30.0)
+    drawn = terms_picture(many, None, "p")
+    named = drawn.count('class="term"')
+    assert drawn.count('class="curve"') == 24
+    assert 0 < named < 24
+    assert f"+ {24 - named} unnamed, 6 not drawn" in drawn
+
+
 def test_the_thinned_dots_of_a_line_keep_its_corners() -> None:
     dots = [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (2.0, 5.0), (9.0, 5.0)]
     assert thinned(dots) == [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (9.0, 5.0)]
