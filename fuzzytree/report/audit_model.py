@@ -269,8 +269,8 @@ def _measured(answer: Answer | None, names: Sequence[str]) -> list[Content]:
 
 def _confidence(answer: Answer | None) -> Content:
     state = answer.state if answer else None
-    if not isinstance(state, Sampled) or not state.rows:
-        return "-"
+    if not isinstance(state, Sampled) or "its class" not in state.of:
+        return "-"  # a share of something else, such as of the rows that it wins
     ends = f"{percent(state.low)} to {percent(state.high)}"
     sure = tag("span", f" ({ends})", class_="interval", title="95 % sure")
     return joined([f"{percent(state.hits / state.rows)} %", sure])
