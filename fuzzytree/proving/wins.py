@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partial
+from typing import Final
 
+from fuzzytree.proving.bounding import wins_by_boxes
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.questions import Question, searched
-from fuzzytree.proving.states import Proved, State
+from fuzzytree.proving.states import Bracket, Proved, State
+from fuzzytree.proving.witnesses import coupled
+
+_TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
 
 
 def wins(
@@ -42,9 +48,19 @@ def wins(
     others = tuple(sorted(rivals))
     if given.is_empty:
         return Proved("the domain has no point")
+    by_boxes = partial(
+        wins_by_boxes, given.rules, given.domain, rule, others, tolerance=_TOLERANCE
+    )
     if given.rules.semantics.conjunction == "product":
-        from fuzzytree.proving.bounding import wins_by_boxes
-
-        return wins_by_boxes(given.rules, given.domain, rule, others, clock)
+        return by_boxes(clock)
     question = Question((rule,), others, None, f"the largest lead of rule {rule}")
-    return searched(given, question, clock)
+    if not coupled(given):
+        return searched(given, question, clock)
+    # Half of the time for cells and inequalities, the rest for boxes of the inputs.
+    found = searched(given, question, clock.share(0.5))
+    if not isinstance(found, Bracket):
+        return found
+    other = by_boxes(clock.share(0.9))
+    if not isinstance(other, Bracket):
+        return other
+    return min(found, other, key=lambda one: one.high)
