@@ -40,6 +40,7 @@ from fuzzytree.tree import FuzzyTree
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from fuzzytree.auditing.difference_records import Difference
     from fuzzytree.auditing.domains import Within
     from fuzzytree.auditing.records import Audit, Source
     from fuzzytree.auditing.records import Settings as AuditSettings
@@ -61,6 +62,7 @@ __all__ = [
     "certify",
     "check",
     "convert",
+    "diff",
     "export",
     "learn",
     "learn_table",
@@ -665,6 +667,95 @@ def audited_rows(
             f"{name_choice(str(labels[0]), classes)}"
         )
     return Rows(name, values, codes)
+
+
+def diff(
+    old: Document | str | os.PathLike[str],
+    new: Document | str | os.PathLike[str],
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    budget_s: float = 60.0,
+    settings: AuditSettings | None = None,
+    allow_loss: bool = False,
+    progress: Progress | None = None,
+) -> Difference:
+    """Return what has changed from one model to another, and which decisions do.
+
+    Args:
+        old: A tree, a rule base or a fuzzy system, or the path of one.
+        new: Another one, in any format.
+        data: A table with rows of one's own, which both answer.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        limits: The ends of inputs, which go before the ranges of the models.
+        budget_s: After so many seconds what is not decided stays open.
+        settings: How many points are drawn from the domain, and their seed.
+        allow_loss: As in `load`, for both files.
+        progress: Told what is done and which share of it.
+
+    Raises:
+        ReadError: If a file cannot be read, or the two are about different inputs, or
+            one gives numbers and the other decides.
+        LossError: As `load`.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a limit is none, or an input has no limits.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, combinations=0)
+        >>> diff(tree, rules_from_tree(tree)).verdict
+        'equal'
+    """
+    from fuzzytree.auditing.decisions import all_inputs
+    from fuzzytree.auditing.differences import (
+        difference,
+        joined_domain,
+        refuse_strangers,
+    )
+    from fuzzytree.auditing.places import ModelFile, model_file
+    from fuzzytree.auditing.records import Settings
+    from fuzzytree.auditing.subject import Rows
+    from fuzzytree.proving.clock import Clock
+
+    clock = Clock(budget_s, tell=progress)
+    models: list[Document] = []
+    files: list[ModelFile | None] = []
+    for model in (old, new):
+        if isinstance(model, str | os.PathLike):
+            file = model_file(os.fspath(model), _bytes_of(model))
+            files.append(file)
+            models.append(load_content(file.content, file.name, allow_loss=allow_loss))
+        else:
+            files.append(None)
+            models.append(model)
+    first, second = models
+    titles = [f.name if f else m.name for f, m in zip(files, models, strict=True)]
+    refuse_strangers(first, second, (titles[0], titles[1]))
+    source = _source_of(data)
+    rows = None
+    if data is not None:
+        found = [
+            *batches(
+                data, all_inputs(first, second), columns=columns, delimiter=delimiter
+            )
+        ]
+        rows = Rows(found[0].piece.name, np.hstack([batch.values for batch in found]))
+        if not rows.values.shape[1]:
+            raise TableError(f"{rows.name} has no rows")
+    return difference(
+        first,
+        second,
+        domain=joined_domain(first, second, limits or {}, rows),
+        rows=rows,
+        settings=settings or Settings(budget_s=budget_s),
+        clock=clock,
+        files=(files[0], files[1]),
+        data=source,
+    )
 
 
 def stability(

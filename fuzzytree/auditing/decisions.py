@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 _PROBES = 4_000  # of each model
 _SEGMENTS = 64  # between points of different decisions, halved down to doubles
 _HALVINGS = 70
+_DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 _MOST_TOLD = 24  # pairs of classes with a witness each
 _MOST_REGIONS = 4  # of which the box is looked for
 
@@ -182,7 +183,8 @@ def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
 def _witness_answers(pair: Pair, found: _Found) -> Iterator[Answer]:
     """Yield a witness for each pair of classes, the clearest one that is known."""
     told = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
-    for number, (labels, (_, name, point)) in enumerate(told[:_MOST_TOLD]):
+    for number, (labels, (_, name, found_at)) in enumerate(told[:_MOST_TOLD]):
+        point = found_at if name else _simple(pair, labels, found_at)
         one, other = answer_at(pair.old, point), answer_at(pair.new, point)
         state = difference_at(pair.old, pair.new, point)
         assert state is not None  # only such points are kept
@@ -210,6 +212,25 @@ def _witness_answers(pair: Pair, found: _Found) -> Iterator[Answer]:
         state = difference_at(pair.old, pair.new, known)
         assert state is not None
         yield Answer("FT801", "more", sentence, state, is_finding=True)
+
+
+def _simple(
+    pair: Pair, labels: tuple[str | None, str | None], point: dict[str, Fraction]
+) -> dict[str, Fraction]:
+    """Return a point of few digits at which both models answer the same as here."""
+    best = dict(point)
+    for name, value in point.items():
+        side = pair.domain.side(name)
+        for digits in _DIGITS if side else ():
+            near = float(f"{float(value):.{digits}g}")
+            if side is None or not side.low <= near <= side.high:
+                continue
+            tried = {**best, name: Fraction(near)}
+            models = (pair.old, pair.new)
+            if tuple(answer_at(model, tried).label for model in models) == labels:
+                best = tried
+                break
+    return best
 
 
 def _answered(one: Answered) -> str:

@@ -29,7 +29,7 @@ from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 
-def common_inputs(old: Document, new: Document, names: tuple[str, str]) -> None:
+def refuse_strangers(old: Document, new: Document, names: tuple[str, str]) -> None:
     """Refuse two models that are about different things.
 
     Raises:

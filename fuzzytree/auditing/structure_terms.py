@@ -29,45 +29,88 @@ def variable_drafts(
     Inputs are known by their names, combinations by what they sum.
     """
     mine, theirs = (
-        {_key(v): (k, v) for k, v in enumerate(m.variables)} for m in (old, new)
+        {_key(v): (k, v) for k, v in enumerate(model.variables)} for model in (old, new)
     )
-    for key, (place, variable) in mine.items():
-        if key not in theirs:
-            yield _gone(variable, place)
-    for key, (place, variable) in theirs.items():
-        if key not in mine:
-            yield _come(variable, place)
     users = _users(old), _users(new)
-    for key, (place, variable) in mine.items():
-        if key in theirs:
-            at, other = theirs[key]
-            paths: tuple[Path, Path] = (("variables", place), ("variables", at))
-            yield from _fact_drafts(variable, other, paths)
-            ends = span(variable, domain)
-            yield from _term_drafts(variable, other, paths, users, curves, ends)
+    pairs = [(key, key) for key in mine if key in theirs]
+    lost = [key for key in mine if key not in theirs]
+    come = [key for key in theirs if key not in mine]
+    for key in list(lost):
+        place, variable = mine[key]
+        twin = next((k for k in come if theirs[k][1].name == variable.name), None)
+        if twin is not None:
+            lost.remove(key)
+            come.remove(twin)
+            pairs.append((key, twin))
+            yield _summed(mine[key], theirs[twin], users)
+    for key in lost:
+        yield _gone(*mine[key], users[0])
+    for key in come:
+        yield _come(*theirs[key], users[1])
+    for one, other in pairs:
+        (place, variable), (at, match) = mine[one], theirs[other]
+        paths: tuple[Path, Path] = (("variables", place), ("variables", at))
+        yield from _fact_drafts(variable, match, paths)
+        ends = span(variable, domain)
+        yield from _term_drafts(variable, match, paths, users, curves, ends)
 
 
 def _key(variable: Variable) -> Key:
     return variable.parts or variable.name
 
 
-def _gone(variable: Variable, place: int) -> Draft:
+def _gone(place: int, variable: Variable, users: Users) -> Draft:
     path: Path = ("variables", place)
-    if variable.parts:
-        text = f"the combination {variable.name!r} was removed, or sums otherwise"
-        return Draft("combination", text, "never", path)
-    text = f"the input {variable.name!r} was removed"
-    return Draft("input", text, "always", path)
+    if not variable.parts:
+        text = f"the input {variable.name!r} was removed"
+        return Draft("input", text, "always", path)
+    text = f"the combination {variable.name!r} was removed"
+    return Draft("combination", text, "rules", path, None, _asking(variable, users))
 
 
-def _come(variable: Variable, place: int) -> Draft:
+def _come(place: int, variable: Variable, users: Users) -> Draft:
     path: Path = ("variables", place)
-    if variable.parts:
-        parts = listed([part.input for part in variable.parts])
-        text = f"the combination {variable.name!r} of {parts} is new, or sums otherwise"
-        return Draft("combination", text, "never", None, path)
-    text = f"the input {variable.name!r} is new, so that rows need it"
-    return Draft("input", text, "always", None, path)
+    if not variable.parts:
+        text = f"the input {variable.name!r} is new, so that rows need it"
+        return Draft("input", text, "always", None, path)
+    parts = listed([part.input for part in variable.parts])
+    text = f"the combination {variable.name!r} of {parts} is new"
+    rules = _asking(variable, users)
+    return Draft("combination", text, "rules", None, path, (), rules)
+
+
+def _summed(
+    was: tuple[int, Variable], now: tuple[int, Variable], users: tuple[Users, Users]
+) -> Draft:
+    """Return that a variable of one name looks at something else."""
+    (place, old), (at, new) = was, now
+    text = f"{new.name!r} sums otherwise"
+    one, other = ([part.input for part in variable.parts] for variable in (old, new))
+    gone = [name for name in one if name not in other]
+    come = [name for name in other if name not in one]
+    if gone:
+        text += f", without {listed(gone)}"
+    if come:
+        text += f", with {listed(come)}"
+    if not (gone or come):
+        text += ": its weights, centres or order have changed"
+    return Draft(
+        "combination",
+        text,
+        "rules" if old.parts and new.parts else "always",
+        ("variables", place),
+        ("variables", at),
+        _asking(old, users[0]),
+        _asking(new, users[1]),
+    )
+
+
+def _asking(variable: Variable, users: Users) -> tuple[int, ...]:
+    """Return the numbers of the rules that ask a variable."""
+    return tuple(
+        sorted({n for (name, _), rules in users.items() if name == variable.name
+                for n in rules})
+    )  # fmt: skip
 
 
 def _users(rules: RuleBase) -> Users:

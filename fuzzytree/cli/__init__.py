@@ -29,6 +29,7 @@ VERBS = (
     "run",
     "check",
     "audit",
+    "diff",
     "explain",
     "recheck",
     "bench",

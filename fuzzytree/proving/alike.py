@@ -36,7 +36,7 @@ from fuzzytree.rulebase import RuleBase, Variable
 MOST_BOXES = 4_000
 """Boxes that are looked at, unless the clock ends before."""
 
-TOUCHING = 2.0**-40
+TOUCHING = 2.0**-50
 """Where classes are no further apart than this, boxes are not halved any more."""
 
 _OF = "the smaller of both margins where the two answer otherwise"

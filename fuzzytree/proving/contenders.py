@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from fuzzytree.proving.stretches import ALWAYS, NEVER, Axis, Numbered, Stretch
+from fuzzytree.proving.stretches import ALWAYS, NEVER, Axis, Numbered, Seen, Stretch
 from fuzzytree.rulebase import Conjunction, RuleBase
 
 Box = tuple[Stretch, ...]
@@ -32,6 +32,7 @@ class Contender(NamedTuple):
         bounds: The least and the largest degree of each.
         low: At most its strength.
         high: At least its strength.
+        is_below: Whether its strength is below `high` at every point.
         place: Where it stands among the rules.
     """
 
@@ -41,6 +42,7 @@ class Contender(NamedTuple):
     bounds: Mapping[Numbered, tuple[float, float]]
     low: float
     high: float
+    is_below: bool
     place: int
 
 
@@ -84,7 +86,8 @@ def left_on(
     may_win = [
         rule
         for rule in made
-        if rule.high > top or (rule.high == top and rule.place <= first)
+        if rule.high > top
+        or (rule.high == top and rule.place <= first and not rule.is_below)
     ]
     if len(may_win) <= _MOST_PAIRED:
         may_win = [
@@ -107,7 +110,7 @@ def left_on(
 def _on_box(
     then: str,
     clauses: tuple[Numbered, ...],
-    seen: Sequence[Sequence[tuple[int, float, float]]],
+    seen: Sequence[Sequence[Seen]],
     conjunction: Conjunction,
     place: int,
 ) -> Contender | None:
@@ -115,8 +118,9 @@ def _on_box(
     form: list[Numbered] = []
     kept: list[Numbered] = []
     bounds: dict[Numbered, tuple[float, float]] = {}
+    short: list[float] = []
     for axis, number in clauses:
-        kind, low, high = seen[axis][number]
+        kind, low, high, is_short = seen[axis][number]
         if kind == NEVER:
             return None
         if kind == ALWAYS or (conjunction == "min" and (axis, kind) in form):
@@ -124,15 +128,18 @@ def _on_box(
         form.append((axis, kind))
         kept.append((axis, number))
         bounds[axis, number] = (low, high)
+        short.append(high if is_short else 2.0)
     lows = [bounds[clause][0] for clause in kept]
     highs = [bounds[clause][1] for clause in kept]
+    high = _joined(highs, conjunction, up=True)
     return Contender(
         then,
         tuple(form),
         tuple(kept),
         bounds,
         _joined(lows, conjunction, up=False),
-        _joined(highs, conjunction, up=True),
+        high,
+        high in short,
         place,
     )
 

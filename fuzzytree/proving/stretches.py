@@ -54,11 +54,13 @@ class Seen(NamedTuple):
         form: Clauses of one form are equal at every point of the stretch.
         low: At most the degree.
         high: At least the degree.
+        is_below: Whether the degree is below `high` at every point.
     """
 
     form: int
     low: float
     high: float
+    is_below: bool = False
 
 
 class Axis:
@@ -101,6 +103,10 @@ class Axis:
             for k, (part, (_, most)) in enumerate(zip(parts, bounds, strict=True))
             if k == best or most > low
         )
+        is_below = not is_negated and all(
+            most < high or _falls_short(part, stretch)
+            for part, (_, most) in zip(parts, bounds, strict=True)
+        )
         if is_negated:
             low, high = 1 - high, 1 - low
         form: object = (is_negated, met)
@@ -111,7 +117,7 @@ class Axis:
         elif low == high:
             form = low
         number = self._forms.setdefault(form, len(self._forms))
-        return Seen(number, outwards(low)[0], outwards(high)[1])
+        return Seen(number, outwards(low)[0], outwards(high)[1], is_below)
 
     def is_above(self, one: int, other: int, stretch: Stretch) -> bool:
         """Return whether a clause is at least as true as another on all of a stretch.
@@ -209,6 +215,20 @@ def _parts(laid_out: Iterable[Piece], stretch: Stretch) -> Iterator[Laid]:
             yield Laid(low, high, difference(piece.polynomial, (ZERO,)), cap)
 
 
+def _falls_short(parts: tuple[Laid, ...], stretch: Stretch) -> bool:
+    """Return whether a curve reaches its upper bound nowhere but at an open low end."""
+    _, high = _bounds(parts)
+    first, *others = parts
+    if (
+        stretch.is_closed
+        or first.low == first.high
+        or _bounds(tuple(others))[1] == high
+    ):
+        return False
+    start, *rest = _bends(first.polynomial, first.low, first.high)
+    return start <= first.cap and bool(rest) and max(rest) < start
+
+
 def _bounds(parts: tuple[Laid, ...]) -> Bounds:
     low, high = ONE, ZERO
     for part in parts:
@@ -218,7 +238,6 @@ def _bounds(parts: tuple[Laid, ...]) -> Bounds:
     return low, high
 
 
-@functools.lru_cache(maxsize=1 << 15)
 def spread(polynomial: Polynomial, low: Fraction, high: Fraction) -> Bounds:
     """Return two numbers between which a polynomial stays on a closed interval.
 
@@ -229,18 +248,29 @@ def spread(polynomial: Polynomial, low: Fraction, high: Fraction) -> Bounds:
         >>> [str(one) for one in spread((ZERO, ZERO, ONE), -ONE, ONE)]
         ['-1', '1']
     """
+    bends = _bends(polynomial, low, high)
+    return min(bends), max(bends)
+
+
+@functools.lru_cache(maxsize=1 << 15)
+def _bends(
+    polynomial: Polynomial, low: Fraction, high: Fraction
+) -> tuple[Fraction, ...]:
+    """Return the Bernstein coefficients; the first is the value at the low end."""
     if len(polynomial) == 1:
-        return polynomial[0], polynomial[0]
+        return polynomial
     unit = composed(polynomial, low, high - low)
     last = len(unit) - 1
-    bends = [
+    return tuple(
         sum(
-            (Fraction(math.comb(j, i), math.comb(last, i)) * unit[i])
-            for i in range(j + 1)
+            (
+                Fraction(math.comb(j, i), math.comb(last, i)) * unit[i]
+                for i in range(j + 1)
+            ),
+            start=ZERO,
         )
         for j in range(last + 1)
-    ]
-    return Fraction(min(bends)), Fraction(max(bends))
+    )
 
 
 def _is_above(one: Asked, other: Asked, stretch: Stretch) -> bool:

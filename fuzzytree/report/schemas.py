@@ -9,10 +9,11 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Final, get_args
 
 import msgspec
 
+from fuzzytree.auditing.difference_records import Difference, Verdict
 from fuzzytree.auditing.records import Audit
 from fuzzytree.criteria.results import Stability
 from fuzzytree.recognition.experiment import Study as Experiment
@@ -25,6 +26,7 @@ FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
     {
         "audit.schema.json": Audit,
         "bench.schema.json": Study,
+        "diff.schema.json": Difference,
         "experiment.schema.json": Experiment,
         "needs.schema.json": Report,
         "stability.schema.json": Stability,
@@ -45,7 +47,10 @@ def generate(name: str) -> bytes:
         True
     """
     kind = FILES[name]
-    return of_result(kind, **(_OK if hasattr(kind, "ok") else {}))
+    added: dict[str, Json] = {**_OK} if hasattr(kind, "ok") else {}
+    if kind is Difference:
+        added["verdict"] = {"enum": [*get_args(Verdict)]}
+    return of_result(kind, **added)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,150 @@
+"""What changed between two models, as plain text."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from fuzzytree.auditing.difference_records import Change, Compared, Difference
+from fuzzytree.auditing.records import Answer, Place
+from fuzzytree.proving.states import Bracket, Coordinate, Witness
+from fuzzytree.report.audit import state_text
+from fuzzytree.report.audit_states import state_word
+from fuzzytree.report.svg_regions import span_text
+from fuzzytree.report.text import counted
+
+WIDTH: Final = 100
+MOST_CHANGES: Final = 40
+"""That are told one by one; `--json` tells all."""
+
+_MOST_INPUTS = 12  # of a point or a region
+_INDENT = " " * 11
+
+
+def diff_lines(found: Difference) -> Iterator[str]:
+    """Yield a difference: the two models, their decisions, and what has changed.
+
+    Args:
+        found: The difference.
+    """
+    yield _model_text("old", found.old)
+    yield _model_text("new", found.new)
+    if found.data is not None:
+        yield f"rows     {found.rows} of {found.data.name}"
+    shown = [
+        f"{side.variable} {side.low:.6g} to {side.high:.6g}"
+        for side in found.domain.sides[:_MOST_INPUTS]
+    ]
+    more = len(found.domain.sides) - len(shown)
+    shown += [f"{more} more"] if more > 0 else []
+    yield from _lines("domain  ", ", ".join(shown) or "no inputs", indent=" " * 9)
+    yield ""
+    yield "decisions"
+    for answer in found.answers:
+        yield from _answer_lines(answer)
+    if found.changes:
+        yield ""
+        yield "changes"
+    for change in found.changes[:MOST_CHANGES]:
+        yield from _change_lines(change)
+    if len(found.changes) > MOST_CHANGES:
+        rest = counted(len(found.changes) - MOST_CHANGES, "more change")
+        yield f"  and {rest}; --json tells all"
+
+
+def verdict_text(found: Difference) -> str:
+    """Return what a difference comes to, in a sentence.
+
+    What is not proved is said not to be.
+    """
+    counts = _counts_text(found.changes)
+    match found.verdict:
+        case "changed":
+            what = "outputs" if found.old.form == "system" else "decisions"
+            return f"{what} have changed; {counts}"
+        case "equal" if not found.changes:
+            return "decisions are proved equal, and nothing else has changed"
+        case "equal":
+            return f"decisions are proved equal; {counts}"
+        case "open":
+            return (
+                "nothing was seen to be answered otherwise, and it is NOT proved that "
+                f"nothing is; {counts}"
+            )
+
+
+def _counts_text(changes: Sequence[Change]) -> str:
+    grades = [change.grade for change in changes]
+    told = [
+        f"{grades.count(grade)} {grade}"
+        for grade in ("breaking", "non-breaking", "cosmetic")
+        if grade in grades
+    ]
+    if not told:
+        return "nothing is said otherwise"
+    return f"{counted(len(grades), 'change')}: {', '.join(told)}"
+
+
+def _model_text(title: str, model: Compared) -> str:
+    of = f"{model.file.name}: " if model.file else ""
+    return _shown(f"{title:8} {of}{model.form} {model.name!r}")
+
+
+def _answer_lines(answer: Answer) -> Iterator[str]:
+    word = state_word(answer.state)
+    yield from _lines(f"  {word:8}", answer.sentence)
+    match answer.state:
+        case Witness(point=point):
+            yield from _lines(f"{_INDENT}at", _point_text(point), indent=_INDENT)
+        case Bracket():
+            yield from _lines(_INDENT[:-1], state_text(answer.state))
+        case state:
+            yield from _lines(_INDENT[:-1], state_text(state))
+    if answer.region:
+        shown = [f"{s.variable} {span_text(s)}" for s in answer.region[:_MOST_INPUTS]]
+        more = len(answer.region) - len(shown)
+        shown += [f"{more} more"] if more > 0 else []
+        text = f"everywhere in the box of {'; '.join(shown)}"
+        yield from _lines(_INDENT[:-1], text)
+
+
+def _point_text(point: Sequence[Coordinate]) -> str:
+    shown = [
+        f"{one.input} = {one.decimal if one.hex else one.exact}"
+        for one in point[:_MOST_INPUTS]
+    ]
+    more = len(point) - len(shown)
+    shown += [f"{more} more"] if more > 0 else []
+    return ", ".join(shown) or "any row"
+
+
+def _change_lines(change: Change) -> Iterator[str]:
+    places = " -> ".join(map(_place_text, filter(None, (change.old, change.new))))
+    doubt = "" if change.is_proved else " (not proved)"
+    text = f"{change.sentence}{doubt}"
+    yield from _lines(f"  {change.grade:12}", text, indent=" " * 15)
+    if places:
+        yield _shown(f"{' ' * 15}{places}")
+
+
+def _place_text(place: Place) -> str:
+    return f"{place.file}:{place.line}:{place.column}"
+
+
+def _lines(lead: str, text: str, *, indent: str = _INDENT) -> Iterator[str]:
+    yield from textwrap.wrap(
+        _shown(text),
+        WIDTH,
+        initial_indent=f"{lead} ",
+        subsequent_indent=indent,
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
+
+
+def _shown(text: str) -> str:
+    """Return a text without what a terminal might obey."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
