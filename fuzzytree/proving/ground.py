@@ -212,7 +212,8 @@ def _axes(rules: RuleBase) -> tuple[Axis, ...]:
         asked = tuple(
             _asked(variable.name, rule.when, shapes, elements) for rule in rules.rules
         )
-        if any(asked):
+        is_last = variable is rules.variables[-1]
+        if any(asked) or (is_last and not made):  # rules that ask nothing have one too
             of = tuple(elements)
             made.append(Axis(variable, of, asked, places(of)))
     return tuple(made)
@@ -244,12 +245,16 @@ def _asked(
 def _laid(
     axes: Sequence[Axis], cells: Sequence[Cells]
 ) -> tuple[tuple[Laid, ...], Bands]:
+    if not axes:  # rules that ask nothing, and have a strength of 1
+        one = [Fraction(1)]
+        return (), Bands(one, one, np.array([True]))
     ends = [side for of in cells for side in (of.left, of.right)]
-    low = np.concatenate([side[0].ravel() for side in ends])
-    high = np.concatenate([side[1].ravel() for side in ends])
+    # Level 0 is always among them, so that there is a level below any other.
+    low = np.concatenate([[0.0], *(side[0].ravel() for side in ends)])
+    high = np.concatenate([[0.0], *(side[1].ravel() for side in ends)])
     band, bands = _bands(low, high)
     made: list[Laid] = []
-    start = 0
+    start = 1
     for axis, of in zip(axes, cells, strict=True):
         size = of.left[0].size
         left, right = (

@@ -100,6 +100,10 @@ def _asked(given: Ground, asked: _Asked, clock: Clock) -> State:
     if given.rules.semantics.conjunction == "product":
         reason = "ties under the product are not decided: it has no exact method here"
         return Declined("FTD01", reason)
+    if not given.axes:
+        point = point_with(given, {})
+        found = None if point is None else _checked(given, asked, point)
+        return found or Proved("no rule asks anything")
     try:
         return _searched(given, asked, clock)
     except OutOfTimeError:
@@ -142,7 +146,9 @@ def _searched(given: Ground, asked: _Asked, clock: Clock) -> State:
             clock.check()
             levels += 1
             families = [
-                _flat_family(contest, axis, band) if is_flat else floors[axis](band)
+                _flat_family(contest, asked, axis, band)
+                if is_flat
+                else floors[axis](band)
                 for axis in range(len(floors))
                 if axis != pivot.axis
             ]
@@ -186,8 +192,13 @@ def _pivots(contest: Contest, asked: _Asked, axis: int, laid: Laid) -> list[_Piv
     return list(found.values())
 
 
-def _flat_family(contest: Contest, axis: int, band: int) -> tuple[int, ...]:
-    """Return what is left strictly below a sharp level where ours reach it."""
+def _flat_family(
+    contest: Contest, asked: _Asked, axis: int, band: int
+) -> tuple[int, ...]:
+    """Return what does not exceed a sharp level where ours reach it.
+
+    Rivals are left strictly below it, or stay at it as curves that are constant.
+    """
     options, laid = contest.all_options[axis], contest.ground.laid[0][axis]
     masks: list[int] = []
     for number in np.flatnonzero(options.where >= START).tolist():
@@ -197,9 +208,19 @@ def _flat_family(contest: Contest, axis: int, band: int) -> tuple[int, ...]:
             options.top[number] == band
             and (cell == START or int(laid.least[one, cell]) == band)
         ):
-            below = options.floor[number] < band
-            masks.append(sum(1 << n for n in np.flatnonzero(below).tolist()))
+            behind = options.floor[number] < band
+            for place in range(len(asked.strict), len(behind)):
+                behind[place] |= _stays(contest, laid, cell, place, band)
+            masks.append(sum(1 << n for n in np.flatnonzero(behind).tolist()))
     return maximal(masks)
+
+
+def _stays(contest: Contest, laid: Laid, cell: int, rival: int, band: int) -> bool:
+    """Return whether a rival's curve is constant in a cell, in a band."""
+    if cell == START:
+        return bool(laid.at[laid.of_start[contest.rivals[rival]], 0] == band)
+    element = laid.of[contest.rivals[rival], cell]
+    return bool(laid.least[element, cell] == band == laid.most[element, cell])
 
 
 def _witness(
@@ -232,7 +253,8 @@ def _witness(
     left = contest.full & ~pivot.mask
     others = [axis for axis in range(len(given.laid[0])) if axis != pivot.axis]
     for axis, mask in zip(others, chosen, strict=True):
-        found = _part(contest, axis, level, mask & left)
+        flat = band if is_flat else None
+        found = _part(contest, axis, level, mask & left, flat)
         if found is None:
             return None
         wanted[axis] = found
@@ -241,12 +263,23 @@ def _witness(
     return None if point is None else _checked(given, asked, point)
 
 
-def _part(contest: Contest, axis: int, level: Fraction, mask: int) -> Stretch | None:
-    """Return where on an axis ours reach a level and some rivals stay below it."""
+def _part(
+    contest: Contest, axis: int, level: Fraction, mask: int, flat: int | None
+) -> Stretch | None:
+    """Return where on an axis ours reach a level and some rivals stay below it.
+
+    Where the level is a band, `flat`, rivals may also stay in it.
+    """
     options, laid = contest.all_options[axis], contest.ground.laid[0][axis]
-    rivals = [n for n in range(len(contest.rivals)) if mask >> n & 1]
+    every = [n for n in range(len(contest.rivals)) if mask >> n & 1]
     order = np.argsort(-options.top, kind="stable")
     for number in order[options.where[order] >= START].tolist():
+        rivals = [
+            n
+            for n in every
+            if flat is None
+            or not _stays(contest, laid, int(options.where[number]), n, flat)
+        ]
         if (options.floor[number, rivals] > options.top[number]).any():
             continue
         cell = int(options.where[number])

@@ -10,9 +10,11 @@ import pytest
 
 from fuzzytree.numerics.oracle import DECIDED, decide
 from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.cover import least_cover, uncovered
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import Ground, ground, narrowed, strengths_at
 from fuzzytree.proving.states import Bracket, Proved, Witness, point_of
+from fuzzytree.proving.ties import tie
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import LR, Clause, Part, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.rulebase import Side as Half
@@ -165,3 +167,13 @@ def test_a_spent_budget_leaves_a_bracket() -> None:
     found = wins(ground(rules, unit_domain(rules)), 1, _rivals(rules, 1), clock)
     assert isinstance(found, Bracket)
     assert "the budget was spent" in found.why
+
+
+def test_rules_that_ask_nothing_are_all_equal() -> None:
+    both = (Rule((), "a"), Rule((), "b"))
+    given = ground(RuleBase("always", ("a", "b"), (), both), Domain(()))
+    assert isinstance(wins(given, 1, (2,)), Proved)
+    assert isinstance(wins(given, 1, ()), Witness)
+    assert isinstance(tie(given, 1, 2), Witness)
+    assert isinstance(uncovered(given), Proved)
+    assert least_cover(given).low == 1.0
