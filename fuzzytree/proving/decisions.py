@@ -3,7 +3,7 @@
 A class decides where the first of the strongest rules is one of its rules. So another
 decision than a class's is made where some rule of another class is stronger than all of
 its rules (`fuzzytree.proving.wins`); where such a rule is as strong as some that stand
-behind it, and stronger than the others (`fuzzytree.proving.precedence`); or where no
+behind it, and stronger than the others (`fuzzytree.proving.ties`); or where no
 rule fires and that is answered otherwise (`fuzzytree.proving.cover`).
 """
 
@@ -15,7 +15,6 @@ from fractions import Fraction
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.cover import uncovered
 from fuzzytree.proving.ground import Ground, strengths_at
-from fuzzytree.proving.precedence import precedes
 from fuzzytree.proving.states import (
     Carrier,
     Claim,
@@ -24,6 +23,7 @@ from fuzzytree.proving.states import (
     Witness,
     point_of,
 )
+from fuzzytree.proving.ties import decides_by_order
 from fuzzytree.proving.wins import wins
 
 
@@ -97,4 +97,4 @@ def _asked(given: Ground, label: str | None, clock: Clock) -> Iterator[State]:
             after = [rival for rival in own if rival > number]
             if after:
                 before = [rival for rival in own if rival < number]
-                yield precedes(given, number, before, after, clock)
+                yield decides_by_order(given, number, before, after, clock)

@@ -13,8 +13,8 @@ from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.decisions import decision_at, other_decision
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import Ground, ground, narrowed, strengths_at
-from fuzzytree.proving.precedence import precedes
 from fuzzytree.proving.states import Bracket, Claim, Proved, State, Witness, point_of
+from fuzzytree.proving.ties import decides_by_order
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import (
     Band,
@@ -97,7 +97,7 @@ def test_a_tie_at_a_constant_degree_is_found() -> None:
         (Rule((Clause("x", ("level",)),), "a"), Rule((Clause("y", ("level",)),), "b")),
     )
     given = ground(rules, _box(rules))
-    assert isinstance(precedes(given, 1, [], [2]), Witness)
+    assert isinstance(decides_by_order(given, 1, [], [2]), Witness)
     assert isinstance(other_decision(given, "a"), Proved)
 
 
@@ -135,7 +135,7 @@ def test_a_spent_budget_leaves_it_open() -> None:
     times = iter([0.0] + [9.0] * 10_000)
     clock = Clock(1.0, now=lambda: next(times))
     rules = _shared(HIGHER)
-    state = precedes(ground(rules, _box(rules)), 1, [], [2], clock)
+    state = decides_by_order(ground(rules, _box(rules)), 1, [], [2], clock)
     assert isinstance(state, Bracket)
     assert state.why == "the budget was spent"
 
