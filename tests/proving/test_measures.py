@@ -25,7 +25,9 @@ from fuzzytree.rulebase import Points, Shape
 from tests.proving.bases import random_shape
 
 ZERO, ONE = Fraction(0), Fraction(1)
-GRID = [Fraction(n, 512) for n in range(513)]
+GRID = [Fraction(n, 128) for n in range(129)]
+SEEDS = [0, *(pytest.param(n, marks=pytest.mark.heavy) for n in range(1, 8))]
+"""The first is tried always, the others where there is time."""
 
 
 def shapes(seed: int, count: int = 6) -> list[Shape]:
@@ -33,7 +35,7 @@ def shapes(seed: int, count: int = 6) -> list[Shape]:
     return [random_shape(chance, "mixed") for _ in range(count)]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_no_degree_is_above_a_height_and_one_is_near_it(seed: int) -> None:
     for shape in shapes(seed):
         ((height, at),) = heights(line([shape], ZERO, ONE))
@@ -43,16 +45,16 @@ def test_no_degree_is_above_a_height_and_one_is_near_it(seed: int) -> None:
         assert height.high - height.low < Fraction(1, 10**9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_areas_equal_dense_sums(seed: int) -> None:
-    middles = [Fraction(2 * n + 1, 4096) for n in range(2048)]
+    middles = [Fraction(2 * n + 1, 1024) for n in range(512)]
     for one, other in itertools.pairwise(shapes(seed, 4)):
         p, q = ([exact_degree(s, x) for x in middles] for s in (one, other))
         found = overlap(line([one, other], ZERO, ONE))
-        shared = sum(map(min, p, q)) / 2048
-        joined = sum(map(max, p, q)) / 2048
-        assert found.shared.nearest == pytest.approx(float(shared), abs=2e-3)
-        assert found.joined.nearest == pytest.approx(float(joined), abs=2e-3)
+        shared = sum(map(min, p, q)) / 512
+        joined = sum(map(max, p, q)) / 512
+        assert found.shared.nearest == pytest.approx(float(shared), abs=8e-3)
+        assert found.joined.nearest == pytest.approx(float(joined), abs=8e-3)
         assert found.shared.high - found.shared.low < Fraction(1, 10**9)
         assert max(map(min, p, q)) <= found.possibility.high
         if any(a > b for a, b in zip(p, q, strict=True)):
@@ -61,7 +63,7 @@ def test_areas_equal_dense_sums(seed: int) -> None:
             assert not found.is_around
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_curves_are_equal_where_they_cross(seed: int) -> None:
     for one, other in itertools.combinations(shapes(seed, 4), 2):
         for at, height in overlap(line([one, other], ZERO, ONE)).crossings:
@@ -73,7 +75,7 @@ def test_curves_are_equal_where_they_cross(seed: int) -> None:
             assert low <= height.low <= max(b for _, b in ends) + Fraction(1, 10**6)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_walk_is_monotone_between_neighbours(seed: int) -> None:
     for shape in shapes(seed):
         walked = [*walk(line([shape], ZERO, ONE), 0)]
@@ -136,7 +138,7 @@ def test_every_dip_of_a_zigzag_is_found() -> None:
     assert places == [both, both, both[:1]]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_polynomial_is_outside_only_where_its_curve_is_clipped(seed: int) -> None:
     for shape in shapes(seed):
         for excess in outside(shape, ZERO, ONE):

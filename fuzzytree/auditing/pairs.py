@@ -1,0 +1,381 @@
+"""Questions about two rules: is one superfluous, hidden, a copy, or in conflict?"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final
+
+from fuzzytree.auditing.clauses import clause_answers
+from fuzzytree.auditing.records import Answer, Measure
+from fuzzytree.auditing.subject import Subject
+from fuzzytree.auditing.terms import measure, short
+from fuzzytree.proving.dominance import Compared
+from fuzzytree.proving.factors import Distance, distance
+from fuzzytree.proving.ground import ground
+from fuzzytree.proving.meeting import Meeting, highest, meet
+from fuzzytree.proving.states import Declined, Proved, State, Witness
+from fuzzytree.proving.witnesses import coupled
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+NEARLY: Final = Fraction(1, 10**6)
+"""Two antecedents are nearly the same if no degree differs by more than this."""
+
+MOST_SHOWN: Final = 20
+"""The most conflicts that are told one by one."""
+
+Pair = tuple[int, int]
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Answer what is to be said of pairs of rules, and of single clauses."""
+    given = ground(subject.rules, subject.domain)
+    if given.is_empty:
+        return
+    compared = Compared(given)
+    copies = [*_copies(subject, compared)]
+    same = {pair for pair, found in copies if not found.each.high}
+    yield from _subsumed(subject, compared, same)
+    if subject.policy.decision == "strongest":
+        yield from _masked(subject, compared, same)
+    yield from _copied(subject, compared, copies)
+    yield from _conflicts(subject, compared)
+    if subject.policy.decision == "strongest":
+        yield from clause_answers(subject)
+
+
+def _then(subject: Subject, number: int) -> str:
+    return subject.rules.rules[number - 1].then
+
+
+def _pairs(subject: Subject, *, is_alike: bool) -> Iterator[Pair]:
+    """Yield the pairs of rules of one class, or of two; not ways of one rule."""
+    count = len(subject.rules.rules)
+    for one, other in itertools.combinations(range(1, count + 1), 2):
+        subject.clock.check()
+        is_same = _then(subject, one) == _then(subject, other)
+        if is_same is is_alike and not _is_one(subject, one, other):
+            yield one, other
+
+
+def _is_one(subject: Subject, one: int, other: int) -> bool:
+    """Return whether two rules are two ways in which one rule of a system holds."""
+    names = [subject.rule_name(number) for number in (one, other)]
+    wholes = {name.split(" of ", 1)[1] for name in names if name.startswith("way ")}
+    return len(wholes) == 1 and all(name.startswith("way ") for name in names)
+
+
+def _noun(subject: Subject) -> str:
+    return "class" if subject.policy.decision == "strongest" else "conclusion"
+
+
+# --- FT104 and FT105: is one rule at least as strong everywhere?
+
+
+def _subsumed(
+    subject: Subject, compared: Compared, same: set[Pair]
+) -> Iterator[Answer]:
+    asked = undecided = 0
+    found: dict[int, list[int]] = {}
+    for pair in _pairs(subject, is_alike=True):
+        if not all(compared.fires[number - 1] for number in pair):
+            continue
+        asked += 1
+        if pair in same:
+            continue
+        forth, back = (
+            compared.never_weaker(*each) for each in (pair, (pair[1], pair[0]))
+        )
+        undecided += "open" in (forth, back)
+        if forth == "always":
+            found.setdefault(pair[1], []).append(pair[0])
+        elif back == "always":
+            found.setdefault(pair[0], []).append(pair[1])
+    for weak, strong in sorted(found.items()):
+        name, by = subject.rule_name(weak), subject.rule_name(strong[0])
+        noun = _noun(subject)
+        yield Answer(
+            "FT104",
+            name,
+            f"{name} is subsumed by {by}: wherever it fires, {by} of the same {noun} "
+            "is at least as strong",
+            Proved(_how(compared)),
+            is_finding=True,
+            severity="warning",
+            rules=(weak, *strong),
+            measures=(Measure("rules that subsume it", len(strong)),),
+        )
+    counts = asked, len(found), undecided
+    yield from _rest_of_strengths("FT104", subject, compared, *counts)
+
+
+def _masked(subject: Subject, compared: Compared, same: set[Pair]) -> Iterator[Answer]:
+    asked = undecided = 0
+    found: dict[int, list[tuple[int, bool]]] = {}
+    for first, second in _pairs(subject, is_alike=False):
+        if not all(compared.fires[number - 1] for number in (first, second)):
+            continue
+        asked += 1
+        if (first, second) in same:
+            continue  # a contradiction, which says it already
+        verdict = compared.never_weaker(first, second)
+        undecided += verdict == "open"
+        if verdict == "always":
+            found.setdefault(second, []).append((first, True))
+        elif compared.is_above(second, first):
+            found.setdefault(first, []).append((second, False))
+    for weak, strong in sorted(found.items()):
+        number, is_before = strong[0]
+        name, by = subject.rule_name(weak), subject.rule_name(number)
+        why = "is at least as strong and stands before it"
+        if not is_before:
+            why = "is stronger"
+        yield Answer(
+            "FT105",
+            name,
+            f"{name} is never answered: wherever it fires, {by} of class "
+            f"{_then(subject, number)!r} {why}",
+            Proved(_how(compared)),
+            is_finding=True,
+            severity="error",
+            rules=(weak, *(number for number, _ in strong)),
+            measures=(Measure("rules that mask it", len(strong)),),
+        )
+    counts = asked, len(found), undecided
+    yield from _rest_of_strengths("FT105", subject, compared, *counts)
+
+
+def _how(compared: Compared) -> str:
+    cells = sum(len(laid.cells.rank) for laid in compared.ground.laid[0])
+    means = "ratios of degrees" if compared.is_product else "orders of degrees"
+    axes = len(compared.ground.axes)
+    return f"{means} in {cells} cells on {_count(axes, 'axis', 'axes')} were compared"
+
+
+def _rest_of_strengths(
+    code: str,
+    subject: Subject,
+    compared: Compared,
+    asked: int,
+    found: int,
+    undecided: int,
+) -> Iterator[Answer]:
+    """Yield what is known of all pairs of which nothing is found."""
+    if not asked:
+        return
+    silent = len(compared.fires) - int(compared.fires.sum())
+    word = "subsumed" if code == "FT104" else "masked"
+    kind = f"one {_noun(subject)}" if code == "FT104" else "two classes"
+    among = f"{_count(asked, 'pair', 'pairs')} of {kind}"
+    rest = "no rule" if not found else "no other rule"
+    state: State = Proved(_how(compared))
+    sentence = f"{rest} is {word}, among {among}"
+    shared = coupled(compared.ground)
+    if shared:
+        reason = "the inputs of variables depend on each other"
+        sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
+        state = Declined("FTD04", reason)
+    elif undecided:
+        reason = (
+            f"{_count(undecided, 'pair', 'pairs')} of strengths are too near to tell"
+        )
+        sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
+        state = Declined("FTD02", reason)
+    yield Answer(
+        code,
+        "pairs of rules",
+        sentence,
+        state,
+        is_finding=False,
+        measures=(
+            Measure("pairs", asked),
+            Measure("pairs too near to tell", undecided),
+            Measure("rules that never fire", silent),
+        ),
+    )
+
+
+# --- FT106: do two rules ask the same?
+
+
+def _copies(subject: Subject, compared: Compared) -> Iterator[tuple[Pair, Distance]]:
+    count = len(subject.rules.rules)
+    for one, other in itertools.combinations(range(count), 2):
+        subject.clock.check()
+        if _is_one(subject, one + 1, other + 1):
+            continue
+        found = distance(compared.factored, one, other, NEARLY)
+        if found is not None and found.whole <= NEARLY:
+            yield (one + 1, other + 1), found
+
+
+def _copied(
+    subject: Subject, compared: Compared, copies: list[tuple[Pair, Distance]]
+) -> Iterator[Answer]:
+    decides = subject.policy.decision == "strongest"
+    for pair, found in copies:
+        first, second = (subject.rule_name(number) for number in pair)
+        one, other = (_then(subject, number) for number in pair)
+        is_exact = not found.each.high
+        nearly = "the same antecedent" if is_exact else "nearly the same antecedent"
+        if one == other:
+            text = f"and the same {_noun(subject)} {one!r}"
+        elif decides:
+            text = f"and contradict each other: {one!r} and {other!r}"
+        else:
+            text = f"and different conclusions: {one!r} and {other!r}"
+        measures: tuple[Measure, ...] = (measure("largest distance", found.each),)
+        if not is_exact:
+            variable = compared.ground.axes[found.axis].variable
+            text += (
+                f"; degrees differ by at most {short(found.each.high)}, "
+                f"at {variable.name!r} = {short(found.at)}"
+            )
+            measures += (Measure("place of it", float(found.at), unit=variable.unit),)
+        contradicts = one != other and decides
+        yield Answer(
+            "FT106",
+            f"{first} and {second}",
+            f"{first} and {second} have {nearly} {text}",
+            Proved("their curves were compared piece by piece in fractions"),
+            is_finding=True,
+            severity="error" if contradicts else "warning",
+            rules=pair,
+            measures=measures,
+        )
+    count = len(subject.rules.rules)
+    pairs = count * (count - 1) // 2
+    if not pairs:
+        return
+    among = _count(pairs, "pair", "pairs")
+    rest = "no two rules" if not copies else "no other two rules"
+    yield Answer(
+        "FT106",
+        "pairs of rules",
+        f"{rest} have nearly the same antecedent, among {among}",
+        Proved(f"somewhere their degrees differ by more than {short(NEARLY)}"),
+        is_finding=False,
+        measures=(Measure("pairs", pairs),),
+    )
+
+
+# --- FT201: do rules of different classes reach a level together?
+
+
+def _conflicts(subject: Subject, compared: Compared) -> Iterator[Answer]:
+    level = subject.settings.level
+    near: list[tuple[float, Pair]] = []
+    clean = 0
+    bounds: dict[int, FloatArray] = {}
+    for one, other in _pairs(subject, is_alike=False):
+        if not _may_conflict(subject, one, other):
+            continue
+        if one not in bounds:
+            bounds[one] = highest(compared, one)
+        most = float(bounds[one][other - 1])
+        if most < level:
+            clean += 1
+        else:
+            near.append((-most, (one, other)))
+    near.sort()
+    told = hidden = 0
+    for place, (_, pair) in enumerate(near):
+        if told == MOST_SHOWN and not compared.is_product:
+            hidden = len(near) - place
+            break
+        subject.clock.check()
+        found = meet(compared, *pair, Fraction(level))
+        if found.level.high < level:
+            clean += 1
+        elif told == MOST_SHOWN:
+            hidden += 1
+        else:
+            told += 1
+            yield _conflict(subject, pair, found)
+    if clean or hidden:
+        yield _rest_of_conflicts(subject, compared, clean, hidden)
+
+
+def _may_conflict(subject: Subject, one: int, other: int) -> bool:
+    """Return whether two rules say different things of one output."""
+    if subject.policy.decision == "strongest" or subject.system is None:
+        return True
+    told = [
+        {
+            (output.name, part)
+            for output in subject.system.outputs
+            for part in _then(subject, number).split(" and ")
+            if part.startswith(f"{output.name} is ")
+        }
+        for number in (one, other)
+    ]
+    shared = {name for name, _ in told[0]} & {name for name, _ in told[1]}
+    return any(name in shared for name, _ in told[0] ^ told[1])
+
+
+def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
+    first, second = (subject.rule_name(number) for number in pair)
+    one, other = (_then(subject, number) for number in pair)
+    low, high = found.level
+    reached = "nearly 1" if low < 1 and short(low) == "1" else short(low)
+    level, most = "highest common level", "highest common level at most"
+    if isinstance(found.state, Witness):
+        region = found.state.region
+        sentence = (
+            f"{first} and {second} conflict: both reach {reached} at one input, "
+            f"and say {one!r} and {other!r}"
+        )
+        exact = str(low) if low == high else None
+        measures = [Measure(level, float(low), exact)]
+        if high - low > NEARLY:
+            least = "highest common level at least"
+            measures = [Measure(least, float(low)), Measure(most, float(high))]
+    else:
+        region = ()
+        sentence = (
+            f"{first} and {second} may conflict, on {one!r} and {other!r}: no more "
+            f"than {short(high)} is reached by both"
+        )
+        measures = [Measure(most, float(high))]
+    return Answer(
+        "FT201",
+        f"{first} and {second}",
+        sentence,
+        found.state,
+        is_finding=isinstance(found.state, Witness),
+        severity="info",
+        rules=pair,
+        region=region,
+        measures=tuple(measures),
+    )
+
+
+def _rest_of_conflicts(
+    subject: Subject, compared: Compared, clean: int, hidden: int
+) -> Answer:
+    level, noun = short(subject.settings.level), _noun(subject)
+    kind = "classes" if noun == "class" else "conclusions"
+    pairs, reach = _count(clean, "pair", "pairs"), "reaches" if clean == 1 else "reach"
+    parts = [f"{pairs} of rules of different {kind} never {reach} {level} together"]
+    if hidden:
+        more = _count(hidden, "pair", "pairs")
+        parts.append(f"{more} besides those told may: they conflict less")
+    means = "products" if compared.is_product else "minima"
+    return Answer(
+        "FT201",
+        "pairs of rules",
+        "; ".join(parts),
+        Proved(f"the largest {means} of degrees were found on each axis"),
+        is_finding=bool(hidden),
+        measures=(
+            Measure("pairs that never do", clean),
+            Measure("pairs not told one by one", hidden),
+        ),
+    )
+
+
+def _count(count: int, noun: str, nouns: str) -> str:
+    return f"{count} {noun if count == 1 else nouns}"

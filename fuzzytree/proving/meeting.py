@@ -1,0 +1,280 @@
+"""The highest level that two rules reach at one point of a box.
+
+Under the minimum, on free axes, it is the least over the axes of the supremum of both
+rules' smaller degree there: exact, and its point is put together axis by axis. Under
+the product the two rules may pull every axis two ways. What they cannot reach is known,
+for no strength exceeds the product of the suprema, and the smaller of two is at most
+the root of their product; what they do reach is tried.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.boxes import region_around
+from fuzzytree.proving.curves import ONE, ZERO
+from fuzzytree.proving.dominance import FAR, Compared
+from fuzzytree.proving.ground import Ground, Laid, strengths_at
+from fuzzytree.proving.measures import Bounds
+from fuzzytree.proving.parts import START, Stretch, stretch, widest
+from fuzzytree.proving.states import (
+    Bracket,
+    Claim,
+    Span,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.proving.witnesses import coupled, is_within, point_with
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray, IntArray
+
+_MOST_CHOICES = 1000  # of parts of axes that share inputs
+_HALVINGS = 12  # of what a level may be raised by
+_WEIGHTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.0, 1.0)
+_NEARLY = Fraction(1, 2**30)  # of a level, by which a point may fall short of it
+
+
+class Meeting(NamedTuple):
+    """Where two rules meet.
+
+    Attributes:
+        level: The highest level that both reach.
+        state: A witness, or a bracket of the level.
+    """
+
+    level: Bounds
+    state: State
+
+
+def highest(compared: Compared, one: int) -> FloatArray:
+    """Return bounds from above of the levels that a rule reaches with each other one.
+
+    Args:
+        compared: The rules.
+        one: The number of a rule, from 1.
+
+    Returns:
+        Shape (rules,). Under the minimum they are the levels themselves, but for
+        rounding upwards.
+    """
+    if compared.is_product:
+        return _product_bounds(compared, one - 1)
+    high = compared.ground.laid[1].high
+    levels = np.array([math.nextafter(float(level), 2.0) for level in high] + [1.0])
+    return levels[np.minimum(_bands(compared, one - 1), len(high))]
+
+
+def _bands(compared: Compared, one: int) -> IntArray:
+    """Return the bands of the highest levels that a rule reaches with each other."""
+    found = np.full(len(compared.ground.rules.rules), FAR)
+    for side in compared.sides:
+        lower = side.rank <= side.rank[one]
+        most = np.where(lower, side.most, side.most[one]).max(axis=1, initial=-1)
+        if side.has_start:
+            start = np.minimum(side.at[:, 0], side.at[one, 0])
+            most = np.maximum(most, start)
+        found = np.minimum(found, most)
+    return found
+
+
+def _product_bounds(compared: Compared, one: int) -> FloatArray:
+    alone = np.ones(len(compared.ground.rules.rules))
+    both = alone
+    for high in compared.factored.tops:
+        alone = alone * high.max(axis=1)
+        both = both * (high * high[one]).max(axis=1)
+    bound = np.minimum(np.minimum(alone, alone[one]), np.sqrt(both))
+    return np.asarray(np.minimum(bound * (1.0 + 2.0**-40), 1.0))
+
+
+def meet(compared: Compared, one: int, other: int, level: Fraction) -> Meeting:
+    """Return the highest level that two rules reach at one point.
+
+    Args:
+        compared: The rules.
+        one: The number of a rule, from 1.
+        other: The number of another.
+        level: A witness must reach at least this.
+    """
+    if compared.is_product:
+        return _by_weights(compared, one, other, level)
+    band = int(_bands(compared, one - 1)[other - 1])
+    bands = compared.ground.laid[1]
+    if band >= len(bands.low):
+        bounds = Bounds(ONE, ONE)
+    else:
+        bounds = Bounds(bands.low[band], bands.high[band])
+    name = f"the highest level that rules {one} and {other} both reach"
+    if bounds.high < level:
+        ends = outwards(bounds.low)[0], outwards(bounds.high)[1]
+        return Meeting(
+            bounds, Bracket(name, *ends, "no point is sought below the level")
+        )
+    below = bands.high[band - 1] if 0 < band < len(bands.low) else ZERO
+    near = max(bounds.low - (bounds.low - below) * _NEARLY, ZERO)
+    given, rules = compared.ground, (one, other)
+    joined = {axis for group in coupled(given) for axis in group}
+    for goal in dict.fromkeys((bounds.low, near, min(level, near))):
+        witness = _witness(given, rules, goal, level, joined)
+        if witness is not None and joined:
+            return _raised(given, rules, witness, bounds, joined)
+        if witness is not None:
+            return Meeting(bounds, witness)
+    high = bounds.high
+    if joined and _is_never(given, rules, level, joined):
+        high = min(high, level * (1 - _NEARLY))
+    why = "the inputs of their variables depend on each other"
+    most = outwards(high)[1]
+    return Meeting(Bounds(ZERO, high), Bracket(name, 0.0, most, why))
+
+
+def _raised(
+    given: Ground,
+    rules: tuple[int, int],
+    witness: Witness,
+    bounds: Bounds,
+    joined: Collection[int],
+) -> Meeting:
+    """Return a meeting at a higher level, where axes share inputs, if one is found."""
+    low, high = Fraction(witness.claims[0].level or 0), bounds.high
+    top = high
+    for _ in range(_HALVINGS):
+        if high - low < _NEARLY:
+            break
+        goal = (low + high) / 2
+        found = _witness(given, rules, goal, low, joined)
+        if found is None:
+            high = goal
+        else:
+            witness, low = found, Fraction(found.claims[0].level or 0)
+    return Meeting(Bounds(low, top), witness)
+
+
+def _witness(
+    given: Ground,
+    rules: tuple[int, int],
+    goal: Fraction,
+    level: Fraction,
+    joined: Collection[int],
+) -> Witness | None:
+    """Return a point at which both rules reach a level, if one is found."""
+    parts: dict[int, list[Stretch]] = {}
+    for axis, laid in enumerate(given.laid[0]):
+        of = [rule - 1 for rule in rules]
+        if any(laid.axis.asked[rule] for rule in of):
+            found = [*_parts(laid, of, goal)]
+            parts[axis] = found if axis in joined else found[:1]
+    for chosen in itertools.islice(itertools.product(*parts.values()), _MOST_CHOICES):
+        point = point_with(given, dict(zip(parts, chosen, strict=True)))
+        if point is not None and is_within(given, point):
+            return _checked(given, rules, point, level)
+    return None
+
+
+def _is_never(
+    given: Ground, rules: tuple[int, int], level: Fraction, joined: Collection[int]
+) -> bool:
+    """Return whether no inputs give axes that share them values that reach a level."""
+    parts: dict[int, list[Stretch]] = {}
+    for axis in sorted(joined):
+        laid = given.laid[0][axis]
+        made: list[Stretch] = []
+        for cell in range(START, laid.of.shape[1]):
+            of = laid.of_start if cell == START else laid.of[:, cell]
+            elements = {int(of[rule - 1]) for rule in rules}
+            part = widest(laid, cell, (level, level), elements, ())
+            if part is not None:
+                made.append(part)
+        parts[axis] = made
+    if math.prod(map(len, parts.values())) > _MOST_CHOICES:
+        return False
+    return all(
+        point_with(given, dict(zip(parts, chosen, strict=True))) is None
+        for chosen in itertools.product(*parts.values())
+    )
+
+
+def _parts(laid: Laid, rules: Sequence[int], goal: Fraction) -> Iterator[Stretch]:
+    """Yield where both rules reach a level on an axis: stretches, widest first."""
+    found: list[Stretch] = []
+    for cell in range(laid.of.shape[1]):
+        elements = {int(laid.of[rule, cell]) for rule in rules}
+        part = stretch(laid, cell, goal, elements, ())
+        if part is not None:
+            found.append(part)
+    found.sort(key=lambda part: part.low - part.high)
+    yield from found
+    zones = laid.cells.zones
+    for number, (low, high) in enumerate(zones):
+        of = laid.of[:, number - 1] if number else laid.of_start
+        curves = [laid.axis.elements[int(of[rule])] for rule in rules]
+        if low == high and all(one.degree(low) >= goal for one in curves):
+            yield Stretch(low, high, is_open=False)
+
+
+def _checked(
+    given: Ground,
+    rules: tuple[int, int],
+    point: Mapping[str, Fraction],
+    level: Fraction,
+) -> Witness | None:
+    strengths = strengths_at(given, point)
+    reached = min(strengths[rule - 1] for rule in rules)
+    if reached < level:
+        return None
+    region: tuple[Span, ...] = ()
+    if given.rules.semantics.conjunction == "min":
+        region = region_around(given, point, rules, (), between=(level, level))
+    claim = Claim("reaches", rules=rules, level=str(reached))
+    return Witness(coordinates(point), (claim,), region)
+
+
+def _by_weights(compared: Compared, one: int, other: int, level: Fraction) -> Meeting:
+    """Return where two rules meet under the product, as a witness or a bracket.
+
+    For a weight w in [0, 1] no point's smaller strength exceeds the product over the
+    axes of the suprema of `q**w r**(1 - w)`. Where these are found, on places between
+    cells, both strengths are evaluated.
+    """
+    given, rules = compared.ground, (one, other)
+    most = Fraction(float(highest(compared, one)[other - 1]))
+    best: Witness | None = None
+    for weight in _WEIGHTS:
+        wanted = _weighed(compared, rules, weight)
+        point = point_with(given, wanted)
+        if point is None or not is_within(given, point):
+            continue
+        floor = level if best is None else Fraction(best.claims[0].level or 0)
+        best = _checked(given, rules, point, floor) or best
+    name = f"the highest level that rules {one} and {other} both reach"
+    if best is None:
+        why = "the product is known on each axis only, not on all together"
+        return Meeting(Bounds(ZERO, most), Bracket(name, 0.0, float(most), why))
+    return Meeting(Bounds(Fraction(best.claims[0].level or 0), most), best)
+
+
+def _weighed(
+    compared: Compared, rules: tuple[int, int], weight: float
+) -> dict[int, Stretch]:
+    """Return the place on each axis where a weighted product of two is largest."""
+    factored = compared.factored
+    found: dict[int, Stretch] = {}
+    for axis, (low, _) in enumerate(factored.at_zones):
+        zones = factored.laid[axis].cells.zones
+        one, other = (low[rule - 1] for rule in rules)
+        worth = one**weight * other ** (1.0 - weight)
+        if not factored.has_start(axis) and len(zones) > 1:
+            worth[0] = -1.0
+        place = int(worth.argmax())
+        at = zones[place][0]
+        found[axis] = Stretch(at, at, is_open=False)
+    return found

@@ -1,0 +1,392 @@
+"""Pairs of rules and clauses: what is planted is found, and gone when removed."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.auditing.audit import audit
+from fuzzytree.auditing.records import Answer, Settings
+from fuzzytree.numerics.exact import exact_answer
+from fuzzytree.proving.answers import answer_at
+from fuzzytree.proving.states import Bracket, Declined, Proved, Witness, point_of
+from fuzzytree.rulebase import (
+    Clause,
+    Conjunction,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
+from tests.auditing.test_views import block_of, system_of
+from tests.proving.bases import random_base
+
+LOW = Term("low", Points((0.0, 2.0, 4.0), (1.0, 1.0, 0.0)))
+HIGH = Term("high", Points((2.0, 4.0), (0.0, 1.0)))
+WIDE = Term("wide", Points((1.0, 2.0), (0.0, 1.0)))
+NONE = Term("none", Points((0.0, 1.0), (1.0, 0.0)))
+TERMS = (LOW, HIGH, WIDE, NONE)
+CONJUNCTIONS: tuple[Conjunction, ...] = ("min", "product")
+
+
+def clause(text: str) -> Clause:
+    variable, _, term = text.split()
+    return Clause(variable, (term,))
+
+
+def base(
+    *rules: tuple[str, str],
+    conjunction: Conjunction = "min",
+    more: tuple[Term, ...] = (),
+    high: float = 4.0,
+) -> RuleBase:
+    """Return rules such as `("force is low, slip is none", "soft")`."""
+    terms = (*TERMS, *more)
+    return RuleBase(
+        "grip",
+        ("soft", "hard"),
+        tuple(Variable(name, terms, low=0.0, high=high) for name in ("force", "slip")),
+        tuple(
+            Rule(tuple(clause(one) for one in when.split(", ") if one), then)
+            for when, then in rules
+        ),
+        Semantics(conjunction),
+    )
+
+
+def asked(rules: RuleBase, code: str, settings: Settings | None = None) -> list[Answer]:
+    settings = settings or Settings(budget_s=5.0)
+    return [*audit(rules, select=[code], settings=settings).answers]
+
+
+def told(rules: RuleBase, code: str) -> list[str]:
+    return [one.sentence for one in asked(rules, code) if one.is_finding]
+
+
+CLEAN = (("force is low", "soft"), ("force is high, slip is high", "hard"))
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+@pytest.mark.parametrize("code", ["FT104", "FT105", "FT106", "FT201", "FT107"])
+def test_a_clean_model_has_no_finding_about_pairs(
+    code: str, conjunction: Conjunction
+) -> None:
+    rules = base(*CLEAN, conjunction=conjunction)
+    settings = Settings(level=0.6)
+    assert not any(one.is_finding for one in asked(rules, code, settings))
+
+
+# --- FT104
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_a_narrower_rule_of_the_same_class_is_subsumed(
+    conjunction: Conjunction,
+) -> None:
+    narrow = ("force is high, slip is high, force is low", "hard")
+    rules = base(*CLEAN, narrow, conjunction=conjunction)
+    assert told(rules, "FT104") == [
+        "rule 3 is subsumed by rule 2: wherever it fires, rule 2 of the same class "
+        "is at least as strong"
+    ]
+    other = ("force is high, slip is none, slip is wide", "hard")
+    assert not told(base(*CLEAN, other, conjunction=conjunction), "FT104")
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_a_rule_with_another_curve_below_is_subsumed(conjunction: Conjunction) -> None:
+    rules = base(
+        ("force is high", "hard"), ("force is wide", "hard"), conjunction=conjunction
+    )
+    (answer,) = [one for one in asked(rules, "FT104") if one.is_finding]
+    assert answer.rules == (1, 2)
+    assert isinstance(answer.state, Proved)
+
+
+def test_under_min_another_clause_may_hold_a_rule_below() -> None:
+    # `slip is faint` is at most 1/4, where `force is high` is not below it.
+    faint = Term("faint", Points((0.0, 4.0), (0.25, 0.25)))
+    quarter = Term("quarter", Points((1.0, 4.0), (0.25, 1.0)))
+    rules = base(
+        ("force is quarter", "hard"),
+        ("force is low, slip is faint", "hard"),
+        more=(faint, quarter),
+    )
+    assert told(rules, "FT104")
+    product = replace(rules, semantics=Semantics("product"))
+    assert told(product, "FT104")  # there 1/4 low is below quarter as well
+    stronger = replace(
+        rules,
+        rules=(rules.rules[0], Rule((Clause("force", ("low",)),), "hard")),
+    )
+    assert not told(stronger, "FT104")
+
+
+def test_rules_that_never_fire_are_not_told_as_subsumed() -> None:
+    never = ("force is none, force is high", "hard")
+    rules = base(*CLEAN, never, ("slip is none", "hard"))
+    assert not told(rules, "FT104")
+    (answer,) = asked(rules, "FT104")
+    assert answer.measures[-1].name == "rules that never fire"
+    assert answer.measures[-1].value == 1
+
+
+def test_with_inputs_that_depend_on_each_other_nothing_is_ruled_out() -> None:
+    mix = Variable("mix", TERMS, parts=(Part("force", 1.0), Part("slip", 1.0)))
+    rules = base(("force is low", "soft"), ("force is high", "soft"))
+    rules = replace(
+        rules,
+        variables=(*rules.variables, mix),
+        rules=(*rules.rules, Rule((Clause("mix", ("high",)),), "soft")),
+    )
+    (answer,) = asked(rules, "FT104")
+    assert isinstance(answer.state, Declined)
+    assert answer.state.code == "FTD04"
+
+
+# --- FT105
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_a_rule_behind_one_of_another_class_that_is_as_strong_is_masked(
+    conjunction: Conjunction,
+) -> None:
+    special = ("force is high, slip is high, force is low", "soft")
+    rules = base(*CLEAN, special, conjunction=conjunction)
+    assert told(rules, "FT105") == [
+        "rule 3 is never answered: wherever it fires, rule 2 of class 'hard' "
+        "is at least as strong and stands before it"
+    ]
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_the_special_case_that_stands_first_is_not_masked(
+    conjunction: Conjunction,
+) -> None:
+    special = ("force is high, slip is high, force is low", "soft")
+    assert not told(base(special, *CLEAN, conjunction=conjunction), "FT105")
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_a_rule_before_a_stronger_one_is_masked(conjunction: Conjunction) -> None:
+    half = Term("half", Points((2.0, 4.0), (0.0, 0.5)))
+    rules = base(
+        ("force is half", "soft"),
+        ("force is high", "hard"),
+        conjunction=conjunction,
+        more=(half,),
+    )
+    assert told(rules, "FT105") == [
+        "rule 1 is never answered: wherever it fires, "
+        "rule 2 of class 'hard' is stronger"
+    ]
+
+
+def test_a_rule_that_ties_somewhere_before_the_other_is_answered_there() -> None:
+    # Both are 1 from 2 on: the first one is answered there.
+    rules = base(("force is wide, force is high", "soft"), ("force is wide", "hard"))
+    assert not told(rules, "FT105")
+    assert exact_answer(rules, {"force": 4.0, "slip": 0.0}).label == "soft"
+
+
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(n, marks=pytest.mark.heavy) for n in range(1, 8))]
+)
+def test_a_masked_rule_is_never_answered_on_a_grid(seed: int) -> None:
+    rules = random_base(seed, 6, 2, kind="points", shared=0.7)
+    masked = {a.rules[0] for a in asked(rules, "FT105") if a.is_finding}
+    grid = [n / 16 for n in range(17)]
+    answered = {
+        exact_answer(rules, {"x1": a, "x2": b}).rule for a in grid for b in grid
+    }
+    assert not masked & answered
+
+
+# --- FT106
+
+
+def test_two_rules_that_ask_the_same_contradict_each_other() -> None:
+    copy = ("slip is high, force is high", "soft")
+    (answer,) = [one for one in asked(base(*CLEAN, copy), "FT106") if one.is_finding]
+    assert answer.sentence == (
+        "rule 2 and rule 3 have the same antecedent and contradict each other: "
+        "'hard' and 'soft'"
+    )
+    assert answer.severity == "error"
+
+
+def test_two_rules_that_ask_the_same_of_one_class_are_copies() -> None:
+    copy = ("slip is high, force is high, force is high", "hard")
+    (answer,) = [one for one in asked(base(*CLEAN, copy), "FT106") if one.is_finding]
+    assert answer.sentence == (
+        "rule 2 and rule 3 have the same antecedent and the same class 'hard'"
+    )
+    assert answer.severity == "warning"
+    assert not told(base(*CLEAN, copy), "FT104")
+    product = base(*CLEAN, copy, conjunction="product")
+    assert not told(product, "FT106")  # the degree counts twice there
+    assert told(product, "FT104")
+
+
+def test_curves_that_nearly_agree_are_told_with_the_place() -> None:
+    near = Term("near", Points((2.0, 4.0), (0.0, 1.0 - 2.0**-20)))
+    rules = base(*CLEAN, ("force is near, slip is high", "hard"), more=(near,))
+    assert told(rules, "FT106") == [
+        "rule 2 and rule 3 have nearly the same antecedent and the same class 'hard'; "
+        "degrees differ by at most 9.537e-07, at 'force' = 4"
+    ]
+
+
+def test_curves_that_agree_on_the_domain_only_are_the_same() -> None:
+    beyond = Term("beyond", Points((2.0, 4.0, 5.0), (0.0, 1.0, 0.0)))
+    rules = (*CLEAN, ("force is beyond, slip is high", "hard"))
+    assert told(base(*rules, more=(beyond,)), "FT106")
+    assert not told(base(*rules, more=(beyond,), high=5.0), "FT106")
+
+
+# --- FT201
+
+
+def test_a_conflict_is_told_with_its_highest_level_and_a_region() -> None:
+    rules = base(*CLEAN, ("slip is wide", "soft"))
+    (first,) = [one for one in asked(rules, "FT201") if one.rules == (2, 3)]
+    assert first.sentence == (
+        "rule 2 and rule 3 conflict: both reach 1 at one input, "
+        "and say 'hard' and 'soft'"
+    )
+    assert isinstance(first.state, Witness)
+    assert [one.variable for one in first.region] == ["force", "slip"]
+    for span in first.region:
+        assert (span.low, span.high) == pytest.approx((3.0, 4.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "kind", ["points", pytest.param("lr", marks=pytest.mark.heavy)]
+)
+def test_no_point_of_a_grid_is_above_the_highest_common_level(kind: str) -> None:
+    rules = random_base(3, 5, 2, kind="lr" if kind == "lr" else "points")
+    grid = [n / 16 for n in range(17)]
+    rows = [
+        exact_answer(rules, {"x1": a, "x2": b}).strengths for a in grid for b in grid
+    ]
+    for answer in asked(rules, "FT201", Settings(level=0.1)):
+        if len(answer.rules) == 2:
+            one, other = (number - 1 for number in answer.rules)
+            level = Fraction(answer.measures[0].exact or answer.measures[0].value)
+            most = max(min(row[one], row[other]) for row in rows)
+            assert most <= level + Fraction(1, 10**9)
+            assert isinstance(answer.state, Witness)
+            row = exact_answer(
+                rules,
+                {k: float(v) for k, v in point_of(answer.state.point).items()},
+            )
+            reached = min(row.strengths[one], row.strengths[other])
+            assert abs(reached - level) < Fraction(1, 10**6)
+
+
+def test_many_conflicts_are_told_up_to_a_number_and_counted() -> None:
+    rules = base(*(("force is low", ("soft", "hard")[n % 2]) for n in range(12)))
+    *found, rest = asked(rules, "FT201")
+    assert (len(found), rest.is_finding) == (20, True)
+    assert rest.sentence == (
+        "0 pairs of rules of different classes never reach 0.5 together; "
+        "16 pairs besides those told may: they conflict less"
+    )
+
+
+def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:
+    mix = Variable("mix", TERMS, parts=(Part("force", 1.0), Part("slip", 1.0)))
+    rules = base(("force is wide", "soft"))
+    rules = replace(
+        rules,
+        variables=(*rules.variables, mix),
+        rules=(*rules.rules, Rule((Clause("mix", ("low",)),), "hard")),
+    )
+    (answer,) = [one for one in asked(rules, "FT201") if one.rules]
+    assert isinstance(answer.state, Witness)
+    point = {k: float(v) for k, v in point_of(answer.state.point).items()}
+    strengths = exact_answer(rules, point).strengths
+    assert min(strengths) > Fraction(9, 10)
+    apart = replace(rules.rules[1], when=(Clause("mix", ("none",)),))
+    assert not told(replace(rules, rules=(rules.rules[0], apart)), "FT201")
+
+
+def test_conclusions_about_different_outputs_do_not_conflict() -> None:
+    system = system_of(block_of())
+    assert not audit(system, select=["FT201"]).findings
+
+
+# --- FT107
+
+
+def test_a_clause_that_is_always_true_is_irrelevant() -> None:
+    always = Term("any", Points((0.0, 4.0), (1.0, 1.0)))
+    rules = base(CLEAN[0], ("force is high, slip is any", "hard"), more=(always,))
+    assert told(rules, "FT107") == ["rule 2 decides the same without 'slip is any'"]
+
+
+def test_a_clause_that_only_others_make_irrelevant_is_proved_by_boxes() -> None:
+    # Without its clause rule 3 is as strong as one of the others, which stand first.
+    rules = base(
+        ("slip is wide, force is low", "soft"),
+        ("slip is wide, force is wide", "soft"),
+        ("slip is wide, force is none", "hard"),
+    )
+    found = asked(rules, "FT107")
+    (answer,) = [one for one in found if one.subject == "rule 3, 'force is none'"]
+    assert isinstance(answer.state, Proved)
+    assert "every box" in answer.state.how
+    found = asked(replace(rules, rules=rules.rules[::-1]), "FT107")
+    (answer,) = [one for one in found if one.subject == "rule 1, 'force is none'"]
+    assert isinstance(answer.state, Witness)
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_an_input_is_told_where_a_clause_matters(conjunction: Conjunction) -> None:
+    rules = base(*CLEAN, conjunction=conjunction)
+    found = {one.subject: one for one in asked(rules, "FT107")}
+    one = found["rule 2, 'slip is high'"]
+    assert one.sentence == (
+        "rule 2 needs 'slip is high': without it 'soft' becomes 'hard' at some input"
+    )
+    assert isinstance(one.state, Witness)
+    point = point_of(one.state.point)
+    shorter = replace(rules.rules[1], when=rules.rules[1].when[:1])
+    assert answer_at(rules, point).label == one.state.claims[0].label
+    without = replace(rules, rules=(rules.rules[0], shorter))
+    assert answer_at(without, point).label == "hard"
+
+
+def test_clauses_of_a_rule_that_never_fires_are_not_asked() -> None:
+    rules = base(*CLEAN, ("force is none, force is high", "hard"))
+    assert [one.sentence for one in asked(rules, "FT107") if one.rules == (3,)] == [
+        "rule 3 never fires, so that its clauses are not asked one by one"
+    ]
+
+
+def test_a_clause_that_a_rule_of_the_class_makes_irrelevant_is_proved() -> None:
+    rules = base(("force is wide", "hard"), ("force is high, slip is low", "hard"))
+    (answer,) = [one for one in asked(rules, "FT107") if "slip" in one.subject]
+    assert isinstance(answer.state, Proved)
+    assert answer.state.how == "rule 1 of the same class is as strong everywhere"
+
+
+def test_many_clauses_that_matter_are_told_up_to_a_number_and_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("fuzzytree.auditing.clauses.MOST_SHOWN", 2)
+    answers = asked(base(*CLEAN), "FT107")
+    assert [isinstance(one.state, Witness) for one in answers] == [True, True, False]
+    assert answers[2].sentence == "1 more clause matters: it decides some input"
+
+
+def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:
+    rules = random_base(2, kind="points", shared=0.3, odd=0.2, combinations=1)
+    made = audit(rules, select=["FT107"], settings=Settings(budget_s=0.05))
+    states = {type(one.state) for one in made.answers}
+    assert not made.is_complete or Bracket in states

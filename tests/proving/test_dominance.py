@@ -1,0 +1,168 @@
+"""Is a rule nowhere weaker than another? Against the exact engine, and on grids."""
+
+from __future__ import annotations
+
+import itertools
+from fractions import Fraction
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.numerics.exact import exact_answer
+from fuzzytree.proving.curves import ONE, ZERO
+from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.dominance import Compared
+from fuzzytree.proving.factors import distance, largest_ratio, quotient
+from fuzzytree.proving.ground import ground
+from fuzzytree.proving.meeting import highest, meet
+from fuzzytree.proving.states import Bracket, Proved, Witness
+from fuzzytree.proving.wins import wins
+from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Semantics, Term, Variable
+from tests.proving.bases import Kind, random_base, unit_domain
+
+KINDS: tuple[Kind, ...] = ("points", "band", "lr")
+GRID = [n / 8 for n in range(9)]
+SEEDS = [0, *(pytest.param(n, marks=pytest.mark.heavy) for n in range(1, 8))]
+"""The first is tried always, the others where there is time."""
+
+
+def compared(rules: RuleBase) -> Compared:
+    return Compared(ground(rules, unit_domain(rules)))
+
+
+def strengths(rules: RuleBase) -> list[tuple[Fraction, ...]]:
+    points = itertools.product(GRID, repeat=len(rules.inputs))
+    return [
+        exact_answer(rules, dict(zip(rules.inputs, p, strict=True))).strengths
+        for p in points
+    ]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_rule_is_nowhere_weaker_iff_the_other_never_wins(
+    kind: Kind, seed: int
+) -> None:
+    rules = random_base(seed, 5, 2, kind=kind, shared=0.5, odd=0.2)
+    both = compared(rules)
+    for strong, weak in itertools.permutations(range(1, 6), 2):
+        state = wins(both.ground, weak, {strong})
+        verdict = both.never_weaker(strong, weak)
+        if not isinstance(state, Bracket):
+            assert (verdict == "always") is isinstance(state, Proved)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "kind", ["points", "band", pytest.param("lr", marks=pytest.mark.heavy)]
+)
+def test_under_the_product_no_point_of_a_grid_speaks_against_it(
+    kind: Kind, seed: int
+) -> None:
+    rules = random_base(seed, 5, 2, "product", kind, shared=0.6, odd=0.2)
+    both, rows = compared(rules), strengths(rules)
+    for strong, weak in itertools.permutations(range(1, 6), 2):
+        pairs = [(row[strong - 1], row[weak - 1]) for row in rows]
+        if both.never_weaker(strong, weak) == "always":
+            assert all(a >= b for a, b in pairs)
+        if both.is_above(strong, weak):
+            assert all(a > b or not b for a, b in pairs)
+        most = largest_ratio(both.factored, strong - 1, weak - 1)
+        if most is not None:
+            assert all(b <= most.high * a for a, b in pairs)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_under_min_a_rule_that_is_above_is_stronger_wherever_the_other_fires(
+    seed: int,
+) -> None:
+    rules = random_base(seed, 6, 2, kind="points", shared=0.8)
+    half = Term("half", Points((0.0, 0.3, 0.6), (0.0, 0.5, 0.0)))
+    tall = Term("tall", Points((-0.1, 0.3, 0.7), (0.0, 1.0, 0.0)))
+    variables = tuple(replace(v, terms=(*v.terms, half, tall)) for v in rules.variables)
+    more = tuple(Rule((Clause("x1", (name,)),), "class 1") for name in ("half", "tall"))
+    rules = replace(rules, variables=variables, rules=(*rules.rules, *more))
+    both, rows = compared(rules), strengths(rules)
+    assert both.is_above(8, 7)
+    for strong, weak in itertools.permutations(range(1, 9), 2):
+        if both.is_above(strong, weak):
+            pairs = [(row[strong - 1], row[weak - 1]) for row in rows]
+            assert all(a > b or not b for a, b in pairs)
+
+
+def test_rules_that_ask_nothing_are_equal() -> None:
+    rules = RuleBase("all", ("a", "b"), (), (Rule((), "a"), Rule((), "b")))
+    for meant in (Semantics("min"), Semantics("product")):
+        both = Compared(ground(replace(rules, semantics=meant), Domain(())))
+        assert both.never_weaker(1, 2) == "always"
+        assert not both.is_above(1, 2)
+        assert both.fires.all()
+
+
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+def test_an_open_lower_end_does_not_count(conjunction: str) -> None:
+    # At 0 itself the second is stronger, above it never.
+    terms = (
+        Term("low", Points((0.0, 1.0), (0.5, 0.0))),
+        Term("spike", Points((0.0, 0.0), (1.0, 0.0))),
+    )
+    rules = RuleBase(
+        "open",
+        ("a",),
+        (Variable("x", terms),),
+        tuple(Rule((Clause("x", (term.name,)),), "a") for term in terms),
+        Semantics("product" if conjunction == "product" else "min"),
+    )
+    verdicts = [
+        Compared(
+            ground(rules, Domain((Side("x", 0.0, 1.0, is_open=is_open),)))
+        ).never_weaker(1, 2)
+        for is_open in (False, True)
+    ]
+    assert verdicts == ["not", "always"]
+
+
+def test_a_quotient_whose_zeros_cancel_has_a_bound() -> None:
+    top = (ZERO, ONE, -ONE)  # x (1 - x)
+    bottom = (ZERO, ONE, ONE)  # x (1 + x)
+    found = quotient(top, bottom, ZERO, ONE)
+    assert found is not None
+    assert found.exact == "1"
+
+
+def test_a_quotient_is_largest_inside() -> None:
+    # x (1 - x) / (1 + x) is largest at sqrt 2 - 1: 3 - 2 sqrt 2.
+    found = quotient((ZERO, ONE, -ONE), (ONE, ONE), ZERO, ONE)
+    assert found is not None
+    assert found.nearest == pytest.approx(3.0 - 2.0 * 2.0**0.5, abs=1e-13)
+    assert found.low**2 - 6 * found.low + 1 >= 0 >= found.high**2 - 6 * found.high + 1
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_point_of_a_grid_is_farther_than_a_distance(seed: int) -> None:
+    rules = random_base(seed, 4, 2, kind="lr", shared=0.7)
+    both, rows = compared(rules), strengths(rules)
+    for one, other in itertools.combinations(range(4), 2):
+        found = distance(both.factored, one, other, ONE)
+        assert found is not None
+        assert all(abs(row[one] - row[other]) <= found.whole for row in rows)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+def test_no_point_of_a_grid_reaches_more_than_where_rules_meet(
+    conjunction: str, seed: int
+) -> None:
+    rules = random_base(seed, 4, 2, kind="mixed", shared=0.3)
+    meant = Semantics("product" if conjunction == "product" else "min")
+    rules = replace(rules, semantics=meant)
+    both, rows, level = compared(rules), strengths(rules), Fraction(1, 10)
+    for one, other in itertools.combinations(range(1, 5), 2):
+        found = meet(both, one, other, level)
+        most = max(min(row[one - 1], row[other - 1]) for row in rows)
+        assert most <= found.level.high + Fraction(1, 10**12)
+        assert most <= highest(both, one)[other - 1]
+        if isinstance(found.state, Witness):
+            assert Fraction(found.state.claims[0].level or 0) >= level
+        if conjunction == "min":
+            assert found.level.high - found.level.low < Fraction(1, 10**9)
