@@ -121,11 +121,22 @@ def _separate(
         except OutOfTimeError:
             return found, False
         if isinstance(state, Witness):
-            found.append(state)
+            found.append(replace(state, region=_held(state, box, subject.domain)))
             todo += _around(given, box, state.region)
         elif not isinstance(state, Proved):
             return found, False
     return found, True
+
+
+def _held(state: Witness, box: Domain, domain: Domain) -> tuple[Span, ...]:
+    """Return the region of a gap in a part of the domain, with the part's own ends."""
+    known = {one.variable for one in state.region}
+    parts = (
+        Span(side.variable, side.low, side.high)
+        for side in box.sides
+        if side.variable not in known and side != domain.side(side.variable)
+    )
+    return (*state.region, *parts) if known else ()
 
 
 def _around(given: Ground, box: Domain, region: tuple[Span, ...]) -> Iterator[Domain]:

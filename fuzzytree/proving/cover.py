@@ -257,6 +257,8 @@ def _bare_region(given: Ground, point: Point) -> tuple[Span, ...]:
         best = max(range(len(zero)), key=lambda place: len(zero[place] & left))
         span = _bare_span(given.laid[0][best], at[best], sorted(zero[best] & left))
         if span is not None:
+            if not (span.low or 0.0) <= at[best] <= (span.high or 0.0):
+                return ()  # narrower than doubles tell
             spans.append(span)
         left -= zero[best]
     return tuple(spans)
