@@ -1515,6 +1515,36 @@ class Grid:
                 raise UndecidedError("two critical levels are too near to tell apart")
         return False
 
+    def is_bare(self, rules: Sequence[Asked]) -> bool | None:
+        """Return whether all rules are somewhere exactly 0; None if it is not known."""
+        found = [False, False]
+        for vague in (False, True):
+            live, full = {0}, (1 << len(rules)) - 1
+            for place, axis in enumerate(self.axes):
+                sets = self._zeros(axis, is_vague=vague)
+                below = {
+                    sum(1 << n for n, of in enumerate(rules) if of[place] & zeros)
+                    for zeros in sets
+                }
+                live = _largest(a | b for a in live for b in _largest(below))
+            found[vague] = full in live
+        return None if found[0] != found[1] else found[0]
+
+    def _zeros(self, axis: Axis, *, is_vague: bool) -> set[int]:
+        """Return which functions are 0 together: in a cell, or at its right end."""
+        bands, zero = self.levels.bands, self.marks[ZERO]
+        lowest = self.levels.band[zero]
+        is_sharp = bands[lowest][0] == bands[lowest][1]
+        found: set[int] = set()
+        for cell in axis.cells:
+            pairs = list(enumerate(zip(cell.left, cell.right, strict=True)))
+            found.add(sum(1 << n for n, ends in pairs if ends == (zero, zero)))
+            right = [n for n, ends in pairs if self.levels.band[ends[1]] == lowest]
+            if not is_vague and not is_sharp:
+                right = [n for n in right if cell.right[n] == zero]
+            found.add(sum(1 << n for n in right))
+        return found
+
     def gap(self, level: Fraction, *, is_above: bool) -> int:
         """Return the band whose gap is just above or just below an extra level."""
         return self.levels.band[self.marks[level]] - (not is_above)
@@ -1599,11 +1629,13 @@ LIMITS = (
 """What every audit says that it does not establish, word for word."""
 
 SEVERITIES = {
-    **dict.fromkeys(("FT101", "FT105", "FT601", "FT602"), "error"),
-    **dict.fromkeys(("FT102", "FT104", "FT202", "FT203", "FT301", "FT402"), "warning"),
+    **dict.fromkeys(("FT105", "FT601", "FT602"), "error"),
+    **dict.fromkeys(("FT102", "FT104", "FT202", "FT203", "FT402"), "warning"),
     **dict.fromkeys(("FT103", "FT107", "FT201", "FT204", "FT205", "FT403"), "info"),
     **dict.fromkeys(("FT404", "FT501", "FT701"), "info"),
     **dict.fromkeys([f"FTD0{n}" for n in range(1, 9)], "info"),
+    "FT101": "error warning",  # it decides by its place alone
+    "FT301": "warning info",  # the model answers a class where no rule fires
     "FT106": "warning error",  # of another class: a contradiction
     "FT401": "warning error",  # never reached at all
 }
@@ -1707,6 +1739,7 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
         checks.report.expect(found.file.sha256 == sha, text)
     checks.head()
     checks.asked()
+    checks.complete()
     checks.ids()
     for number, answer in enumerate(found.answers, 1):
         checks.answer(answer, f"answer {number} ({answer.code}, {answer.subject:.60})")
@@ -1879,6 +1912,32 @@ class _Checks:
             expect(
                 not is_both, f"{text.split(' ')[0]} was asked, and told to be left out"
             )
+
+    def complete(self) -> None:
+        """Check that each rule and clause was asked about, if the code was not cut."""
+        told = {text.split(" ")[0] for text in self.audit.unasked}
+        by: dict[str, list[Answer]] = {code: [] for code in SEVERITIES}
+        for one in self.audit.answers:
+            by.get(one.code, []).append(one)
+        every = {*self.numbers}
+        dead = {one.rules[0] for one in by["FT101"] if one.is_finding and one.rules}
+        wanted = {"FT101": every, "FT102": every - dead, "FT103": every}
+        if isinstance(self.model, Tree):
+            wanted["FT101"] = dead
+            wanted["FT205"] = every - dead
+        if len(every) == 1:
+            del wanted["FT103"]
+        for code, numbers in wanted.items():
+            found = {one.rules[0] for one in by[code] if one.rules}
+            if code not in told and by[code] and found != numbers:
+                self.report.wrong.append(f"{code} was not asked of each rule, or twice")
+        clauses = sum(len(rule.when) for rule in self.rules.rules)
+        asked = sum(
+            m.value for one in by["FT107"] for m in one.measures if not one.rules
+        )
+        asked += sum(bool(one.rules) for one in by["FT107"])
+        is_all = "FT107" in told or not by["FT107"] or asked == clauses
+        self.report.expect(is_all, "FT107 was not asked of each clause")
 
     def ids(self) -> None:
         """Check each id: its code and a hash of what the rules and terms say."""
@@ -2328,12 +2387,41 @@ def _shows_region(checks: _Checks, answer: Answer, state: Witness) -> None:
 
 
 def _covered(checks: _Checks, answer: Answer) -> None:
+    grid = checks.grid
+    if answer.subject == "cover":
+        is_gap = grid.is_bare(grid.of)
+        if is_gap is None:
+            raise UndecidedError("a curve may touch 0 where it is not known exactly")
+        _never(is_gap, checks, "there are points at which no rule fires")
+        return
     if checks.rules.semantics.conjunction != "min":
         raise UndecidedError("gaps under product are not decided again here")
-    grid = checks.grid
     below = grid.gap(Fraction(checks.audit.settings.epsilon), is_above=False)
     is_gap = grid.leaves(None, grid.of, below)
     _never(is_gap, checks, "there are points at which every rule is below epsilon")
+
+
+def _superfluous(checks: _Checks, answer: Answer) -> None:
+    _require(len(answer.rules) == 1 and answer.is_finding, "it is of no rule")
+    number, grid = answer.rules[0], checks.grid
+    mine, then = grid.of[number - 1], _then(checks, number)
+    others = [of for n, of in enumerate(grid.of, 1) if n != number]
+    _never(_beats(checks, mine, others), checks, "it is stronger than all somewhere")
+    later = [n for n in checks.numbers if n > number and _then(checks, n) != then]
+    alike = [n for n in checks.numbers if n != number and _then(checks, n) == then]
+    for other in alike:  # one that hides it, with no other class between the two
+        between = [n for n in later if n < other]
+        if not between and not _beats(checks, mine, [grid.of[other - 1]]):
+            return
+    if later:
+        raise UndecidedError("that no tie is decided by its place is not asked here")
+
+
+def _tied(checks: _Checks, answer: Answer) -> None:
+    pairs = checks.pairs(alike=False)
+    told = [one for one in checks.audit.answers if one.code == "FT202" and one.rules]
+    _counted(answer, {"pairs": len(pairs), "pairs told one by one": len(told)}, 2)
+    raise UndecidedError("that the other pairs do not tie is not asked here")
 
 
 def _hidden(checks: _Checks, answer: Answer) -> None:
@@ -2445,15 +2533,72 @@ def _without(checks: _Checks, answer: Answer) -> tuple[tuple[Clause, ...], Claus
     return (*when[:place], *when[place + 1 :]), found[0]
 
 
+def _shows_win(checks: _Checks, answer: Answer, state: Witness) -> None:
+    """Ask that a claim compares the rule with every rule that it is about."""
+    _require(len(answer.rules) == 1, "it is of no rule")
+    number = answer.rules[0]
+    then = _then(checks, number)
+    rivals = [n for n in checks.numbers if n != number]
+    if answer.code != "FT103":
+        rivals = [n for n in rivals if _then(checks, n) != then]
+    ties = [c for c in state.claims if c.kind == "ties" and number in c.rules]
+    if answer.is_finding or (answer.code == "FT103" and ties):  # it ties, and is first
+        _require(bool(ties), "it is not claimed that the rule ties")
+        return
+    beats = [c for c in state.claims if (c.kind, c.rules) == ("beats", (number,))]
+    is_all = any(set(rivals) <= set(claim.rivals) for claim in beats)
+    _require(is_all, "it is not claimed that the rule beats all these others")
+
+
+def _shows_lead(checks: _Checks, answer: Answer, state: Witness) -> None:
+    point = {one.input: _fraction(one.exact) for one in state.point}
+    _require(len(answer.rules) == 1 and not answer.is_finding, "it is of no rule")
+    every, then = strengths(checks.rules, point), _then(checks, answer.rules[0])
+    pairs = zip(every, checks.rules.rules, strict=True)
+    best = max((one for one, rule in pairs if rule.then != then), default=ZERO)
+    lead = every[answer.rules[0] - 1] - best
+    told = [m.value for m in answer.measures if m.name == "largest lead, at least"]
+    is_so = len(told) == 1 and lead >= Fraction(told[0]) >= checks.audit.settings.lead
+    _require(is_so, "the rule does not lead by so much there")
+
+
+def _shows_tie(checks: _Checks, answer: Answer, state: Witness) -> None:
+    met = [
+        c for c in state.claims if c.kind == "ties" and {*answer.rules} <= {*c.rules}
+    ]
+    is_all = any({*c.rules, *c.rivals} == {*checks.numbers} for c in met)
+    _require(is_all and answer.is_finding, "it is not claimed that the two tie")
+    classes = {_then(checks, number) for number in answer.rules}
+    _require(len(classes) == 2, "the rules are of one class")
+
+
+def _shows_gap(checks: _Checks, answer: Answer, state: Witness) -> None:
+    level = ZERO
+    if not answer.subject.startswith("gap "):
+        level = Fraction(checks.audit.settings.epsilon)
+    met = [
+        c for c in state.claims if c.kind == "below" and {*c.rules} == {*checks.numbers}
+    ]
+    is_low = any(_fraction(claim.level or "1") <= level for claim in met)
+    _require(is_low and answer.is_finding, "it is not claimed that all rules are below")
+
+
+def _shows_difference(checks: _Checks, answer: Answer, state: Witness) -> None:
+    said = {claim.of: claim.label for claim in state.claims if claim.kind == "decides"}
+    _require(said.keys() == {"tree", "raw rules"}, "it is not claimed what both answer")
+    is_near = not answer.rules  # the nearest to a row is no finding
+    _require(answer.is_finding or is_near, "two answers that differ are a finding")
+    _require(said["tree"] != said["raw rules"], "the two answers are the same")
+
+
 def _shows_need(checks: _Checks, answer: Answer, state: Witness) -> None:
     rest, _ = _without(checks, answer)
     point = {one.input: _fraction(one.exact) for one in state.point}
     every = list(checks.rules.rules)
     every[answer.rules[0] - 1] = every[answer.rules[0] - 1]._replace(when=rest)
     other = answer_of(checks.rules._replace(rules=tuple(every)), point)
-    _require(
-        other != answer_of(checks.rules, point), "the clause does not matter there"
-    )
+    is_other = other != answer_of(checks.rules, point) and not answer.is_finding
+    _require(is_other, "the clause does not matter there")
 
 
 def _shows_conflict(checks: _Checks, answer: Answer, state: Witness) -> None:
@@ -2598,17 +2743,25 @@ def _shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] |
 
 
 _SHOWS: dict[str, Callable[[_Checks, Answer, Witness], None]] = {
+    "FT101": _shows_win,
+    "FT102": _shows_lead,
+    "FT103": _shows_win,
     "FT107": _shows_need,
     "FT201": _shows_conflict,
+    "FT202": _shows_tie,
+    "FT203": _shows_difference,
     "FT205": _shows_region,
+    "FT301": _shows_gap,
 }
 _AGAIN: dict[str, Callable[[_Checks, Answer], None]] = {
     "FT101": _dead,
+    "FT103": _superfluous,
     "FT104": _hidden,
     "FT105": _hidden,
     "FT106": _copied,
     "FT107": _needless,
     "FT201": _apart,
+    "FT202": _tied,
     "FT301": _covered,
     "FT401": _heights,
     "FT403": _overlaps,
