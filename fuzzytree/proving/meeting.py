@@ -234,8 +234,12 @@ def _checked(
     region: tuple[Span, ...] = ()
     if given.rules.semantics.conjunction == "min":
         region = region_around(given, point, rules, (), between=(level, level))
-    claim = Claim("reaches", rules=rules, level=str(reached))
-    return Witness(coordinates(point), (claim,), region)
+    weakest = min(rules, key=lambda rule: strengths[rule - 1])
+    claims = (
+        Claim("reaches", rules=rules, level=str(level)),  # on all of the region
+        Claim("strength", rules=(weakest,), level=str(reached)),
+    )
+    return Witness(coordinates(point), claims, region)
 
 
 def _by_weights(compared: Compared, one: int, other: int, level: Fraction) -> Meeting:
