@@ -13,13 +13,20 @@ their curves and numbers, is not part of it.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
-from typing import Final, Literal, NoReturn
 
 import msgspec
 
+from fuzzytree.auditing.conditions import (
+    MOST_QUESTIONS,
+    NORMS,
+    Conditions,
+    DecliningError,
+    Terms,
+    decline,
+)
 from fuzzytree.auditing.records import Answer, Label, Policy
 from fuzzytree.casting import as_rules
 from fuzzytree.casting.shapes import shape_of
@@ -28,7 +35,6 @@ from fuzzytree.lowering import rules_from_tree
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Declined, Proved
 from fuzzytree.rulebase import (
-    Clause,
     Conjunction,
     Points,
     Rule,
@@ -42,11 +48,7 @@ from fuzzytree.rulebase import (
 from fuzzytree.system import (
     And,
     Conclusion,
-    Condition,
     FuzzySystem,
-    Is,
-    Not,
-    Or,
     RuleBlock,
     SystemInput,
     SystemRule,
@@ -55,11 +57,6 @@ from fuzzytree.system import (
 )
 from fuzzytree.system import Label as SystemLabel
 from fuzzytree.tree import FuzzyTree
-
-MOST_WAYS: Final = 64
-"""The most rules that one rule of a system becomes."""
-
-_NORMS: Mapping[str | None, Conjunction] = {"minimum": "min", "product": "product"}
 
 
 class View(msgspec.Struct, frozen=True, eq=False):
@@ -169,19 +166,21 @@ def _conjunction(system: FuzzySystem) -> Conjunction:
     """Return the AND of most rules that have one, of those with an exact method."""
     counts: dict[Conjunction, int] = {"min": 0, "product": 0}
     for block in system.blocks:
-        norm = _NORMS.get(block.conjunction)
+        norm = NORMS.get(block.conjunction)
         if norm:
             counts[norm] += sum(And in joints(rule.when) for rule in block.rules)
     return "product" if counts["product"] > counts["min"] else "min"
-
-
-Terms = Mapping[str, Mapping[str, Shape]]
 
 
 def _terms(system: FuzzySystem) -> tuple[Terms, list[Answer]]:
     """Return the terms of the inputs that have an exact shape, and the others."""
     terms: dict[str, dict[str, Shape]] = {}
     others: list[Answer] = []
+    asking = Counter(
+        key
+        for rule in system.rules
+        for key in {(asked.variable, asked.label) for asked in questions(rule.when)}
+    )
     for one in system.inputs:
         terms[one.name] = {}
         for label in one.labels:
@@ -193,11 +192,8 @@ def _terms(system: FuzzySystem) -> tuple[Terms, list[Answer]]:
             reason = f"its curve ({kind}) has no exact method"
             if one.parts and one.clips:
                 reason = "a combination that is moved into a range has no exact method"
-            asking = sum(
-                any(q.variable == one.name and q.label == label.name for q in asked)
-                for asked in ([*questions(rule.when)] for rule in system.rules)
-            )
-            count = "1 rule asks" if asking == 1 else f"{asking} rules ask"
+            rules = asking[one.name, label.name]
+            count = "1 rule asks" if rules == 1 else f"{rules} rules ask"
             name = f"term {label.name!r} of {one.name!r}"
             found = _declined("FTD02", name, f"{reason}; {count} for it")
             terms_of = (Label(one.name, label.name),)
@@ -286,10 +282,12 @@ class _Taken:
             self._never(name, "its weight is 0")
             return
         try:
+            if sum(1 for _ in questions(rule.when)) > MOST_QUESTIONS:
+                decline("FTD05", f"it asks more than {MOST_QUESTIONS} questions")
             if rule.weight != 1.0:
-                _decline("FTD07", f"its weight of {rule.weight!r} has no exact method")
-            ways = _Conditions(self.conjunction, self.terms, block).ways(rule.when)
-        except _DecliningError as error:
+                decline("FTD07", f"its weight of {rule.weight!r} has no exact method")
+            ways = Conditions(self.conjunction, self.terms, block).ways(rule.when)
+        except DecliningError as error:
             self.is_whole = False
             self.answers.append(_declined(error.code, name, error.reason))
             return
@@ -313,132 +311,3 @@ def _text(then: Iterable[Conclusion]) -> str:
     return " and ".join(
         " ".join((one.output, "is", *one.hedges, one.label)) for one in then
     )
-
-
-# --- conditions
-
-
-class _DecliningError(Exception):
-    """A condition has no exact counterpart."""
-
-    def __init__(self, code: str, reason: str) -> None:
-        super().__init__(reason)
-        self.code = code
-        self.reason = reason
-
-
-def _decline(code: str, reason: str) -> NoReturn:
-    raise _DecliningError(code, reason)
-
-
-Way = tuple[Clause, ...]
-"""Clauses that all hold."""
-
-_ALWAYS: tuple[Way, ...] = ((),)
-_NEVER: tuple[Way, ...] = ()
-
-
-class _Conditions:
-    """Makes ways of a block's conditions: each holds as far as the best of them."""
-
-    def __init__(
-        self, conjunction: Conjunction, terms: Terms, block: RuleBlock
-    ) -> None:
-        self.conjunction = conjunction
-        self.terms = terms
-        self.block = block
-
-    def ways(self, condition: Condition | None, *, negated: bool = False) -> list[Way]:
-        """Return the ways in which a condition holds; none if it never does.
-
-        Args:
-            condition: The condition; None holds always.
-            negated: Whether the ways in which it does not hold are asked for.
-        """
-        match condition:
-            case None:
-                return [*_ALWAYS]
-            case Is():
-                return self._asked(condition, negated=negated)
-            case Not(part=part):
-                return self.ways(part, negated=not negated)
-            case And(parts=(part,)) | Or(parts=(part,)):
-                return self.ways(part, negated=negated)
-            case And(parts=parts):
-                self._check_joint("and", negated=negated)
-                return self._joined(parts, is_union=negated, negated=negated)
-            case Or(parts=parts):
-                whole = self._one_clause(parts, negated=negated)
-                if whole is not None:
-                    return [(whole,)]
-                self._check_joint("or", negated=negated)
-                return self._joined(parts, is_union=not negated, negated=negated)
-
-    def _asked(self, asked: Is, *, negated: bool) -> list[Way]:
-        """Return the only way of a question: a clause, or always, or never."""
-        hedges = asked.hedges
-        while hedges and hedges[0] == "not":
-            negated, hedges = not negated, hedges[1:]
-        if hedges and hedges[0] == "any":
-            return [*(_NEVER if negated else _ALWAYS)]
-        if hedges:
-            _decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
-        terms = self.terms.get(asked.variable)
-        if terms is None:
-            _decline("FTD07", f"it asks the output {asked.variable!r}")
-        if asked.label is None or asked.label not in terms:
-            name = f"{asked.label!r} of {asked.variable!r}"
-            _decline("FTD02", f"the curve of {name} has no exact method")
-        return [(Clause(asked.variable, (asked.label,), negated),)]
-
-    def _one_clause(
-        self, parts: Sequence[Condition], *, negated: bool
-    ) -> Clause | None:
-        """Return `x is a or b` as one clause, if it is that and a maximum."""
-        if self.block.disjunction != "maximum":
-            return None
-        found = [self.ways(part) for part in parts]
-        clauses = [ways[0][0] for ways in found if len(ways) == 1 and len(ways[0]) == 1]
-        names = {clause.variable for clause in clauses}
-        is_plain = len(clauses) == len(parts) and not any(c.negated for c in clauses)
-        if len(names) > 1 or not is_plain:
-            return None
-        terms = dict.fromkeys(term for clause in clauses for term in clause.terms)
-        return Clause(names.pop(), tuple(terms), negated)
-
-    def _check_joint(self, word: Literal["and", "or"], *, negated: bool) -> None:
-        """Raise unless a joint is a minimum, maximum or product where that is exact."""
-        block = self.block
-        norm = block.conjunction if word == "and" else block.disjunction
-        exact = {"and": ("minimum", "product"), "or": ("maximum",)}[word]
-        if norm not in exact:
-            _decline("FTD01", f"its {word!r} is the {norm}, which has no exact method")
-        if word == "and" and negated and norm == "product":
-            _decline("FTD07", "it negates a product, which has no exact method")
-        if word == "or" and negated and self.conjunction == "product":
-            _decline("FTD07", "it negates an 'or' within rules that multiply")
-        if word == "and" and not negated and _NORMS[norm] != self.conjunction:
-            text = f"its 'and' is the {norm}, and that of most rules is another"
-            _decline("FTD01", text)
-
-    def _joined(
-        self, parts: Sequence[Condition], *, is_union: bool, negated: bool
-    ) -> list[Way]:
-        found = [*(_NEVER if is_union else _ALWAYS)]
-        for part in parts:
-            ways = self.ways(part, negated=negated)
-            count = len(found) + len(ways) if is_union else len(found) * len(ways)
-            if count > MOST_WAYS:
-                _decline("FTD05", f"it can hold in more than {MOST_WAYS} ways")
-            if is_union:
-                found += ways
-            else:
-                pairs = itertools.product(found, ways)
-                found = [self._both(one, other) for one, other in pairs]
-            found = [*dict.fromkeys(found)]
-        return found
-
-    def _both(self, one: Way, other: Way) -> Way:
-        """Return clauses of both; a minimum does not change by asking twice."""
-        both = (*one, *other)
-        return tuple(dict.fromkeys(both)) if self.conjunction == "min" else both

@@ -9,7 +9,8 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.views import MOST_WAYS, View, view
+from fuzzytree.auditing.conditions import MOST_QUESTIONS, MOST_WAYS
+from fuzzytree.auditing.views import View, view
 from fuzzytree.casting import as_system
 from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
@@ -180,6 +181,18 @@ def test_a_rule_without_an_exact_method_is_left_out_and_told(text: str) -> None:
     assert not found.is_whole
     assert rules_of(found)[-1] == "IF b is high THEN power is big"
     assert found.numbers[-1] == len(kept.rules)
+
+
+def test_deep_and_long_conditions_end_soon() -> None:
+    deep: Condition = Or((A_LOW, A_HIGH))
+    for _ in range(90):
+        deep = Or((deep, A_LOW))
+    found = view(system_of(block_of(deep)), BOX)
+    assert rules_of(found) == ["IF a is low or high THEN power is big"]
+    long = And((A_LOW,) * (MOST_QUESTIONS + 1))
+    assert reasons(view(system_of(block_of(long)), BOX)) == [
+        f"rule 1 is not taken over: it asks more than {MOST_QUESTIONS} questions"
+    ]
 
 
 def test_rules_of_another_norm_than_most_are_left_out() -> None:
