@@ -7,6 +7,8 @@ Only where different rivals are ahead at different places must boxes become smal
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Collection, Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
@@ -16,6 +18,7 @@ import numpy as np
 from fuzzytree.numerics.enclosures import U
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.branching import (
+    TOO_MANY,
     Found,
     Point,
     Verdict,
@@ -35,10 +38,15 @@ from fuzzytree.rulebase import RuleBase
 if TYPE_CHECKING:
     from fuzzytree.contracts import IntArray
 
+_EASY = 2_000  # boxes that are looked at without knowing the order of curves
 _PATIENCE = 100_000  # boxes, before a lead that may be none is left open
 
 TINY: Final = 2.0**-50
 """A lead that roundings of doubles can feign."""
+
+
+# Many questions are asked about the same rules on the same domain.
+_ground = functools.lru_cache(maxsize=4)(ground)
 
 
 # --- the lead of a rule
@@ -74,8 +82,9 @@ def wins_by_boxes(
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1), conjunction="product")
         >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
-        >>> wins_by_boxes(rules, box, 1, {2, 3}).claims
-        (Claim(kind='beats', of='rules', rules=(1,), rivals=(2, 3), ...
+        >>> found = wins_by_boxes(rules, box, 1, {2, 3})
+        >>> found.claims[0].kind, found.claims[0].rivals
+        ('beats', (2, 3))
     """
     lead = _Lead(rules, domain, rule, rivals)
     found = lead.search(clock or Clock(), tolerance, is_first_enough=True)
@@ -119,24 +128,33 @@ class _Lead:
         self, rules: RuleBase, domain: Domain, rule: int, rivals: Collection[int]
     ) -> None:
         self.rule, self.rivals = rule, tuple(sorted(rivals))
-        self.given = ground(rules, domain)
-        chosen = (rule - 1, *(number - 1 for number in self.rivals))
-        pairs = [Pair(chosen[0], other) for other in chosen[1:]]
-        self.space = Space(rules, domain, chosen, pairs)
+        self.given = _ground(rules, domain)
+        self.chosen = (rule - 1, *(number - 1 for number in self.rivals))
+        self.pairs = [Pair(rule - 1, other) for other in self.chosen[1:]]
+        self.space = Space(self.given, self.chosen, self.pairs)
 
     def search(
         self, clock: Clock, tolerance: float, *, is_first_enough: bool = False
     ) -> Found:
-        return search(
-            self.space,
-            self._judge,
-            self._exact,
-            clock,
-            floor=Fraction(0),
-            tolerance=tolerance,
-            patience=_PATIENCE if is_first_enough else 0,
-            is_first_enough=is_first_enough,
-        )
+        def run(limit: float) -> Found:
+            return search(
+                self.space,
+                self._judge,
+                self._exact,
+                clock,
+                floor=Fraction(0),
+                tolerance=tolerance,
+                patience=_PATIENCE if is_first_enough else 0,
+                limit=limit,
+                is_first_enough=is_first_enough,
+            )
+
+        first = run(_EASY)
+        if first.why != TOO_MANY:
+            return first
+        self.space = Space(self.given, self.chosen, self.pairs, is_ordered=True)
+        found = run(math.inf)
+        return found._replace(boxes=first.boxes + found.boxes)
 
     def _judge(self, seen: Seen, boxes: IntArray) -> Verdict:
         del boxes
@@ -261,9 +279,9 @@ class _Cover:
     def __init__(
         self, rules: RuleBase, domain: Domain, *, is_zero_wanted: bool = False
     ) -> None:
-        self.given = ground(rules, domain)
+        self.given = _ground(rules, domain)
         self.numbers = tuple(range(1, len(rules.rules) + 1))
-        self.space = Space(rules, domain, range(len(rules.rules)))
+        self.space = Space(self.given, range(len(rules.rules)))
         self.is_zero_wanted = is_zero_wanted
 
     def search(
@@ -347,8 +365,8 @@ def widest_conflict(
     Returns:
         A bracket; its point is where both reach `low`.
     """
-    given = ground(rules, domain)
-    space = Space(rules, domain, (one - 1, other - 1))
+    given = _ground(rules, domain)
+    space = Space(given, (one - 1, other - 1))
 
     def judge(seen: Seen, boxes: IntArray) -> Verdict:
         del boxes

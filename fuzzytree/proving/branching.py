@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
 
 Point = dict[str, Fraction]
+
+TOO_MANY: Final = "too many boxes are left"
 
 _BATCH = 4096  # boxes that are parted at a time
 _MOST_BOXES = 3_000_000  # that may wait, for the sake of memory
@@ -71,6 +73,7 @@ def search(
     floor: Fraction,
     tolerance: float,
     patience: int = 0,
+    limit: float = math.inf,
     is_first_enough: bool = False,
 ) -> Found:
     """Return the largest value of something on a domain, within bounds.
@@ -83,6 +86,7 @@ def search(
         floor: Boxes that cannot be above this are put away.
         tolerance: How near to each other the two bounds must come.
         patience: How many boxes are looked at, at least, before that is enough.
+        limit: How many boxes are looked at before it gives up.
         is_first_enough: Whether any value above the floor ends the search.
     """
     best, point = floor, None
@@ -112,8 +116,8 @@ def search(
             why = "no double lies within the boxes that are left"
         elif clock.is_over:
             why = "the budget was spent"
-        elif len(boxes) > _MOST_BOXES:
-            why = "too many boxes are left"
+        elif looked > limit or len(boxes) > _MOST_BOXES:
+            why = TOO_MANY
         if why is not None:
             return Found(point, best, max(bound, outwards(best)[1]), looked, why)
         chosen = _highest(verdict.bound, _BATCH)

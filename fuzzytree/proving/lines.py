@@ -60,6 +60,22 @@ class Table(NamedTuple):
     width: FloatArray
 
 
+class Spans(NamedTuple):
+    """Intervals `low < x <= high`, in order and apart from each other."""
+
+    low: FloatArray
+    high: FloatArray
+
+    def hold(self, a: FloatArray, b: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which cells `a < x <= b` lie within one of the intervals."""
+        if not len(self.low):
+            return np.zeros(a.shape, dtype=bool)
+        place = np.searchsorted(self.high, b).clip(max=len(self.low) - 1)
+        starts: npt.NDArray[np.bool_] = self.low[place] <= a
+        ends: npt.NDArray[np.bool_] = b <= self.high[place]
+        return starts & ends & (a < b)
+
+
 class Asked:
     """What some rules ask of one variable.
 
@@ -67,6 +83,7 @@ class Asked:
         clauses: The clauses that differ, by what they say.
         rules: For each rule the positions of its clauses.
         pairs: For each pair the clauses that only one of both has.
+        ordered: For each pair where `other` is at least as large, exactly known.
     """
 
     def __init__(
@@ -75,6 +92,7 @@ class Asked:
         variable: Variable,
         chosen: Sequence[int],
         pairs: Sequence[Pair],
+        ordered: Sequence[Spans] = (),
     ) -> None:
         self.is_product = rules.semantics.conjunction == "product"
         self.shapes = shapes_of([variable])
@@ -99,6 +117,7 @@ class Asked:
             _apart(self.rules[place[one]], self.rules[place[other]])
             for one, other in pairs
         ]
+        self.ordered = ordered or [Spans(np.empty(0), np.empty(0))] * len(pairs)
         self.ones = [place[pair.one] for pair in pairs]
         self.others = [place[pair.other] for pair in pairs]
         steps = [bends(shape).steps for shape in dict.fromkeys(self.shapes.values())]
@@ -124,22 +143,20 @@ class Asked:
         low = [self._joined(lows, asked, size, -1) for asked in self.rules]
         high = [self._joined(highs, asked, size, 1) for asked in self.rules]
         at = [self._joined(ats, asked, size[:1], 0) for asked in self.rules]
-        known: dict[tuple[object, int], tuple[FloatArray, FloatArray]] = {}
-        for (mine, theirs), one in zip(self.pairs, self.ones, strict=True):
-            if ((mine, theirs), one) not in known:
-                ours, others = (
-                    Enclosure(
-                        self._joined(lows, asked, size, -1),
-                        self._joined(highs, asked, size, 1),
-                    )
-                    for asked in (mine, theirs)
+        compare = _ratios if self.is_product else _losses
+        apart: list[tuple[FloatArray, FloatArray]] = []
+        for (mine, theirs), one, spans in zip(
+            self.pairs, self.ones, self.ordered, strict=True
+        ):
+            ours, others = (
+                Enclosure(
+                    self._joined(lows, asked, size, -1),
+                    self._joined(highs, asked, size, 1),
                 )
-                compare = _ratios if self.is_product else _losses
-                found = compare(ours, others, high[one])
-                known[(mine, theirs), one] = found
-        apart = [
-            known[pair, one] for pair, one in zip(self.pairs, self.ones, strict=True)
-        ]
+                for asked in (mine, theirs)
+            )
+            is_below = spans.hold(edges[:, :-1], edges[:, 1:])
+            apart.append(compare(ours, others, high[one], is_below))
         least_low = _columns([one.min(axis=1) for one in low], size[0])
         most_high = _columns([one.max(axis=1) for one in high], size[0])
         most = _columns([one for one, _ in apart], size[0])
@@ -218,16 +235,19 @@ def _ratios(
     one: Enclosure,
     other: Enclosure,
     whole: FloatArray,
+    is_below: npt.NDArray[np.bool_],
 ) -> tuple[FloatArray, FloatArray]:
     """Return how many times one is as large as the other, at most and at least.
 
-    Cells where one's rule cannot fire do not count for the most.
+    Cells where one's rule cannot fire do not count for the most; where the other is
+    known to be as large (`is_below`), it is at most 1.
     """
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         most = one.high / other.low * (1.0 + 4 * U)
         least = one.low / other.high * (1.0 - 4 * U)
-    most = np.where(one.high <= other.low, np.minimum(most, 1.0), most)
     most = np.where(other.low == 0.0, np.inf, np.maximum(most, LEAST))
+    is_below = is_below | (one.high <= other.low)
+    most = np.where(is_below, np.minimum(most, 1.0), most)
     most = np.where(whole == 0.0, 0.0, most)
     least = np.where(other.high == 0.0, np.inf, least)
     least = np.where((one.low == 0.0) | (least < LEAST), 0.0, least)
@@ -238,10 +258,12 @@ def _losses(
     one: Enclosure,
     other: Enclosure,
     whole: FloatArray,
+    is_below: npt.NDArray[np.bool_],
 ) -> tuple[FloatArray, FloatArray]:
     """Return how small the other is, at least, where it is below one's rule."""
     del one
-    most = np.where(other.low >= whole, np.inf, other.low).min(axis=1)
+    is_below = is_below | (other.low >= whole)
+    most = np.where(is_below, np.inf, other.low).min(axis=1)
     return most, np.zeros(most.shape)
 
 

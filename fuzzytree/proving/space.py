@@ -6,7 +6,7 @@ takes, on a box, values between the sums of its summands' ends, rounded outwards
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,8 +15,11 @@ import numpy as np
 from fuzzytree.numerics.enclosures import U
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.lines import Asked, Line, Pair, Table, product_of
-from fuzzytree.rulebase import RuleBase, Variable
+from fuzzytree.proving.ground import Ground
+from fuzzytree.proving.linear import Row, feasible
+from fuzzytree.proving.lines import Asked, Line, Pair, Spans, Table, product_of
+from fuzzytree.proving.regions import linear_form
+from fuzzytree.rulebase import Variable
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -61,6 +64,13 @@ class Seen(NamedTuple):
 class Space:
     """The inputs that some rules need, on a domain.
 
+    Args:
+        given: The rules and their domain.
+        chosen: The positions of the rules that matter.
+        pairs: Which of them are compared.
+        is_ordered: Whether it is worked out exactly where one's curve is above the
+            other's: it takes longer, and proves what doubles leave open.
+
     Attributes:
         names: The inputs.
         lines: One for each.
@@ -70,11 +80,13 @@ class Space:
 
     def __init__(
         self,
-        rules: RuleBase,
-        domain: Domain,
+        given: Ground,
         chosen: Sequence[int],
         pairs: Sequence[Pair] = (),
+        *,
+        is_ordered: bool = False,
     ) -> None:
+        rules, domain = given.rules, given.domain
         self.is_product = rules.semantics.conjunction == "product"
         self.domain = domain
         asked = {c.variable for n in chosen for c in rules.rules[n].when}
@@ -89,16 +101,25 @@ class Space:
         inputs = inputs or [v for v in rules.variables if not v.parts][:1]
         self.names = tuple(v.name for v in inputs)
         self.lines: list[Line] = []
+        ordered = _ordered(given, pairs) if is_ordered else {}
         for variable in inputs:
             side = domain.side(variable.name)
             if side is None:
                 raise ValueError(f"the domain has no side for {variable.name!r}")
-            of = Asked(rules, variable, chosen, pairs)
+            of = Asked(rules, variable, chosen, pairs, ordered.get(variable.name, ()))
             self.lines.append(Line(of, side.low, side.high, is_open=side.is_open))
         number = {name: n for n, name in enumerate(self.names)}
         self.mixes = [
-            _mix(v, Asked(rules, v, chosen, pairs), number, domain) for v in mixed
+            _mix(
+                v,
+                Asked(rules, v, chosen, pairs, ordered.get(v.name, ())),
+                number,
+                domain,
+            )
+            for v in mixed
         ]
+
+        self.limits = [*_limits(mixed, domain, number)]
 
     def roots(self) -> IntArray:
         """Return the boxes that make up the domain, shape (boxes, inputs)."""
@@ -138,9 +159,16 @@ class Space:
         return np.stack([one[boxes[:, n]] for n, one in enumerate(of)], axis=1)
 
     def point(self, box: IntArray) -> dict[str, Fraction]:
-        """Return the middle of one box, for the inputs that are needed."""
-        values = self.middles(box[np.newaxis])[0].tolist()
-        return dict(zip(self.names, map(Fraction, values), strict=True))
+        """Return a point of one box for the inputs that are needed: its middle.
+
+        Where combinations are limited it is one within the limits, if there is one.
+        """
+        found = [*map(Fraction, self.middles(box[np.newaxis])[0].tolist())]
+        if self.limits:
+            low, high = (ends[0].tolist() for ends in self.ends(box[np.newaxis]))
+            ranges = [*zip(map(Fraction, low), map(Fraction, high), strict=True)]
+            found = feasible(ranges, self.limits) or found
+        return dict(zip(self.names, found, strict=True))
 
     def look(self, boxes: IntArray) -> Seen:
         """Return what is known of boxes."""
@@ -188,6 +216,60 @@ class Space:
             nothing,
             nothing,
         )
+
+
+def _ordered(given: Ground, pairs: Sequence[Pair]) -> dict[str, list[Spans]]:
+    """Return, for each variable and pair, where `other` is at least as large.
+
+    Only where each of both is one curve: a product of several has no order there.
+    """
+    if not pairs or given.is_empty:
+        return {}
+    is_product = given.rules.semantics.conjunction == "product"
+    found: dict[str, list[Spans]] = {}
+    for laid in given.laid[0]:
+        zones, rank = laid.cells.zones, laid.cells.rank
+        rows = np.arange(len(rank))
+        of: list[Spans] = []
+        for pair in pairs:
+            asked = (laid.axis.asked[pair.one], laid.axis.asked[pair.other])
+            if is_product and max(map(len, asked)) > 1:
+                of.append(_spans(zones, np.zeros(len(rank), dtype=bool)))
+                continue
+            one, other = rank[rows, laid.of[pair.one]], rank[rows, laid.of[pair.other]]
+            of.append(_spans(zones, one <= other))
+        found[laid.axis.variable.name] = of
+    return found
+
+
+def _spans(
+    zones: Sequence[tuple[Fraction, Fraction]], holds: npt.NDArray[np.bool_]
+) -> Spans:
+    """Return the cells for which something holds, joined at exactly known places.
+
+    All curves are continuous from the left, so what holds in a cell holds at its end.
+    """
+    ends: list[list[Fraction]] = []
+    for cell in np.flatnonzero(holds).tolist():
+        low, high = zones[cell][1], zones[cell + 1][0]
+        if ends and ends[-1][1] == low:
+            ends[-1][1] = high
+        else:
+            ends.append([low, high])
+    lows = [outwards(low)[1] for low, _ in ends]
+    highs = [outwards(high)[0] for _, high in ends]
+    return Spans(np.array(lows), np.array(highs))
+
+
+def _limits(
+    mixed: Sequence[Variable], domain: Domain, number: Mapping[str, int]
+) -> Iterator[Row]:
+    for variable in mixed:
+        side = domain.side(variable.name)
+        if side is not None:
+            weights, constant = linear_form(variable, number)
+            low, high = Fraction(side.low) - constant, Fraction(side.high) - constant
+            yield Row(weights, low, high, side.is_open)
 
 
 def _mix(

@@ -57,7 +57,7 @@ def _rows(rules: RuleBase, count: int, seed: int = 0) -> Iterator[dict[str, floa
 
 
 def _small_bases(conjunction: Conjunction) -> Iterator[RuleBase]:
-    for seed in range(8):
+    for seed in (2, 5, 7):
         yield random_base(
             seed,
             5,
@@ -76,7 +76,7 @@ def test_every_witness_holds_and_no_sampled_row_contradicts_a_proof(
 ) -> None:
     states = set()
     for rules in _small_bases(conjunction):
-        answers = [exact_answer(rules, row).strengths for row in _rows(rules, 60)]
+        answers = [exact_answer(rules, row).strengths for row in _rows(rules, 25)]
         for rule in range(1, 6):
             rivals = _rivals(rules, rule)
             state = wins_by_boxes(rules, unit_domain(rules), rule, rivals, Clock(5.0))
@@ -93,17 +93,28 @@ def test_every_witness_holds_and_no_sampled_row_contradicts_a_proof(
     assert states == {Witness, Proved}
 
 
+def _check_against_cells(rules: RuleBase) -> None:
+    box = unit_domain(rules)
+    given = ground(rules, box)
+    for rule in range(1, 6):
+        rivals = _rivals(rules, rule)
+        one = wins_by_boxes(rules, box, rule, rivals, Clock(5.0))
+        other = wins(given, rule, rivals)
+        # Where rules tie at irrational levels, cells alone cannot tell.
+        if not isinstance(other, Bracket):
+            assert type(one) is type(other), (rules.name, rule)
+
+
 def test_boxes_and_cells_decide_alike_under_the_minimum() -> None:
-    for rules in _small_bases("min"):
-        box = unit_domain(rules)
-        given = ground(rules, box)
-        for rule in range(1, 6):
-            rivals = _rivals(rules, rule)
-            one = wins_by_boxes(rules, box, rule, rivals, Clock(5.0))
-            other = wins(given, rule, rivals)
-            # Where rules tie at irrational levels, cells alone cannot tell.
-            if not isinstance(other, Bracket):
-                assert type(one) is type(other), (rules.name, rule)
+    _check_against_cells(random_base(2, 5, 2, "min", "mixed", shared=0.4))
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(8))
+def test_boxes_and_cells_decide_alike_on_many_bases(seed: int) -> None:
+    _check_against_cells(
+        random_base(seed, 5, 3, "min", "mixed", shared=0.2 * (seed % 4))
+    )
 
 
 def _covered_by_two(degree: float, conjunction: Conjunction) -> RuleBase:
@@ -135,6 +146,20 @@ def _covered_by_two(degree: float, conjunction: Conjunction) -> RuleBase:
     return RuleBase("two", ("a", "b", "c"), (x, y), made, Semantics(conjunction))
 
 
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+@pytest.mark.parametrize("degree", [0.7, 0.71, 0.9])
+def test_a_rule_dead_by_the_union_of_two_others_is_proved(
+    conjunction: Conjunction, degree: float
+) -> None:
+    rules = _covered_by_two(degree, conjunction)
+    box = unit_domain(rules)
+    assert isinstance(wins_by_boxes(rules, box, 1, (2, 3)), Proved)
+    assert isinstance(wins_by_boxes(rules, box, 1, (2,)), Witness)
+    lead = largest_lead(rules, box, 1, (2, 3))
+    assert lead.low == 0.0
+    assert lead.high <= 1e-6
+
+
 def test_a_rule_that_leads_in_a_sliver_is_found() -> None:
     rules = _covered_by_two(0.7 - 1e-9, "product")
     # At y = 0.11 "more" is weaker than "some" is not: so only x = 0.5 leaves a lead.
@@ -152,7 +177,7 @@ def test_rules_of_a_tree_that_share_clauses_are_decided(
     conjunction: Conjunction,
 ) -> None:
     # Rules from one subtree tie wherever a shared clause is the smallest.
-    for seed in range(3):
+    for seed in range(2):
         rules = rules_from_tree(random_tree(seed, leaves=6), conjunction=conjunction)
         box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
         for rule in range(1, 7):
@@ -162,7 +187,7 @@ def test_rules_of_a_tree_that_share_clauses_are_decided(
 
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
 def test_the_largest_lead_is_between_its_bounds(conjunction: Conjunction) -> None:
-    for rules in itertools.islice(_small_bases(conjunction), 3):
+    for rules in itertools.islice(_small_bases(conjunction), 1):
         rivals = _rivals(rules, 2)
         found = largest_lead(
             rules, unit_domain(rules), 2, rivals, Clock(5.0), tolerance=1e-2
