@@ -30,7 +30,7 @@ from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.ground import span
 from fuzzytree.proving.points import Places, Point, middle
 from fuzzytree.proving.states import Bracket, Proved, Span, State, Witness
-from fuzzytree.proving.stretches import Key, Numbered, Stretch, laid
+from fuzzytree.proving.stretches import Axis, Key, Numbered, Stretch, laid
 from fuzzytree.rulebase import RuleBase, Variable
 
 MOST_BOXES = 4_000
@@ -241,10 +241,10 @@ class _Search:
 
     def _points(self, box: Box, *, is_wanted: bool) -> list[Point] | None:
         """Return points of a box to try; None if no input reaches it."""
-        if not self.places.has_sums:
-            return self.places.some(box)
         if not is_wanted:
             return []
+        if not self.places.has_sums:
+            return self.places.some(box)
         point = self.places.solved(box)
         return None if point is None else [point]
 
@@ -270,20 +270,23 @@ class _Search:
         if not doubt:
             return None
         axis = max(doubt, key=lambda one: (doubt[one], -one))
-        return axis, _cut_at(self.axes[axis].marks, box[axis])
+        return axis, _cut_at(self.axes[axis], box[axis])
 
 
-def _cut_at(marks: Sequence[Fraction], stretch: Stretch) -> Fraction:
-    """Return the mark nearest to the middle of a stretch, or the middle."""
+def _cut_at(axis: Axis, stretch: Stretch) -> Fraction:
+    """Return where a stretch is cut: near its middle, at an edge of a curve if any."""
     low, high, is_closed = stretch
     centre = middle(stretch)
-    place = bisect_left(marks, centre)
-    near = [
-        mark
-        for mark in marks[max(place - 1, 0) : place + 1]
-        if low < mark < high or (is_closed and mark == low)
-    ]
-    return min(near, key=lambda mark: abs(mark - centre), default=centre)
+    for marks in (axis.edges, axis.marks):
+        place = bisect_left(marks, centre)
+        near = [
+            mark
+            for mark in marks[max(place - 1, 0) : place + 1]
+            if low < mark < high or (is_closed and mark == low)
+        ]
+        if near:
+            return min(near, key=lambda mark: abs(mark - centre))
+    return centre
 
 
 def _asked(old: RuleBase, new: RuleBase) -> dict[Key, Variable]:

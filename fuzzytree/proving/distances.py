@@ -18,8 +18,8 @@ from fuzzytree.proving.polynomials import difference
 from fuzzytree.proving.stretches import Stretch, overlaps, spread
 from fuzzytree.rulebase import Shape
 
-_STEPS = 400
-_FINE = Fraction(1, 10**12)
+_STEPS = 80
+_FINE = Fraction(1, 10**9)
 
 
 class Distance(NamedTuple):
@@ -40,7 +40,7 @@ def distance(one: Shape, other: Shape, low: Fraction, high: Fraction) -> Distanc
     """Return how far two curves are apart at most on a closed interval.
 
     The ends of all pieces are looked at, from both sides; between them the difference
-    is enclosed and intervals are halved, until the two numbers are 1e-12 apart.
+    is enclosed and intervals are halved, until the two numbers are 1e-9 apart.
 
     Example:
         >>> from fuzzytree.rulebase import Points

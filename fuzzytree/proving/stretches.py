@@ -36,7 +36,7 @@ Bounds = tuple[Fraction, Fraction]
 NEVER, ALWAYS = 0, 1
 """The numbers of the forms that are 0 and 1 throughout."""
 
-_MOST_CROSSED = 24  # curves of an axis of which crossings are looked for
+_MOST_CROSSED = 400  # pairs of pieces, of which crossings are looked for
 
 
 class Stretch(NamedTuple):
@@ -131,15 +131,33 @@ class Axis:
         return self._above[key]
 
     @functools.cached_property
+    def edges(self) -> tuple[Fraction, ...]:
+        """Where a curve begins or ceases to be constant, within the whole."""
+        return self._inside(
+            end
+            for shape in self._shapes
+            for one, other in itertools.pairwise(pieces(shape))
+            if (end := one.high) is not None
+            and min(len(one.polynomial), len(other.polynomial)) == 1
+        )
+
+    @functools.cached_property
     def marks(self) -> tuple[Fraction, ...]:
         """Where a curve changes its formula or crosses another, within the whole."""
-        shapes = list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
+        shapes = self._shapes
         found = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
-        if len(shapes) <= _MOST_CROSSED:
-            for one, other in itertools.combinations(shapes, 2):
+        for one, other in itertools.combinations(shapes, 2):
+            if len(pieces(one)) * len(pieces(other)) <= _MOST_CROSSED:
                 found.update(_crossings(one, other, self.whole))
+        return self._inside(found)
+
+    @property
+    def _shapes(self) -> list[Shape]:
+        return list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
+
+    def _inside(self, marks: Iterable[Fraction]) -> tuple[Fraction, ...]:
         low, high = self.whole.low, self.whole.high
-        return tuple(sorted(mark for mark in found if low <= mark < high))
+        return tuple(sorted({mark for mark in marks if low <= mark < high}))
 
 
 def laid(
@@ -259,6 +277,9 @@ def _bends(
     """Return the Bernstein coefficients; the first is the value at the low end."""
     if len(polynomial) == 1:
         return polynomial
+    if len(polynomial) == 2:
+        constant, slope = polynomial
+        return constant + slope * low, constant + slope * high
     unit = composed(polynomial, low, high - low)
     last = len(unit) - 1
     return tuple(
