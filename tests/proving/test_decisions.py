@@ -7,13 +7,23 @@ from fractions import Fraction
 from typing import get_args
 
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.decisions import decision_at, other_decision
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import Ground, ground, narrowed, strengths_at
-from fuzzytree.proving.states import Bracket, Claim, Proved, State, Witness, point_of
+from fuzzytree.proving.proportions import may_tie
+from fuzzytree.proving.states import (
+    Bracket,
+    Claim,
+    Declined,
+    Proved,
+    State,
+    Witness,
+    point_of,
+)
 from fuzzytree.proving.ties import decides_by_order
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import (
@@ -129,6 +139,40 @@ def test_where_no_rule_fires_the_first_that_does_is_another_decision() -> None:
     assert isinstance(other_decision(ground(rules, _box(rules)), None), Witness)
     outside = ground(rules, _box(rules, x=(0.8, 1.0)))
     assert isinstance(other_decision(outside, None), Proved)
+
+
+def _as_product(rules: RuleBase) -> RuleBase:
+    return replace(rules, semantics=replace(rules.semantics, conjunction="product"))
+
+
+@pytest.mark.parametrize(
+    ("other", "may"),
+    [
+        (Points((0.0, 1.0), (1.0, 0.875)), False),
+        (Points((0.0, 1.0), (0.5, 0.375)), True),  # half of the other one
+        (Points((0.0, 1.0), (0.0, 0.5)), False),
+    ],
+)
+def test_a_tie_under_the_product_needs_multiples(other: Points, may: bool) -> None:
+    rules = _as_product(_shared(other))
+    given = ground(rules, _box(rules))
+    assert may_tie(given, 1, 2) is may
+
+
+def test_a_tie_on_a_plateau_under_the_product_is_not_taken_for_none() -> None:
+    full = Term("full", Band(0.25, 0.75))
+    rules = RuleBase(
+        "plateaus",
+        ("a", "b"),
+        (Variable("x", (full,)), Variable("y", (full,))),
+        (Rule((Clause("x", ("full",)),), "a"), Rule((Clause("y", ("full",)),), "b")),
+        Semantics("product"),
+    )
+    inside = ground(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))
+    assert other_decision(inside, "b") == Declined(
+        "FTD01", "rule 1 may tie, under the product"
+    )
+    assert isinstance(other_decision(inside, "a"), Proved)  # the first one decides
 
 
 def test_a_spent_budget_leaves_it_open() -> None:
