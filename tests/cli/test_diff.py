@@ -1,0 +1,142 @@
+"""`fuzzytree diff` tells what changed, and exits with 1 if someone would notice."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
+import pytest
+from msgspec.structs import replace
+
+import fuzzytree as ft
+from fuzzytree.rulebase import Rule
+from tests.cli.conftest import Call, grip
+
+SCHEMA = Path(__file__).resolve().parents[2] / "schemas" / "diff.schema.json"
+
+
+@pytest.fixture(autouse=True)
+def _here(folder: Path) -> None:
+    rules = ft.rules_from_tree(grip())
+    ft.save(replace(rules, rules=rules.rules[::-1], name="turned"), "turned.yaml")
+    changed = replace(rules.rules[0], then="loose")
+    ft.save(replace(rules, rules=(changed, *rules.rules[1:])), "changed.yaml")
+
+
+def test_a_tree_and_its_rules_are_proved_equal(call: Call) -> None:
+    code, out, err = call("diff", "grip.yaml", "rules.yaml")
+    assert code == 0, out
+    assert out.splitlines() == [
+        "old      grip.yaml: tree 'grip'",
+        "new      rules.yaml: rules 'grip'",
+        "domain   force 0 to 5, slip -2.5 to 3.5",
+        "",
+        "decisions",
+        "  PROVED   both models decide alike",
+        "           both take the same curves of the same inputs in the same rules, "
+        "on any input",
+    ]
+    assert err == "decisions are proved equal, and nothing else has changed\n"
+
+
+def test_rules_in_another_order_are_told_and_break_nothing(call: Call) -> None:
+    code, out, err = call("diff", "rules.yaml", "turned.yaml")
+    assert code == 0, out
+    assert "  PROVED   both models decide alike everywhere on the domain" in out
+    assert "2 rules stand at another place among the others" in out
+    assert "               rules.yaml:" in out
+    assert err == (
+        "decisions are proved equal; 2 changes: 1 non-breaking, 1 cosmetic\n"
+    )
+
+
+def test_a_changed_class_is_shown_with_a_witness_and_its_box(call: Call) -> None:
+    code, out, err = call("diff", "rules.yaml", "changed.yaml", "--data", "grasps.csv")
+    assert code == 1
+    assert "rows     4 of grasps.csv" in out
+    assert (
+        "  WITNESS  row 1: the old model answers 'soft' by rule 1, the new one 'loose' "
+        "by rule 1\n"
+        "           at force = 1.5, slip = 0.0\n"
+        "           everywhere in the box of force 0 to 2\n"
+    ) in out
+    assert "  SAMPLED  1 of 4 rows of grasps.csv are answered otherwise" in out
+    assert (
+        "  breaking     rule 1 has changed: its class is 'loose', and was 'soft'" in out
+    )
+    assert err == "decisions have changed; 1 change: 1 breaking\n"
+
+
+def test_json_fits_its_schema_and_is_the_same_each_time(call: Call) -> None:
+    words = ("diff", "rules.yaml", "changed.yaml", "--json", "--quiet")
+    code, out, _ = call(*words)
+    facts = json.loads(out)
+    assert code == 1
+    assert (facts["ok"], facts["verdict"]) == (False, "changed")
+    assert facts["changes"][0]["grade"] == "breaking"
+    jsonschema.validate(facts, json.loads(SCHEMA.read_text("utf-8")))
+    assert call(*words)[1] == out
+
+
+def test_quiet_says_nothing_of_equal_models_and_the_verdict_of_others(
+    call: Call,
+) -> None:
+    assert call("diff", "grip.yaml", "grip.yaml", "--quiet")[2] == ""
+    code, _, err = call("diff", "rules.yaml", "changed.yaml", "--quiet")
+    assert (code, err) == (1, "decisions have changed; 1 change: 1 breaking\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("nothing.yaml",), "nothing.yaml: cannot be read: no such file or directory"),
+        (
+            ("grip.yaml", "--limits", "force=5:1"),
+            "the limits of 'force' are swapped: 5.0 to 1.0; the smaller one stands "
+            "first",
+        ),
+        (
+            ("grip.yaml", "--limits", "force"),
+            "--limits force: must be NAME=LOW:HIGH",
+        ),
+        (
+            ("grip.yaml", "--budget", "0"),
+            "the budget must be above 0 seconds, not 0.0",
+        ),
+        (
+            ("grip.yaml", "--data", "nothing.csv"),
+            "nothing.csv: cannot be read: no such file or directory",
+        ),
+    ],
+)
+def test_what_cannot_run_is_said_in_one_sentence(
+    call: Call, words: tuple[str, ...], said: str
+) -> None:
+    code, out, err = call("diff", "grip.yaml", *words)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[0] == said
+
+
+def test_damaged_and_foreign_files_are_refused(call: Call) -> None:
+    Path("bad.yaml").write_bytes(b"kind: tree\nname: [")
+    code, out, err = call("diff", "grip.yaml", "bad.yaml")
+    assert (code, out) == (2, "")
+    assert err.startswith("bad.yaml:3:1: not YAML: ")
+    other = replace(ft.rules_from_tree(grip()), variables=(), rules=(Rule((), "firm"),))
+    slip = replace(grip().variables[1], name="wind")
+    ft.save(replace(other, variables=(slip,), columns=()), "other.yaml")
+    code, _, err = call("diff", "grip.yaml", "other.yaml")
+    assert code == 2
+    assert err == (
+        "other.yaml: has no input in common with grip.yaml: it asks 'wind', and that "
+        "asks 'force', 'slip'\n"
+    )
+
+
+def test_names_in_files_command_no_terminal(call: Call) -> None:
+    rules = ft.rules_from_tree(grip())
+    ft.save(replace(rules, name="a\x1b[31mb"), "named.yaml")
+    code, out, _ = call("diff", "rules.yaml", "named.yaml")
+    assert code == 0
+    assert "\x1b" not in out
