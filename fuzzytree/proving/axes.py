@@ -29,8 +29,15 @@ from fuzzytree.numerics.enclosures import (
     clause_enclosure,
     degree_enclosure,
 )
-from fuzzytree.numerics.exact import CAP, exact_degree, outwards
-from fuzzytree.proving.curves import ONE, ZERO, Piece, degree_after, pieces
+from fuzzytree.numerics.exact import CAP, outwards
+from fuzzytree.proving.curves import (
+    ONE,
+    ZERO,
+    Piece,
+    degree_after,
+    piece_at,
+    pieces,
+)
 from fuzzytree.proving.polynomials import (
     Polynomial,
     Root,
@@ -38,9 +45,9 @@ from fuzzytree.proving.polynomials import (
     composed,
     derivative,
     difference,
+    integer_roots,
     integers,
     refined,
-    roots,
     value_at,
 )
 from fuzzytree.rulebase import Band, Clause, Shape
@@ -66,7 +73,7 @@ class Element(NamedTuple):
 
     def degree(self, x: Fraction) -> Fraction:
         """Return the exact degree at a value."""
-        found = exact_degree(self.shape, x)
+        found = piece_at(pieces(self.shape), x).degree(x)
         return 1 - found if self.is_complement else found
 
     def degree_after(self, x: Fraction) -> Fraction:
@@ -120,16 +127,19 @@ def places(elements: Sequence[Element]) -> tuple[Place, ...]:
         for piece, polynomial in of:
             found.update(end for end in (piece.low, piece.high) if end is not None)
             if len(polynomial) > 1:
-                _solve(_turning(polynomial), piece.low, piece.high, found, irrational)
+                ends = piece.low, piece.high
+                turning = integers(derivative(polynomial))[0]
+                if len(turning) > 1:
+                    _solve(turning, *ends, found, irrational)
                 for level in levels:
                     if len(polynomial) > 2 or ZERO < level < ONE:
-                        moved = difference(polynomial, (level,))
-                        _solve(moved, piece.low, piece.high, found, irrational)
+                        met = _crossing(polynomial, (level,))
+                        _solve(met, *ends, found, irrational)
     for one, other in itertools.combinations(laid, 2):
         for low, high, p, q in _overlaps(one, other):
             if len(p) > 1 or len(q) > 1:
-                _solve(difference(p, q), low, high, found, irrational)
-    return tuple(_apart([*(Place(x, x) for x in found), *dict.fromkeys(irrational)]))
+                _solve(_crossing(p, q), low, high, found, irrational)
+    return tuple(_apart([*(Place(x, x) for x in found), *irrational]))
 
 
 def _apart(found: Iterable[Place]) -> list[Place]:
@@ -189,24 +199,30 @@ def _narrowed(place: Place, bits: int) -> Place:
     return Place(root.low, root.high, (place.of[0], root))
 
 
-def _turning(polynomial: Polynomial) -> Polynomial:
-    return derivative(polynomial) if len(polynomial) > 2 else (ONE,)
+def _crossing(one: Polynomial, other: Polynomial) -> list[int]:
+    """Return a positive multiple of a difference, in whole numbers."""
+    a, of_a = integers(one)
+    b, of_b = integers(other)
+    common = math.gcd(of_a, of_b)
+    of_a, of_b = of_a // common, of_b // common
+    return [x * of_b - y * of_a for x, y in itertools.zip_longest(a, b, fillvalue=0)]
 
 
 def _solve(
-    polynomial: Polynomial,
+    numbers: Sequence[int],
     low: Fraction | None,
     high: Fraction | None,
     found: set[Fraction],
     irrational: list[Place],
 ) -> None:
-    if len(polynomial) < 2 or low is None or high is None:
+    if low is None or high is None:
         return
-    for root in roots(polynomial, low, high):
+    for root in integer_roots(numbers, low, high):
         if root.low == root.high:
             found.add(root.low)
         else:
-            irrational.append(Place(root.low, root.high, (polynomial, root)))
+            of = tuple(map(Fraction, numbers))
+            irrational.append(Place(root.low, root.high, (of, root)))
 
 
 def _overlaps(

@@ -180,19 +180,11 @@ def _undominated(options: Options) -> Options:
     """Leave out options that another one is at least as good as at every level."""
     if len(options.where) > 400:  # the comparison takes its square
         return options
-    kept: list[int] = []
     # An option of a vague place must not make one of a cell useless.
-    order = sorted(
-        range(len(options.where)),
-        key=lambda n: (options.where[n] < START, -options.top[n]),
-    )
-    for number in order:
-        top, floor = options.top[number], options.floor[number]
-        others = np.array(kept, dtype=np.int64)
-        is_worse = (options.top[others] >= top) & np.all(
-            options.floor[others] <= floor, axis=1
-        )
-        if not is_worse.any():
-            kept.append(number)
-    chosen = np.array(kept, dtype=np.int64)
+    order = np.lexsort((-options.top, options.where < START))
+    top, floor = options.top[order], options.floor[order]
+    is_better = top[:, np.newaxis] >= top
+    for rival in range(floor.shape[1]):
+        is_better &= floor[:, np.newaxis, rival] <= floor[:, rival]
+    chosen = order[~np.triu(is_better, 1).any(axis=0)]
     return Options(options.where[chosen], options.top[chosen], options.floor[chosen])

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
+from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.proving.axes import ALWAYS, Cells, Element, Place, cut, places
 from fuzzytree.proving.domain import Domain
 from fuzzytree.rulebase import Clause, RuleBase, Variable, shapes_of
@@ -351,8 +352,14 @@ def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]
             for group in groups:
                 for one in group:
                     if one not in degrees:
-                        degrees[one] = axis.elements[one].degree(value)
+                        degrees[one] = _defined(axis.elements[one], value)
                 found = max(degrees[one] for one in group)
                 before = strengths[number]
                 strengths[number] = before * found if is_product else min(before, found)
     return strengths
+
+
+def _defined(element: Element, value: Fraction) -> Fraction:
+    """Return a degree by the definition, which shares nothing with pieces and cells."""
+    found = exact_degree(element.shape, value)
+    return 1 - found if element.is_complement else found

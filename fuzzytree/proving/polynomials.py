@@ -53,11 +53,22 @@ def value_at(polynomial: Polynomial, x: Fraction) -> Fraction:
     return Fraction(total, common * power)
 
 
-@functools.lru_cache(maxsize=1 << 14)
-def integers(polynomial: Polynomial) -> tuple[tuple[int, ...], int]:
+Integers = tuple[int, ...]
+
+_KNOWN: dict[int, tuple[Polynomial, Integers, int]] = {}  # by identity: no hashing
+_MOST_KNOWN = 1 << 14
+
+
+def integers(polynomial: Polynomial) -> tuple[Integers, int]:
     """Return the coefficients over their common denominator, and the denominator."""
+    known = _KNOWN.get(id(polynomial))
+    if known is not None and known[0] is polynomial:
+        return known[1], known[2]
     common = math.lcm(*(one.denominator for one in polynomial))
     scaled = tuple(one.numerator * (common // one.denominator) for one in polynomial)
+    if len(_KNOWN) >= _MOST_KNOWN:
+        _KNOWN.clear()
+    _KNOWN[id(polynomial)] = polynomial, scaled, common
     return scaled, common
 
 
@@ -136,7 +147,13 @@ def roots(polynomial: Polynomial, low: Fraction, high: Fraction) -> tuple[Root, 
     """  # noqa: E501
     if not low < high:
         raise ValueError(f"no interval from {low} to {high}")
-    numbers, _ = integers(polynomial)
+    return integer_roots(integers(polynomial)[0], low, high)
+
+
+def integer_roots(
+    numbers: Sequence[int], low: Fraction, high: Fraction
+) -> tuple[Root, ...]:
+    """Return what `roots` does, of a polynomial with whole coefficients."""
     while len(numbers) > 1 and not numbers[-1]:
         numbers = numbers[:-1]
     if len(numbers) == 1:
@@ -194,21 +211,21 @@ def _apart(
 
 
 @functools.cache
-def _weights(degree: int) -> tuple[tuple[int, ...], ...]:
-    """Return what each coefficient counts in each Bernstein coefficient, times n!."""
-    whole = math.factorial(degree)
+def _weights(degree: int) -> tuple[int, ...]:
+    """Return degree! over each binomial coefficient: whole numbers i! (degree - i)!."""
     return tuple(
-        tuple(math.comb(j, i) * (whole // math.comb(degree, i)) for i in range(j + 1))
-        for j in range(degree + 1)
+        math.factorial(i) * math.factorial(degree - i) for i in range(degree + 1)
     )
 
 
 def _bernstein(numbers: Sequence[int]) -> list[int]:
-    # degree! / C(degree, i) is whole: it is i! (degree - i)!.
-    return [
-        sum(weight * one for weight, one in zip(row, numbers, strict=False))
-        for row in _weights(len(numbers) - 1)
-    ]
+    """Return degree! times the Bernstein coefficients: sums of C(j, i) over C(n, i)."""
+    degree = len(numbers) - 1
+    found = [a * b for a, b in zip(numbers, _weights(degree), strict=True)]
+    for step in range(degree):  # Pascal's triangle, by additions
+        for place in range(degree, step, -1):
+            found[place] += found[place - 1]
+    return found
 
 
 def _changes(bends: Sequence[int]) -> int:

@@ -131,7 +131,9 @@ class _Search:
                 found.append((band, above))
                 above = bands.low[band]
         # Between levels far apart the lead is large, and so is the box around it.
-        yield from sorted(found, key=lambda one: float(bands.high[one[0]] - one[1]))
+        yield from sorted(
+            found, key=lambda one: float(bands.high[one[0]]) - float(one[1])
+        )
 
     def _doubtful(self, contest: Contest) -> Iterator[int]:
         """Yield bands within which the order of levels is not known and matters."""
