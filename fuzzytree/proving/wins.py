@@ -41,8 +41,8 @@ def wins(
         >>> rules = rules_from_tree(random_tree(1))
         >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
         >>> found = wins(ground(rules, box), 1, {2, 3})
-        >>> found.claims
-        (Claim(kind='beats', of='rules', rules=(1,), rivals=(2, 3), ...
+        >>> [(one.kind, one.rules, one.rivals, one.level) for one in found.claims]
+        [('beats', (1,), (2, 3), None), ('strength', (1,), (), '1')]
     """
     clock = clock or Clock()
     others = tuple(sorted(rivals))
