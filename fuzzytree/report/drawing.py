@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 from fuzzytree.inference.curves import curve_degree
@@ -21,6 +22,7 @@ LETTER = 0.58
 
 _STEPS = 72  # at which a curve is looked at, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
+_KEPT = 1024  # degrees of one curve
 _FLAT = 0.04  # points of a picture that nobody sees
 
 
@@ -56,6 +58,11 @@ class Curve(NamedTuple):
     name: str
     degree: Callable[[float], float]
     corners: tuple[float, ...]
+
+    def corners_between(self, low: float, high: float) -> list[float]:
+        """Return the corners between two values; some of them if they are many."""
+        found = [one for one in self.corners if low <= one <= high]
+        return found[:: 1 + len(found) // _CORNERS]
 
 
 class Axis(NamedTuple):
@@ -143,6 +150,7 @@ def curve_of(name: str, shape: Shape) -> Curve:
         (0.0, 1.0)
     """
 
+    @lru_cache(maxsize=_KEPT)  # pictures of findings ask for the same values again
     def degree(value: float) -> float:
         return float(exact_degree(shape, Fraction(value)))
 
@@ -187,8 +195,7 @@ def polyline(curve: Curve, x: Scale, y: Scale) -> Markup:
         x: From values to the picture.
         y: From degrees to the picture.
     """
-    corners = [one for one in curve.corners if x.low <= one <= x.high]
-    corners = corners[:: 1 + len(corners) // _CORNERS]
+    corners = curve.corners_between(x.low, x.high)
     values = {between(x.low, x.high, k / _STEPS) for k in range(_STEPS + 1)}
     for corner in corners:
         values |= {corner, math.nextafter(corner, math.inf)}

@@ -182,7 +182,7 @@ def _top(curve: Curve, x: Scale) -> float:
     """Return the point in the middle of where a curve is highest."""
     steps = 60
     values = [between(x.low, x.high, k / steps) for k in range(steps + 1)]
-    values += [corner for corner in curve.corners if x.low <= corner <= x.high]
+    values += curve.corners_between(x.low, x.high)
     degrees = [curve.degree(value) for value in values]
     highest = max(degrees)
     tops = [v for v, d in zip(values, degrees, strict=True) if d == highest]
