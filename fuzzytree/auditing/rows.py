@@ -84,12 +84,19 @@ def _shuffled(number: int) -> int:
     return number * 0x9E3779B97F4A7C15 % 2**64
 
 
-def measure(name: str, value: Fraction, *, unit: str = OF_RANGES) -> Measure:
-    """Return a number of an answer: at most the number itself, as a double."""
+def measure(name: str, value: Fraction) -> Measure:
+    """Return a distance as a number of an answer, with the exact one if it is short.
+
+    Where it is not, the double is at most the distance.
+
+    Args:
+        name: What it is, without the unit, which is added.
+        value: In widths of the inputs' ranges.
+    """
     exact = str(value)
-    return Measure(
-        name, outwards(value)[0], exact if len(exact) <= _MOST_DIGITS else None, unit
-    )
+    if len(exact) <= _MOST_DIGITS:
+        return Measure(f"{name}, in ranges", float(value), exact)
+    return Measure(f"{name}, in ranges", outwards(value)[0])
 
 
 def ranked(

@@ -74,8 +74,8 @@ def test_the_nearest_disagreement_to_a_row_is_bounded_on_both_sides() -> None:
         "others the nearest disagreement is 10 % of each input's range from row 2"
     )
     assert _number(told, "row") == 2
-    assert 0.0998 < _number(told, "certified distance") <= 0.1
-    assert 0.1 <= _number(told, "distance of the witness") < 0.1002
+    assert 0.0998 < _number(told, "certified distance, in ranges") <= 0.1
+    assert 0.1 <= _number(told, "distance of the witness, in ranges") < 0.1002
     assert isinstance(told.state, Witness)
 
 
@@ -125,7 +125,9 @@ def _sampled(seed: int, points: int) -> None:
         {name: Fraction(x) for name, x in zip(reach, row, strict=True)} for row in rows
     ]
     starts = [start for start in starts if not both.differ(start)]
-    certified = [m.value for m in near.measures if m.name == "certified distance"]
+    certified = [
+        m.value for m in near.measures if m.name == "certified distance, in ranges"
+    ]
     for number in range(points):
         start = starts[number % len(starts)] if starts else None
         share = draw.random() if start is None else draw.random() ** 3

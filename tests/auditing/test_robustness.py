@@ -40,15 +40,15 @@ def test_the_radius_of_a_row_of_a_tree_is_the_distance_to_its_cut() -> None:
 def test_a_cut_moved_away_makes_the_radius_larger() -> None:
     far = radius(subject_of(two_cuts(0.75)), {"x": 0.6, "y": 0.5})
     near = radius(subject_of(two_cuts(0.625)), {"x": 0.6, "y": 0.5})
-    assert 0.0249 < _number(near, "certified radius") < 0.0251
-    assert 0.0999 < _number(far, "certified radius") < 0.1001
+    assert 0.0249 < _number(near, "certified radius, in ranges") < 0.0251
+    assert 0.0999 < _number(far, "certified radius, in ranges") < 0.1001
 
 
 def test_the_radius_to_a_combination_is_shared_by_its_inputs() -> None:
     # From (0.6, 0.1) the sum grows to 0.9 when both inputs grow by 0.1.
     found = radius(subject_of(two_cuts(0.9, combined=True)), {"x": 0.6, "y": 0.1})
-    assert 0.0999 * 0.998 < _number(found, "certified radius") <= 0.1
-    assert 0.1 <= _number(found, "distance of the witness") < 0.1002
+    assert 0.0999 * 0.998 < _number(found, "certified radius, in ranges") <= 0.1
+    assert 0.1 <= _number(found, "distance of the witness, in ranges") < 0.1002
 
 
 def test_a_domain_decided_alike_has_no_other_decision() -> None:
@@ -64,8 +64,8 @@ def test_the_radius_of_a_row_of_rules_is_found_by_their_strengths(
     raw = subject_of(one_cut(0.25, conjunction)).raw
     assert raw is not None
     found = radius(subject_of(raw), {"x": 0.75})
-    assert 0.499 < _number(found, "certified radius") <= 0.5
-    assert 0.5 <= _number(found, "distance of the witness") < 0.501
+    assert 0.499 < _number(found, "certified radius, in ranges") <= 0.5
+    assert 0.5 <= _number(found, "distance of the witness, in ranges") < 0.501
     assert isinstance(found.state, Witness)
     assert found.state.claims[0].of == "rules"
 
@@ -122,8 +122,10 @@ def _check(subject: Subject, row: Mapping[str, float], points: int, seed: int) -
         point = point_of(found.state.point)
         assert decider.decided(point)[0] == found.state.claims[0].label != label
         near = float(distance(subject.domain, start, point))
-        assert near == pytest.approx(_number(found, "distance of the witness"))
-        assert near - _number(found, "certified radius") <= 0.003 * near
+        assert near == pytest.approx(
+            _number(found, "distance of the witness, in ranges")
+        )
+        assert near - _number(found, "certified radius, in ranges") <= 0.003 * near
     within = 1.0 if isinstance(found.state, Proved) else found.measures[0].value
     for _ in range(points):
         moved = {}
