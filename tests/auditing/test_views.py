@@ -38,12 +38,13 @@ from fuzzytree.system import (
     SystemRule,
     Trapezoid,
 )
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 
 BOX_INPUTS: Sequence[str] = ("a", "b")
 BOX = Domain((Side("a", 0.0, 4.0), Side("b", 0.0, 4.0)))
 LOW: Curve = Trapezoid(None, 0.0, 1.0, 3.0)
 HIGH: Curve = Trapezoid(1.0, 3.0, 4.0, None)
+ROUNDING = Fraction(1, 2**48)  # of a few products and sums of degrees
 THEN = (Conclusion("power", "big"),)
 A_LOW, A_HIGH = Is("a", "low"), Is("a", "high")
 B_LOW, B_HIGH = Is("b", "low"), Is("b", "high")
@@ -286,3 +287,29 @@ def test_trees_rules_and_systems_that_stand_for_rules_decide_by_the_strongest() 
     assert of_system.policy.decision == "strongest"
     assert of_system.rules is not None
     assert len(of_system.rules.rules) == len(rules.rules)
+
+
+def test_random_systems_are_as_strong_as_their_views_within_rounding() -> None:
+    compared = 0
+    for seed in range(120):
+        system = random_system(seed)
+        found = view(system, Domain(()))
+        if found.rules is None:
+            continue
+        chance = random.Random(seed)
+        row = {
+            one.name: chance.uniform(one.low or 0.0, one.high or 1.0)
+            for one in system.inputs
+            if not one.parts
+        }
+        right = infer(system, row).activations
+        best = dict.fromkeys(found.numbers, Fraction(0))
+        exact = exact_answer(found.rules, row).strengths
+        for number, strength in zip(found.numbers, exact, strict=True):
+            best[number] = max(best[number], strength)
+        ways = [b.activation.method for b in system.blocks for _ in b.rules]
+        for number, strength in best.items():
+            if ways[number - 1] == "general":
+                compared += 1
+                assert abs(strength - Fraction(right[number - 1])) <= ROUNDING
+    assert compared > 10
