@@ -2034,6 +2034,9 @@ class _Checks:
             self.report.count("answers with a WITNESS, evaluated again")
         elif isinstance(state, Bracket):
             _require(state.low <= state.high, "the ends of the bracket are swapped")
+            is_far = answer.code == "FT102" and state.high < self.audit.settings.lead
+            may_be = is_far or answer.code in ("FT403", "FT203", "FT204", "FT601")
+            _require(may_be or not answer.is_finding, "what is open is no finding")
             if state.point or state.claims:
                 self._point(state.point, state.claims)
             raise UndecidedError("a bracket is not made again here")
@@ -2421,6 +2424,7 @@ def _tied(checks: _Checks, answer: Answer) -> None:
     pairs = checks.pairs(alike=False)
     told = [one for one in checks.audit.answers if one.code == "FT202" and one.rules]
     _counted(answer, {"pairs": len(pairs), "pairs told one by one": len(told)}, 2)
+    _require(not answer.is_finding, "that others do not tie is no finding")
     raise UndecidedError("that the other pairs do not tie is not asked here")
 
 
@@ -2495,6 +2499,7 @@ def _apart(checks: _Checks, answer: Answer) -> None:
     level, grid = Fraction(checks.audit.settings.level), checks.grid
     rest = [pair for pair in checks.pairs(alike=False) if pair not in told]
     hidden = next((m.value for m in answer.measures if "not told" in m.name), 0)
+    _require(answer.is_finding == (hidden > 0), "a finding that is none")
     _counted(answer, {"pairs that never do": len(rest) - hidden}, 1)
     if hidden:
         raise UndecidedError("which pairs are not told is not known")
@@ -2560,6 +2565,7 @@ def _shows_lead(checks: _Checks, answer: Answer, state: Witness) -> None:
     told = [m.value for m in answer.measures if m.name == "largest lead, at least"]
     is_so = len(told) == 1 and lead >= Fraction(told[0]) >= checks.audit.settings.lead
     _require(is_so, "the rule does not lead by so much there")
+    _shows_win(checks, answer, state)
 
 
 def _shows_tie(checks: _Checks, answer: Answer, state: Witness) -> None:
@@ -2707,6 +2713,7 @@ def _overlaps(checks: _Checks, answer: Answer) -> None:
     told = [a for a in checks.audit.answers if a.code == "FT403" and a.terms]
     _require({a.terms for a in told} <= near.keys(), "two terms are easy to tell apart")
     if not answer.terms:
+        _require(answer.is_finding == (len(near) > len(told)), "a finding that is none")
         bare = sum(share is None for share in checks.shares.values())
         counts = {"pairs not told one by one": len(near) - len(told)}
         counts |= {"pairs apart": len(checks.shares) - len(near) - bare}

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from fuzzytree.rechecking import LIMITS
+
+pytestmark = pytest.mark.usefixtures("folder")
+
+Call = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def audit(call: Call) -> dict[str, object]:
+    """Write the audit of the tree as audit.json, and return its facts."""
+    _, out, _ = call("audit", "grip.yaml", "--select", "FT205,FT404", "--json")
+    Path("audit.json").write_text(out, "utf-8")
+    facts: dict[str, object] = json.loads(out)
+    return facts
+
+
+def test_an_audit_that_holds_is_told_with_what_was_checked(
+    call: Call, audit: dict[str, object]
+) -> None:
+    code, out, err = call("recheck", "audit.json", "grip.yaml")
+    assert (code, err) == (0, "")
+    assert out.splitlines() == [
+        "answers PROVED, decided again            1",
+        "answers with a WITNESS, evaluated again  3",
+        "claims evaluated again                   3",
+        "facts about the audit                    12",
+        "points of regions                        39",
+        "the audit holds as far as it was checked again",
+    ]
+
+
+def test_an_audit_whose_panel_was_cut_fails(
+    call: Call, audit: dict[str, object]
+) -> None:
+    Path("audit.json").write_text(json.dumps(audit | {"limits": LIMITS[1:]}), "utf-8")
+    code, out, _ = call("recheck", "audit.json", "grip.yaml")
+    assert code == 1
+    assert out.splitlines()[-3].startswith("DOES NOT HOLD: the digest is ")
+    assert out.splitlines()[-2:] == [
+        "DOES NOT HOLD: the panel of limits is not the fixed one",
+        "2 points do not hold",
+    ]
+
+
+def test_a_file_that_is_no_audit_is_one_sentence(call: Call) -> None:
+    code, out, err = call("recheck", "grip.yaml", "grip.yaml")
+    assert (code, out) == (2, "")
+    assert err == "grip.yaml: not JSON: Expecting value: line 1 column 1 (char 0)\n"
+
+
+def test_a_file_that_is_not_there_is_one_sentence(call: Call) -> None:
+    code, out, err = call("recheck", "none.json", "grip.yaml")
+    assert (code, out, err) == (2, "", "none.json: No such file or directory\n")
+
+
+def test_the_module_is_the_same_program(call: Call, audit: dict[str, object]) -> None:
+    ran = subprocess.run(
+        [sys.executable, "-m", "fuzzytree.rechecking", "audit.json", "grip.yaml"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    code, out, err = call("recheck", "audit.json", "grip.yaml")
+    assert (ran.returncode, ran.stdout, ran.stderr) == (code, out, err)
