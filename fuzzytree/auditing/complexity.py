@@ -10,7 +10,7 @@ from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.auditing.terms import Range, measure, ranges, short
 from fuzzytree.proving.curves import ONE, ZERO
-from fuzzytree.proving.measures import Bounds, Line, local
+from fuzzytree.proving.measures import Bounds, Line, apart, local
 from fuzzytree.proving.polynomials import (
     Polynomial,
     difference,
@@ -132,7 +132,7 @@ def coverage(of: Range) -> Bounds:
         '1'
     """
     terms = of.variable.terms
-    made = of.line(*terms)
+    made = apart([term.shape for term in terms], of.low, of.high)
     total, slack = ZERO, sum((b - a for a, b in made.cells.zones), ZERO)
     for low, high in made.cells.between:
         summed = _sum(made, (low + high) / 2)

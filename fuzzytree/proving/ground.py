@@ -10,6 +10,7 @@ least and of its largest value.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
@@ -344,22 +345,21 @@ def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]
         Fraction(1, 1)
     """
     is_product = given.rules.semantics.conjunction == "product"
-    strengths = [Fraction(1)] * len(given.rules.rules)
-    for axis in given.axes:
-        value = variable_value(axis.variable, point)
-        degrees: dict[int, Fraction] = {}
-        for number, groups in enumerate(axis.asked):
-            for group in groups:
-                for one in group:
-                    if one not in degrees:
-                        degrees[one] = _defined(axis.elements[one], value)
-                found = max(degrees[one] for one in group)
-                before = strengths[number]
-                strengths[number] = before * found if is_product else min(before, found)
+    shapes = shapes_of(given.rules.variables)
+    clauses = dict.fromkeys(c for rule in given.rules.rules for c in rule.when)
+    values = {
+        axis.variable.name: variable_value(axis.variable, point) for axis in given.axes
+    }
+    degrees: dict[Clause, Fraction] = {}
+    for clause in clauses:
+        value = values[clause.variable]
+        found = max(
+            exact_degree(shapes[clause.variable, t], value) for t in clause.terms
+        )
+        degrees[clause] = 1 - found if clause.negated else found
+    strengths: list[Fraction] = []
+    for rule in given.rules.rules:
+        each = [degrees[clause] for clause in rule.when]
+        whole = math.prod(each, start=Fraction(1))
+        strengths.append(whole if is_product else min(each, default=Fraction(1)))
     return strengths
-
-
-def _defined(element: Element, value: Fraction) -> Fraction:
-    """Return a degree by the definition, which shares nothing with pieces and cells."""
-    found = exact_degree(element.shape, value)
-    return 1 - found if element.is_complement else found

@@ -10,7 +10,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from fuzzytree.proving.axes import Cells, Element, cut, places
 from fuzzytree.proving.curves import ONE, ZERO, piece_at, pieces
@@ -24,7 +26,13 @@ from fuzzytree.proving.polynomials import (
     roots,
     value_at,
 )
+from fuzzytree.proving.ranges import shape_ranges
 from fuzzytree.rulebase import Shape
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+
+_CELLS = 256  # on which degrees are enclosed before areas are asked exactly
 
 
 class Bounds(NamedTuple):
@@ -87,6 +95,16 @@ def line(
     elements = tuple(Element(shape) for shape in shapes)
     cells = cut(elements, places(elements), low, high)
     return Line(elements, cells, is_open)
+
+
+def apart(shapes: Sequence[Shape], low: Fraction, high: Fraction) -> Line:
+    """Return shapes on an axis, cut where one of them changes; not where two cross.
+
+    In a cell each curve is one polynomial, but their order may change: enough for sums.
+    """
+    elements = tuple(Element(shape) for shape in shapes)
+    found = [place for element in elements for place in places([element])]
+    return Line(elements, cut(elements, found, low, high))
 
 
 def local(element: Element, at: Fraction) -> Polynomial:
@@ -293,6 +311,31 @@ def overlap(of: Line) -> Overlap:
         all(order <= 0 for order in orders),
         all(order >= 0 for order in orders),
     )
+
+
+def most_shared(shapes: Sequence[Shape], low: float, high: float) -> FloatArray:
+    """Return bounds from above of the shared by the joined area of each two curves.
+
+    Degrees are enclosed on each of some cells, so nothing is left to chance; only what
+    comes near to an answer is worth the exact areas.
+
+    Returns:
+        Shape (shapes, shapes); 1 where nothing is known.
+    """
+    width = (high - low) / _CELLS
+    if not width > 1e-6 * max(abs(low), abs(high)):
+        return np.ones((len(shapes), len(shapes)))
+    edges = np.linspace(low, high, _CELLS + 1, dtype=np.float64)
+    cells = [shape_ranges(shape, edges)[1] for shape in shapes]
+    least = np.array([one.low for one in cells])
+    most = np.array([one.high for one in cells])
+    found = np.ones((len(shapes), len(shapes)))
+    for place in range(len(shapes)):
+        shared = np.minimum(most, most[place]).sum(axis=1)
+        joined = np.maximum(least, least[place]).sum(axis=1)
+        # Edges and sums are off by roundings, which are far below this.
+        found[place] = (shared + 1e-6) / np.maximum(joined - 1e-6, 1e-12)
+    return np.minimum(found, 1.0)
 
 
 def _both(

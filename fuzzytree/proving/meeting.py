@@ -126,7 +126,7 @@ def meet(compared: Compared, one: int, other: int, level: Fraction) -> Meeting:
     for goal in dict.fromkeys((bounds.low, near, min(level, near))):
         witness = _witness(given, rules, goal, level, joined)
         if witness is not None and joined:
-            return _raised(given, rules, witness, bounds, joined)
+            return _raised(given, rules, witness, bounds, level, joined)
         if witness is not None:
             return Meeting(bounds, witness)
     high = bounds.high
@@ -142,21 +142,26 @@ def _raised(
     rules: tuple[int, int],
     witness: Witness,
     bounds: Bounds,
+    level: Fraction,
     joined: Collection[int],
 ) -> Meeting:
     """Return a meeting at a higher level, where axes share inputs, if one is found."""
-    low, high = Fraction(witness.claims[0].level or 0), bounds.high
-    top = high
+    low, high = _reached(witness), bounds.high
     for _ in range(_HALVINGS):
         if high - low < _NEARLY:
             break
         goal = (low + high) / 2
-        found = _witness(given, rules, goal, low, joined)
-        if found is None:
+        found = _witness(given, rules, goal, level, joined)
+        if found is None or _reached(found) <= low:
             high = goal
         else:
-            witness, low = found, Fraction(found.claims[0].level or 0)
-    return Meeting(Bounds(low, top), witness)
+            witness, low = found, _reached(found)
+    return Meeting(Bounds(low, bounds.high), witness)
+
+
+def _reached(witness: Witness) -> Fraction:
+    """Return the smaller of both strengths at a witness, which it claims last."""
+    return Fraction(witness.claims[-1].level or 0)
 
 
 def _witness(
@@ -257,13 +262,14 @@ def _by_weights(compared: Compared, one: int, other: int, level: Fraction) -> Me
         point = point_with(given, wanted)
         if point is None or not is_within(given, point):
             continue
-        floor = level if best is None else Fraction(best.claims[0].level or 0)
-        best = _checked(given, rules, point, floor) or best
+        found = _checked(given, rules, point, level)
+        if best is None or (found is not None and _reached(found) > _reached(best)):
+            best = found
     name = f"the highest level that rules {one} and {other} both reach"
     if best is None:
         why = "the product is known on each axis only, not on all together"
         return Meeting(Bounds(ZERO, most), Bracket(name, 0.0, float(most), why))
-    return Meeting(Bounds(Fraction(best.claims[0].level or 0), most), best)
+    return Meeting(Bounds(_reached(best), most), best)
 
 
 def _weighed(

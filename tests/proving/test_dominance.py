@@ -13,7 +13,7 @@ from fuzzytree.proving.curves import ONE, ZERO
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.dominance import Compared
 from fuzzytree.proving.factors import distance, largest_ratio, quotient
-from fuzzytree.proving.ground import ground
+from fuzzytree.proving.ground import ground, strengths_at
 from fuzzytree.proving.meeting import highest, meet
 from fuzzytree.proving.states import Bracket, Proved, Witness
 from fuzzytree.proving.wins import wins
@@ -88,6 +88,19 @@ def test_under_min_a_rule_that_is_above_is_stronger_wherever_the_other_fires(
         if both.is_above(strong, weak):
             pairs = [(row[strong - 1], row[weak - 1]) for row in rows]
             assert all(a > b or not b for a, b in pairs)
+
+
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+def test_the_strengths_of_a_ground_are_those_of_the_definition(
+    conjunction: str,
+) -> None:
+    rules = random_base(3, 6, 2, kind="mixed", odd=0.7, combinations=1)
+    meant = Semantics("product" if conjunction == "product" else "min")
+    rules = replace(rules, semantics=meant)
+    given = ground(rules, unit_domain(rules))
+    for a, b in itertools.product(GRID, repeat=2):
+        found = strengths_at(given, {"x1": Fraction(a), "x2": Fraction(b)})
+        assert tuple(found) == exact_answer(rules, {"x1": a, "x2": b}).strengths
 
 
 def test_rules_that_ask_nothing_are_equal() -> None:

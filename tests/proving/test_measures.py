@@ -17,6 +17,7 @@ from fuzzytree.proving.measures import (
     heights,
     line,
     local,
+    most_shared,
     outside,
     overlap,
     walk,
@@ -147,3 +148,17 @@ def test_a_polynomial_is_outside_only_where_its_curve_is_clipped(seed: int) -> N
             assert degree > 1 - Fraction(1, 2**52) if excess.is_above else degree == 0
             assert excess.low <= excess.at <= excess.high
             assert excess.depth > 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_two_curves_share_more_than_their_bound(seed: int) -> None:
+    made = shapes(seed)
+    most = most_shared(made, 0.0, 1.0)
+    for a, b in itertools.combinations(range(len(made)), 2):
+        jaccard = overlap(line([made[a], made[b]], ZERO, ONE)).jaccard
+        assert jaccard is None or jaccard.high <= most[a, b]
+        assert jaccard is None or most[a, b] < jaccard.high + Fraction(1, 4)
+
+
+def test_nothing_is_known_of_shares_on_a_point() -> None:
+    assert (most_shared(shapes(1), 1.0, 1.0) == 1.0).all()
