@@ -84,6 +84,8 @@ class Asked:
         rules: For each rule the positions of its clauses.
         pairs: For each pair the clauses that only one of both has.
         ordered: For each pair where `other` is at least as large, exactly known.
+        steps: Where a curve jumps.
+        marks: Where a curve turns or one of its pieces ends.
     """
 
     def __init__(
@@ -120,8 +122,10 @@ class Asked:
         self.ordered = ordered or [Spans(np.empty(0), np.empty(0))] * len(pairs)
         self.ones = [place[pair.one] for pair in pairs]
         self.others = [place[pair.other] for pair in pairs]
-        steps = [bends(shape).steps for shape in dict.fromkeys(self.shapes.values())]
-        self.steps = np.unique(np.concatenate([np.empty(0), *steps]))
+        turns = [bends(shape) for shape in dict.fromkeys(self.shapes.values())]
+        nothing = np.empty(0)
+        self.steps = np.unique(np.concatenate([nothing, *(t.steps for t in turns)]))
+        self.marks = np.unique(np.concatenate([nothing, *(t.low for t in turns)]))
 
     def table(self, edges: FloatArray, middle: FloatArray) -> Table:
         """Return what is known on intervals.
@@ -273,7 +277,8 @@ class Line:
     Attributes:
         start: Shape (parts,): where each part begins.
         end: Where it ends.
-        middle: Where it is parted: a double in it, a step of a curve if there is one.
+        middle: Where it is parted: a double in it; a step or mark of a curve if
+            there is a good one.
         child: The number of the lower half; the upper one follows. -1 before it is
             parted.
         table: What is known on each part.
@@ -321,16 +326,24 @@ class Line:
     def _middles(self, start: FloatArray, end: FloatArray) -> FloatArray:
         middle = start * 0.5 + end * 0.5
         middle = np.where((start < middle) & (middle < end), middle, end)
-        steps = self.asked.steps
-        if len(steps):
-            after = np.searchsorted(steps, middle)
-            below = steps[np.maximum(after - 1, 0)]
-            above = steps[np.minimum(after, len(steps) - 1)]
-            near = np.where(middle - below < above - middle, below, above)
-            far = np.where(middle - below < above - middle, above, below)
-            for step in (far, near):
-                middle = np.where((start < step) & (step < end), step, middle)
+        quarter = (end - start) * 0.25
+        for mark in _neighbours(self.asked.marks, middle):
+            is_central = (start + quarter < mark) & (mark < end - quarter)
+            middle = np.where(is_central, mark, middle)
+        for step in _neighbours(self.asked.steps, middle):
+            middle = np.where((start < step) & (step < end), step, middle)
         return middle
+
+
+def _neighbours(marks: FloatArray, x: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the marks about each value, the nearer one last."""
+    if not len(marks):
+        return ()
+    after = np.searchsorted(marks, x)
+    below = marks[np.maximum(after - 1, 0)]
+    above = marks[np.minimum(after, len(marks) - 1)]
+    is_below = x - below < above - x
+    return np.where(is_below, above, below), np.where(is_below, below, above)
 
 
 def _stacked(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ import numpy as np
 from fuzzytree.numerics.enclosures import U
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.ground import Ground
+from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.linear import Row, feasible
 from fuzzytree.proving.lines import Asked, Line, Pair, Spans, Table, product_of
 from fuzzytree.proving.regions import linear_form
@@ -228,31 +228,37 @@ def _ordered(given: Ground, pairs: Sequence[Pair]) -> dict[str, list[Spans]]:
     is_product = given.rules.semantics.conjunction == "product"
     found: dict[str, list[Spans]] = {}
     for laid in given.laid[0]:
-        zones, rank = laid.cells.zones, laid.cells.rank
-        rows = np.arange(len(rank))
         of: list[Spans] = []
         for pair in pairs:
             asked = (laid.axis.asked[pair.one], laid.axis.asked[pair.other])
             if is_product and max(map(len, asked)) > 1:
-                of.append(_spans(zones, np.zeros(len(rank), dtype=bool)))
-                continue
-            one, other = rank[rows, laid.of[pair.one]], rank[rows, laid.of[pair.other]]
-            of.append(_spans(zones, one <= other))
+                of.append(Spans(np.empty(0), np.empty(0)))
+            else:
+                of.append(_spans(laid, laid.of[pair.one], laid.of[pair.other]))
         found[laid.axis.variable.name] = of
     return found
 
 
-def _spans(
-    zones: Sequence[tuple[Fraction, Fraction]], holds: npt.NDArray[np.bool_]
-) -> Spans:
-    """Return the cells for which something holds, joined at exactly known places.
+def _spans(laid: Laid, one: IntArray, other: IntArray) -> Spans:
+    """Return where one element is at most another, given both for each cell.
 
-    All curves are continuous from the left, so what holds in a cell holds at its end.
+    Cells are joined at a place that is known exactly, for curves are continuous from
+    the left; and at any other where bounds of both tell the order.
     """
+    cells, rows = laid.cells, np.arange(len(one))
+    holds = cells.rank[rows, one] <= cells.rank[rows, other]
+    joins = [a == b for a, b in cells.zones]
+    inner = np.arange(1, len(one))  # the places between cells
+    told = np.ones(len(inner), dtype=bool)
+    for mine, theirs in ((one[:-1], other[:-1]), (one[1:], other[1:])):
+        for values in (cells.left, cells.right):
+            below = values[1, mine, inner] <= values[0, theirs, inner]
+            told &= below | (mine == theirs)
     ends: list[list[Fraction]] = []
     for cell in np.flatnonzero(holds).tolist():
-        low, high = zones[cell][1], zones[cell + 1][0]
-        if ends and ends[-1][1] == low:
+        low, high = cells.zones[cell][1], cells.zones[cell + 1][0]
+        is_next = bool(ends) and ends[-1][1] == cells.zones[cell][0]
+        if is_next and (joins[cell] or told[cell - 1]):
             ends[-1][1] = high
         else:
             ends.append([low, high])

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace
 
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.rulebase import (
@@ -166,3 +167,43 @@ def _curve(chance: random.Random) -> tuple[float, ...]:
     b2 = chance.uniform(0.0, b1)
     # Bernstein coefficients 0, b2, b1, 1 in q: rising, 0 at q = 0, 1 at q = 1.
     return (3 * b2, 3 * b1 - 6 * b2, 1 - 3 * b1 + 3 * b2)
+
+
+def with_hidden_rule(rules: RuleBase, level: float = 0.9) -> RuleBase:
+    """Return rules with three more, of which the last never wins if `level >= 0.7`.
+
+    On the first input it reaches 0.7 at 0.5, where one of the two before it ends and
+    the other begins to reach `level`; neither alone suffices. Below 0.7 it wins in a
+    sliver about 0.5.
+    """
+    first, *others = (variable for variable in rules.variables if not variable.parts)
+    added: dict[str, tuple[Term, ...]] = {
+        first.name: (
+            Term("left", Points((0.5, 0.6), (level, 0.0))),
+            Term("right", Points((0.4, 0.5), (0.0, level))),
+            Term("middle", Points((0.2, 0.5, 0.8), (0.0, 0.7, 0.0))),
+        )
+    }
+    for place, variable in enumerate(others):
+        peak = 0.3 + 0.4 * place / len(others)
+        narrow = Points((0.1, peak, 0.9), (0.0, 0.8, 0.0))
+        added[variable.name] = (
+            Term("wide", Points((0.05, peak, 0.95), (0.0, 1.0, 0.0))),
+            Term("broad", Points((0.1, peak, 0.9), (0.0, 0.9, 0.0))),
+            Term("narrow", narrow),
+        )
+        if level < 0.7:  # then only the first input tells them apart
+            alike = (Term(term.name, narrow) for term in added[variable.name])
+            added[variable.name] = tuple(alike)
+    variables = tuple(
+        replace(variable, terms=(*variable.terms, *added.get(variable.name, ())))
+        for variable in rules.variables
+    )
+    made = tuple(
+        Rule(
+            tuple(Clause(name, (terms[place].name,)) for name, terms in added.items()),
+            rules.classes[0] if place < 2 else rules.classes[1],
+        )
+        for place in range(3)
+    )
+    return replace(rules, variables=variables, rules=(*rules.rules, *made))
