@@ -287,7 +287,7 @@ def _conflicts(subject: Subject, compared: Compared) -> Iterator[Answer]:
             hidden = len(near) - place
             break
         subject.clock.check()
-        found = meet(compared, *pair, Fraction(level))
+        found = meet(compared, *pair, Fraction(level), subject.clock.share(0.05))
         if found.level.high < level:
             clean += 1
         elif told == MOST_SHOWN:

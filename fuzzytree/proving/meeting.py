@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.bounding import widest_conflict
 from fuzzytree.proving.boxes import region_around
+from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.curves import ONE, ZERO
 from fuzzytree.proving.dominance import FAR, Compared
 from fuzzytree.proving.ground import Ground, Laid, strengths_at
@@ -31,6 +33,7 @@ from fuzzytree.proving.states import (
     State,
     Witness,
     coordinates,
+    point_of,
 )
 from fuzzytree.proving.witnesses import coupled, is_within, point_with
 
@@ -40,6 +43,7 @@ if TYPE_CHECKING:
 _MOST_CHOICES = 1000  # of parts of axes that share inputs
 _HALVINGS = 12  # of what a level may be raised by
 _WEIGHTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.0, 1.0)
+_CLOSE = Fraction(1, 1000)  # how well a level is known under the product
 _NEARLY = Fraction(1, 2**30)  # of a level, by which a point may fall short of it
 
 
@@ -96,7 +100,13 @@ def _product_bounds(compared: Compared, one: int) -> FloatArray:
     return np.asarray(np.minimum(bound * (1.0 + 2.0**-40), 1.0))
 
 
-def meet(compared: Compared, one: int, other: int, level: Fraction) -> Meeting:
+def meet(
+    compared: Compared,
+    one: int,
+    other: int,
+    level: Fraction,
+    clock: Clock | None = None,
+) -> Meeting:
     """Return the highest level that two rules reach at one point.
 
     Args:
@@ -104,9 +114,14 @@ def meet(compared: Compared, one: int, other: int, level: Fraction) -> Meeting:
         one: The number of a rule, from 1.
         other: The number of another.
         level: A witness must reach at least this.
+        clock: How much time there is for branch and bound under the product; without
+            it only places between cells are tried.
     """
     if compared.is_product:
-        return _by_weights(compared, one, other, level)
+        found = _by_weights(compared, one, other, level)
+        if clock is None or found.level.high - found.level.low < _CLOSE:
+            return found
+        return _by_boxes(compared, (one, other), level, found, clock)
     band = int(_bands(compared, one - 1)[other - 1])
     bands = compared.ground.laid[1]
     if band >= len(bands.low):
@@ -270,6 +285,30 @@ def _by_weights(compared: Compared, one: int, other: int, level: Fraction) -> Me
         why = "the product is known on each axis only, not on all together"
         return Meeting(Bounds(ZERO, most), Bracket(name, 0.0, float(most), why))
     return Meeting(Bounds(_reached(best), most), best)
+
+
+def _by_boxes(
+    compared: Compared,
+    rules: tuple[int, int],
+    level: Fraction,
+    known: Meeting,
+    clock: Clock,
+) -> Meeting:
+    """Return what is known of a meeting, made narrower by branch and bound."""
+    given = compared.ground
+    tighter = widest_conflict(
+        given.rules, given.domain, *rules, clock, tolerance=float(_CLOSE)
+    )
+    low, high = known.level
+    high = max(low, min(high, Fraction(tighter.high)))
+    point = point_of(tighter.point)
+    witness = _checked(given, rules, point, level) if point else None
+    if witness is not None and _reached(witness) > low:
+        low = _reached(witness)
+        return Meeting(Bounds(low, max(low, high)), witness)
+    if isinstance(known.state, Witness):
+        return Meeting(Bounds(low, high), known.state)
+    return Meeting(Bounds(Fraction(tighter.low), high), tighter)
 
 
 def _weighed(

@@ -289,6 +289,20 @@ def test_no_point_of_a_grid_is_above_the_highest_common_level(kind: str) -> None
             assert abs(reached - level) < Fraction(1, 10**6)
 
 
+def test_under_the_product_the_highest_common_level_is_closed_in_on() -> None:
+    rules = random_base(0, 4, 2, "product", "points")
+    found = [one for one in asked(rules, "FT201", Settings(level=0.2)) if one.rules]
+    assert found
+    for answer in found:
+        assert isinstance(answer.state, Witness)
+        least, most = (answer.measures * 2)[:2]
+        assert most.value - least.value <= 0.001
+        point = {k: float(v) for k, v in point_of(answer.state.point).items()}
+        strengths = exact_answer(rules, point).strengths
+        reached = min(strengths[number - 1] for number in answer.rules)
+        assert float(reached) == pytest.approx(least.value, abs=1e-12)
+
+
 def test_many_conflicts_are_told_up_to_a_number_and_counted() -> None:
     rules = base(*(("force is low", ("soft", "hard")[n % 2]) for n in range(12)))
     *found, rest = asked(rules, "FT201")
@@ -386,7 +400,7 @@ def test_many_clauses_that_matter_are_told_up_to_a_number_and_counted(
 
 
 def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:
-    rules = random_base(2, kind="points", shared=0.3, odd=0.2, combinations=1)
-    made = audit(rules, select=["FT107"], settings=Settings(budget_s=0.05))
+    rules = random_base(2, 4, 2, kind="points", odd=0.2, combinations=1)
+    made = audit(rules, select=["FT107"], settings=Settings(budget_s=0.02))
     states = {type(one.state) for one in made.answers}
     assert not made.is_complete or Bracket in states

@@ -98,7 +98,7 @@ def test_the_strengths_of_a_ground_are_those_of_the_definition(
     meant = Semantics("product" if conjunction == "product" else "min")
     rules = replace(rules, semantics=meant)
     given = ground(rules, unit_domain(rules))
-    for a, b in itertools.product(GRID, repeat=2):
+    for a, b in itertools.product(GRID[1::2], repeat=2):
         found = strengths_at(given, {"x1": Fraction(a), "x2": Fraction(b)})
         assert tuple(found) == exact_answer(rules, {"x1": a, "x2": b}).strengths
 
