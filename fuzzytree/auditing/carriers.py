@@ -71,7 +71,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
             yield from _certified(
                 subject, one, made[one.carrier.rpartition(" in ")[0]], how
             )
-        yield from conventions.answers(subject)
+    yield from conventions.answers(subject)
 
 
 def _model(subject: Subject) -> Model:

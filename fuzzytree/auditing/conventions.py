@@ -18,7 +18,7 @@ from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.auditing.support import drawn, outside
 from fuzzytree.comparing import Answers, labels
-from fuzzytree.contracts import Model
+from fuzzytree.contracts import Model, SystemOutcome
 from fuzzytree.errors import LossError
 from fuzzytree.lowering import forms
 from fuzzytree.numerics.oracle import TIE, decide, exact_answer
@@ -34,12 +34,13 @@ from fuzzytree.proving.states import (
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray, IntArray, Run
+    from fuzzytree.contracts import FloatArray, IntArray, Run, SystemRun
 
     BoolArray = npt.NDArray[np.bool_]
 
@@ -49,6 +50,7 @@ RUNTIMES: Final = ("native", "reference", "onnxruntime float64")
 MOST: Final = 240
 """The most probes of one question."""
 
+_OF_SYSTEMS = ("missing values", "infinite values", "far outside")
 _BASES = 6  # rows in which one value is replaced
 _TRIED = 1_000  # probes, and as many drawn points, among which ties are looked for
 _FAR = (-1e300, -1e30, 1e30, 1e300)
@@ -75,6 +77,9 @@ def answers(subject: Subject) -> Iterator[Answer]:
     Raises:
         OutOfTimeError: If the budget is spent.
     """
+    if subject.system is not None:
+        yield from _of_system(subject, subject.system)
+        return
     runs = [*_runs(subject.rules if subject.tree is None else subject.tree)]
     for question in questions(subject):
         subject.clock.check()
@@ -222,10 +227,7 @@ def _broken(
     subject: Subject, question: Question, one: Answers, base: Answers, rows: IntArray
 ) -> Answer:
     values = question.values[:, rows]
-    names = subject.rules.inputs
-    probe = ", ".join(
-        f"{name} {x!r}" for name, x in zip(names, values[:, 0].tolist(), strict=True)
-    )
+    probe = _probe(subject, values[:, 0])
     row = int(rows[0])
     sentence = (
         f"{question.name}: {one.title} answers {_said(one, row)} where {base.title} "
@@ -250,6 +252,69 @@ def _said(answers: Answers, row: int) -> str:
     rule, status = int(answers.outcome.rule[row]), int(answers.outcome.status[row])
     how = "" if status == Status.DECIDED else f", {Status(status).name.lower()}"
     return f"{label} ({f'rule {rule}' if rule else 'no rule'}{how})"
+
+
+# --- systems
+
+
+def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
+    """Ask a system's runtimes where values are missing, infinite or far away.
+
+    How an answer came about must be alike, and which outputs have a number. Numbers
+    are compared among the carriers, within what rounding may do to them.
+    """
+    runs: list[tuple[str, SystemRun]] = []
+    for runtime in map(find_runtime, RUNTIMES):
+        if runtime.load_system is not None and is_installed(runtime):
+            with contextlib.suppress(LossError):  # told by the other comparisons
+                runs.append((runtime.name, runtime.load_system(system)))
+    for question in questions(subject):
+        if question.name not in _OF_SYSTEMS:
+            continue
+        subject.clock.check()
+        found = [(name, run(question.values)) for name, run in runs]
+        yield from told_of_system(subject, question, found)
+
+
+def told_of_system(
+    subject: Subject, question: Question, found: Sequence[tuple[str, SystemOutcome]]
+) -> Iterator[Answer]:
+    """Yield what runtimes of a system answer: each that differs, or that none does."""
+    count = question.values.shape[1]
+    first, base = found[0]
+    is_alike = True
+    for name, one in found[1:]:
+        differ = one.status != base.status
+        differ |= (np.isnan(one.outputs) != np.isnan(base.outputs)).any(axis=0)
+        rows = np.flatnonzero(differ)
+        if not rows.size:
+            continue
+        is_alike = False
+        probe = _probe(subject, question.values[:, rows[0]])
+        text = (
+            f"{question.name}: {name} and {first} differ in which outputs have a "
+            f"number, at {probe}; {rows.size} of {count} probes differ"
+        )
+        yield Answer(
+            "FT602",
+            f"{question.name}, {name}",
+            text,
+            Proved(f"both were run on the probe {probe}"),
+            is_finding=True,
+            severity="error",
+        )
+    if is_alike:
+        text = f"{question.name}: {len(found)} carriers answer {count} probes alike"
+        how = f"each probe was answered by {', '.join(name for name, _ in found)}"
+        yield Answer("FT602", question.name, text, Proved(how), is_finding=False)
+
+
+def _probe(subject: Subject, values: FloatArray) -> str:
+    pairs = zip(subject.rules.inputs, values.tolist(), strict=True)
+    return ", ".join(f"{name} {x!r}" for name, x in pairs)
+
+
+# --- witnesses
 
 
 def witness(subject: Subject, form: Model, values: FloatArray) -> Witness | None:

@@ -144,8 +144,30 @@ def test_raw_rules_that_differ_from_their_tree_by_design_are_no_finding() -> Non
 
 def test_a_system_is_compared_in_all_runtimes() -> None:
     found = [*carriers.answers(subject_of(system_of(block_of(A_LOW))))]
-    assert [one.subject for one in found] == ["carriers, by rows", "carriers, by calls"]
+    assert [one.subject for one in found] == [
+        *("carriers, by rows", "carriers, by calls"),
+        *("missing values", "infinite values", "far outside"),
+    ]
     assert not any(one.is_finding for one in found)
+
+
+def test_a_runtime_of_systems_in_which_nan_is_a_number_is_found() -> None:
+    system = system_of(block_of(A_LOW))
+    subject = subject_of(system)
+    question = asked(subject, "missing values")
+    load = find_runtime("native").load_system
+    assert load is not None
+    right = load(system)(question.values)
+    blind = load(system)(np.nan_to_num(question.values, nan=0.5))
+    (clean,) = conventions.told_of_system(subject, question, [("one", right)] * 2)
+    assert not clean.is_finding
+    pairs = [("native", right), ("blind", blind)]
+    (finding,) = conventions.told_of_system(subject, question, pairs)
+    assert finding.is_finding
+    assert finding.sentence.startswith(
+        "missing values: blind and native differ in which outputs have a number, at a "
+    )
+    assert finding.sentence.endswith("; 12 of 12 probes differ")
 
 
 # --- conventions
