@@ -188,7 +188,7 @@ def test_the_page_works_by_keyboard(seen: Seen) -> None:
         return seen.browser.switch_to.active_element
 
     first = press(keys.TAB)
-    assert first.text == "Skip to the findings of the audit"
+    assert first.text == "Skip to the content"
     assert first.rect["x"] >= 0
     outline = "return getComputedStyle(document.activeElement).outlineStyle"
     assert seen.run(outline) == "solid"
