@@ -23,6 +23,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.system import Conclusion, Is, RuleBlock, SystemRule
 from tests.auditing.test_views import block_of, system_of
 from tests.proving.bases import random_base
 
@@ -330,9 +331,28 @@ def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:
     assert not told(replace(rules, rules=(rules.rules[0], apart)), "FT201")
 
 
-def test_conclusions_about_different_outputs_do_not_conflict() -> None:
-    system = system_of(block_of())
-    assert not audit(system, select=["FT201"]).findings
+@pytest.mark.parametrize(
+    ("conclusions", "count"),
+    [
+        ((("power", "big"), ("fan", "big")), 0),
+        ((("power", "big"), ("power", "small")), 1),
+        ((("power", "big"), ("power", "big")), 0),
+    ],
+    ids=["two outputs", "one output", "one conclusion"],
+)
+def test_only_conclusions_about_one_output_conflict(
+    conclusions: tuple[tuple[str, str], ...], count: int
+) -> None:
+    (power,) = system_of(block_of()).outputs
+    labels = (*power.labels, replace(power.labels[0], name="small"))
+    outputs = tuple(replace(power, name=n, labels=labels) for n in ("power", "fan"))
+    rules = tuple(
+        SystemRule(Is(name, "high"), (Conclusion(output, label),))
+        for name, (output, label) in zip("ab", conclusions, strict=True)
+    )
+    empty = system_of(block_of())
+    system = replace(empty, outputs=outputs, blocks=(RuleBlock(rules),))
+    assert len(audit(system, select=["FT201"]).findings) == count
 
 
 # --- FT107
