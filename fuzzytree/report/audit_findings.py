@@ -182,10 +182,11 @@ def _finding(
         tag("p", *facts, class_="facts"),
         _concerned(answer, scene),
     ]
+    if answer.region:
+        where = _region_text(answer.region, scene)
+        parts.append(tag("p", f"Where {where}", class_="how"))
     if drawn != "nothing":
         parts.append(pictures(answer, name, scene, drawn))
-    elif answer.region:
-        parts.append(tag("p", f"Where: {_region_text(answer.region, scene)}"))
     parts += [evidence(answer.state), _measures(answer.measures)]
     named = tag("code", answer.id) if answer.id else None
     repeat = tag("code", answer.repeat, class_="copied") if answer.repeat else None
@@ -201,7 +202,7 @@ def _place(place: Place) -> str:
 def _region_text(region: Sequence[Span], scene: Scene) -> str:
     units = {span.variable: scene.axes.get(span.variable) for span in region}
     return " and ".join(
-        f"{span.variable} {span_text(span, axis.unit if axis else '')}"
+        f"{span.variable} is {span_text(span, axis.unit if axis else '')}"
         for span, axis in zip(region, units.values(), strict=True)
     )
 

@@ -274,21 +274,24 @@ def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | Non
         named: All, in the order of the page.
     """
     told = {id(one) for one in findings if one.severity != "info"}
-    names = zip(named, anchors(named), strict=True)
-    urgent = [(one, name) for one, name in names if id(one) in told]
+    urgent: dict[tuple[str, str], list[tuple[Answer, str]]] = {}
+    for one, name in zip(named, anchors(named), strict=True):
+        if id(one) in told:
+            urgent.setdefault((one.code, one.sentence), []).append((one, name))
     if not urgent:
         return None
-    items: list[Content] = [
-        joined(
-            [
-                tag("span", icon(one.severity), class_=one.severity),
-                tag("a", one.sentence, href=f"#{name}"),
-                " ",
-                tag("span", one.code, class_="code"),
-            ]
-        )
-        for one, name in urgent[:_MOST_URGENT]
-    ]
+    items: list[Content] = []
+    for alike in [*urgent.values()][:_MOST_URGENT]:
+        one, name = alike[0]
+        times = f" {len(alike)} times" if len(alike) > 1 else ""
+        parts = [
+            tag("span", icon(one.severity), class_=one.severity),
+            tag("a", one.sentence, href=f"#{name}"),
+            text(times) if times else None,
+            " ",
+            tag("span", one.code, class_="code"),
+        ]
+        items.append(joined(parts))
     more = len(urgent) - _MOST_URGENT
     if more > 0:
         items.append(tag("a", f"and {more} more", href="#findings"))

@@ -61,6 +61,8 @@ def span_text(span: Span, unit: str = "", digits: int = 6) -> str:
         'from 0.5 N'
     """
     after = f" {unit}" if unit else ""
+    if span.low is not None and span.low == span.high:
+        return f"at {span.low!r}{after}"
     low, high = _ends_text(span, digits)
     if low is None and high is None:
         return "anywhere"
@@ -68,7 +70,7 @@ def span_text(span: Span, unit: str = "", digits: int = 6) -> str:
         return f"up to {high}{after}"
     if high is None:
         return f"from {low}{after}"
-    return f"at {low}{after}" if low == high else f"{low} to {high}{after}"
+    return f"{low} to {high}{after}"
 
 
 def _ends_text(span: Span, digits: int) -> tuple[str | None, str | None]:

@@ -118,6 +118,15 @@ def test_an_accepted_finding_is_shown_but_not_counted() -> None:
     assert "rule 4 never wins" in text
 
 
+def test_the_verdict_names_alike_findings_once() -> None:
+    gap = next(one for one in answers() if one.code == "FT301")
+    gaps = [msgspec.structs.replace(gap, id=f"FT301-{k}") for k in range(3)]
+    found = shown(found=tuple(gaps))
+    assert f"{gap.sentence} 3 times FT301" in found.text
+    assert found.links.count("#FT301-0") == 1
+    assert "#FT301-1" not in found.links
+
+
 def test_every_part_of_a_finding_is_on_the_page() -> None:
     text = shown().text
     for said in (
@@ -134,6 +143,7 @@ def test_every_part_of_a_finding_is_on_the_page() -> None:
         "rows in both: 3 of 40 rows, 7.5 % (95 % sure: 2 to 20 %)",
         "FTD06, needs rows: no rows were given",
         "from 7.7 kPa; witness 8.667",
+        "Where pressure is from 7.7 kPa and area is 88 to 90.5 mm²",
     ):
         assert said in text, said
 
