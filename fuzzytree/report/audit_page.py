@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from importlib import resources
 from string import Template
 from typing import TYPE_CHECKING
@@ -37,14 +37,13 @@ from fuzzytree.report.audit_model import (
 from fuzzytree.report.audit_pictures import Scene
 from fuzzytree.report.audit_rows import data_of, passing
 from fuzzytree.report.audit_states import (
-    SEVERITIES,
     STATES,
-    icon,
     known_as,
     state_badge,
     state_note,
     state_word,
 )
+from fuzzytree.report.audit_verdict import verdict
 from fuzzytree.report.drawing import axes_of
 from fuzzytree.report.markup import (
     Content,
@@ -66,8 +65,6 @@ if TYPE_CHECKING:
 
 MOST_QUESTIONS = 1000
 """That are listed one by one."""
-
-_MOST_URGENT = 12  # findings that the verdict names
 
 _MOST_DECLINED = 100  # reasons that are listed
 
@@ -130,7 +127,7 @@ def page(
         policy=_policy(whole),
         title=text(f"{audit.model}: audit"),
         head=_head(audit, model),
-        verdict=_verdict(audit),
+        verdict=verdict(audit),
         links=joined(links),
         body=joined(shown),
     )
@@ -219,83 +216,6 @@ def _policy_text(audit: Audit) -> str:
         )
     ]
     return f"AND is {policy.conjunction}; {'; '.join([who, *none])}"
-
-
-def _verdict(audit: Audit) -> Markup:
-    """Return what was found, in words, and how it is known."""
-    findings = gravest_first(audit.open_findings)
-    states = known_as(audit.answers)
-    sign, said = _result(findings, states)
-    accepted = len(audit.findings) - len(findings)
-    if accepted:
-        said += f"; {counted(accepted, 'other')} {'is' if accepted == 1 else 'are'} "
-        said += "accepted"
-    asked = counted(len(audit.answers), "question")
-    whole = f"The audit is complete: {asked} asked, all of them answered or declined"
-    if not audit.is_complete:
-        by = "by hand" if audit.was_interrupted else "by its budget"
-        whole = f"The audit was cut short {by}: {asked} asked, others were not"
-    shown = [
-        tag("li", state_badge(word), tag("b", str(states[word])), f" {meaning}")
-        for word, meaning in STATES.items()
-    ]
-    return joined(
-        [
-            tag("p", icon(sign), said, class_=f"said {sign}"),
-            tag("p", whole, class_="whole" if audit.is_complete else "whole cut"),
-            _urgent(findings, gravest_first(audit.findings)),
-            tag("ul", *shown, class_="known"),
-        ]
-    )
-
-
-def _result(findings: Sequence[Answer], states: Mapping[str, int]) -> tuple[str, str]:
-    """Return a sign and a sentence: what was found, and what that is worth."""
-    counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
-    told = [counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]]
-    if told:
-        worst = next(one for one in SEVERITIES if counts[one])
-        verb = "was" if len(findings) == 1 else "were"
-        others = ", ".join(told[:-1])
-        return worst, f"{others}{' and ' if others else ''}{told[-1]} {verb} found"
-    whole, declined = sum(states.values()), states["DECLINED"]
-    if not declined:
-        return "calm", "Nothing was found"
-    if declined == whole:
-        return "declined", "Nothing was decided: every question was declined"
-    return "info", f"Nothing was found; {declined} of {whole} questions were declined"
-
-
-def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | None:
-    """Return links to the errors and warnings among findings.
-
-    Args:
-        findings: Those that are not accepted.
-        named: All, in the order of the page.
-    """
-    told = {id(one) for one in findings if one.severity != "info"}
-    urgent: dict[tuple[str, str], list[tuple[Answer, str]]] = {}
-    for one, name in zip(named, anchors(named), strict=True):
-        if id(one) in told:
-            urgent.setdefault((one.code, one.sentence), []).append((one, name))
-    if not urgent:
-        return None
-    items: list[Content] = []
-    for alike in [*urgent.values()][:_MOST_URGENT]:
-        one, name = alike[0]
-        times = f" {len(alike)} times" if len(alike) > 1 else ""
-        parts = [
-            tag("span", icon(one.severity), class_=one.severity),
-            tag("a", one.sentence, href=f"#{name}"),
-            text(times) if times else None,
-            " ",
-            tag("span", one.code, class_="code"),
-        ]
-        items.append(joined(parts))
-    more = len(urgent) - _MOST_URGENT
-    if more > 0:
-        items.append(tag("a", f"and {more} more", href="#findings"))
-    return listed(items, class_="urgent")
 
 
 def _links(findings: Sequence[Answer]) -> dict[int, list[Markup]]:
