@@ -35,6 +35,8 @@ from fuzzytree.tree import FuzzyTree
 MOST_ROWS = 1000
 """Rows around which the nearest disagreement is sought."""
 
+_PART = 0.25  # of the time that is left, for one leaf
+
 
 def answers(subject: Subject) -> Iterator[Answer]:
     """Yield where a tree and its raw rules differ, leaf by leaf, and near which rows.
@@ -74,7 +76,9 @@ def differing(
             f"leaf {region.leaf} against the raw rules", region.leaf / len(found)
         )
         inside = [*boxes(region, tree, subject.domain)]
-        state = other_in(given, inside, region.label, subject.clock)
+        subject.clock.check()
+        part = subject.clock.share(_PART)
+        state = other_in(given, inside, region.label, part)
         asked += len(inside)
         if isinstance(state, Proved):
             alike += 1
@@ -98,7 +102,6 @@ def other_in(
     """
     left_open: State | None = None
     for box in inside:
-        clock.check()
         state = other_decision(narrowed(given, box), label, clock, of="raw rules")
         if isinstance(state, Witness):
             tree_too = Claim("decides", of="tree", label=label)

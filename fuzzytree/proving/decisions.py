@@ -11,11 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
+from typing import Final
+
+import numpy as np
 
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.cover import uncovered
 from fuzzytree.proving.ground import Ground, strengths_at
 from fuzzytree.proving.proportions import may_tie
+from fuzzytree.proving.seeking import ends_of, near_strengths
 from fuzzytree.proving.states import (
     Carrier,
     Claim,
@@ -23,10 +27,14 @@ from fuzzytree.proving.states import (
     Proved,
     State,
     Witness,
+    coordinates,
     point_of,
 )
 from fuzzytree.proving.ties import decides_by_order
 from fuzzytree.proving.wins import wins
+from fuzzytree.proving.witnesses import Point, is_within
+
+_DRAWN: Final = 256  # points in which another decision is looked for first
 
 
 def decision_at(given: Ground, point: Mapping[str, Fraction]) -> str | None:
@@ -71,6 +79,10 @@ def other_decision(
     clock = clock or Clock()
     if given.is_empty:
         return Proved("the domain has no point")
+    drawn = _drawn(given, label)
+    if drawn is not None:
+        claim = Claim("decides", of=of, label=decision_at(given, drawn))
+        return Witness(coordinates(drawn), (claim,))
     left_open: State | None = None
     asked = 0
     for state in _asked(given, label, clock):
@@ -103,3 +115,32 @@ def _asked(given: Ground, label: str | None, clock: Clock) -> Iterator[State]:
         elif after:
             before = [rival for rival in own if rival < number]
             yield decides_by_order(given, number, before, after, clock)
+
+
+def _drawn(given: Ground, label: str | None) -> Point | None:
+    """Return a point that is decided otherwise, if one of some that are drawn is."""
+    chance = np.random.default_rng(0)
+    low, high = ends_of(given.rules, given.domain)
+    values = low + chance.random((len(low), _DRAWN)) * (high - low)
+    strengths = near_strengths(given.rules, np.clip(values, low, high))
+    is_own = np.array([rule.then == label for rule in given.rules.rules])
+    own = np.max(strengths, axis=0, where=is_own[:, np.newaxis], initial=0.0)
+    others = np.max(strengths, axis=0, where=~is_own[:, np.newaxis], initial=0.0)
+    best = int(np.argmax(others - own))
+    point = {
+        name: Fraction(float(value))
+        for name, value in zip(given.rules.inputs, values[:, best], strict=True)
+    }
+    if not _is_other(given, point, label):
+        return None
+    for name, value in point.items():
+        for digits in range(1, 6):
+            plain = {**point, name: Fraction(float(f"{float(value):.{digits}g}"))}
+            if _is_other(given, plain, label):
+                point = plain
+                break
+    return point
+
+
+def _is_other(given: Ground, point: Point, label: str | None) -> bool:
+    return is_within(given, point) and decision_at(given, point) != label
