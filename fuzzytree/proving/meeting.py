@@ -226,7 +226,10 @@ def _is_never(
 def _parts(laid: Laid, rules: Sequence[int], goal: Fraction) -> Iterator[Stretch]:
     """Yield where both rules reach a level on an axis: stretches, widest first."""
     found: list[Stretch] = []
-    for cell in range(laid.of.shape[1]):
+    tops = np.maximum(laid.cells.right[1][:, :-1], laid.cells.left[1][:, 1:])
+    every = np.arange(laid.of.shape[1])
+    reach = np.minimum(*(tops[laid.of[rule], every] for rule in rules))
+    for cell in np.flatnonzero(reach >= outwards(goal)[0]).tolist():
         elements = {int(laid.of[rule, cell]) for rule in rules}
         part = stretch(laid, cell, goal, elements, ())
         if part is not None:
