@@ -6,13 +6,13 @@ import functools
 import hashlib
 import importlib
 import importlib.metadata
-import importlib.util
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, cast
 
 import msgspec
 
+from fuzzytree.auditing.alarms import enforced
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.domains import domain_of, inputs_of
 from fuzzytree.auditing.limits import LIMITS, digest_of
@@ -50,22 +50,16 @@ class Family(msgspec.Struct, frozen=True):
     codes: tuple[str, ...]
 
 
-_PLANNED: Final = (
+FAMILIES: Final = (
     Family("terms", ("FT401", "FT402", "FT403", "FT404")),
     Family("complexity", ("FT501",)),
     Family("support", ("FT701",)),
     Family("gaps", ("FT301",)),
     Family("deciding", ("FT101", "FT102", "FT103", "FT202")),
     Family("pairs", ("FT104", "FT105", "FT106", "FT107", "FT201")),
-    Family("trees", ("FT101", "FT205")),
-    Family("disagreement", ("FT203",)),
+    Family("trees", ("FT101", "FT203", "FT205")),
     Family("robustness", ("FT204",)),
     Family("carriers", ("FT601", "FT602")),
-)
-FAMILIES: Final = tuple(
-    one
-    for one in _PLANNED
-    if importlib.util.find_spec(f"fuzzytree.auditing.{one.module}")
 )
 """In the order in which they are asked: the quick ones first, so that a spent budget
 costs as few answers as it can. Each takes at most half of the time that is left."""
@@ -266,16 +260,21 @@ def _ask_all(
         try:
             clock.check()
             own.tell(CODES[task.codes[0]].title, 0.0)
-            for answer in task.ask(msgspec.structs.replace(subject, clock=own)):
-                asked.answers.append(answer)
-                if isinstance(answer.state, Declined) and answer.state.code == _LATE:
-                    asked.cut[answer.code] = why
+            with enforced(own):
+                for answer in task.ask(msgspec.structs.replace(subject, clock=own)):
+                    asked.answers.append(answer)
+                    if _is_late(answer):
+                        asked.cut[answer.code] = why
         except OutOfTimeError:
             asked.cut |= dict.fromkeys(task.codes, why)
         except KeyboardInterrupt:
             rest = [code for one in tasks[position:] for code in one.codes]
             asked.cut |= dict.fromkeys(rest, INTERRUPTED)
             return
+
+
+def _is_late(answer: Answer) -> bool:
+    return isinstance(answer.state, Declined) and answer.state.code == _LATE
 
 
 def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
