@@ -2014,7 +2014,7 @@ class _Checks:
             self._state(answer, where)
         except DoesNotHoldError as error:
             wrong.append(f"{where}: {error}")
-        except (LookupError, ArithmeticError, StopIteration):
+        except (LookupError, ArithmeticError, ValueError, StopIteration):
             wrong.append(f"{where}: it names what there is not")
         except UndecidedError as error:
             state = type(answer.state).__name__.upper()

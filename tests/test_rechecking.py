@@ -90,7 +90,7 @@ def test_its_reading_of_a_file_is_ours() -> None:
 
 @pytest.mark.heavy
 def test_its_reading_of_many_files_is_ours() -> None:
-    for seed in range(1, 60):
+    for seed in range(1, 30):
         model: RuleBase | FuzzyTree
         for model in (random_tree(seed, leaves=2 + seed), random_base(seed, odd=0.3)):
             found = read(model)
@@ -168,7 +168,7 @@ def test_its_proofs_agree_with_the_engine() -> None:
     from fuzzytree.proving.ground import ground
     from fuzzytree.proving.wins import wins
 
-    for seed in range(40):
+    for seed in range(16):
         base = random_base(seed, 5, 2, kind="mixed", odd=0.3, shared=0.5)
         given = ground(base, Domain(tuple(Side(n, 0.0, 1.0) for n in base.inputs)))
         for number, mine in enumerate(wins_of(base)[1]):

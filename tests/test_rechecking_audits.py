@@ -262,3 +262,15 @@ def test_a_witness_outside_the_domain_is_told(tmp_path: Path) -> None:
     facts["digest"] = digest_of(facts)
     where = f"answer {number} ({answer['code']}, {answer['subject']})"
     assert wrong_with(facts, content) == [f"{where}: the point lies outside the domain"]
+
+
+def test_an_answer_that_names_three_rules_for_two_is_told() -> None:
+    answers = json.loads(small()[0])["answers"]
+    number, answer = next(
+        (n, one)
+        for n, one in enumerate(answers, 1)
+        if one["code"] == "FT106" and not one["rules"]
+    )
+    answer["rules"] = [1, 2, 3]
+    where = f"answer {number} (FT106, pairs of rules)"
+    assert f"{where}: it names what there is not" in changed(answers=answers)
