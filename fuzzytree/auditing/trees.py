@@ -32,6 +32,9 @@ from fuzzytree.tree import FuzzyTree
 MOST_BOXES = 20_000
 """Boxes of all leaves together, beyond which a tree's regions are not looked at."""
 
+MOST_TOLD = 1000
+"""Boxes beyond which it is told that leaves are reached, and not where they decide."""
+
 NOT_LOOKED_AT = "the regions of the leaves are not looked at"
 
 
@@ -71,7 +74,11 @@ def reached(
         tree: The tree itself.
         found: Its regions.
     """
-    live = 0
+    live, count = 0, sum(map(box_count, found))
+    if count > MOST_TOLD:
+        why = f"the leaves are made of {count} boxes, more than {MOST_TOLD}"
+        text = "the regions of the leaves are not told one by one"
+        yield Answer("FT205", "leaves", text, Declined("FTD05", why), False)
     for region in found:
         subject.clock.check()
         inside = [*boxes(region, tree, subject.domain)]
@@ -81,7 +88,7 @@ def reached(
             yield _unreached(subject, tree, region, len(inside))
             continue
         live += 1
-        for number, (box, point) in enumerate(parts, 1):
+        for number, (box, point) in enumerate(parts if count <= MOST_TOLD else (), 1):
             name = f"leaf {region.leaf}"
             if len(parts) > 1:
                 name += f", part {number} of {len(parts)}"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from fuzzytree.auditing import trees
 from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.auditing.trees import answers, too_many, values_text
@@ -105,6 +108,17 @@ def test_leaves_of_too_many_boxes_are_declined() -> None:
     declined = too_many([region])
     assert isinstance(declined, Declined)
     assert declined.reason == "the leaves are made of 1000000 boxes, more than 20000"
+
+
+def test_many_regions_are_not_told_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(trees, "MOST_TOLD", 1)
+    told = [*answers(subject_of(two_cuts(0.25)))]
+    assert [one.code for one in told] == ["FT205", "FT101", "FT101"]
+    assert told[0].state == Declined(
+        "FTD05", "the leaves are made of 2 boxes, more than 1"
+    )
 
 
 def test_values_are_told_in_words() -> None:
