@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Iterator
 
 import pytest
 
 from fuzzytree.auditing.alarms import enforced
 from fuzzytree.proving.clock import Clock, OutOfTimeError
+
+
+@pytest.fixture(autouse=True)
+def _no_alarm() -> Iterator[None]:
+    """Take the alarm from whoever runs the tests, and give it back."""
+    handler = signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    delay, again = signal.setitimer(signal.ITIMER_REAL, 0.0)
+    yield
+    signal.signal(signal.SIGALRM, handler)
+    signal.setitimer(signal.ITIMER_REAL, delay, again)
 
 
 def forever() -> None:
