@@ -79,11 +79,19 @@ def alike(
 
 
 class _Open(NamedTuple):
-    """A box that is open: at most its margin, and how often it was halved."""
+    """A box that is open.
+
+    Attributes:
+        margin: At least the largest margin on it.
+        box: The box.
+        depth: How often it was halved.
+        rules: Of each model the places of the rules that may win on it; all if None.
+    """
 
     margin: float
     box: Box
     depth: int
+    rules: tuple[tuple[int, ...] | None, ...] = (None, None)
 
 
 class _Found(NamedTuple):
@@ -91,6 +99,7 @@ class _Found(NamedTuple):
 
     margin: float
     cut: tuple[int, Fraction] | None
+    rules: tuple[tuple[int, ...] | None, ...]
 
 
 class _Todo:
@@ -166,6 +175,8 @@ class _Search:
             margin = max(todo.margin, stuck)
             if settled + len(todo) > most or clock.is_over or todo.is_touching:
                 return self._open(margin, settled, len(todo), clock)
+            if not settled % 64:
+                clock.tell("settling boxes", settled / (settled + len(todo)))
             box = todo.take()
             found = self._look(box)
             if isinstance(found, Witness):
@@ -175,7 +186,8 @@ class _Search:
                 stuck = stuck if found is None else max(stuck, found.margin)
                 continue
             for half in _halves(box.box, *found.cut):
-                todo.put(_Open(min(found.margin, 1.0), half, box.depth + 1))
+                margin = min(found.margin, 1.0)
+                todo.put(_Open(margin, half, box.depth + 1, found.rules))
         if stuck >= 0.0:
             why = "no double is known that reaches what is open"
             return Bracket(_OF, 0.0, stuck, why)
@@ -197,10 +209,10 @@ class _Search:
 
     def _look(self, given: _Open) -> Witness | _Found | None:
         """Settle a box (None), find a witness in it, or say how to halve it."""
-        _, box, depth = given
+        _, box, depth, among = given
         one, other = (
-            left_on(model, asked, self.axes, box)
-            for model, asked in zip(self.models, self.rules, strict=True)
+            left_on(model, asked, self.axes, box, known)
+            for model, asked, known in zip(self.models, self.rules, among, strict=True)
         )
         first, second = self._answers(0, one), self._answers(1, other)
         if len(first) == 1 and first == second:
@@ -221,7 +233,8 @@ class _Search:
                 return witness
         is_beyond = is_apart and (depth > _DEEPEST or not self.places.has_sums)
         cut = None if is_beyond else self._cut(box, [*one.rules, *other.rules])
-        return _Found(min(one.margin, other.margin), cut)
+        rules = tuple(tuple(rule.place for rule in left.rules) for left in (one, other))
+        return _Found(min(one.margin, other.margin), cut, rules)
 
     def answers(self, box: Box) -> tuple[set[str | None], set[str | None]] | None:
         """Return the one answer of each model on all of a box, None if one has more."""
@@ -249,7 +262,27 @@ class _Search:
         return None if point is None else [point]
 
     def _cut(self, box: Box, rules: Sequence[Contender]) -> tuple[int, Fraction] | None:
-        """Return the axis and the place where halving a box promises most."""
+        """Return the axis and the place where halving a box promises most.
+
+        That is an edge that most of the rules have which may be the strongest, as the
+        cut of a tree's root is; where there is none left, the axis on which some
+        degree varies most.
+        """
+        votes: dict[tuple[int, Fraction], int] = {}
+        top = max((rule.high for rule in rules), default=0.0)
+        for rule in (one for one in rules if one.high == top):
+            for axis, number in rule.clauses:
+                low, high, is_closed = box[axis]
+                for edge in self.axes[axis].edges[number]:
+                    if low < edge < high or (is_closed and edge == low < high):
+                        votes[axis, edge] = votes.get((axis, edge), 0) + 1
+        if votes:
+            return min(votes, key=lambda one: (-votes[one], one))
+        axis = self._widest(box, rules)
+        return None if axis is None else (axis, _cut_at(self.axes[axis], box[axis]))
+
+    def _widest(self, box: Box, rules: Sequence[Contender]) -> int | None:
+        """Return the axis on which a degree that matters varies most."""
         is_min = all(m.semantics.conjunction == "min" for m in self.models)
         common: set[Numbered] = set()
         if rules and not is_min:
@@ -267,26 +300,20 @@ class _Search:
                 length = float((stretch.high - stretch.low) / (whole.high - whole.low))
                 known = doubt.get(clause[0], (0.0, length))
                 doubt[clause[0]] = max(known, (width, length))
-        if not doubt:
-            return None
-        axis = max(doubt, key=lambda one: (doubt[one], -one))
-        return axis, _cut_at(self.axes[axis], box[axis])
+        return max(doubt, key=lambda one: (doubt[one], -one), default=None)
 
 
 def _cut_at(axis: Axis, stretch: Stretch) -> Fraction:
-    """Return where a stretch is cut: near its middle, at an edge of a curve if any."""
+    """Return where a stretch is cut: near its middle, at a mark of the axis if any."""
     low, high, is_closed = stretch
     centre = middle(stretch)
-    for marks in (axis.edges, axis.marks):
-        place = bisect_left(marks, centre)
-        near = [
-            mark
-            for mark in marks[max(place - 1, 0) : place + 1]
-            if low < mark < high or (is_closed and mark == low)
-        ]
-        if near:
-            return min(near, key=lambda mark: abs(mark - centre))
-    return centre
+    place = bisect_left(axis.marks, centre)
+    near = [
+        mark
+        for mark in axis.marks[max(place - 1, 0) : place + 1]
+        if low < mark < high or (is_closed and mark == low)
+    ]
+    return min(near, key=lambda mark: abs(mark - centre), default=centre)
 
 
 def _asked(old: RuleBase, new: RuleBase) -> dict[Key, Variable]:

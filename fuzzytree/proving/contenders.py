@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from fuzzytree.proving.stretches import ALWAYS, NEVER, Axis, Numbered, Seen, Stretch
@@ -65,6 +65,7 @@ def left_on(
     asked: Sequence[tuple[Numbered, ...]],
     axes: Sequence[Axis],
     box: Box,
+    among: Iterable[int] | None = None,
 ) -> Left:
     """Return which rules may win on a box.
 
@@ -73,12 +74,15 @@ def left_on(
         asked: The clauses of each of them; see `fuzzytree.proving.stretches.laid`.
         axes: The axes.
         box: A stretch of each.
+        among: The places of the rules that may win on a box around this one, in order;
+            all unless given.
     """
     conjunction = rules.semantics.conjunction
     seen = [axis.seen(s) for axis, s in zip(axes, box, strict=True)]
     made: list[Contender] = []
-    for place, (rule, clauses) in enumerate(zip(rules.rules, asked, strict=True)):
-        found = _on_box(rule.then, clauses, seen, conjunction, place)
+    for place in range(len(asked)) if among is None else among:
+        then = rules.rules[place].then
+        found = _on_box(then, asked[place], seen, conjunction, place)
         if found is not None and found.high > 0.0:
             made.append(found)
     top = max((rule.low for rule in made), default=0.0)

@@ -131,33 +131,33 @@ class Axis:
         return self._above[key]
 
     @functools.cached_property
-    def edges(self) -> tuple[Fraction, ...]:
-        """Where a curve begins or ceases to be constant, within the whole."""
-        return self._inside(
-            end
-            for shape in self._shapes
-            for one, other in itertools.pairwise(pieces(shape))
-            if (end := one.high) is not None
-            and min(len(one.polynomial), len(other.polynomial)) == 1
+    def edges(self) -> tuple[tuple[Fraction, ...], ...]:
+        """Where the curves of each clause begin or cease to be constant."""
+        return tuple(
+            self._inside(end for shape in curves for end in _edges(shape))
+            for _, curves in self.clauses
         )
 
     @functools.cached_property
     def marks(self) -> tuple[Fraction, ...]:
         """Where a curve changes its formula or crosses another, within the whole."""
-        shapes = self._shapes
+        shapes = list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
         found = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
         for one, other in itertools.combinations(shapes, 2):
             if len(pieces(one)) * len(pieces(other)) <= _MOST_CROSSED:
                 found.update(_crossings(one, other, self.whole))
         return self._inside(found)
 
-    @property
-    def _shapes(self) -> list[Shape]:
-        return list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
-
     def _inside(self, marks: Iterable[Fraction]) -> tuple[Fraction, ...]:
         low, high = self.whole.low, self.whole.high
         return tuple(sorted({mark for mark in marks if low <= mark < high}))
+
+
+def _edges(shape: Shape) -> Iterator[Fraction]:
+    for one, other in itertools.pairwise(pieces(shape)):
+        is_edge = min(len(one.polynomial), len(other.polynomial)) == 1
+        if is_edge and one.high is not None:
+            yield one.high
 
 
 def laid(
