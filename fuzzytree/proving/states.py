@@ -106,7 +106,8 @@ class Bracket(Value, frozen=True, tag="BRACKET", tag_field="state"):
         low: It is at least this.
         high: It is at most this.
         why: What stopped it, in a sentence.
-        point: Where `low` is reached, if such a point is known.
+        point: Where one of the two ends is reached, if such a point is known: `low` of
+            what is largest somewhere, `high` of a distance.
         claims: What holds at the point.
     """
 
