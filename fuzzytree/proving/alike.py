@@ -278,8 +278,8 @@ class _Search:
                         votes[axis, edge] = votes.get((axis, edge), 0) + 1
         if votes:
             return min(votes, key=lambda one: (-votes[one], one))
-        axis = self._widest(box, rules)
-        return None if axis is None else (axis, _cut_at(self.axes[axis], box[axis]))
+        wide = self._widest(box, rules)
+        return None if wide is None else (wide, _cut_at(self.axes[wide], box[wide]))
 
     def _widest(self, box: Box, rules: Sequence[Contender]) -> int | None:
         """Return the axis on which a degree that matters varies most."""
