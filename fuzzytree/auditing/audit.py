@@ -57,7 +57,8 @@ FAMILIES: Final = (
     Family("gaps", ("FT301",)),
     Family("deciding", ("FT101", "FT102", "FT103", "FT202")),
     Family("pairs", ("FT104", "FT105", "FT106", "FT107", "FT201")),
-    Family("trees", ("FT101", "FT203", "FT205")),
+    Family("trees", ("FT101", "FT205")),
+    Family("disagreement", ("FT203",)),
     Family("robustness", ("FT204",)),
     Family("carriers", ("FT601", "FT602")),
 )

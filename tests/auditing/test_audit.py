@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import msgspec
@@ -61,6 +62,17 @@ def test_every_code_belongs_to_one_table_or_another() -> None:
     elsewhere = {code for code in CODES if code.startswith(("FT8", "FTD"))}
     assert ASKED | elsewhere == set(CODES)
     assert not ASKED & elsewhere
+
+
+def test_every_module_that_asks_is_in_the_table_or_asked_by_one() -> None:
+    folder = Path(__file__).parents[2] / "fuzzytree" / "auditing"
+    asking = {
+        path.stem
+        for path in folder.glob("*.py")
+        if re.search(r"^def answers\(subject: Subject\)", path.read_text("utf-8"), re.M)
+    }
+    inner = {"conventions"}  # carriers ask it
+    assert asking - inner == {family.module for family in FAMILIES}
 
 
 def test_every_family_answers_with_its_own_codes() -> None:
