@@ -57,6 +57,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.contracts import FloatArray, IntArray
 
+    BoolArray = npt.NDArray[np.bool_]
     Values = npt.NDArray[np.float64] | npt.NDArray[np.object_]
 
 _FINE_BITS = 256  # to which irrational places are known where floats do not suffice
@@ -260,6 +261,8 @@ class Cells(NamedTuple):
         between: The open cells between neighbouring zones.
         is_vague: Shape (zones,): whether more than one place may be in a zone, so
             that a cell is hidden in it.
+        is_zero: Shape (elements, cells): whether an element is 0 throughout.
+        is_zero_at: Shape (elements, zones): whether it is 0 there, for sure.
     """
 
     zones: tuple[tuple[Fraction, Fraction], ...]
@@ -268,7 +271,9 @@ class Cells(NamedTuple):
     right: Values
     start_rank: IntArray
     between: tuple[tuple[Fraction, Fraction], ...]
-    is_vague: npt.NDArray[np.bool_]
+    is_vague: BoolArray
+    is_zero: BoolArray
+    is_zero_at: BoolArray
 
 
 def cut(
@@ -290,18 +295,25 @@ def cut(
             of doubles.
     """
     zones, is_vague = _zones(found, low, high, is_fine=is_fine)
-    rank = _ranks(elements, zones)
+    rank, is_zero = _ranks(elements, zones)
     start = _order([element.degree(low) for element in elements])
     left, right = (_fine_values if is_fine else _values)(elements, zones)
-    between = tuple((a[1], b[0]) for a, b in itertools.pairwise(zones))
     return Cells(
-        zones, rank, left, right, np.array(start, dtype=np.int64), between, is_vague
+        zones,
+        rank,
+        left,
+        right,
+        np.array(start, dtype=np.int64),
+        tuple((a[1], b[0]) for a, b in itertools.pairwise(zones)),
+        is_vague,
+        is_zero,
+        _zeros_at(elements, zones, left),
     )
 
 
 def _zones(
     found: Iterable[Place], low: Fraction, high: Fraction, *, is_fine: bool
-) -> tuple[tuple[tuple[Fraction, Fraction], ...], npt.NDArray[np.bool_]]:
+) -> tuple[tuple[tuple[Fraction, Fraction], ...], BoolArray]:
     within: list[tuple[Fraction, Fraction, bool]] = [(low, low, False)]
     if low < high:
         within.append((high, high, False))
@@ -338,7 +350,11 @@ def _bits(root: Root) -> int:
 
 def _ranks(
     elements: Sequence[Element], zones: Sequence[tuple[Fraction, Fraction]]
-) -> IntArray:
+) -> tuple[IntArray, BoolArray]:
+    """Return the order of elements in each cell, and which are 0 in it.
+
+    Where a curve meets 0 is a place, so it is 0 in all of a cell or nowhere in it.
+    """
     ends = [(a[1], b[0]) for a, b in itertools.pairwise(zones)]
     points = [_between(a, b) for a, b in ends]
     near = np.array([float(point) for point in points])
@@ -355,7 +371,23 @@ def _ranks(
         if given is None:
             given = _order([element.degree(point) for element in elements])
         ranks[cell] = given
-    return ranks
+    is_zero = high == 0.0
+    for row, cell in np.argwhere((low == 0.0) & ~is_zero).tolist():
+        is_zero[row, cell] = elements[row].degree(points[cell]) == 0
+    return ranks, is_zero
+
+
+def _zeros_at(
+    elements: Sequence[Element],
+    zones: Sequence[tuple[Fraction, Fraction]],
+    left: Values,
+) -> BoolArray:
+    is_zero: BoolArray = np.asarray(left[1] == 0, dtype=bool)
+    is_open = np.asarray(left[0] == 0, dtype=bool) & ~is_zero
+    for row, place in np.argwhere(is_open).tolist():
+        low, high = zones[place]
+        is_zero[row, place] = low == high and elements[row].degree(low) == 0
+    return is_zero
 
 
 def _between(low: Fraction, high: Fraction) -> Fraction:

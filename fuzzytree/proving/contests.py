@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -28,9 +28,10 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import IntArray
 
 NEVER = np.iinfo(np.int64).max
+_MOST_BITS = 63
 
 
-class Options(NamedTuple):
+class Options(msgspec.Struct, frozen=True, eq=False, dict=True):
     """The options on one axis.
 
     Attributes:
@@ -48,16 +49,40 @@ class Options(NamedTuple):
     def masks(self, is_open: npt.NDArray[np.bool_], band: int) -> tuple[int, ...]:
         """Return the largest sets of rivals that open options leave below a band."""
         below = self.floor[is_open] <= band
+        if below.shape[1] < _MOST_BITS:
+            weights = np.left_shift(1, np.arange(below.shape[1], dtype=np.int64))
+            return maximal(np.unique(below @ weights).tolist())
         packed = np.packbits(below, axis=1, bitorder="little")
         return maximal(int.from_bytes(row.tobytes(), "little") for row in packed)
 
     def at_gap(self, band: int) -> tuple[int, ...]:
         """Return what is left below at levels between a band and the next one."""
-        return self.masks((self.top > band) & (self.where >= START), band)
+        return self._known(band, is_within=False)
 
     def at_band(self, band: int) -> tuple[int, ...]:
         """Return what may be left below somewhere within a band: never too little."""
-        return self.masks(self.top >= band, band)
+        return self._known(band, is_within=True)
+
+    @functools.cached_property
+    def events(self) -> IntArray:
+        """The bands at which options come or go, in ascending order."""
+        return np.unique(np.concatenate([self.top, self.floor[self.floor < NEVER]]))
+
+    @functools.cached_property
+    def _masks(self) -> dict[tuple[int, bool, bool], tuple[int, ...]]:
+        return {}
+
+    def _known(self, band: int, *, is_within: bool) -> tuple[int, ...]:
+        """Return masks, worked out once for all bands between two events."""
+        place = int(np.searchsorted(self.events, band, side="right"))
+        is_event = bool(place) and int(self.events[place - 1]) == band
+        key = place, is_within, is_event and is_within
+        if key not in self._masks:
+            is_open = self.top >= band
+            if not is_within:
+                is_open = (self.top > band) & (self.where >= START)
+            self._masks[key] = self.masks(is_open, band)
+        return self._masks[key]
 
 
 class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
@@ -107,8 +132,7 @@ class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
 def _events(every: Iterable[Options]) -> tuple[int, ...]:
     found = {0}  # without rivals nothing happens down to the lowest level
     for options in every:
-        found.update(options.top.tolist())
-        found.update(options.floor[options.floor < NEVER].tolist())
+        found.update(options.events.tolist())
     return tuple(sorted(found, reverse=True))
 
 

@@ -217,12 +217,18 @@ def _bare_point(
                 continue
             if tried > _MOST_CHOICES:
                 return None
-        seen: set[int] = set()
-        for mask, part in reversed(ways[place]):
-            if joined or mask not in seen:
-                todo.append(({**wanted, place: part}, covered | mask))
-            seen.add(mask)
+        kept = ways[place] if joined else _first_of_each(ways[place])
+        for mask, part in reversed(kept):
+            todo.append(({**wanted, place: part}, covered | mask))
     return None
+
+
+def _first_of_each(ways: list[tuple[int, Stretch]]) -> list[tuple[int, Stretch]]:
+    """Return the first way to each mask, in order."""
+    kept: dict[int, Stretch] = {}
+    for mask, part in ways:
+        kept.setdefault(mask, part)
+    return list(kept.items())
 
 
 def _bare_witness(given: Ground, point: Point) -> State:

@@ -275,8 +275,8 @@ def _laid(
                 np.maximum(*ends_of_cells),
                 left,
                 right,
-                (of.right[1][:, :-1] == 0) & (of.left[1][:, 1:] == 0),
-                of.left[1] == 0,
+                of.is_zero,
+                of.is_zero_at,
                 of.left[0] == 0,
             )
         )

@@ -11,7 +11,6 @@ from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.questions import Question, searched
 from fuzzytree.proving.states import Bracket, Proved, State
-from fuzzytree.proving.witnesses import coupled
 
 _TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
 
@@ -54,9 +53,8 @@ def wins(
     if given.rules.semantics.conjunction == "product":
         return by_boxes(clock)
     question = Question((rule,), others, None, f"the largest lead of rule {rule}")
-    if not coupled(given):
-        return searched(given, question, clock)
-    # Half of the time for cells and inequalities, the rest for boxes of the inputs.
+    # Half of the time for cells, the rest for boxes: they see that clauses cancel, and
+    # know inputs that depend on each other.
     found = searched(given, question, clock.share(0.5))
     if not isinstance(found, Bracket):
         return found
