@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,19 +15,17 @@ from fuzzytree.report.sarif import sarif
 from fuzzytree.testing import random_tree
 from tests.report.audits import every_state
 
-Need = Callable[[str], str]
-SCHEMA = Path("@microsoft", "jest-sarif", "lib", "schemas", "sarif-2.1.0-rtm.5.json")
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = "@microsoft/jest-sarif"
+SCHEMA = f"build/sarif/node_modules/{PACKAGE}/lib/schemas/sarif-2.1.0-rtm.5.json"
 
 
 @pytest.fixture
-def validate(program: Need, missing: Callable[[str], None]) -> Callable[[str], None]:
+def validate(missing: Callable[[str], None]) -> Callable[[str], None]:
     """Return a function that refuses what is no SARIF."""
-    npm = program("npm")
-    words = [npm, "root", "-g"]
-    root = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-    path = Path(root.strip()) / SCHEMA
+    path = ROOT / SCHEMA
     if not path.is_file():
-        missing("the npm package @microsoft/jest-sarif is not installed")
+        missing(f"npm install --prefix build/sarif {PACKAGE} was not run")
     schema: Any = json.loads(path.read_text("utf-8"))
     checker = jsonschema.validators.validator_for(schema)(schema)
 
