@@ -16,15 +16,9 @@ from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.decisions import decision_at, other_decision
 from fuzzytree.proving.domain import Domain
-from fuzzytree.proving.ground import ground, narrowed, strengths_at, variable_value
+from fuzzytree.proving.ground import ground, narrowed, strengths_at
 from fuzzytree.proving.nearest import Nearest, nearest, nearest_box
-from fuzzytree.proving.regions import (
-    boxes,
-    contains,
-    leaf_at,
-    point_in,
-    regions,
-)
+from fuzzytree.proving.regions import boxes, leaf_at, point_in, regions
 from fuzzytree.proving.states import (
     Bracket,
     Carrier,
@@ -35,6 +29,7 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
+from fuzzytree.proving.variables import contains, variable_value
 from fuzzytree.proving.witnesses import is_within
 from fuzzytree.tree import FuzzyTree
 

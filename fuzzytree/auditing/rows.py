@@ -13,8 +13,8 @@ from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Rows, Subject
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.domain import Domain
-from fuzzytree.proving.regions import contains
 from fuzzytree.proving.states import Span, Witness, point_of
+from fuzzytree.proving.variables import contains
 
 OF_RANGES = "of each input's range"
 """The unit of distances: the largest difference of an input, in its range's width."""

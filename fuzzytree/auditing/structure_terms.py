@@ -12,8 +12,8 @@ from fuzzytree.auditing.records import Measure
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.distances import distance
 from fuzzytree.proving.domain import Domain
-from fuzzytree.proving.ground import span
 from fuzzytree.proving.stretches import Key
+from fuzzytree.proving.variables import span
 from fuzzytree.rulebase import Path, RuleBase, Term, Variable
 from fuzzytree.tree import FuzzyTree
 

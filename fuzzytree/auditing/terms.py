@@ -11,7 +11,6 @@ from fuzzytree.auditing.records import Answer, Label, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.axes import Element
 from fuzzytree.proving.curves import pieces
-from fuzzytree.proving.ground import span
 from fuzzytree.proving.measures import (
     Bounds,
     Excess,
@@ -28,6 +27,7 @@ from fuzzytree.proving.measures import (
     walk,
 )
 from fuzzytree.proving.states import Bracket, Declined, Proved, Span, State
+from fuzzytree.proving.variables import span
 from fuzzytree.rulebase import Points, Shape, Term, Variable
 from fuzzytree.system import questions
 

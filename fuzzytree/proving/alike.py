@@ -27,10 +27,10 @@ from fuzzytree.proving.answers import difference_at
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.contenders import Box, Contender, Left, left_on, same
 from fuzzytree.proving.domain import Domain
-from fuzzytree.proving.ground import span
 from fuzzytree.proving.points import Places, Point, middle
 from fuzzytree.proving.states import Bracket, Proved, Span, State, Witness
 from fuzzytree.proving.stretches import Axis, Key, Numbered, Stretch, laid
+from fuzzytree.proving.variables import span
 from fuzzytree.rulebase import RuleBase, Variable
 
 MOST_BOXES = 4_000

@@ -5,11 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.proving.ground import rule_strengths
 from fuzzytree.proving.linear import ZERO
 from fuzzytree.proving.points import Point
 from fuzzytree.proving.states import Claim, Witness, coordinates
-from fuzzytree.rulebase import Part, RuleBase, Variable, shapes_of
+from fuzzytree.rulebase import RuleBase
 
 
 class Answered(NamedTuple):
@@ -37,22 +37,7 @@ def answer_at(rules: RuleBase, point: Point) -> Answered:
         >>> answer_at(RuleBase("a", ("x",), (), (Rule((), "x"),)), {}).label
         'x'
     """
-    shapes = shapes_of(rules.variables)
-    values = {v.name: _value(v, point) for v in rules.variables}
-    strengths: list[Fraction] = []
-    for rule in rules.rules:
-        strength = Fraction(1)
-        for clause in rule.when:
-            value = values[clause.variable]
-            degree = max(
-                exact_degree(shapes[clause.variable, t], value) for t in clause.terms
-            )
-            degree = 1 - degree if clause.negated else degree
-            if rules.semantics.conjunction == "product":
-                strength *= degree
-            else:
-                strength = min(strength, degree)
-        strengths.append(strength)
+    strengths = rule_strengths(rules, point)
     best = max(strengths)
     if best == 0:
         return Answered(rules.semantics.uncovered, 0, False, ZERO)
@@ -63,16 +48,6 @@ def answer_at(rules: RuleBase, point: Point) -> Answered:
     ]
     margin = best - max(others, default=ZERO)
     return Answered(label, winner + 1, strengths.count(best) > 1, margin)
-
-
-def _value(variable: Variable, point: Point) -> Fraction:
-    if not variable.parts:
-        return point[variable.name]
-    return sum((_share(part, point) for part in variable.parts), ZERO)
-
-
-def _share(part: Part, point: Point) -> Fraction:
-    return Fraction(part.weight) * (point[part.input] - Fraction(part.centre))
 
 
 def difference_at(old: RuleBase, new: RuleBase, point: Point) -> Witness | None:

@@ -9,10 +9,11 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 from fuzzytree.numerics.exact import outwards
-from fuzzytree.proving.ground import Ground, Laid, variable_value
+from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.linear import simple
 from fuzzytree.proving.parts import part_of
 from fuzzytree.proving.states import Span
+from fuzzytree.proving.variables import variable_value
 
 if TYPE_CHECKING:
     from fuzzytree.proving.axes import Values

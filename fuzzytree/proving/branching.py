@@ -18,12 +18,11 @@ from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.space import Seen, Space
+from fuzzytree.proving.variables import Point
 from fuzzytree.proving.witnesses import is_within
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
-
-Point = dict[str, Fraction]
 
 TOO_MANY: Final = "too many boxes are left"
 

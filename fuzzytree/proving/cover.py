@@ -11,7 +11,7 @@ from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest
 from fuzzytree.proving.covering import cover, maximal
-from fuzzytree.proving.ground import Ground, Laid, strengths_at, variable_value
+from fuzzytree.proving.ground import Ground, Laid, strengths_at
 from fuzzytree.proving.parts import Stretch
 from fuzzytree.proving.questions import Question, searched
 from fuzzytree.proving.seeking import leader
@@ -24,7 +24,8 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.proving.witnesses import Point, coupled, is_within, point_with
+from fuzzytree.proving.variables import Point, variable_value
+from fuzzytree.proving.witnesses import coupled, is_within, point_with
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs
 _MOST_FINE = 300  # levels that are worth knowing as fractions

@@ -31,8 +31,9 @@ from fuzzytree.proving.states import (
     point_of,
 )
 from fuzzytree.proving.ties import decides_by_order
+from fuzzytree.proving.variables import Point
 from fuzzytree.proving.wins import wins
-from fuzzytree.proving.witnesses import Point, is_within
+from fuzzytree.proving.witnesses import is_within
 
 _DRAWN: Final = 256  # points in which another decision is looked for first
 

@@ -21,6 +21,7 @@ import numpy as np
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.proving.axes import ALWAYS, Cells, Element, Place, cut, places
 from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.variables import span, variable_value
 from fuzzytree.rulebase import Clause, RuleBase, Variable, shapes_of
 
 if TYPE_CHECKING:
@@ -183,28 +184,6 @@ def _ends(
     return tuple(ends)
 
 
-def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
-    """Return the least and largest exact value of a variable on a box.
-
-    A combination is linear, so both are reached at corners; its own side, if it has
-    one, cuts them. The first is above the second if nothing is left.
-    """
-    side = domain.side(variable.name)
-    if not variable.parts:
-        assert side is not None  # checked when the ground was made
-        return Fraction(side.low), Fraction(side.high)
-    low = high = Fraction(0)
-    for part in variable.parts:
-        of = domain.side(part.input)
-        assert of is not None
-        weight, centre = Fraction(part.weight), Fraction(part.centre)
-        ends = [weight * (Fraction(end) - centre) for end in (of.low, of.high)]
-        low, high = low + min(ends), high + max(ends)
-    if side is not None:
-        low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
-    return low, high
-
-
 @functools.lru_cache(maxsize=64)
 def _axes(rules: RuleBase) -> tuple[Axis, ...]:
     shapes = shapes_of(rules.variables)
@@ -321,16 +300,6 @@ def _chosen(axis: Axis, rank: IntArray) -> IntArray:
     return chosen
 
 
-def variable_value(variable: Variable, point: Mapping[str, Fraction]) -> Fraction:
-    """Return the exact value of a variable at a point of the inputs."""
-    if not variable.parts:
-        return point[variable.name]
-    total = Fraction(0)
-    for part in variable.parts:
-        total += Fraction(part.weight) * (point[part.input] - Fraction(part.centre))
-    return total
-
-
 def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]:
     """Return every rule's exact strength at a point of the inputs.
 
@@ -344,11 +313,17 @@ def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]
         >>> max(strengths_at(ground(rules, box), point))
         Fraction(1, 1)
     """
-    is_product = given.rules.semantics.conjunction == "product"
-    shapes = shapes_of(given.rules.variables)
-    clauses = dict.fromkeys(c for rule in given.rules.rules for c in rule.when)
+    return rule_strengths(given.rules, point)
+
+
+def rule_strengths(rules: RuleBase, point: Mapping[str, Fraction]) -> list[Fraction]:
+    """Return every rule's exact strength, without a domain."""
+    is_product = rules.semantics.conjunction == "product"
+    shapes = shapes_of(rules.variables)
+    clauses = dict.fromkeys(c for rule in rules.rules for c in rule.when)
+    asked = {clause.variable for clause in clauses}
     values = {
-        axis.variable.name: variable_value(axis.variable, point) for axis in given.axes
+        v.name: variable_value(v, point) for v in rules.variables if v.name in asked
     }
     degrees: dict[Clause, Fraction] = {}
     for clause in clauses:
@@ -358,7 +333,7 @@ def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]
         )
         degrees[clause] = 1 - found if clause.negated else found
     strengths: list[Fraction] = []
-    for rule in given.rules.rules:
+    for rule in rules.rules:
         each = [degrees[clause] for clause in rule.when]
         whole = math.prod(each, start=Fraction(1))
         strengths.append(whole if is_product else min(each, default=Fraction(1)))

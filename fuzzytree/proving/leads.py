@@ -13,7 +13,8 @@ from fuzzytree.proving.covering import cover
 from fuzzytree.proving.ground import Ground, strengths_at
 from fuzzytree.proving.seeking import leader, plainer
 from fuzzytree.proving.states import Bracket, Claim, Witness, coordinates, point_of
-from fuzzytree.proving.witnesses import Point, is_within
+from fuzzytree.proving.variables import Point
+from fuzzytree.proving.witnesses import is_within
 
 _STEPS = 10  # halvings of the upper end
 

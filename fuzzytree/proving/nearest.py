@@ -23,9 +23,8 @@ from fuzzytree.proving.states import (
     Witness,
     point_of,
 )
+from fuzzytree.proving.variables import Point
 from fuzzytree.rulebase import Value
-
-Point = dict[str, Fraction]
 
 NARROW = Fraction(1, 1000)
 """The two bounds differ by this share of the upper one, unless something stops it."""

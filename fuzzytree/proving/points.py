@@ -8,6 +8,7 @@ from fractions import Fraction
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.linear import ZERO, Row, feasible
 from fuzzytree.proving.stretches import Key, Stretch
+from fuzzytree.proving.variables import combined
 from fuzzytree.rulebase import RuleBase
 
 Point = Mapping[str, Fraction]
@@ -97,12 +98,8 @@ def _row(
     if isinstance(key, str):
         weights = {place[key]: Fraction(1)}
         return Row(weights, stretch.low, stretch.high, is_open)
-    weights, shift = {}, ZERO
-    for part in key:
-        number, weight = place[part.input], Fraction(part.weight)
-        weights[number] = weights.get(number, ZERO) + weight
-        shift += weight * Fraction(part.centre)
-    return Row(weights, stretch.low + shift, stretch.high + shift, is_open)
+    weights, constant = combined(key, place)
+    return Row(weights, stretch.low - constant, stretch.high - constant, is_open)
 
 
 def _holds(row: Row, values: Sequence[Fraction]) -> bool:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.ground import span, variable_value
 from fuzzytree.proving.linear import Row, feasible
+from fuzzytree.proving.variables import linear_form, span, variable_value
 from fuzzytree.rulebase import Value, Variable
 from fuzzytree.tree import Branch, FuzzyTree, intervals
 
@@ -174,41 +174,6 @@ def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
 
 def _strict(row: Row) -> Row:
     return row._replace(is_open_low=True, is_open_high=True)
-
-
-def linear_form(
-    variable: Variable, number: Mapping[str, int]
-) -> tuple[dict[int, Fraction], Fraction]:
-    """Return a variable as weights of the inputs, by their numbers, and a constant."""
-    if not variable.parts:
-        return {number[variable.name]: Fraction(1)}, Fraction(0)
-    weights: dict[int, Fraction] = {}
-    constant = Fraction(0)
-    for part in variable.parts:
-        weight, place = Fraction(part.weight), number[part.input]
-        weights[place] = weights.get(place, Fraction(0)) + weight
-        constant -= weight * Fraction(part.centre)
-    return weights, constant
-
-
-def contains(
-    domain: Domain, variables: Iterable[Variable], point: Mapping[str, Fraction]
-) -> bool:
-    """Return whether a point of the inputs is in a domain, exactly.
-
-    Example:
-        >>> box = Domain((Side("x", 0.0, 1.0, is_open=True),))
-        >>> contains(box, [Variable("x")], {"x": Fraction(0)})
-        False
-    """
-    for variable in variables:
-        side = domain.side(variable.name)
-        if side is None:
-            continue
-        value = variable_value(variable, point)
-        if not side.low <= value <= side.high or (side.is_open and value == side.low):
-            return False
-    return True
 
 
 def leaf_at(tree: FuzzyTree, point: Mapping[str, Fraction]) -> int:

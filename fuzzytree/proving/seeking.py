@@ -12,7 +12,8 @@ from fuzzytree.numerics.enclosures import axis_value, clause_enclosure, degree_e
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.ground import Ground, strengths_at
 from fuzzytree.proving.linear import simple
-from fuzzytree.proving.witnesses import Point, is_within
+from fuzzytree.proving.variables import Point
+from fuzzytree.proving.witnesses import is_within
 from fuzzytree.rulebase import RuleBase, shapes_of
 
 if TYPE_CHECKING:

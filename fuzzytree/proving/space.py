@@ -18,7 +18,7 @@ from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.linear import Row, feasible
 from fuzzytree.proving.lines import Asked, Line, Pair, Spans, Table, product_of
-from fuzzytree.proving.regions import linear_form
+from fuzzytree.proving.variables import linear_form
 from fuzzytree.rulebase import Variable
 
 if TYPE_CHECKING:

@@ -31,7 +31,8 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.proving.witnesses import Point, is_within, point_with
+from fuzzytree.proving.variables import Point
+from fuzzytree.proving.witnesses import is_within, point_with
 
 
 class _Asked(NamedTuple):

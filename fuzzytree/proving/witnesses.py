@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from fuzzytree.proving.ground import Ground, variable_value
+from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.linear import Row, feasible, simple
 from fuzzytree.proving.parts import Stretch
-
-Point = dict[str, Fraction]
+from fuzzytree.proving.variables import Point, contains, linear_form
 
 
 def coupled(given: Ground) -> tuple[tuple[int, ...], ...]:
@@ -65,11 +64,11 @@ def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
     for variable in given.rules.variables:
         side = given.domain.side(variable.name)
         if variable.parts and side is not None:
-            weights, constant = linear_form(given, variable.name, number)
+            weights, constant = linear_form(variable, number)
             low, high = Fraction(side.low) - constant, Fraction(side.high) - constant
             rows.append(Row(weights, low, high, is_open_low=side.is_open))
     for axis, part in wanted.items():
-        weights, constant = linear_form(given, given.axes[axis].variable.name, number)
+        weights, constant = linear_form(given.axes[axis].variable, number)
         low, high = part.low - constant, part.high - constant
         rows.append(Row(weights, low, high, part.is_open, part.is_open))
     joined = {place for row in rows if len(row.weights) > 1 for place in row.weights}
@@ -101,29 +100,6 @@ def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
     return dict(zip(names, point, strict=True))
 
 
-def linear_form(
-    given: Ground, name: str, number: Mapping[str, int]
-) -> tuple[dict[int, Fraction], Fraction]:
-    """Return a variable as weights of inputs, by number, and a constant."""
-    variable = next(v for v in given.rules.variables if v.name == name)
-    if not variable.parts:
-        return {number[name]: Fraction(1)}, Fraction(0)
-    weights: dict[int, Fraction] = {}
-    constant = Fraction(0)
-    for part in variable.parts:
-        weight, place = Fraction(part.weight), number[part.input]
-        weights[place] = weights.get(place, Fraction(0)) + weight
-        constant -= weight * Fraction(part.centre)
-    return weights, constant
-
-
 def is_within(given: Ground, point: Mapping[str, Fraction]) -> bool:
     """Return whether a point of the inputs lies in the domain."""
-    for variable in given.rules.variables:
-        side = given.domain.side(variable.name)
-        if side is None:
-            continue
-        value = variable_value(variable, point)
-        if not side.low <= value <= side.high or (side.is_open and value == side.low):
-            return False
-    return True
+    return contains(given.domain, given.rules.variables, point)

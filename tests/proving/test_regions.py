@@ -9,12 +9,12 @@ from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.regions import (
     boxes,
     common,
-    contains,
     cut_side,
     leaf_at,
     point_in,
     regions,
 )
+from fuzzytree.proving.variables import contains
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree, Node
 
