@@ -50,7 +50,7 @@ from fuzzytree.proving.polynomials import (
     refined,
     value_at,
 )
-from fuzzytree.rulebase import Band, Clause, Shape
+from fuzzytree.rulebase import Band, Clause, Points, Shape
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -124,7 +124,8 @@ def places(elements: Sequence[Element]) -> tuple[Place, ...]:
             for level in (CAP, 1 - CAP)
         }
     )
-    for of in laid:
+    for element, of in zip(elements, laid, strict=True):
+        is_kept = isinstance(element.shape, Points)  # lines that stay in [0, 1]
         for piece, polynomial in of:
             found.update(end for end in (piece.low, piece.high) if end is not None)
             if len(polynomial) > 1:
@@ -133,7 +134,7 @@ def places(elements: Sequence[Element]) -> tuple[Place, ...]:
                 if len(turning) > 1:
                     _solve(turning, *ends, found, irrational)
                 for level in levels:
-                    if len(polynomial) > 2 or ZERO < level < ONE:
+                    if not is_kept or ZERO < level < ONE:
                         met = _crossing(polynomial, (level,))
                         _solve(met, *ends, found, irrational)
     for one, other in itertools.combinations(laid, 2):

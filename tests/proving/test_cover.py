@@ -12,7 +12,8 @@ from fuzzytree.proving.cover import below, least_cover, uncovered
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import ground, strengths_at
 from fuzzytree.proving.states import Bracket, Proved, Witness, point_of
-from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.rulebase import LR, Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.rulebase import Side as Half
 from tests.proving.bases import random_base, unit_domain
 
 
@@ -91,3 +92,14 @@ def test_what_is_proved_covered_has_no_uncovered_row(seed: int, kind: str) -> No
         assert max(strengths_at(given, point_of(hit.point))) < level
     if least.low > 0:
         assert isinstance(below(given, Fraction(least.low)), Proved)
+
+
+def test_a_side_that_falls_as_a_line_covers_the_inputs_before_its_zero() -> None:
+    steep = LR(0.75, Half(0.25, (40.0,)), Half(0.125, (1.0,)))  # 0 from 0.74375 down
+    rule = Rule((Clause("x", ("steep",)),), "a")
+    rules = RuleBase("p", ("a",), (Variable("x", (Term("steep", steep),)),), (rule,))
+    zero = 0.75 - 0.25 / 40.0
+    assert isinstance(uncovered(ground(rules, _box(zero + 1e-9, 0.75))), Proved)
+    found = uncovered(ground(rules, _box(0.0, 0.75)))
+    assert isinstance(found, Witness)
+    assert found.region[0].high == pytest.approx(zero)
