@@ -13,9 +13,9 @@ from fuzzytree.cli.talk import answer
 def command(audit: str, model: str) -> int:
     """Check AUDIT, the JSON of an audit, against MODEL, the YAML file that it is of.
 
-    Everything is read, evaluated and decided again by one file of Python that imports
-    nothing of fuzzytree and runs alone; `python -m fuzzytree.rechecking` is the same.
-    Exit 1 if something does not hold.
+    Everything is read, evaluated and decided again by code that imports nothing else
+    of fuzzytree and runs alone; `python -m fuzzytree.rechecking` is the same. Exit 1 if
+    something does not hold.
     """
     from fuzzytree.errors import ReadError
     from fuzzytree.rechecking import CannotRunError, recheck_files

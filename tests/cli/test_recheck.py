@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.rechecking import LIMITS
+from fuzzytree.rechecking.fixed import LIMITS
 
 pytestmark = pytest.mark.usefixtures("folder")
 

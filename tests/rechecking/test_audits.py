@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import random
 import re
@@ -10,28 +9,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 
-from fuzzytree import rechecking
-from fuzzytree.auditing.audit import audit
-from fuzzytree.auditing.places import ModelFile
-from fuzzytree.auditing.subject import Rows
-from fuzzytree.exporters import yaml
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rechecking import CannotRunError, digest_of, recheck
-from fuzzytree.rulebase import (
-    Clause,
-    Conjunction,
-    Points,
-    Rule,
-    RuleBase,
-    Term,
-    Variable,
-)
+from fuzzytree.rechecking import CannotRunError, recheck
+from fuzzytree.rechecking.fingerprints import digest_of
+from fuzzytree.rechecking.fixed import LIMITS
+from fuzzytree.rulebase import Conjunction, RuleBase
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree
 from tests.proving.bases import random_base
+from tests.rechecking.audits import audited, small
 
 Facts = dict[str, Any]
 Way = tuple[str | int, ...]
@@ -52,47 +40,6 @@ FREE = (
 
 UNSURE = ("FT102", "FT103", "FT106", "FT203", "FT204", "FT301", "FT402", "FT6", "FT7")
 """Codes some of whose answers are not decided again, so that one may be missing."""
-
-
-def grip() -> RuleBase:
-    """Return rules with a duplicate clause, a subsumed rule and conflicts."""
-    up = Points((0.0, 4.0), (0.0, 1.0))
-    down = Points((0.0, 4.0), (1.0, 0.0))
-    middle = Points((1.0, 2.0, 3.0), (0.0, 1.0, 0.0))
-    terms = (Term("low", down), Term("mid", middle), Term("high", up))
-
-    def rule(then: str, *asked: tuple[str, str]) -> Rule:
-        return Rule(tuple(Clause(name, (term,)) for name, term in asked), then)
-
-    return RuleBase(
-        "grip",
-        ("soft", "firm"),
-        tuple(Variable(name, terms, "N", 0.0, 4.0) for name in ("force", "slip")),
-        (
-            rule("soft", ("force", "low"), ("slip", "low")),
-            rule("firm", ("force", "high"), ("slip", "high")),
-            rule("soft", ("force", "mid"), ("slip", "mid")),
-            rule("firm", ("force", "high"), ("slip", "high"), ("slip", "mid")),
-        ),
-    )
-
-
-def audited(
-    model: RuleBase | FuzzyTree, *, rows: Rows | None = None, **options: Any
-) -> tuple[bytes, bytes]:
-    """Return an audit and the file that it is of."""
-    content = yaml.write(model).content
-    file = ModelFile("grip.yaml", content)
-    repeat = "fuzzytree audit grip.yaml"
-    options.setdefault("ignore", ["FT6"])
-    found = audit(model, file=file, repeat=repeat, rows=rows, **options)
-    return msgspec.json.encode(found), content
-
-
-@functools.cache
-def small() -> tuple[bytes, bytes]:
-    """Return the audit of a small rule base."""
-    return audited(grip())
 
 
 def wrong_with(facts: Facts, content: bytes) -> list[str]:
@@ -219,7 +166,7 @@ def changed(**changes: Any) -> list[str]:
 
 
 def test_a_panel_that_was_edited_is_told() -> None:
-    limits = [*rechecking.LIMITS[:-1]]
+    limits = [*LIMITS[:-1]]
     assert changed(limits=limits) == ["the panel of limits is not the fixed one"]
 
 

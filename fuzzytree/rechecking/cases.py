@@ -1,0 +1,151 @@
+"""An audit beside its model, and what every question about the two needs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+
+from fuzzytree.rechecking.areas import height, shared
+from fuzzytree.rechecking.audit_records import Answer, Audit, Label
+from fuzzytree.rechecking.cells import Line
+from fuzzytree.rechecking.grid import Asked, Grid
+from fuzzytree.rechecking.model_records import Model, Tree, Variable
+from fuzzytree.rechecking.outcomes import UndecidedError, require
+from fuzzytree.rechecking.polynomials import ZERO
+from fuzzytree.rechecking.trees import Steps, paths, rules_of
+
+
+class Case:
+    """An audit and its model in every form.
+
+    Attributes:
+        rules: The rules of the model; of a tree, its relative ones.
+        carriers: Everything that a claim can be of, by name.
+        variables: The variables of the model by name.
+        sides: The sides of the domain by name.
+        is_free: Whether no variable is a combination of others.
+        numbers: The numbers of the rules, from 1.
+    """
+
+    def __init__(self, audit: Audit, model: Model) -> None:
+        self.audit, self.model = audit, model
+        self.carriers: dict[str, Model] = {}
+        if isinstance(model, Tree):
+            self.rules = rules_of(model, "relative")
+            self.carriers = {"tree": model}
+            if model.sets:
+                self.carriers["raw rules"] = rules_of(model, "raw")
+        else:
+            self.rules = model
+        self.carriers["rules"] = self.rules
+        self.variables = {v.name: v for v in model.variables}
+        self.sides = {side.variable: side for side in audit.domain.sides}
+        self.is_free = not any(v.parts for v in model.variables)
+        self.numbers = range(1, len(self.rules.rules) + 1)
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The rules in cells."""
+        lines = {v.name: self.line(v) for v in self.rules.variables}
+        given = self.audit.settings
+        return Grid(self.rules, lines, map(Fraction, (given.epsilon, given.level)))
+
+    @cached_property
+    def paths(self) -> dict[int, Steps]:
+        """The path to each leaf."""
+        return dict(paths(self.model)) if isinstance(self.model, Tree) else {}
+
+    @cached_property
+    def heights(self) -> dict[Label, Fraction]:
+        """The largest degree of each term on the domain."""
+        level = Fraction(self.audit.settings.level)
+        return {
+            Label(v.name, term.name): height(term.shape, self.line(v), level)
+            for v in self.rules.variables
+            for term in v.terms
+        }
+
+    @cached_property
+    def shares(self) -> dict[tuple[Label, ...], tuple[Fraction, Fraction] | None]:
+        """The shared area of each pair of terms of a variable; None without area."""
+        return {
+            (Label(v.name, a.name), Label(v.name, b.name)): shared(
+                a.shape, b.shape, self.line(v)
+            )
+            for v in self.rules.variables
+            for a, b in itertools.combinations(v.terms, 2)
+        }
+
+    def line(self, variable: Variable) -> Line:
+        """Return a variable's values in the domain; of a combination, at most these."""
+        side = self.sides.get(variable.name)
+        if not variable.parts and side is not None:
+            return Line(Fraction(side.low), Fraction(side.high))
+        low = high = ZERO
+        for part in variable.parts:
+            one, weight = self.sides[part.input], Fraction(part.weight)
+            away = (
+                Fraction(end) - Fraction(part.centre) for end in (one.low, one.high)
+            )
+            ends = [weight * end for end in away]
+            low, high = low + min(ends), high + max(ends)
+        if side is not None:
+            low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
+        return Line(low, high)
+
+    def coded(self, code: str) -> list[Answer]:
+        """Return the answers of a code."""
+        return [one for one in self.audit.answers if one.code == code]
+
+    def then(self, number: int) -> str:
+        """Return the class of a rule."""
+        return self.rules.rules[number - 1].then
+
+    def asked(self, number: int) -> Asked:
+        """Return what a rule asks of each axis."""
+        return self.grid.of[number - 1]
+
+    def differ(self, numbers: Sequence[int]) -> None:
+        """Refuse rules that are not of two classes."""
+        classes = {self.then(number) for number in numbers}
+        require(len(classes) == 2, "the rules are of one class")
+
+    def pairs(self, *, alike: bool) -> list[tuple[int, int]]:
+        """Return the pairs of rules of one class, or of two."""
+        every = itertools.combinations(self.numbers, 2)
+        return [p for p in every if (self.then(p[0]) == self.then(p[1])) is alike]
+
+    def fire(self, *numbers: int) -> bool:
+        """Return whether each of some rules fires somewhere."""
+        gap = self.grid.gap(ZERO, is_above=True)
+        return all(self.grid.leaves(self.asked(n), (), gap) for n in numbers)
+
+    def beats(self, mine: Asked, rivals: Sequence[Asked]) -> bool:
+        """Return whether a rule is somewhere stronger than each rival.
+
+        Raises:
+            UndecidedError: If that cannot be told here.
+        """
+        if self.rules.semantics.conjunction == "min":
+            return self.grid.wins(mine, rivals)
+        if any(self.grid.is_below(mine, rival) for rival in rivals):
+            return False
+        text = "under product only one rule that hides another is seen here"
+        raise UndecidedError(text)
+
+    def never(self, is_so: bool, otherwise: str) -> None:
+        """Refuse what was found although it should never happen, if inputs are free."""
+        if is_so and not self.is_free:
+            text = "combinations share inputs, which needs more than cells"
+            raise UndecidedError(text)
+        require(not is_so, otherwise)
+
+
+def counted(answer: Answer, counts: Mapping[str, float], number: int) -> None:
+    """Refuse an answer that counts otherwise, or not so many things."""
+    told = {m.name: m.value for m in answer.measures if m.name in counts}
+    require(len(told) == number, "a count is missing")
+    wrong = [name for name, value in told.items() if value != counts[name]]
+    require(not wrong, f"counted otherwise here: {', '.join(wrong)}")

@@ -1,0 +1,134 @@
+"""Pairs of rules, and clauses: FT104 to FT107, FT201."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from fuzzytree.rechecking.audit_records import Answer, Witness, fraction
+from fuzzytree.rechecking.cases import Case, counted
+from fuzzytree.rechecking.claims import point_of
+from fuzzytree.rechecking.meaning import answer_of
+from fuzzytree.rechecking.model_records import Clause
+from fuzzytree.rechecking.outcomes import UndecidedError, require
+
+
+def hidden(case: Case, answer: Answer) -> None:
+    """Ask each rule that is told to hide another; or all pairs that are not told."""
+    if answer.rules:
+        _told_to_hide(case, answer)
+    else:
+        _not_told_to_hide(case, answer)
+
+
+def _told_to_hide(case: Case, answer: Answer) -> None:
+    weak, *strong = answer.rules
+    for number in strong:
+        is_one = case.then(number) == case.then(weak)
+        require(is_one == (answer.code == "FT104"), "the classes are not so")
+        beats = case.beats(case.asked(weak), [case.asked(number)])
+        case.never(beats, f"rule {weak} is somewhere stronger than rule {number}")
+        if answer.code == "FT105" and number > weak:
+            raise UndecidedError("that it is always strictly weaker is not asked here")
+    counted(answer, {"rules that subsume it": len(strong)}, answer.code == "FT104")
+    counted(answer, {"rules that mask it": len(strong)}, answer.code == "FT105")
+
+
+def _not_told_to_hide(case: Case, answer: Answer) -> None:
+    is_alike = answer.code == "FT104"
+    pairs = [pair for pair in case.pairs(alike=is_alike) if case.fire(*pair)]
+    silent = sum(not case.fire(number) for number in case.numbers)
+    counted(answer, {"pairs": len(pairs), "rules that never fire": silent}, 2)
+    told = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
+    copies = {one.rules for one in case.coded("FT106") if _is_copy(one)}
+    for first, second in pairs:
+        is_told = (first, second) in told or (second, first) in told
+        if is_told or (first, second) in copies:
+            continue
+        one, other = case.asked(first), case.asked(second)
+        require(case.beats(other, [one]), f"rule {second} hides behind {first}")
+        if is_alike:
+            require(case.beats(one, [other]), f"rule {first} hides behind {second}")
+
+
+def _is_copy(answer: Answer) -> bool:
+    """Return whether two rules are told to be at no distance of each other."""
+    return any(measure.exact == "0" for measure in answer.measures)
+
+
+def copied(case: Case, answer: Answer) -> None:
+    """Ask whether one of two rules that are told to be alike is ever stronger."""
+    if not answer.rules:
+        count = len(case.numbers)
+        counted(answer, {"pairs": count * (count - 1) // 2}, 1)
+        text = "that no other two rules are nearly alike is not asked here"
+        raise UndecidedError(text)
+    first, second = answer.rules
+    is_one = case.then(first) == case.then(second)
+    require((answer.severity == "error") != is_one, "the classes are not so")
+    if not _is_copy(answer):
+        raise UndecidedError("the distance of curves that differ is not measured here")
+    one, other = case.asked(first), case.asked(second)
+    if one != other:
+        is_more = case.beats(one, [other]) or case.beats(other, [one])
+        require(not is_more, "the two rules are not alike")
+
+
+def apart(case: Case, answer: Answer) -> None:
+    """Ask of each pair that is not told whether both rules can reach the level."""
+    if case.rules.semantics.conjunction != "min":
+        raise UndecidedError("conflicts under product are not decided again here")
+    told = {one.rules for one in case.coded("FT201")}
+    level, grid = Fraction(case.audit.settings.level), case.grid
+    rest = [pair for pair in case.pairs(alike=False) if pair not in told]
+    untold = next((m.value for m in answer.measures if "not told" in m.name), 0)
+    require(answer.is_finding == (untold > 0), "a finding that is none")
+    counted(answer, {"pairs that never do": len(rest) - untold}, 1)
+    if untold:
+        raise UndecidedError("which pairs are not told is not known")
+    for one, other in rest:
+        asked = zip(case.asked(one), case.asked(other), strict=True)
+        both = tuple(a | b for a, b in asked)
+        if not grid.leaves(both, (), grid.gap(level, is_above=False)):
+            continue
+        is_met = level < 1 and grid.leaves(both, (), grid.gap(level, is_above=True))
+        case.never(is_met, f"rules {one} and {other} reach the level together")
+        raise UndecidedError(f"rules {one} and {other} touch the level")
+
+
+def needless(case: Case, answer: Answer) -> None:
+    """Ask whether a rule without a clause is anywhere stronger than with it."""
+    require(len(answer.rules) == 1, "it is of no rule")
+    rest = case.grid.asked(_without(case, answer))
+    if case.beats(rest, [case.asked(answer.rules[0])]):
+        raise UndecidedError("the rule is stronger without it, if not in its answers")
+
+
+def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:
+    """Return a rule's clauses without the one that an answer is about."""
+    when = case.rules.rules[answer.rules[0] - 1].when
+    variables = tuple(label.variable for label in answer.terms[:1])
+    asked = (variables, {label.term for label in answer.terms})
+    found = {clause for clause in when if ((clause[0],), {*clause.terms}) == asked}
+    require(len(found) == 1, "it is of no clause of the rule")
+    place = when.index(found.pop())
+    return (*when[:place], *when[place + 1 :])
+
+
+def shows_need(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that the answer at the witness is another one without the clause."""
+    rest, point = _without(case, answer), point_of(state.point)
+    every, place = list(case.rules.rules), answer.rules[0] - 1
+    every[place] = every[place]._replace(when=rest)
+    other = answer_of(case.rules._replace(rules=tuple(every)), point)
+    is_other = other != answer_of(case.rules, point) and not answer.is_finding
+    require(is_other, "the clause does not matter there")
+
+
+def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that two rules of two classes are claimed to reach the level together."""
+    level = Fraction(case.audit.settings.level)
+    met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
+    is_high = any(fraction(claim.level or "0") >= level for claim in met)
+    is_found = is_high and answer.is_finding
+    require(is_found, "it is not claimed that both reach the level")
+    case.differ(answer.rules)

@@ -1,0 +1,44 @@
+"""What a re-check found."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+
+
+class Report:
+    """What a re-check found.
+
+    Attributes:
+        wrong: What does not hold, a sentence each.
+        counts: How often each kind of check was made.
+        undecided: The codes of the answers not decided again, by state and reason.
+    """
+
+    def __init__(self) -> None:
+        self.wrong: list[str] = []
+        self.counts = Counter[str]()
+        self.undecided = defaultdict[tuple[str, str], list[str]](list)
+
+    def expect(self, is_so: bool, otherwise: str) -> None:
+        """Note what does not hold, unless it is so."""
+        if not is_so:
+            self.wrong.append(otherwise)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the report, line by line."""
+        counts = dict(sorted(self.counts.items()))
+        for (state, _), codes in self.undecided.items():
+            name = f"answers {state}, not decided again"
+            counts[name] = counts.get(name, 0) + len(codes)
+        width = max(map(len, counts), default=0)
+        yield from (f"{what:<{width}}  {number}" for what, number in counts.items())
+        if self.undecided:
+            yield "not decided again:"
+        for (_, why), codes in self.undecided.items():
+            size = f" ({len(codes)} answers)" if len(codes) > 1 else ""
+            yield f"  {', '.join(dict.fromkeys(codes))}{size}: {why}"
+        yield from (f"DOES NOT HOLD: {text}" for text in self.wrong)
+        many = len(self.wrong)
+        what = f"{many} {'points do' if many != 1 else 'point does'} not hold"
+        yield what if many else "the audit holds as far as it was checked again"

@@ -1,0 +1,29 @@
+"""Models of every kind, and how the re-checker reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fuzzytree.errors import LossError
+from fuzzytree.exporters import yaml
+from fuzzytree.rechecking import model_records
+from fuzzytree.rechecking.models import read_model
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.testing import exporter_models
+from fuzzytree.tree import FuzzyTree
+
+
+def models(seed: int) -> Iterator[RuleBase | FuzzyTree]:
+    """Yield models of every kind that can be written."""
+    for _, model in exporter_models(seed):
+        if isinstance(model, RuleBase | FuzzyTree):
+            try:
+                yaml.write(model)
+            except LossError:
+                continue
+            yield model
+
+
+def read(model: RuleBase | FuzzyTree) -> model_records.Model:
+    """Return a model as the re-checker reads it."""
+    return read_model(yaml.write(model).content, "model.yaml")
