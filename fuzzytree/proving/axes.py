@@ -48,6 +48,7 @@ from fuzzytree.proving.polynomials import (
     integer_roots,
     integers,
     refined,
+    roots,
     value_at,
 )
 from fuzzytree.rulebase import Band, Clause, Points, Shape
@@ -172,7 +173,7 @@ def _same(one: Place, other: Place) -> Place | None:
         exact, vague = (one, other) if one.of is None else (other, one)
         if vague.of is None:
             return exact if exact.low == vague.low else None
-        return exact if value_at(vague.of[0], exact.low) == 0 else None
+        return exact if _is_only_root(vague.of[0], exact.low, vague) else None
     low, high = max(one.low, other.low), min(one.high, other.high)
     if not (one.of[1].is_sure and other.of[1].is_sure and low < high):
         return None
@@ -182,6 +183,22 @@ def _same(one: Place, other: Place) -> Place | None:
     if len(shared) > 1 and value_at(shared, low) * value_at(shared, high) < 0:
         return Place(low, high, (shared, Root(low, high)))
     return None
+
+
+def _is_only_root(of: Polynomial, at: Fraction, place: Place) -> bool:
+    """Return whether a polynomial is 0 at a value, and nowhere else in a place."""
+    if value_at(of, at) != 0:
+        return False
+    while len(of) > 1 and value_at(of, at) == 0:
+        of = _without(of, at)
+    ends = place.low, place.high
+    return all(value_at(of, end) for end in ends) and not roots(of, *ends)
+
+
+def _without(of: Polynomial, root: Fraction) -> Polynomial:
+    """Return a polynomial divided by x minus a root of it (Horner's scheme)."""
+    sums = itertools.accumulate(reversed(of), lambda total, one: total * root + one)
+    return tuple(sums)[-2::-1]
 
 
 def _told_apart(one: Place, other: Place) -> tuple[Place, Place]:

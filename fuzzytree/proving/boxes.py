@@ -100,13 +100,15 @@ def _span(laid: Laid, x: Fraction, held: Held) -> Span | None:
     """Return from where to where it holds along an axis; None if all along it."""
     zones = laid.cells.zones
     low, high = _walked(laid, x, held, -1), _walked(laid, x, held, 1)
-    if low <= zones[0][0] and high >= zones[-1][1]:
+    # It may not hold at the ends themselves, be they the axis's own.
+    is_from = low <= zones[0][0] and _holds_at(laid, 0, held)
+    is_to = high >= zones[-1][1] and _holds_at(laid, len(zones) - 1, held)
+    if is_from and is_to:
         return None
     first, last = outwards(low)[1], outwards(high)[0]
-    # It may not hold at the ends themselves, other than the axis's own.
-    if first == low and low not in (x, zones[0][0]):
+    if first == low and low != x and not is_from:
         first = math.nextafter(first, math.inf)
-    if last == high and high not in (x, zones[-1][1]):
+    if last == high and high != x and not is_to:
         last = math.nextafter(last, -math.inf)
     return Span(laid.axis.variable.name, first, last)
 

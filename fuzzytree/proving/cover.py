@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from fractions import Fraction
 
@@ -91,7 +92,7 @@ def least_cover(given: Ground, clock: Clock | None = None) -> Bracket:
             else:
                 high = middle
     except OutOfTimeError:
-        ends = float(bands.low[low + 1]), float(bands.high[high])
+        ends = outwards(bands.low[low + 1])[0], outwards(bands.high[high])[1]
         return Bracket(name, *ends, "the budget was spent")
     ends = outwards(bands.low[high])[0], outwards(bands.high[high])[1]
     if coupled(given):
@@ -292,16 +293,20 @@ def _bare_span(laid: Laid, x: Fraction, rules: list[int]) -> Span | None:
         if not is_bare_at(up):
             break
         high = zones[up][1]
+    is_step = False  # only from below curves are not continuous
     while down >= 0 and is_bare(down):
         low = cells[down][0]
         if not is_bare_at(down):
+            is_step = low == zones[down][0]
             break
         low = zones[down][0]
         down -= 1
-    if low <= zones[0][0] and high >= zones[-1][1]:
+    if low <= zones[0][0] and high >= zones[-1][1] and not is_step:
         return None
     first, last = outwards(low)[1], outwards(high)[0]
-    return Span(laid.axis.variable.name, min(first, float(x)), max(last, float(x)))
+    if is_step and first == low:
+        first = math.nextafter(first, math.inf)
+    return Span(laid.axis.variable.name, first, last)
 
 
 def _cell_of(laid: Laid, x: Fraction) -> int:

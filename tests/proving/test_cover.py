@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -12,7 +13,7 @@ from fuzzytree.proving.cover import below, least_cover, uncovered
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import ground, strengths_at
 from fuzzytree.proving.states import Bracket, Proved, Witness, point_of
-from fuzzytree.rulebase import LR, Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.rulebase import LR, Band, Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.rulebase import Side as Half
 from tests.proving.bases import random_base, unit_domain
 
@@ -103,3 +104,14 @@ def test_a_side_that_falls_as_a_line_covers_the_inputs_before_its_zero() -> None
     found = uncovered(ground(rules, _box(0.0, 0.75)))
     assert isinstance(found, Witness)
     assert found.region[0].high == pytest.approx(zero)
+
+
+def test_a_gap_behind_a_step_begins_after_it() -> None:
+    step = Term("step", Band(5.0, 9.0))
+    rule = Rule((Clause("x", ("step",)),), "a")
+    rules = RuleBase("p", ("a",), (Variable("x", (step,)),), (rule,))
+    for start in (5.5, 9.0):  # 9 itself is covered
+        found = uncovered(ground(rules, _box(start, 10.0)))
+        assert isinstance(found, Witness)
+        (span,) = found.region
+        assert (span.low, span.high) == (math.nextafter(9.0, 10.0), 10.0)

@@ -16,7 +16,17 @@ from fuzzytree.proving.ground import Ground, ground, narrowed, strengths_at
 from fuzzytree.proving.states import Bracket, Proved, Witness, point_of
 from fuzzytree.proving.ties import tie
 from fuzzytree.proving.wins import wins
-from fuzzytree.rulebase import LR, Clause, Part, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Term,
+    Variable,
+)
 from fuzzytree.rulebase import Side as Half
 from tests.proving.bases import random_base, unit_domain
 
@@ -177,3 +187,20 @@ def test_rules_that_ask_nothing_are_all_equal() -> None:
     assert isinstance(tie(given, 1, 2), Witness)
     assert isinstance(uncovered(given), Proved)
     assert least_cover(given).low == 1.0
+
+
+def test_an_end_of_the_domain_at_which_a_rule_does_not_fire_is_no_part() -> None:
+    terms = (Term("first", Band(0.0, 5.0)), Term("second", Band(5.0, 9.0)))
+    rules = RuleBase(
+        "steps",
+        ("a", "b"),
+        (Variable("x", terms),),
+        tuple(
+            Rule((Clause("x", (term.name,)),), then)
+            for term, then in zip(terms, "ab", strict=True)
+        ),
+    )
+    given = ground(rules, Domain((Side("x", 0.0, 10.0),)))
+    found = wins(given, 1, (2,))
+    assert isinstance(found, Witness)
+    assert 0.0 < found.region[0].low < 1e-300  # type: ignore[operator]
