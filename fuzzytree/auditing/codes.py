@@ -118,7 +118,8 @@ _CODES = (
         "warning",
         what="Two rules ask the same: their clauses have equal curves, or curves that "
         "differ nowhere by more than a tolerance, which is told. With different "
-        "classes they contradict each other, and the finding is an error.",
+        "classes they contradict each other, and the finding is an error; where all "
+        "rules take part, one case may well have two conclusions: a note.",
         why="Of two equal rules one is superfluous; of two contradicting ones the "
         "order of the file decides.",
         example="1. IF force is high THEN firm\n2. IF force is strong THEN soft\n"

@@ -17,13 +17,15 @@ from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.clock import OutOfTimeError
 from fuzzytree.proving.cover import below, least_cover, uncovered
 from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.ground import Ground, ground, narrowed, span
+from fuzzytree.proving.ground import Ground, ground, narrowed
 from fuzzytree.proving.states import Declined, Proved, Span, State, Witness
+from fuzzytree.proving.variables import span
 
 MOST_GAPS: Final = 8
 """The most gaps that are told one by one."""
 
 _MOST_BOXES = 64  # parts of the domain in which a gap is looked for
+_MOST_SIDES = 3  # of a gap that a sentence tells
 _PART = 0.3  # of the time that is left, for one question
 
 
@@ -65,8 +67,8 @@ def _weak(subject: Subject, given: Ground) -> Answer:
         return Answer("FT301", subject_of, sentence, state, False, measures=measures)
     if isinstance(state, Witness):
         sentence = (
-            f"no rule has a strength of {epsilon:g} here; where it is least, the "
-            f"strongest rule has {least.high:.3g}"
+            f"no rule has a strength of {epsilon:g} {_place(state.region)}; where it "
+            f"is least, the strongest rule has {least.high:.3g}"
         )
         return Answer(
             "FT301", subject_of, sentence, state, True, "warning",
@@ -97,9 +99,26 @@ def _gap(subject: Subject, state: Witness) -> Answer:
     what = "no class" if answer is None else f"{answer!r}"
     if subject.policy.decision == "all":
         what = "what the outputs have by default"
-    sentence = f"no rule fires here: the answer is {what}"
+    sentence = f"no rule fires {_place(state.region)}: the answer is {what}"
     severity: Severity = "warning" if answer is None else "info"
     return Answer("FT301", "gap", sentence, state, True, severity, region=state.region)
+
+
+def _place(region: tuple[Span, ...]) -> str:
+    """Return where a gap is, for a sentence."""
+    told = [f"{one.variable!r} is {_stretch(one)}" for one in region[:_MOST_SIDES]]
+    if len(region) > _MOST_SIDES:
+        told.append("so on")
+    return f"where {' and '.join(told)}" if told else "here"
+
+
+def _stretch(side: Span) -> str:
+    low, high = (None if end is None else f"{end:.6g}" for end in (side.low, side.high))
+    if low is None or high is None:
+        return f"at most {high}" if low is None else f"at least {low}"
+    if low == high:  # six digits do not tell them apart
+        return f"about {low}" if side.low != side.high else low
+    return f"{low} to {high}"
 
 
 def _separate(

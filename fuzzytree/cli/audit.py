@@ -63,6 +63,9 @@ Form = Literal["text", "json", "sarif", "github"]
     default="text",
     show_default=True,
 )
+@click.option(
+    "--all", "is_whole", is_flag=True, help="Tell also what is no finding, one by one."
+)
 @click.option("-o", "--output", metavar="FILE", help="Instead of stdout.")
 @click.option("--page", metavar="FILE", help="Write a page for a browser as well.")
 @delimiter_option
@@ -78,6 +81,7 @@ def command(
     write_baseline: str | None,
     fail_on: FailOn | None,
     form: Form,
+    is_whole: bool,
     output: str | None,
     page: str | None,
     delimiter: str | None,
@@ -133,7 +137,9 @@ def command(
             progress=tell,
         )
     _tell_domain(found, quiet=quiet)
-    text = _told(found, "json" if as_json else form, model, accepted if path else None)
+    form = "json" if as_json else form
+    known_ids = accepted if path else None
+    text = _told(found, form, model, known_ids, is_whole=is_whole)
     if output is None:
         if text:  # no finding is no annotation
             answer(text)
@@ -159,7 +165,12 @@ def command(
 
 
 def _told(
-    found: Audit, form: Form, model: str, baseline: Mapping[str, str] | None
+    found: Audit,
+    form: Form,
+    model: str,
+    baseline: Mapping[str, str] | None,
+    *,
+    is_whole: bool,
 ) -> str:
     """Return an audit in the form that was asked for."""
     from fuzzytree.report.annotations import annotation_lines
@@ -175,7 +186,12 @@ def _told(
         case "github":
             return "\n".join(annotation_lines(found))
         case "text":
-            lines = audit_lines(found, _lines_of(model), is_coloured=_is_coloured())
+            lines = audit_lines(
+                found,
+                _lines_of(model),
+                is_coloured=_is_coloured(),
+                is_whole=is_whole,
+            )
             return "\n".join(lines)
 
 

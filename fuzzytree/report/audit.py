@@ -25,8 +25,7 @@ WIDTH: Final = 100
 MOST_FINDINGS: Final = 200
 """That are told one by one."""
 
-_MOST_CALM = 40
-_MOST_DECLINED = 40
+_MOST_CALM = 40  # lines of answers that are no findings, unless all are wanted
 _MOST_INPUTS = 12  # of a point or region on the terminal
 _LEFT_OUT = ": left out by the user"
 _SHOWN = 84  # characters of a source line
@@ -67,31 +66,37 @@ def audit_lines(
     source: Sequence[str] = (),
     *,
     is_coloured: bool = False,
+    is_whole: bool = False,
 ) -> Iterator[str]:
     """Yield an audit: what was asked where, the findings, the table, the limits.
+
+    Findings come gravest first. Of the other answers those that are open, BRACKET and
+    DECLINED, are told one by one, and the rest is counted.
 
     Args:
         audit: The audit.
         source: The lines of the model's file, for the line that a finding is about.
         is_coloured: Whether codes, severities and states have colours.
+        is_whole: Whether every answer is told one by one.
     """
     paint = _painted if is_coloured else _plain
+    gravity = [*_GRAVE].index
     yield from _head(audit)
     yield ""
-    told = audit.open_findings
-    for answer in told[:MOST_FINDINGS]:
+    told = sorted(audit.open_findings, key=lambda one: gravity(one.severity))
+    for answer in told if is_whole else told[:MOST_FINDINGS]:
         yield from _finding(answer, audit, source, paint)
         yield ""
-    if len(told) > MOST_FINDINGS:
+    if len(told) > MOST_FINDINGS and not is_whole:
         rest = counted(len(told) - MOST_FINDINGS, "more finding")
-        yield f"and {rest}; --output-format json has all"
+        yield f"and {rest}; --all tells each"
         yield ""
     if audit.accepted:
         yield f"{counted(len(audit.accepted), 'accepted finding')} of the baseline"
         yield ""
-    yield from _calm(audit, paint)
+    yield from _calm(audit, paint, is_whole=is_whole)
     yield from summary_lines(audit)
-    yield from _declined(audit)
+    yield from _declined(audit, is_whole=is_whole)
     if audit.unasked:
         yield ""
         yield "not asked, or not to the end"
@@ -302,24 +307,33 @@ def _by_severity(found: Sequence[Answer]) -> str:
     return f"{counted(len(found), 'finding')}: {', '.join(counts)}"
 
 
-def _calm(audit: Audit, paint: _Paint) -> Iterator[str]:
-    """Yield the answers that are no findings and were not declined, a line each."""
+def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
+    """Yield the answers that are no findings and were not declined, a line each.
+
+    Unless all are wanted, only those that are open: the others are counted.
+    """
     answers = [one for one in audit.answers if not one.is_finding]
     answers = [one for one in answers if not isinstance(one.state, Declined)]
-    if not answers:
-        return
-    yield "answers that are no findings"
-    for answer in answers[:_MOST_CALM]:
+    shown = answers
+    if not is_whole:
+        shown = [one for one in answers if isinstance(one.state, Bracket)][:_MOST_CALM]
+    if shown:
+        yield "answers that are no findings" if is_whole else "open"
+    for answer in shown:
         word = state_word(answer.state)
         first, *rest = _wrapped(answer.sentence, WIDTH - 17) or [""]
         yield f"  {answer.code} {paint(f'{word:8}', word)} {first}".rstrip()
         yield from (f"{' ' * 17}{line}" for line in rest)
-    if len(answers) > _MOST_CALM:
-        yield f"  and {len(answers) - _MOST_CALM} more; --output-format json has all"
-    yield ""
+    if shown:
+        yield ""
+    if hidden := len(answers) - len(shown):
+        what = "more answer" if shown else "answer"
+        verb = "is no finding" if hidden == 1 else "are no findings"
+        yield f"{counted(hidden, what)} {verb}; --all tells each"
+        yield ""
 
 
-def _declined(audit: Audit) -> Iterator[str]:
+def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
     """Yield what was declined and why; the findings among it were told before."""
     states = [(one, one.state) for one in audit.answers if not one.is_finding]
     texts = [
@@ -331,10 +345,10 @@ def _declined(audit: Audit) -> Iterator[str]:
         return
     yield ""
     yield "declined"
-    for text in texts[:_MOST_DECLINED]:
+    for text in texts if is_whole else texts[:_MOST_CALM]:
         yield from _item(text)
-    if len(texts) > _MOST_DECLINED:
-        yield f"- and {len(texts) - _MOST_DECLINED} more; --output-format json has all"
+    if len(texts) > _MOST_CALM and not is_whole:
+        yield f"- and {len(texts) - _MOST_CALM} more; --all tells each"
 
 
 def _gathered(unasked: Sequence[str]) -> Iterator[str]:

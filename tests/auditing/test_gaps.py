@@ -57,13 +57,16 @@ def test_every_gap_is_told_with_its_ends() -> None:
     ends = sorted((one.region[0].low, one.region[0].high) for one in given)
     assert ends == [(1.0, 1.5), (3.5, 4.0)]
     assert all(one.is_finding and one.severity == "warning" for one in given)
-    assert given[0].sentence == "no rule fires here: the answer is no class"
+    assert sorted(one.sentence for one in given) == [
+        "no rule fires where 'x' is 1 to 1.5: the answer is no class",
+        "no rule fires where 'x' is 3.5 to 4: the answer is no class",
+    ]
 
 
 def test_a_gap_with_a_declared_answer_is_no_warning() -> None:
     given = _asked(0.0, 2.5, uncovered="b")
     assert {one.severity for one in given} == {"info"}
-    assert given[0].sentence == "no rule fires here: the answer is 'b'"
+    assert given[0].sentence.endswith("to 1.5: the answer is 'b'")
 
 
 def test_the_gap_nearest_to_a_row_comes_first() -> None:
@@ -79,6 +82,10 @@ def test_weak_cover_is_told_with_the_least_strength() -> None:
     assert isinstance(cover.state, Proved)
     assert isinstance(weak.state, Witness)
     assert weak.is_finding
+    assert weak.sentence == (
+        "no rule has a strength of 0.1 where 'x' is 0.92 to 0.98; where it is least, "
+        "the strongest rule has 0.05"
+    )
     assert 0.049 < weak.measures[0].value <= weak.measures[1].value < 0.051
 
 

@@ -60,6 +60,15 @@ def test_nothing_found_is_exit_0(call: Call) -> None:
     assert err.splitlines()[-1].startswith("nothing found; ")
 
 
+def test_what_is_no_finding_is_counted_and_told_one_by_one_by_all(call: Call) -> None:
+    _, out, _ = call("audit", "grip.yaml", "--select", "FT101")
+    assert "; --all tells each\n" in out
+    assert "answers that are no findings" not in out
+    _, out, _ = call("audit", "grip.yaml", "--select", "FT101", "--all")
+    assert "answers that are no findings\n  FT101 " in out
+    assert "--all" not in out
+
+
 def test_quiet_says_nothing_unless_something_fails(call: Call) -> None:
     assert call("audit", "grip.yaml", "--select", "FT101", "--quiet")[2] == ""
     assert call("audit", "grip.yaml", "--quiet", *FAR)[2].startswith("1 finding: ")

@@ -40,8 +40,7 @@ grip.yaml: FT202 warning: rules 1 and 2 are equally strong on a part of the doma
 
 1 accepted finding of the baseline
 
-answers that are no findings
-  FT701 SAMPLED  rule 1 wins 3 of 4 rows
+1 answer is no finding; --all tells each
 
 code   question      asked  found  proved  witness  bracket  sampled  declined
 FT101  dead rule     1      1      1       -        -        -        -
@@ -68,6 +67,32 @@ def shown() -> str:
 
 def test_an_audit_is_told_as_it_is() -> None:
     assert shown().partition("this audit does not establish")[0] == WHOLE
+
+
+def test_what_is_open_is_told_and_the_rest_counted_unless_all_are_wanted() -> None:
+    audit = every_state()
+    open_one = replace(audit.answers[2], is_finding=False)
+    answers = (*audit.answers[:2], open_one, audit.answers[4], audit.answers[4])
+    audit = replace(audit, answers=answers, accepted=())
+    short = "\n".join(audit_lines(audit, LINES))
+    bracket = "  FT301 BRACKET  how weak the weakest cover is was not settled\n"
+    assert f"\nopen\n{bracket}\n2 more answers are no findings; --all" in short
+    assert "rule 1 wins 3 of 4 rows" not in short
+    whole = "\n".join(audit_lines(audit, LINES, is_whole=True))
+    sampled = "  FT701 SAMPLED  rule 1 wins 3 of 4 rows\n"
+    assert f"\nanswers that are no findings\n{bracket}{sampled}{sampled}\n" in whole
+    assert "--all" not in whole
+
+
+def test_the_gravest_finding_comes_first() -> None:
+    audit = every_state()
+    first, second, third = audit.answers[:3]
+    audit = replace(audit, answers=(third, second, first), accepted=())
+    text = "\n".join(audit_lines(audit))
+    places = [
+        text.index(f"{one.code} {one.severity}:") for one in (first, second, third)
+    ]
+    assert places == sorted(places)
 
 
 def test_the_panel_is_told_whole() -> None:
@@ -115,7 +140,9 @@ def test_findings_beyond_the_most_are_counted() -> None:
         replace(audit.answers[0], id=f"FT101-{k:08x}") for k in range(MOST_FINDINGS + 2)
     )
     lines = [*audit_lines(replace(audit, answers=many), LINES)]
-    assert "and 2 more findings; --output-format json has all" in lines
+    assert "and 2 more findings; --all tells each" in lines
+    whole = [*audit_lines(replace(audit, answers=many), LINES, is_whole=True)]
+    assert sum("FT101 error:" in line for line in whole) == MOST_FINDINGS + 2
 
 
 def test_the_verdict_counts_and_says_what_next() -> None:
