@@ -6,9 +6,9 @@ import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 
+from fuzzytree.auditing.ranges import Range, measure, ranges
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Subject
-from fuzzytree.auditing.terms import Range, measure, ranges, short
 from fuzzytree.proving.curves import ONE, ZERO
 from fuzzytree.proving.measures import Bounds, Line, apart, local
 from fuzzytree.proving.polynomials import (
@@ -19,6 +19,7 @@ from fuzzytree.proving.polynomials import (
     value_at,
 )
 from fuzzytree.proving.states import Proved
+from fuzzytree.proving.wording import counted, short
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.tree import FuzzyTree
 
@@ -38,7 +39,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if subject.tree is not None:
         measures.append(Measure("depth of the tree", depth(subject.tree)))
     index = nauck(subject)
-    text = f"{_count(len(clauses), 'rule')} with {_count(sum(clauses), 'clause')}"
+    text = f"{counted(len(clauses), 'rule')} with {counted(sum(clauses), 'clause')}"
     if index is not None:
         names = ("complexity", "coverage", "partition")
         measures += [
@@ -170,7 +171,3 @@ def _terms(rules: RuleBase) -> set[tuple[str, str]]:
             for clause in rule.when
         )
     )
-
-
-def _count(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -19,7 +19,6 @@ import numpy as np
 from fuzzytree.auditing.domains import inputs_of
 from fuzzytree.auditing.drafting import Evidence
 from fuzzytree.auditing.records import Answer, Settings
-from fuzzytree.auditing.structure import answer_text
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.auditing.support import drawn, share
 from fuzzytree.contracts import Document
@@ -37,6 +36,7 @@ from fuzzytree.proving.states import (
     Witness,
     point_of,
 )
+from fuzzytree.proving.wording import answer_text
 from fuzzytree.pruning import proof_faults, unguarded
 from fuzzytree.rulebase import Rule, RuleBase, Variable
 from fuzzytree.tree import FuzzyTree

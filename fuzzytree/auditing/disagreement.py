@@ -8,9 +8,9 @@ from fractions import Fraction
 import msgspec
 
 from fuzzytree.auditing.records import Answer, Measure
-from fuzzytree.auditing.rows import OF_RANGES, Points, measure, points_of
+from fuzzytree.auditing.rows import OF_RANGES, Points, distance_measure, points_of
 from fuzzytree.auditing.subject import Subject
-from fuzzytree.auditing.trees import NOT_LOOKED_AT, answer_text, too_many
+from fuzzytree.auditing.trees import NOT_LOOKED_AT, too_many
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.decisions import decision_at, other_decision
@@ -29,6 +29,7 @@ from fuzzytree.proving.states import (
     point_of,
 )
 from fuzzytree.proving.witnesses import is_within
+from fuzzytree.proving.wording import answer_text, percent
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.tree import FuzzyTree
 
@@ -266,8 +267,8 @@ def _nearest_answer(
         state = _no_nearest(search, low)
         text = f"{before}; no disagreement is known around {some} others"
         return Answer("FT203", "rows", text, state, False, measures=tuple(measures))
-    measures.append(measure("certified distance", low))
-    measures.append(measure("distance of the witness", best.high))
+    measures.append(distance_measure("certified distance", low))
+    measures.append(distance_measure("distance of the witness", best.high))
     measures.append(Measure("row", search.row))
     claims = both.claims(best.point)
     state = narrowed_state(
@@ -310,13 +311,3 @@ def narrowed_state(
         return Witness(point, tuple(claims))
     high = outwards(found.high)[1]
     return Bracket(name, outwards(low)[0], high, why, point, tuple(claims))
-
-
-def percent(share: Fraction) -> str:
-    """Return a share as people read it.
-
-    Example:
-        >>> percent(Fraction(1, 300))
-        '0.333 %'
-    """
-    return f"{100.0 * float(share):.3g} %"

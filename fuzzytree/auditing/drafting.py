@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from fuzzytree.auditing.difference_records import Change, Grade
@@ -86,13 +85,3 @@ def graded(draft: Draft, evidence: Evidence) -> Change:
         draft.new_rules,
         draft.measures,
     )
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names as people read them.
-
-    Example:
-        >>> listed(["a", "b"]), listed([])
-        ("'a', 'b'", 'none')
-    """
-    return ", ".join(map(repr, names)) or "none"

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple, Protocol
 
-from fuzzytree.auditing.disagreement import narrowed_state, percent
+from fuzzytree.auditing.disagreement import narrowed_state
 from fuzzytree.auditing.records import Answer, Measure
-from fuzzytree.auditing.rows import OF_RANGES, Points, measure, points_of
+from fuzzytree.auditing.rows import OF_RANGES, Points, distance_measure, points_of
 from fuzzytree.auditing.subject import Subject
-from fuzzytree.auditing.trees import answer_text, number_text, too_many
+from fuzzytree.auditing.trees import too_many
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.decisions import decision_at, other_decision
@@ -31,6 +31,7 @@ from fuzzytree.proving.states import (
 )
 from fuzzytree.proving.variables import contains, variable_value
 from fuzzytree.proving.witnesses import is_within
+from fuzzytree.proving.wording import answer_text, number_text, percent
 from fuzzytree.tree import FuzzyTree
 
 MOST_ROWS = 200
@@ -262,8 +263,8 @@ def _answer(
         state=narrowed_state(what, found.low, found, [claim], found.why),
         is_finding=False,
         measures=(
-            measure("certified radius", found.low),
-            measure("distance of the witness", found.high),
+            distance_measure("certified radius", found.low),
+            distance_measure("distance of the witness", found.high),
         ),
     )
 
@@ -332,8 +333,8 @@ def _in_all(decider: Decider, points: Points, asked: Sequence[_Asked]) -> Answer
         is_finding=False,
         measures=(
             count,
-            measure("smallest certified radius", least),
-            measure("median certified radius", median),
+            distance_measure("smallest certified radius", least),
+            distance_measure("median certified radius", median),
             Measure("row", first.number),
         ),
     )

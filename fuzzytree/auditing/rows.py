@@ -84,7 +84,7 @@ def _shuffled(number: int) -> int:
     return number * 0x9E3779B97F4A7C15 % 2**64
 
 
-def measure(name: str, value: Fraction) -> Measure:
+def distance_measure(name: str, value: Fraction) -> Measure:
     """Return a distance as a number of an answer, with the exact one if it is short.
 
     Where it is not, the double is at most the distance.
@@ -132,7 +132,7 @@ def ranked(
             continue
         away, number = found
         added = (
-            measure("distance to the nearest row", away),
+            distance_measure("distance to the nearest row", away),
             Measure("nearest row", number),
         )
         measures = (*gap.measures, *added)

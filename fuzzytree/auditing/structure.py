@@ -6,7 +6,7 @@ import itertools
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.auditing.drafting import Draft, Shown, listed
+from fuzzytree.auditing.drafting import Draft, Shown
 from fuzzytree.auditing.matching import (
     Curves,
     Match,
@@ -17,6 +17,7 @@ from fuzzytree.auditing.matching import (
 )
 from fuzzytree.auditing.structure_terms import set_drafts, variable_drafts
 from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.wording import answer_text, listed
 from fuzzytree.rulebase import Path, Rule, RuleBase, clause_text, sentence
 from fuzzytree.tree import FuzzyTree
 
@@ -152,16 +153,6 @@ def _answer_drafts(
         text = f"the AND of rules is {other.conjunction}, and was {one.conjunction}"
         path = ("semantics", "conjunction")
         yield Draft("answer", text, "any", path, path)
-
-
-def answer_text(label: str | None) -> str:
-    """Return an answer as people read it.
-
-    Example:
-        >>> answer_text("a"), answer_text(None)
-        ("'a'", 'no class')
-    """
-    return "no class" if label is None else repr(label)
 
 
 # --- rules

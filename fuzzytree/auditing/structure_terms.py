@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from fuzzytree.auditing.drafting import Draft, listed
+from fuzzytree.auditing.drafting import Draft
 from fuzzytree.auditing.matching import Curves
 from fuzzytree.auditing.records import Measure
 from fuzzytree.numerics.exact import outwards
@@ -14,6 +14,7 @@ from fuzzytree.proving.distances import distance
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.stretches import Key
 from fuzzytree.proving.variables import span
+from fuzzytree.proving.wording import listed
 from fuzzytree.rulebase import Path, RuleBase, Term, Variable
 from fuzzytree.tree import FuzzyTree
 

@@ -27,6 +27,7 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
+from fuzzytree.proving.wording import number_text
 from fuzzytree.tree import FuzzyTree
 
 MOST_BOXES = 20_000
@@ -207,13 +208,3 @@ def values_text(union: Union) -> str:
         below = [] if high is None else [f"at most {number_text(high)}"]
         texts.append(" and ".join([*above, *below]) or "any value")
     return " or ".join(texts)
-
-
-def answer_text(label: str | None) -> str:
-    """Return an answer as sentences show it."""
-    return "no class" if label is None else repr(label)
-
-
-def number_text(number: float) -> str:
-    """Return a number in six digits, as sentences show it."""
-    return f"{number:.6g}"

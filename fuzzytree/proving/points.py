@@ -8,8 +8,8 @@ from fractions import Fraction
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.linear import ZERO, Row, feasible
 from fuzzytree.proving.stretches import Key, Stretch
-from fuzzytree.proving.variables import combined
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.proving.variables import linear_form
+from fuzzytree.rulebase import RuleBase, Variable
 
 Point = Mapping[str, Fraction]
 
@@ -98,7 +98,7 @@ def _row(
     if isinstance(key, str):
         weights = {place[key]: Fraction(1)}
         return Row(weights, stretch.low, stretch.high, is_open)
-    weights, constant = combined(key, place)
+    weights, constant = linear_form(Variable("", parts=key), place)
     return Row(weights, stretch.low - constant, stretch.high - constant, is_open)
 
 

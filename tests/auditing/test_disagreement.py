@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.disagreement import Both, answers, percent
+from fuzzytree.auditing.disagreement import Both, answers
+from fuzzytree.proving.wording import percent
 from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.numerics.exact import exact_answer

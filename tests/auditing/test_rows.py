@@ -7,7 +7,13 @@ from fractions import Fraction
 import numpy as np
 
 from fuzzytree.auditing.records import Answer
-from fuzzytree.auditing.rows import Rows, box_distance, measure, points_of, ranked
+from fuzzytree.auditing.rows import (
+    Rows,
+    box_distance,
+    distance_measure,
+    points_of,
+    ranked,
+)
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Claim, Proved, Span, Witness, coordinates
 from tests.auditing.small_trees import subject_of, two_cuts
@@ -85,8 +91,8 @@ def test_of_many_rows_some_are_taken_at_even_distances() -> None:
 
 def test_a_long_exact_number_is_left_out_and_its_double_is_no_larger() -> None:
     third = Fraction(1, 3)
-    assert measure("d", third).exact == "1/3"
+    assert distance_measure("d", third).exact == "1/3"
     long = Fraction(10**50 + 1, 3 * 10**50)
-    told = measure("d", long)
+    told = distance_measure("d", long)
     assert told.exact is None
     assert Fraction(told.value) < long

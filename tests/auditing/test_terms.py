@@ -9,10 +9,10 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.audit import audit
 from fuzzytree.auditing.records import Answer, Settings
-from fuzzytree.auditing.terms import short
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Bracket, Declined, Proved
+from fuzzytree.proving.wording import short
 from fuzzytree.rulebase import (
     LR,
     Band,

@@ -1,0 +1,62 @@
+"""The values of each variable on the domain, and names for what has terms there."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.auditing.records import Label, Measure
+from fuzzytree.auditing.subject import Subject
+from fuzzytree.proving.measures import Bounds, Line, line
+from fuzzytree.proving.variables import span
+from fuzzytree.rulebase import Term, Variable
+
+
+class Range(NamedTuple):
+    """The values of a variable on the domain.
+
+    Attributes:
+        variable: The variable.
+        low: The least.
+        high: The largest.
+        is_open: Whether the least is left out.
+    """
+
+    variable: Variable
+    low: Fraction
+    high: Fraction
+    is_open: bool
+
+    def line(self, *terms: Term) -> Line:
+        """Return the curves of some terms on the range."""
+        shapes = [term.shape for term in terms]
+        return line(shapes, self.low, self.high, is_open=self.is_open)
+
+
+def ranges(subject: Subject) -> tuple[Range, ...]:
+    """Return the range of each variable that has terms; none if the domain is empty."""
+    found: list[Range] = []
+    for variable in subject.rules.variables:
+        low, high = span(variable, subject.domain)
+        if low > high:
+            return ()
+        side = subject.domain.side(variable.name)
+        if variable.terms:
+            is_open = side is not None and side.is_open and low == side.low < high
+            found.append(Range(variable, low, high, is_open))
+    return tuple(found)
+
+
+def measure(name: str, value: Bounds, unit: str = "") -> Measure:
+    """Return a number between bounds as a measure."""
+    return Measure(name, value.nearest, value.exact, unit)
+
+
+def term_name(variable: Variable, term: Term) -> str:
+    """Return how sentences name a term."""
+    return f"term {term.name!r} of {variable.name!r}"
+
+
+def labels_of(of: Range, *terms: Term) -> tuple[Label, ...]:
+    """Return terms of a variable as answers name them."""
+    return tuple(Label(of.variable.name, term.name) for term in terms)
