@@ -20,7 +20,6 @@ from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.branching import (
     TOO_MANY,
     Found,
-    Point,
     Verdict,
     filled,
     search,
@@ -32,6 +31,7 @@ from fuzzytree.proving.ground import ground, strengths_at
 from fuzzytree.proving.lines import Pair
 from fuzzytree.proving.space import Seen, Space
 from fuzzytree.proving.states import Bracket, Claim, Proved, State, Witness, coordinates
+from fuzzytree.proving.variables import Point
 from fuzzytree.proving.witnesses import is_within
 from fuzzytree.rulebase import RuleBase
 
@@ -91,7 +91,7 @@ def wins_by_boxes(
     if found.point is not None:
         return lead.witness(found.point)
     if not found.why:
-        return Proved(f"{found.boxes} boxes visited, none is left")
+        return Proved(_why(found))
     return lead.bracket(found)
 
 
@@ -215,7 +215,8 @@ class _Lead:
 
 
 def _why(found: Found) -> str:
-    text = f"{found.boxes} boxes visited"
+    boxes = "1 box" if found.boxes == 1 else f"{found.boxes} boxes"
+    text = f"{boxes} visited"
     return f"{found.why}: {text}" if found.why else f"{text}, none is left"
 
 

@@ -35,7 +35,8 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.proving.witnesses import Point, coupled, is_within, point_with
+from fuzzytree.proving.variables import Point
+from fuzzytree.proving.witnesses import coupled, is_within, point_with
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs, in one question
 _DEEPEST = 4  # halvings of levels for axes that share inputs
@@ -153,8 +154,11 @@ class _Search:
         contest = self._contest(self.given)
         cells = sum(len(options.where) for options in contest.all_options)
         axes = len(self.given.axes)
-        text = f"{self.levels} levels with {cells} cells on {axes} axes visited"
-        return f"{text}, {self.choices} choices of inputs" if self.choices else text
+        levels, parts = _count(self.levels, "level"), _count(cells, "cell")
+        text = f"{levels} with {parts} on {_count(axes, 'axis', 'axes')} visited"
+        if not self.choices:
+            return text
+        return f"{text}, {_count(self.choices, 'choice')} of inputs"
 
     def _bracket(self, high: float, why: str) -> Bracket:
         return Bracket(self.question.of, 0.0, high, f"{why}: {self._how()}")
@@ -411,3 +415,7 @@ def _parts(
                 part = stretch(laid, cell, levels[0], [mine], below)
             if part is not None:
                 yield part, sum(1 << n for n in kept)
+
+
+def _count(count: int, noun: str, nouns: str | None = None) -> str:
+    return f"{count} {noun if count == 1 else nouns or noun + 's'}"

@@ -247,7 +247,7 @@ def test_a_spent_budget_leaves_a_bracket() -> None:
     clock = Clock(1.0, now=lambda: float(next(moments)))
     found = largest_lead(rules, unit_domain(rules), 1, (2, 3), clock, tolerance=0.0)
     assert 0.0 <= found.low < found.high <= 1.0
-    assert found.why == "the budget was spent: 1 boxes visited"
+    assert found.why == "the budget was spent: 1 box visited"
 
 
 def test_a_step_at_the_lower_end_of_the_domain_is_not_missed() -> None:
