@@ -8,15 +8,16 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
 from fuzzytree.auditing.clauses import clause_answers
-from fuzzytree.auditing.records import Answer, Measure
+from fuzzytree.auditing.ranges import measure
+from fuzzytree.auditing.records import Answer, Measure, Severity
 from fuzzytree.auditing.subject import Subject
-from fuzzytree.auditing.terms import measure, short
 from fuzzytree.proving.dominance import Compared
 from fuzzytree.proving.factors import Distance, distance
 from fuzzytree.proving.ground import ground
 from fuzzytree.proving.meeting import Meeting, highest, meet
-from fuzzytree.proving.states import Declined, Proved, State, Witness
+from fuzzytree.proving.states import Bracket, Declined, Proved, State, Witness
 from fuzzytree.proving.witnesses import coupled
+from fuzzytree.proving.wording import short
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -235,14 +236,16 @@ def _copied(
                 f"at {variable.name!r} = {short(found.at)}"
             )
             measures += (Measure("place of it", float(found.at), unit=variable.unit),)
-        contradicts = one != other and decides
+        severity: Severity = "warning"
+        if one != other:  # a contradiction; in a system two rules for two outputs
+            severity = "error" if decides else "info"
         yield Answer(
             "FT106",
             f"{first} and {second}",
             f"{first} and {second} have {nearly} {text}",
             Proved("their curves were compared piece by piece in fractions"),
             is_finding=True,
-            severity="error" if contradicts else "warning",
+            severity=severity,
             rules=pair,
             measures=measures,
         )
@@ -282,21 +285,48 @@ def _conflicts(subject: Subject, compared: Compared) -> Iterator[Answer]:
             near.append((-most, (one, other)))
     near.sort()
     told = hidden = 0
+    unsure: list[tuple[Pair, Meeting]] = []
     for place, (_, pair) in enumerate(near):
-        if told == MOST_SHOWN and not compared.is_product:
+        if told + len(unsure) >= MOST_SHOWN and not compared.is_product:
             hidden = len(near) - place
             break
         subject.clock.check()
         found = meet(compared, *pair, Fraction(level), subject.clock.share(0.05))
         if found.level.high < level:
             clean += 1
+        elif not isinstance(found.state, Witness):
+            unsure.append((pair, found))
         elif told == MOST_SHOWN:
             hidden += 1
         else:
             told += 1
             yield _conflict(subject, pair, found)
+    if len(unsure) > 1:
+        yield _open_conflicts(subject, [found for _, found in unsure])
+    else:
+        yield from (_conflict(subject, *one) for one in unsure)
     if clean or hidden:
         yield _rest_of_conflicts(subject, compared, clean, hidden)
+
+
+def _open_conflicts(subject: Subject, found: list[Meeting]) -> Answer:
+    """Return what is known of pairs of which no common point was found: one bracket."""
+    high = max(one.level.high for one in found)
+    low = max(one.level.low for one in found)
+    states = [one.state for one in found]
+    whys = dict.fromkeys(one.why for one in states if isinstance(one, Bracket))
+    name = "the highest level that two of these rules reach together"
+    kind = "classes" if _noun(subject) == "class" else "conclusions"
+    level = short(subject.settings.level)
+    return Answer(
+        "FT201",
+        "open pairs of rules",
+        f"{len(found)} pairs of rules of different {kind} may reach {level} together: "
+        f"none is seen to, and no more than {short(high)} is reached by both",
+        Bracket(name, float(low), float(high), "; ".join(whys)),
+        is_finding=False,
+        measures=(Measure("pairs that are open", len(found)),),
+    )
 
 
 def _may_conflict(subject: Subject, one: int, other: int) -> bool:
@@ -359,10 +389,11 @@ def _rest_of_conflicts(
     level, noun = short(subject.settings.level), _noun(subject)
     kind = "classes" if noun == "class" else "conclusions"
     pairs, reach = _count(clean, "pair", "pairs"), "reaches" if clean == 1 else "reach"
-    parts = [f"{pairs} of rules of different {kind} never {reach} {level} together"]
+    never = f"{pairs} of rules of different {kind} never {reach} {level} together"
+    parts = [never] if clean else []
     if hidden:
-        more = _count(hidden, "pair", "pairs")
-        parts.append(f"{more} besides those told may: they conflict less")
+        more = _count(hidden, "more pair", "more pairs")
+        parts.append(f"{more} of rules may reach {level}: they conflict less")
     means = "products" if compared.is_product else "minima"
     return Answer(
         "FT201",

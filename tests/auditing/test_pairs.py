@@ -308,10 +308,21 @@ def test_many_conflicts_are_told_up_to_a_number_and_counted() -> None:
     rules = base(*(("force is low", ("soft", "hard")[n % 2]) for n in range(12)))
     *found, rest = asked(rules, "FT201")
     assert (len(found), rest.is_finding) == (20, True)
-    assert rest.sentence == (
-        "0 pairs of rules of different classes never reach 0.5 together; "
-        "16 pairs besides those told may: they conflict less"
+    assert rest.sentence == ("16 more pairs of rules may reach 0.5: they conflict less")
+
+
+@pytest.mark.heavy
+def test_pairs_that_are_open_are_told_in_one_bracket() -> None:
+    rules = random_base(0, 4, 2, kind="points", combinations=1)
+    answers = asked(rules, "FT201", Settings(level=0.3))
+    (bracket,) = [one for one in answers if isinstance(one.state, Bracket)]
+    assert isinstance(bracket.state, Bracket)
+    assert bracket.sentence == (
+        "2 pairs of rules of different classes may reach 0.3 together: none is seen "
+        "to, and no more than 0.5505 is reached by both"
     )
+    assert bracket.state.why == "the inputs of their variables depend on each other"
+    assert not bracket.is_finding
 
 
 def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:
@@ -353,6 +364,11 @@ def test_only_conclusions_about_one_output_conflict(
     empty = system_of(block_of())
     system = replace(empty, outputs=outputs, blocks=(RuleBlock(rules),))
     assert len(audit(system, select=["FT201"]).findings) == count
+    alike = replace(rules[1], when=rules[0].when)
+    system = replace(empty, outputs=outputs, blocks=(RuleBlock((rules[0], alike)),))
+    (same,) = audit(system, select=["FT106"]).findings
+    is_one = conclusions[0] == conclusions[1]
+    assert same.severity == ("warning" if is_one else "info")
 
 
 # --- FT107
