@@ -114,6 +114,16 @@ class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
         return tuple(map(_undominated, self.all_options))
 
     @functools.cached_property
+    def all_inner(self) -> tuple[Options, ...]:
+        """All but lower ends: these are surfaces, but where an axis is one value."""
+        return tuple(map(_inner, self.all_options))
+
+    @functools.cached_property
+    def inner_options(self) -> tuple[Options, ...]:
+        """Of these the ones that no other one makes useless."""
+        return tuple(map(_undominated, self.all_inner))
+
+    @functools.cached_property
     def all_options(self) -> tuple[Options, ...]:
         """The options on each axis."""
         return tuple(_options(self, laid) for laid in self.ground.laid[0])
@@ -122,6 +132,11 @@ class Contest(msgspec.Struct, frozen=True, eq=False, dict=True):
     def events(self) -> tuple[int, ...]:
         """The bands at which options come or go, the highest first."""
         return _events(self.options)
+
+    @functools.cached_property
+    def inner_events(self) -> tuple[int, ...]:
+        """The same without lower ends."""
+        return _events(self.inner_options)
 
     @functools.cached_property
     def all_events(self) -> tuple[int, ...]:
@@ -198,6 +213,13 @@ def _zones(contest: Contest, laid: Laid) -> tuple[IntArray, IntArray, IntArray]:
     floor = np.array([bands_of(rule)[0] for rule in contest.rivals], dtype=np.int64)
     floor = floor.reshape(len(contest.rivals), len(vague)).T
     return -2 - vague, top, floor
+
+
+def _inner(options: Options) -> Options:
+    kept = options.where != START
+    if not (options.where >= 0).any():
+        return options
+    return Options(options.where[kept], options.top[kept], options.floor[kept])
 
 
 def _undominated(options: Options) -> Options:

@@ -5,14 +5,15 @@ same curve on one axis, the *pivot*: there the level is that curve's value, all 
 rules reach it on the other axes, and every rival stays at or below it: on some other
 axis strictly below, or on the pivot as a curve that is below or equal. The level moves
 with the pivot's value, so levels between two critical ones suffice; a curve that is
-constant has its one level, which is then a critical one.
+constant has its one level, which is then a critical one. Two rules may be constant at
+one level on different axes too; there are two pivots then.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,13 @@ from fuzzytree.proving.states import (
 from fuzzytree.proving.variables import Point
 from fuzzytree.proving.witnesses import is_within, point_with
 
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.contracts import IntArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
 
 class _Asked(NamedTuple):
     """Rules that shall tie, rivals that must be below, rivals that may be equal."""
@@ -48,10 +56,25 @@ class _Asked(NamedTuple):
 
 
 class _Pivot(NamedTuple):
+    """Where a rule, or all of ours, are as strong as one curve.
+
+    Attributes:
+        axis: The axis.
+        cell: The cell.
+        element: The curve.
+        mask: The rivals that do not exceed it.
+        beside: Where the rest of ours are as strong as theirs, of the same level.
+    """
+
     axis: int
     cell: int
     element: int
     mask: int
+    beside: _Pivot | None = None
+
+    @property
+    def all(self) -> tuple[_Pivot, ...]:
+        return (self,) if self.beside is None else (self, self.beside)
 
 
 def tie(given: Ground, one: int, other: int, clock: Clock | None = None) -> State:
@@ -124,21 +147,22 @@ def _searched(given: Ground, asked: _Asked, clock: Clock) -> State:
         for axis, laid in enumerate(given.laid[0])
         for pivot in _pivots(contest, asked, axis, laid)
     ]
+    pivots += _crossed(contest, asked)
     bands, levels, is_open = contest.bands, 0, False
-    floors = [options.at_gap for options in contest.options]
+    floors = [options.at_gap for options in contest.inner_options]
     for pivot in pivots:
-        laid = given.laid[0][pivot.axis]
-        least = int(laid.least[pivot.element, pivot.cell])
-        most = int(laid.most[pivot.element, pivot.cell])
+        held = {part.axis: part.mask for part in pivot.all}
+        masks = [(mask,) for mask in held.values()]
+        least, most = _ends(given.laid[0][pivot.axis], pivot.element, pivot.cell)
         is_flat = least == most
         if is_flat and not bands.is_sharp[least]:
             clock.check()
             vague = [
                 options.at_band(least)
-                for axis, options in enumerate(contest.options)
-                if axis != pivot.axis
+                for axis, options in enumerate(contest.inner_options)
+                if axis not in held
             ]
-            if cover([(pivot.mask,), *vague], contest.full, clock) is None:
+            if cover([*masks, *vague], contest.full, clock) is None:
                 continue
             # What may be there is looked for as at a level that is known exactly.
             is_open = True
@@ -151,12 +175,14 @@ def _searched(given: Ground, asked: _Asked, clock: Clock) -> State:
                 if is_flat
                 else floors[axis](band)
                 for axis in range(len(floors))
-                if axis != pivot.axis
+                if axis not in held
             ]
-            chosen = cover([(pivot.mask,), *families], contest.full, clock)
+            chosen = cover([*masks, *families], contest.full, clock)
             if chosen is None:
                 continue
-            found = _witness(contest, asked, pivot, band, chosen[1:], is_flat=is_flat)
+            found = _witness(
+                contest, asked, pivot, band, chosen[len(held) :], is_flat=is_flat
+            )
             if found is not None:
                 return found
             is_open = True
@@ -168,29 +194,110 @@ def _searched(given: Ground, asked: _Asked, clock: Clock) -> State:
     return Proved(f"{len(pivots)} cells where they share a curve, {levels} levels")
 
 
+class _Seen(NamedTuple):
+    """The rules' degrees in the cells of an axis; at its value where it has only one.
+
+    Attributes:
+        cells: The cells.
+        of: Shape (rules, cells): the element that is a rule's degree.
+        height: The same shape: its rank.
+        is_zero: The same shape: whether it is 0 throughout.
+    """
+
+    cells: list[int]
+    of: IntArray
+    height: IntArray
+    is_zero: BoolArray
+
+
+def _seen(laid: Laid) -> _Seen:
+    count = len(laid.cells.rank)
+    if not count:
+        of = laid.of_start[:, np.newaxis]
+        return _Seen(
+            [START], of, laid.cells.start_rank[of], laid.is_zero_at[of[:, 0], :1]
+        )
+    columns = np.arange(count)
+    height = laid.cells.rank[columns, laid.of]
+    is_zero = laid.is_zero[laid.of, columns]
+    return _Seen([*range(count)], laid.of, height, is_zero)
+
+
+def _whole(laid: Laid, cell: int) -> Stretch:
+    """Return all of a cell, or the one value of an axis."""
+    if cell == START:
+        return Stretch(*laid.cells.zones[0], is_open=False)
+    return Stretch(*laid.cells.between[cell])
+
+
+def _ends(laid: Laid, element: int, cell: int) -> tuple[int, int]:
+    """Return the bands of the least and the largest value of a curve in a cell."""
+    if cell == START:
+        return int(laid.at[element, 0]), int(laid.at[element, 0])
+    return int(laid.least[element, cell]), int(laid.most[element, cell])
+
+
 def _levels(contest: Contest, least: int, most: int) -> list[int]:
     """Return bands from which on, up to the next one, nothing changes."""
-    inner = {band for band in contest.events if least < band < most}
+    inner = {band for band in contest.inner_events if least < band < most}
     return sorted({least, *inner})
 
 
 def _pivots(contest: Contest, asked: _Asked, axis: int, laid: Laid) -> list[_Pivot]:
     """Return the cells of an axis in which all of ours are the same curve, not 0."""
-    rank = laid.cells.rank
-    columns = np.arange(len(rank))
-    ours = rank[columns, laid.of[np.array(contest.ours)]]
-    rivals = rank[columns, laid.of[np.array(contest.rivals, dtype=np.int64)]]
-    mine = laid.of[contest.ours[0]]
-    fits = (ours == ours[0]).all(axis=0) & ~laid.is_zero[mine, columns]
-    limit = np.array([0] * len(asked.strict) + [1] * len(asked.weak))[:, np.newaxis]
-    is_below = rivals < ours[0] + limit
+    seen = _seen(laid)
+    ours = seen.height[np.array(contest.ours)]
+    rivals = seen.height[np.array(contest.rivals, dtype=np.int64)]
+    mine = seen.of[contest.ours[0]]
+    fits = (ours == ours[0]).all(axis=0) & ~seen.is_zero[contest.ours[0]]
+    is_below = rivals < ours[0] + _limits(asked)
     found: dict[tuple[int, int, int, int], _Pivot] = {}
-    for cell in np.flatnonzero(fits).tolist():
-        mask = sum(1 << n for n in np.flatnonzero(is_below[:, cell]).tolist())
-        element = int(mine[cell])
-        ends = int(laid.least[element, cell]), int(laid.most[element, cell])
-        found.setdefault((element, mask, *ends), _Pivot(axis, cell, element, mask))
+    for column in np.flatnonzero(fits).tolist():
+        mask = sum(1 << n for n in np.flatnonzero(is_below[:, column]).tolist())
+        element, cell = int(mine[column]), seen.cells[column]
+        key = element, mask, *_ends(laid, element, cell)
+        found.setdefault(key, _Pivot(axis, cell, element, mask))
     return list(found.values())
+
+
+def _crossed(contest: Contest, asked: _Asked) -> list[_Pivot]:
+    """Return pairs of constants of one level, on two axes, that hold two rules."""
+    if len(asked.ours) < 2:
+        return []
+    one, other = ([*_held(contest, asked, rule)] for rule in contest.ours)
+    found: dict[tuple[int, ...], _Pivot] = {}
+    for first, level in one:
+        for second, same in other:
+            if first.axis != second.axis and level == same:
+                key = level, first.axis, first.mask, second.axis, second.mask
+                found.setdefault(key, first._replace(beside=second))
+    return list(found.values())
+
+
+def _held(contest: Contest, asked: _Asked, rule: int) -> Iterator[tuple[_Pivot, int]]:
+    """Yield where a rule, the least of ours, is constant and not 0, with the band."""
+    for axis, laid in enumerate(contest.ground.laid[0]):
+        seen = _seen(laid)
+        height, mine = seen.height[rule], seen.of[rule]
+        fits = (height <= seen.height[np.array(contest.ours)]).all(axis=0)
+        fits &= ~seen.is_zero[rule]
+        rivals = seen.height[np.array(contest.rivals, dtype=np.int64)]
+        is_behind = rivals < height + _limits(asked)
+        for column in np.flatnonzero(fits).tolist():
+            element, cell = int(mine[column]), seen.cells[column]
+            least, most = _ends(laid, element, cell)
+            if least == most:
+                mask = sum(
+                    1 << n for n in np.flatnonzero(is_behind[:, column]).tolist()
+                )
+                yield _Pivot(axis, cell, element, mask), least
+
+
+def _limits(asked: _Asked) -> IntArray:
+    """Return, of each rival, by how many ranks it must stay below: 0, or 1 less."""
+    return np.array([0] * len(asked.strict) + [1] * len(asked.weak), dtype=np.int64)[
+        :, np.newaxis
+    ]
 
 
 def _flat_family(
@@ -200,7 +307,7 @@ def _flat_family(
 
     Rivals are left strictly below it, or stay at it as curves that are constant.
     """
-    options, laid = contest.all_options[axis], contest.ground.laid[0][axis]
+    options, laid = contest.all_inner[axis], contest.ground.laid[0][axis]
     masks: list[int] = []
     for number in np.flatnonzero(options.where >= START).tolist():
         cell = int(options.where[number])
@@ -236,7 +343,8 @@ def _witness(
     """Return a point at which ours tie, if one is found."""
     given = contest.ground
     laid = given.laid[0][pivot.axis]
-    low, high = ends = laid.cells.between[pivot.cell]
+    low, high, _ = _whole(laid, pivot.cell)
+    ends = low, high
     element = laid.axis.elements[pivot.element]
     if not is_flat:
         first, last = contest.bands.high[band], contest.bands.low_after(band)
@@ -249,10 +357,12 @@ def _witness(
     at = simple(low, high)
     level = element.degree(at)
     wanted = {pivot.axis: Stretch(at, at, is_open=False)}
-    if is_flat:
-        wanted = {pivot.axis: Stretch(low, high)}
-    left = contest.full & ~pivot.mask
-    others = [axis for axis in range(len(given.laid[0])) if axis != pivot.axis]
+    left = contest.full
+    for held in pivot.all:
+        if is_flat:
+            wanted[held.axis] = _whole(given.laid[0][held.axis], held.cell)
+        left &= ~held.mask
+    others = [axis for axis in range(len(given.laid[0])) if axis not in wanted]
     for axis, mask in zip(others, chosen, strict=True):
         flat = band if is_flat else None
         found = _part(contest, axis, level, mask & left, flat)
@@ -271,7 +381,7 @@ def _part(
 
     Where the level is a band, `flat`, rivals may also stay in it.
     """
-    options, laid = contest.all_options[axis], contest.ground.laid[0][axis]
+    options, laid = contest.all_inner[axis], contest.ground.laid[0][axis]
     every = [n for n in range(len(contest.rivals)) if mask >> n & 1]
     order = np.argsort(-options.top, kind="stable")
     for number in order[options.where[order] >= START].tolist():

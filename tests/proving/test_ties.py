@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.numerics.oracle import TIE, decide
 from fuzzytree.proving.domain import Domain, Side
@@ -13,6 +14,7 @@ from fuzzytree.proving.ground import ground, strengths_at
 from fuzzytree.proving.states import Declined, Proved, Witness, point_of
 from fuzzytree.proving.ties import decides_by_order, tie
 from fuzzytree.rulebase import (
+    Band,
     Clause,
     Points,
     Rule,
@@ -108,3 +110,51 @@ def test_no_row_ties_where_a_tie_is_excluded(seed: int) -> None:
                 assert strengths[one - 1] == strengths[other - 1] == max(strengths)
                 assert max(strengths) > Fraction(0)
     assert declined <= 1
+
+
+def test_constants_of_one_level_on_different_axes_tie() -> None:
+    def rules(level: float) -> RuleBase:
+        other = Term("other", Points((0.0,), (level,)))
+        return RuleBase(
+            "flat",
+            ("a", "b", "c"),
+            (Variable("x", (HALF, DOWN)), Variable("y", (other,))),
+            (
+                Rule((Clause("x", ("half",)),), "a"),
+                Rule((Clause("y", ("other",)),), "b"),
+                Rule((Clause("x", ("down",)),), "c"),
+            ),
+        )
+
+    given = ground(rules(0.5), SQUARE)
+    found = tie(given, 1, 2)
+    assert isinstance(found, Witness)
+    assert point_of(found.point)["x"] > Fraction(1, 2)  # above, the third is weaker
+    assert isinstance(tie(ground(rules(0.4), SQUARE), 1, 2), Proved)
+
+
+def test_rules_that_meet_at_an_end_of_the_domain_alone_do_not_tie() -> None:
+    first = Term("first", Band(-1.0, 0.0))
+    rules = RuleBase(
+        "end",
+        ("a", "b"),
+        (Variable("x", (first,)), Variable("y", (UP, DOWN))),
+        (
+            Rule((Clause("x", ("first",)), Clause("y", ("up",))), "a"),
+            Rule((Clause("x", ("first",)), Clause("y", ("up",))), "b"),
+        ),
+    )
+    given = ground(rules, SQUARE)
+    assert isinstance(tie(given, 1, 2), Proved)
+    apart = replace(rules, rules=(rules.rules[0], Rule((Clause("y", ("up",)),), "b")))
+    assert isinstance(tie(ground(apart, SQUARE), 1, 2), Proved)
+
+
+def test_on_a_domain_of_one_value_rules_tie_along_the_other_inputs() -> None:
+    rules = _rules(("half", "up", "a"), ("half", "up", "b"))
+    line = Domain((Side("x", 0.25, 0.25), Side("y", 0.0, 1.0)))
+    assert isinstance(tie(ground(rules, line), 1, 2), Witness)
+    point = Domain((Side("x", 0.25, 0.25), Side("y", 0.75, 0.75)))
+    assert isinstance(tie(ground(rules, point), 1, 2), Witness)
+    assert isinstance(decides_by_order(ground(rules, point), 1, (), (2,)), Witness)
+    assert isinstance(decides_by_order(ground(rules, point), 2, (1,), ()), Proved)
