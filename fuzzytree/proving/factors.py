@@ -198,7 +198,7 @@ def least_ratios(of: Factored) -> FloatArray:
     for axis, (low, high) in enumerate(of.at_zones):
         first = 0 if of.has_start(axis) else 1
         for weak in range(count):
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 each = low[weak, first:] / high[:, first:] * (1.0 - 2.0**-50)
                 each = np.nan_to_num(each, nan=0.0, posinf=np.inf)
                 found[:, weak] *= each.max(axis=1, initial=0.0)
@@ -266,8 +266,14 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
 def _is_single(laid: Laid, low: Fraction, high: Fraction) -> bool:
     """Return whether a zone is one place: no cell lies hidden in it."""
     met = [p for p in laid.axis.found if p.low <= high and p.high >= low]
-    roots_of = {tuple(c / p.of[0][-1] for c in p.of[0]) for p in met if p.of}
+    roots_of = {_monic(p.of[0]) for p in met if p.of}
     return len(roots_of) == 1 and all(p.of and p.of[1].is_sure for p in met)
+
+
+def _monic(polynomial: Polynomial) -> Polynomial:
+    """Return the multiple of a polynomial, not 0, whose last coefficient is 1."""
+    end = max(n for n, one in enumerate(polynomial, 1) if one)
+    return tuple(one / polynomial[end - 1] for one in polynomial[:end])
 
 
 def quotient(

@@ -36,7 +36,7 @@ def combined(
 ) -> tuple[dict[int, Fraction], Fraction]:
     """Return a combination as weights of the inputs, by their numbers, and a constant.
 
-    Summands of one input are added up.
+    Summands of one input are added up; what cancels is left out.
     """
     weights: dict[int, Fraction] = {}
     constant = Fraction(0)
@@ -44,7 +44,7 @@ def combined(
         weight, place = Fraction(part.weight), number[part.input]
         weights[place] = weights.get(place, Fraction(0)) + weight
         constant -= weight * Fraction(part.centre)
-    return weights, constant
+    return {place: weight for place, weight in weights.items() if weight}, constant
 
 
 def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
@@ -57,12 +57,12 @@ def span(variable: Variable, domain: Domain) -> tuple[Fraction, Fraction]:
     if not variable.parts:
         assert side is not None  # checked when the ground was made
         return Fraction(side.low), Fraction(side.high)
-    low = high = Fraction(0)
-    for part in variable.parts:
-        of = domain.side(part.input)
-        assert of is not None
-        weight, centre = Fraction(part.weight), Fraction(part.centre)
-        ends = [weight * (Fraction(end) - centre) for end in (of.low, of.high)]
+    number = {one.variable: place for place, one in enumerate(domain.sides)}
+    weights, low = linear_form(variable, number)
+    high = low
+    for place, weight in weights.items():
+        of = domain.sides[place]
+        ends = [weight * Fraction(end) for end in (of.low, of.high)]
         low, high = low + min(ends), high + max(ends)
     if side is not None:
         low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))

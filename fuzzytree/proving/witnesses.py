@@ -71,6 +71,8 @@ def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
         weights, constant = linear_form(given.axes[axis].variable, number)
         low, high = part.low - constant, part.high - constant
         rows.append(Row(weights, low, high, part.is_open, part.is_open))
+    if not all(_may_hold(row) for row in rows if not row.weights):
+        return None
     joined = {place for row in rows if len(row.weights) > 1 for place in row.weights}
     point: list[Fraction] = []
     for place, (low, high) in enumerate(ranges):
@@ -78,9 +80,10 @@ def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
             point.append(low)
             continue
         for row in rows:
-            if place in row.weights:  # of weight 1
-                low = low if row.low is None else max(low, row.low)
-                high = high if row.high is None else min(high, row.high)
+            if place in row.weights:  # and nothing else
+                first, last = _ends(row, row.weights[place])
+                low = low if first is None else max(low, first)
+                high = high if last is None else min(high, last)
         if low > high:
             return None
         point.append(simple(low, high))
@@ -98,6 +101,19 @@ def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
         for place, at in inner.items():
             point[place] = found[at]
     return dict(zip(names, point, strict=True))
+
+
+def _may_hold(row: Row) -> bool:
+    """Return whether 0 is within a row's bounds; open ones are checked later."""
+    return (row.low is None or row.low <= 0) and (row.high is None or row.high >= 0)
+
+
+def _ends(row: Row, weight: Fraction) -> tuple[Fraction | None, Fraction | None]:
+    """Return what the only input of a row must be between, given its weight."""
+    first, last = (
+        None if bound is None else bound / weight for bound in (row.low, row.high)
+    )
+    return (first, last) if weight > 0 else (last, first)
 
 
 def is_within(given: Ground, point: Mapping[str, Fraction]) -> bool:

@@ -17,7 +17,17 @@ from fuzzytree.proving.ground import ground, strengths_at
 from fuzzytree.proving.meeting import highest, meet
 from fuzzytree.proving.states import Bracket, Proved, Witness
 from fuzzytree.proving.wins import wins
-from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Semantics, Term, Variable
+from fuzzytree.rulebase import (
+    Band,
+    Clause,
+    Flank,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
 from tests.proving.bases import Kind, random_base, unit_domain
 
 KINDS: tuple[Kind, ...] = ("points", "band", "lr")
@@ -179,3 +189,24 @@ def test_no_point_of_a_grid_reaches_more_than_where_rules_meet(
             assert Fraction(found.state.claims[0].level or 0) >= level
         if conjunction == "min":
             assert found.level.high - found.level.low < Fraction(1, 10**9)
+
+
+def test_curves_whose_leading_coefficients_cancel_are_compared() -> None:
+    # Two cubics in x, whose difference is a quadratic with an irrational zero, at
+    # which two ramps are seen as well.
+    terms = (
+        Term("one", Band(high=0.0, right=Flank(0.0, 1.0, (0.0, 0.0, 1.0)))),
+        Term("two", Band(high=0.5, right=Flank(0.5, 1.5, (-0.5, 0.0, 1.0)))),
+        Term("high", Points((0.0, 1.0), (0.5, 1.0))),
+        Term("low", Points((0.0, 1.0), (0.25, 0.5))),
+    )
+    rules = RuleBase(
+        "cubics",
+        ("a",),
+        (Variable("x", terms),),
+        tuple(Rule((Clause("x", (term.name,)),), "a") for term in terms),
+        Semantics("product"),
+    )
+    both = compared(rules)
+    assert both.never_weaker(1, 2) == "not"
+    assert both.never_weaker(3, 4) == "always"
