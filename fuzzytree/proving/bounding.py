@@ -33,6 +33,7 @@ from fuzzytree.proving.space import Seen, Space
 from fuzzytree.proving.states import Bracket, Claim, Proved, State, Witness, coordinates
 from fuzzytree.proving.variables import Point
 from fuzzytree.proving.witnesses import is_within
+from fuzzytree.proving.wording import counted
 from fuzzytree.rulebase import RuleBase
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def wins_by_boxes(
     return lead.bracket(found)
 
 
-def largest_lead(
+def largest_lead_by_boxes(
     rules: RuleBase,
     domain: Domain,
     rule: int,
@@ -215,15 +216,14 @@ class _Lead:
 
 
 def _why(found: Found) -> str:
-    boxes = "1 box" if found.boxes == 1 else f"{found.boxes} boxes"
-    text = f"{boxes} visited"
+    text = f"{counted(found.boxes, 'box', 'boxes')} visited"
     return f"{found.why}: {text}" if found.why else f"{text}, none is left"
 
 
 # --- the strongest rule where it is weakest
 
 
-def least_cover(
+def least_cover_by_boxes(
     rules: RuleBase,
     domain: Domain,
     clock: Clock | None = None,
@@ -344,7 +344,7 @@ class _Cover:
 # --- two rules at once
 
 
-def widest_conflict(
+def highest_by_boxes(
     rules: RuleBase,
     domain: Domain,
     one: int,

@@ -74,9 +74,9 @@ def least_cover(given: Ground, clock: Clock | None = None) -> Bracket:
     """
     clock = clock or Clock()
     if given.rules.semantics.conjunction == "product":
-        from fuzzytree.proving.bounding import least_cover as by_boxes
+        from fuzzytree.proving.bounding import least_cover_by_boxes
 
-        return by_boxes(given.rules, given.domain, clock)
+        return least_cover_by_boxes(given.rules, given.domain, clock)
     contest = Contest(given, (), tuple(range(len(given.rules.rules))))
     bands = contest.bands
     if not given.is_fine and len(bands.low) < _MOST_FINE:

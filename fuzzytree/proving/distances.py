@@ -1,25 +1,15 @@
-"""How far two curves are apart at most: exactly for lines, else between two numbers."""
+"""How far two curves are apart at most: exactly, but where a turning point is not."""
 
 from __future__ import annotations
 
-import heapq
-import itertools
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.proving.curves import (
-    ZERO,
-    Piece,
-    degree_after,
-    piece_at,
-    pieces,
-)
+from fuzzytree.proving.curves import ZERO
+from fuzzytree.proving.measures import Bounds, apart, extremes, local
 from fuzzytree.proving.polynomials import difference
-from fuzzytree.proving.stretches import Stretch, overlaps, spread
 from fuzzytree.rulebase import Shape
-
-_STEPS = 80
-_FINE = Fraction(1, 10**9)
 
 
 class Distance(NamedTuple):
@@ -39,8 +29,8 @@ class Distance(NamedTuple):
 def distance(one: Shape, other: Shape, low: Fraction, high: Fraction) -> Distance:
     """Return how far two curves are apart at most on a closed interval.
 
-    The ends of all pieces are looked at, from both sides; between them the difference
-    is enclosed and intervals are halved, until the two numbers are 1e-9 apart.
+    The interval is cut where a curve changes; in each cell both are polynomials, whose
+    difference is largest at an end or where it turns.
 
     Example:
         >>> from fuzzytree.rulebase import Points
@@ -50,52 +40,34 @@ def distance(one: Shape, other: Shape, low: Fraction, high: Fraction) -> Distanc
         >>> str(found.low), str(found.high), str(found.at)
         ('1/2', '1/2', '1')
     """
-    first = piece_at(pieces(one), low).degree(low)
-    best = (abs(first - piece_at(pieces(other), low).degree(low)), low)
-    numbers = itertools.count()
-    todo: list[tuple[Fraction, int, Fraction, Fraction, Piece, Piece]] = []
-    for a, b, start, end in overlaps(one, other, Stretch(low, high)):
-        best = max(best, _ends(a, b, start, end), key=lambda found: found[0])
-        todo.append((-_most(a, b, start, end), next(numbers), start, end, a, b))
-    after = abs(degree_after(pieces(one), low) - degree_after(pieces(other), low))
-    if low < high and after > best[0]:
-        best = (after, low)
-    heapq.heapify(todo)
-    for _ in range(_STEPS):
-        if not todo or -todo[0][0] <= best[0] + _FINE:
-            break
-        _, _, start, end, a, b = heapq.heappop(todo)
-        middle = Fraction(float((start + end) / 2))
-        if not start < middle < end:
-            middle = (start + end) / 2
-        for x, y in ((start, middle), (middle, end)):
-            best = max(best, _ends(a, b, x, y), key=lambda found: found[0])
-            heapq.heappush(todo, (-_most(a, b, x, y), next(numbers), x, y, a, b))
-    high_end = max(best[0], -todo[0][0]) if todo else best[0]
-    return Distance(best[0], high_end, best[1])
+    found = [*_gaps(one, other, low, high)]
+    least, at = max(((gap.low, at) for at, gap in found), key=lambda best: best[0])
+    return Distance(least, max(gap.high for _, gap in found), at)
 
 
-def _ends(
-    one: Piece, other: Piece, low: Fraction, high: Fraction
-) -> tuple[Fraction, Fraction]:
-    """Return the larger of the differences at both ends, and where it is."""
-    return max(
-        ((abs(one.degree(x) - other.degree(x)), x) for x in (high, low)),
-        key=lambda found: found[0],
-    )
+def _gaps(
+    one: Shape, other: Shape, low: Fraction, high: Fraction
+) -> Iterator[tuple[Fraction, Bounds]]:
+    """Yield places with how far two curves are apart there; the largest is among them.
 
-
-def _most(one: Piece, other: Piece, low: Fraction, high: Fraction) -> Fraction:
-    """Return at least the largest difference of two pieces on a closed interval.
-
-    Clipping brings no two numbers further apart; a cap that only one of them has adds
-    what it takes from 1.
+    What is reached only from above is told of the place that it is approached at.
     """
-    gap = difference(one.polynomial, other.polynomial)
-    bounds = [abs(end) for end in spread(gap, low, high)]
-    ranges = [
-        [min(max(end, ZERO), p.cap) for end in spread(p.polynomial, low, high)]
-        for p in (one, other)
-    ]
-    (a, b), (c, d) = ranges
-    return min(max(bounds) + abs(one.cap - other.cap), max(b - c, d - a))
+    laid = apart([one, other], low, high)
+    first, second = laid.elements
+    start = abs(first.degree(low) - second.degree(low))
+    yield low, Bounds(start, start)
+    for a, b in laid.cells.between:
+        middle = (a + b) / 2
+        gap = difference(local(first, middle), local(second, middle))
+        for at, value in extremes(gap, a, b):
+            ends = sorted((abs(value.low), abs(value.high)))
+            yield at, Bounds(ZERO if value.low < 0 < value.high else ends[0], ends[1])
+    # Where a curve changes at an irrational place, that is known as a narrow interval.
+    lows, highs = laid.cells.left
+    for number, (a, b) in enumerate(laid.cells.zones):
+        if a < b:
+            sides = (0, 1), (1, 0)
+            most = max(
+                Fraction(highs[p, number]) - Fraction(lows[q, number]) for p, q in sides
+            )
+            yield (a + b) / 2, Bounds(ZERO, max(most, ZERO))

@@ -58,9 +58,9 @@ def largest_lead(
     high, why = Fraction(1), "a lead that large is enough"
     if low < enough:
         if given.rules.semantics.conjunction == "product":
-            from fuzzytree.proving.bounding import largest_lead as by_boxes
+            from fuzzytree.proving.bounding import largest_lead_by_boxes
 
-            wide = by_boxes(given.rules, given.domain, rule, others, clock)
+            wide = largest_lead_by_boxes(given.rules, given.domain, rule, others, clock)
             high, why = Fraction(wide.high), wide.why
         else:
             high, why = _bound(given, rule, others, low, clock)

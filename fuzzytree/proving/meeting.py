@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.numerics.exact import outwards
-from fuzzytree.proving.bounding import widest_conflict
+from fuzzytree.proving.bounding import highest_by_boxes
 from fuzzytree.proving.boxes import region_around
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.curves import ONE, ZERO
@@ -299,7 +299,7 @@ def _by_boxes(
 ) -> Meeting:
     """Return what is known of a meeting, made narrower by branch and bound."""
     given = compared.ground
-    tighter = widest_conflict(
+    tighter = highest_by_boxes(
         given.rules, given.domain, *rules, clock, tolerance=float(_CLOSE)
     )
     low, high = known.level

@@ -37,6 +37,7 @@ from fuzzytree.proving.states import (
 )
 from fuzzytree.proving.variables import Point
 from fuzzytree.proving.witnesses import coupled, is_within, point_with
+from fuzzytree.proving.wording import counted
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs, in one question
 _DEEPEST = 4  # halvings of levels for axes that share inputs
@@ -154,11 +155,11 @@ class _Search:
         contest = self._contest(self.given)
         cells = sum(len(options.where) for options in contest.all_options)
         axes = len(self.given.axes)
-        levels, parts = _count(self.levels, "level"), _count(cells, "cell")
-        text = f"{levels} with {parts} on {_count(axes, 'axis', 'axes')} visited"
+        levels, parts = counted(self.levels, "level"), counted(cells, "cell")
+        text = f"{levels} with {parts} on {counted(axes, 'axis', 'axes')} visited"
         if not self.choices:
             return text
-        return f"{text}, {_count(self.choices, 'choice')} of inputs"
+        return f"{text}, {counted(self.choices, 'choice')} of inputs"
 
     def _bracket(self, high: float, why: str) -> Bracket:
         return Bracket(self.question.of, 0.0, high, f"{why}: {self._how()}")
@@ -415,7 +416,3 @@ def _parts(
                 part = stretch(laid, cell, levels[0], [mine], below)
             if part is not None:
                 yield part, sum(1 << n for n in kept)
-
-
-def _count(count: int, noun: str, nouns: str | None = None) -> str:
-    return f"{count} {noun if count == 1 else nouns or noun + 's'}"

@@ -309,7 +309,7 @@ def _curve_is_above(upper: Shape, lower: Shape, stretch: Stretch) -> bool:
         return False
     return all(
         _formula_is_above(above, below, low, high)
-        for above, below, low, high in overlaps(upper, lower, stretch)
+        for above, below, low, high in _overlaps(upper, lower, stretch)
     )
 
 
@@ -332,7 +332,7 @@ def _degree(shape: Shape, at: Fraction) -> Fraction:
     return piece_at(pieces(shape), at).degree(at)
 
 
-def overlaps(
+def _overlaps(
     one: Shape, other: Shape, stretch: Stretch
 ) -> Iterator[tuple[Piece, Piece, Fraction, Fraction]]:
     """Yield the pieces of two curves that meet on a stretch, with where they do."""
@@ -351,7 +351,7 @@ def overlaps(
 
 def _crossings(one: Shape, other: Shape, stretch: Stretch) -> Iterator[Fraction]:
     """Yield a point at, or beside, each crossing of two curves within a stretch."""
-    for first, second, low, high in overlaps(one, other, stretch):
+    for first, second, low, high in _overlaps(one, other, stretch):
         gap = difference(first.polynomial, second.polynomial)
         if len(gap) > 1:
             for root in roots(gap, low, high):

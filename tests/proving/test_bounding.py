@@ -12,9 +12,9 @@ from fuzzytree.lowering import rules_from_tree
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.proving.bounding import (
     below_by_boxes,
-    largest_lead,
-    least_cover,
-    widest_conflict,
+    highest_by_boxes,
+    largest_lead_by_boxes,
+    least_cover_by_boxes,
     wins_by_boxes,
 )
 from fuzzytree.proving.clock import Clock
@@ -155,7 +155,7 @@ def test_a_rule_dead_by_the_union_of_two_others_is_proved(
     box = unit_domain(rules)
     assert isinstance(wins_by_boxes(rules, box, 1, (2, 3)), Proved)
     assert isinstance(wins_by_boxes(rules, box, 1, (2,)), Witness)
-    lead = largest_lead(rules, box, 1, (2, 3))
+    lead = largest_lead_by_boxes(rules, box, 1, (2, 3))
     assert lead.low == 0.0
     assert lead.high <= 1e-6
 
@@ -189,7 +189,7 @@ def test_rules_of_a_tree_that_share_clauses_are_decided(
 def test_the_largest_lead_is_between_its_bounds(conjunction: Conjunction) -> None:
     for rules in itertools.islice(_small_bases(conjunction), 1):
         rivals = _rivals(rules, 2)
-        found = largest_lead(
+        found = largest_lead_by_boxes(
             rules, unit_domain(rules), 2, rivals, Clock(5.0), tolerance=1e-2
         )
         assert 0.0 <= found.low <= found.high <= found.low + 1.1e-2
@@ -205,7 +205,7 @@ def test_the_largest_lead_is_between_its_bounds(conjunction: Conjunction) -> Non
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
 def test_the_least_cover_is_below_every_sampled_one(conjunction: Conjunction) -> None:
     rules = random_base(1, 6, 2, conjunction, "lr")
-    found = least_cover(rules, unit_domain(rules), Clock(5.0), tolerance=1e-4)
+    found = least_cover_by_boxes(rules, unit_domain(rules), Clock(5.0), tolerance=1e-4)
     assert found.high - found.low <= 1e-4
     assert found.low <= max(_strengths(rules, found.point)) <= found.high
     for row in _rows(rules, 100):
@@ -232,7 +232,7 @@ def test_two_rules_conflict_at_a_level_that_both_reach(
     conjunction: Conjunction,
 ) -> None:
     rules = random_base(3, 2, 3, conjunction, "mixed")
-    found = widest_conflict(rules, unit_domain(rules), 1, 2, tolerance=1e-3)
+    found = highest_by_boxes(rules, unit_domain(rules), 1, 2, tolerance=1e-3)
     assert 0.0 < found.low <= found.high <= found.low + 1.1e-3
     level = found.claims[0].level
     assert level is not None
@@ -245,7 +245,9 @@ def test_a_spent_budget_leaves_a_bracket() -> None:
     rules = random_base(1, 7, 4, "product", "lr")
     moments = iter(range(100))
     clock = Clock(1.0, now=lambda: float(next(moments)))
-    found = largest_lead(rules, unit_domain(rules), 1, (2, 3), clock, tolerance=0.0)
+    found = largest_lead_by_boxes(
+        rules, unit_domain(rules), 1, (2, 3), clock, tolerance=0.0
+    )
     assert 0.0 <= found.low < found.high <= 1.0
     assert found.why == "the budget was spent: 1 box visited"
 
