@@ -15,7 +15,7 @@ from fuzzytree.proving.dominance import Compared
 from fuzzytree.proving.factors import Distance, distance
 from fuzzytree.proving.ground import ground
 from fuzzytree.proving.meeting import Meeting, highest, meet
-from fuzzytree.proving.states import Bracket, Declined, Proved, State, Witness
+from fuzzytree.proving.states import Declined, Proved, State, Witness
 from fuzzytree.proving.witnesses import coupled
 from fuzzytree.proving.wording import short
 
@@ -285,48 +285,23 @@ def _conflicts(subject: Subject, compared: Compared) -> Iterator[Answer]:
             near.append((-most, (one, other)))
     near.sort()
     told = hidden = 0
-    unsure: list[tuple[Pair, Meeting]] = []
+    own = subject.clock.share(0.5)
     for place, (_, pair) in enumerate(near):
-        if told + len(unsure) >= MOST_SHOWN and not compared.is_product:
-            hidden = len(near) - place
+        if own.is_over or (told == MOST_SHOWN and not compared.is_product):
+            hidden += len(near) - place
             break
         subject.clock.check()
         found = meet(compared, *pair, Fraction(level), subject.clock.share(0.05))
+        is_shown = isinstance(found.state, Witness)
         if found.level.high < level:
             clean += 1
-        elif not isinstance(found.state, Witness):
-            unsure.append((pair, found))
-        elif told == MOST_SHOWN:
+        elif is_shown and told == MOST_SHOWN:
             hidden += 1
         else:
-            told += 1
+            told += is_shown
             yield _conflict(subject, pair, found)
-    if len(unsure) > 1:
-        yield _open_conflicts(subject, [found for _, found in unsure])
-    else:
-        yield from (_conflict(subject, *one) for one in unsure)
     if clean or hidden:
         yield _rest_of_conflicts(subject, compared, clean, hidden)
-
-
-def _open_conflicts(subject: Subject, found: list[Meeting]) -> Answer:
-    """Return what is known of pairs of which no common point was found: one bracket."""
-    high = max(one.level.high for one in found)
-    low = max(one.level.low for one in found)
-    states = [one.state for one in found]
-    whys = dict.fromkeys(one.why for one in states if isinstance(one, Bracket))
-    name = "the highest level that two of these rules reach together"
-    kind = "classes" if _noun(subject) == "class" else "conclusions"
-    level = short(subject.settings.level)
-    return Answer(
-        "FT201",
-        "open pairs of rules",
-        f"{len(found)} pairs of rules of different {kind} may reach {level} together: "
-        f"none is seen to, and no more than {short(high)} is reached by both",
-        Bracket(name, float(low), float(high), "; ".join(whys)),
-        is_finding=False,
-        measures=(Measure("pairs that are open", len(found)),),
-    )
 
 
 def _may_conflict(subject: Subject, one: int, other: int) -> bool:

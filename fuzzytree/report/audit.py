@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final
 
@@ -26,6 +27,7 @@ MOST_FINDINGS: Final = 200
 """That are told one by one."""
 
 _MOST_CALM = 40  # lines of answers that are no findings, unless all are wanted
+_MOST_ALIKE = 3  # of one code that are open
 _MOST_INPUTS = 12  # of a point or region on the terminal
 _LEFT_OUT = ": left out by the user"
 _SHOWN = 84  # characters of a source line
@@ -314,9 +316,8 @@ def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
     """
     answers = [one for one in audit.answers if not one.is_finding]
     answers = [one for one in answers if not isinstance(one.state, Declined)]
-    shown = answers
-    if not is_whole:
-        shown = [one for one in answers if isinstance(one.state, Bracket)][:_MOST_CALM]
+    unsure = [one for one in answers if isinstance(one.state, Bracket)]
+    shown = answers if is_whole else [*_first(unsure)][:_MOST_CALM]
     if shown:
         yield "answers that are no findings" if is_whole else "open"
     for answer in shown:
@@ -324,13 +325,25 @@ def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
         first, *rest = _wrapped(answer.sentence, WIDTH - 17) or [""]
         yield f"  {answer.code} {paint(f'{word:8}', word)} {first}".rstrip()
         yield from (f"{' ' * 17}{line}" for line in rest)
+    if len(shown) < len(unsure):
+        yield f"  and {len(unsure) - len(shown)} more; --all tells each"
     if shown:
         yield ""
-    if hidden := len(answers) - len(shown):
+    sure = len(answers) - len(unsure)
+    if sure and not is_whole:
+        verb = "is no finding" if sure == 1 else "are no findings"
         what = "more answer" if shown else "answer"
-        verb = "is no finding" if hidden == 1 else "are no findings"
-        yield f"{counted(hidden, what)} {verb}; --all tells each"
+        yield f"{counted(sure, what)} {verb}; --all tells each"
         yield ""
+
+
+def _first(answers: Sequence[Answer]) -> Iterator[Answer]:
+    """Yield the first few answers of each code."""
+    seen: Counter[str] = Counter()
+    for answer in answers:
+        seen[answer.code] += 1
+        if seen[answer.code] <= _MOST_ALIKE:
+            yield answer
 
 
 def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
@@ -360,12 +373,19 @@ def _gathered(unasked: Sequence[str]) -> Iterator[str]:
 
 
 def _asked_text(audit: Audit) -> str:
-    """Return how many questions were asked, and how many of them were declined."""
+    """Return how many questions were asked, and how many are open or declined."""
     asked = f"{counted(len(audit.answers), 'question')} asked"
-    declined = sum(isinstance(one.state, Declined) for one in audit.answers)
-    return (
-        f"{asked}, {declined} of them declined" if declined else f"{asked} and answered"
-    )
+    kinds = {"open": Bracket, "declined": Declined}
+    counts = {
+        word: sum(isinstance(one.state, kind) for one in audit.answers)
+        for word, kind in kinds.items()
+    }
+    if counts["declined"] == len(audit.answers) > 0:
+        return f"{asked}, and every one declined: nothing is known"
+    told = [f"{count} {word}" for word, count in counts.items() if count]
+    if not told:
+        return f"{asked} and answered"
+    return f"{asked}, {' and '.join(told).replace(' ', ' of them ', 1)}"
 
 
 def _item(text: str) -> Iterator[str]:

@@ -311,18 +311,20 @@ def test_many_conflicts_are_told_up_to_a_number_and_counted() -> None:
     assert rest.sentence == ("16 more pairs of rules may reach 0.5: they conflict less")
 
 
-@pytest.mark.heavy
-def test_pairs_that_are_open_are_told_in_one_bracket() -> None:
-    rules = random_base(0, 4, 2, kind="points", combinations=1)
-    answers = asked(rules, "FT201", Settings(level=0.3))
-    (bracket,) = [one for one in answers if isinstance(one.state, Bracket)]
-    assert isinstance(bracket.state, Bracket)
-    assert bracket.sentence == (
-        "2 pairs of rules of different classes may reach 0.3 together: none is seen "
-        "to, and no more than 0.5505 is reached by both"
+def test_pairs_that_only_touch_are_open_and_take_no_place_of_a_conflict() -> None:
+    # ramps down and up that cross at 0.1 + 0.2, which is no short fraction
+    third = 0.1 + 0.2
+    ramps = (
+        Term("down", Points((0.0, 2.0 * third), (1.0, 0.0))),
+        Term("up", Points((0.0, 2.0 * third), (0.0, 1.0))),
     )
-    assert bracket.state.why == "the inputs of their variables depend on each other"
-    assert not bracket.is_finding
+    rules = base(*(("force is down", "soft"), ("force is up", "hard")) * 5, more=ramps)
+    answers = [one for one in asked(rules, "FT201") if one.rules]
+    assert len(answers) == 25
+    assert not any(one.is_finding for one in answers)
+    states = [one.state for one in answers]
+    why = "where they meet is known nearly, and no point above the level was found"
+    assert all(isinstance(one, Bracket) and one.why == why for one in states)
 
 
 def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:

@@ -78,6 +78,10 @@ def test_what_is_open_is_told_and_the_rest_counted_unless_all_are_wanted() -> No
     bracket = "  FT301 BRACKET  how weak the weakest cover is was not settled\n"
     assert f"\nopen\n{bracket}\n2 more answers are no findings; --all" in short
     assert "rule 1 wins 3 of 4 rows" not in short
+    many = replace(audit, answers=(open_one,) * 5)
+    assert f"\nopen\n{bracket * 3}  and 2 more; --all tells each\n" in "\n".join(
+        audit_lines(many)
+    )
     whole = "\n".join(audit_lines(audit, LINES, is_whole=True))
     sampled = "  FT701 SAMPLED  rule 1 wins 3 of 4 rows\n"
     assert f"\nanswers that are no findings\n{bracket}{sampled}{sampled}\n" in whole
@@ -154,6 +158,15 @@ def test_the_verdict_counts_and_says_what_next() -> None:
     )
     calm = replace(audit, answers=audit.answers[3:], accepted=(), is_complete=True)
     assert verdict_text(calm) == "nothing found; 2 questions asked, 1 of them declined"
+    none = replace(calm, answers=calm.answers[:1])
+    assert verdict_text(none) == (
+        "nothing found; 1 question asked, and every one declined: nothing is known"
+    )
+    bracket = replace(audit.answers[2], is_finding=False)
+    unsure = replace(calm, answers=(bracket, *calm.answers))
+    assert verdict_text(unsure) == (
+        "nothing found; 3 questions asked, 1 of them open and 1 declined"
+    )
     sure = replace(calm, answers=calm.answers[1:])
     assert verdict_text(sure) == "nothing found; 1 question asked and answered"
     cut = replace(calm, unasked=("FT101 dead rule: cut short: interrupted",))
