@@ -147,7 +147,9 @@ def meet(
     high = bounds.high
     if joined and _is_never(given, rules, level, joined):
         high = min(high, level * (1 - _NEARLY))
-    why = "the inputs of their variables depend on each other"
+    why = "where they meet is known nearly, and no point that reaches the level is found"
+    if joined:
+        why = "the inputs of their variables depend on each other"
     most = outwards(high)[1]
     return Meeting(Bounds(ZERO, high), Bracket(name, 0.0, most, why))
 
