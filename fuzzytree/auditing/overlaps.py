@@ -11,7 +11,8 @@ from fuzzytree.auditing.ranges import Range, labels_of, measure
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.curves import pieces
-from fuzzytree.proving.measures import Bounds, Overlap, most_shared, overlap
+from fuzzytree.proving.measures import Bounds
+from fuzzytree.proving.overlap import Overlap, most_shared, overlap
 from fuzzytree.proving.states import Bracket, Declined, Proved, State
 from fuzzytree.proving.wording import counted, short
 from fuzzytree.rulebase import Term

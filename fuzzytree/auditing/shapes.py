@@ -9,18 +9,10 @@ from typing import Final
 from fuzzytree.auditing.ranges import Range, labels_of, measure, term_name
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Subject
-from fuzzytree.proving.axes import Element
 from fuzzytree.proving.curves import pieces
-from fuzzytree.proving.measures import (
-    Bounds,
-    Excess,
-    area,
-    dips,
-    line,
-    local,
-    outside,
-    walk,
-)
+from fuzzytree.proving.defects import Excess, dips, outside
+from fuzzytree.proving.elements import Element
+from fuzzytree.proving.measures import Bounds, area, line, local, walk
 from fuzzytree.proving.states import Proved, Span
 from fuzzytree.proving.wording import short
 from fuzzytree.rulebase import Points, Shape, Term

@@ -51,7 +51,7 @@ def below(given: Ground, epsilon: Fraction, clock: Clock | None = None) -> State
         >>> rules = rules_from_tree(random_tree(1))
         >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
         >>> below(ground(rules, box), Fraction(1, 2)).how.split(" with ")[0]
-        '1 levels'
+        '1 level'
     """
     clock = clock or Clock()
     if given.is_empty:

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.proving.axes import Element
 from fuzzytree.proving.curves import ONE, ZERO
+from fuzzytree.proving.elements import Element
 from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.measures import (
     Bounds,
@@ -29,6 +29,7 @@ from fuzzytree.proving.polynomials import (
     Polynomial,
     derivative,
     difference,
+    divided,
     roots,
     value_at,
 )
@@ -308,7 +309,7 @@ def quotient(
         while value_at(bottom, end) == 0:
             if value_at(top, end) != 0:
                 return None
-            top, bottom = _divided(top, end), _divided(bottom, end)
+            top, bottom = divided(top, end), divided(bottom, end)
     if len(top) == len(bottom) == 1:
         ratio = top[0] / bottom[0]
         return Bounds(ratio, ratio)
@@ -325,16 +326,6 @@ def quotient(
         least = max(least, above.low / below.high)
         most = max(most, above.high / below.low)
     return Bounds(least, most)
-
-
-def _divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
-    """Return p / (x - at), where p is 0 at `at`."""
-    found: list[Fraction] = []
-    carried = ZERO
-    for one in reversed(polynomial[1:]):
-        carried = one + carried * at
-        found.append(carried)
-    return tuple(reversed(found))
 
 
 # --- distances

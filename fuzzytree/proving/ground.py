@@ -19,8 +19,9 @@ import msgspec
 import numpy as np
 
 from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.proving.axes import ALWAYS, Cells, Element, Place, cut, places
+from fuzzytree.proving.axes import Cells, cut
 from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.elements import ALWAYS, Element, Place, places
 from fuzzytree.proving.variables import span, variable_value
 from fuzzytree.rulebase import Clause, RuleBase, Variable, shapes_of
 

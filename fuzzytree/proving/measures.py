@@ -7,15 +7,13 @@ where a cell ends at an irrational place is the answer a narrow interval.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from fuzzytree.proving.axes import Cells, Element, cut, places
+from fuzzytree.proving.axes import Cells, cut
 from fuzzytree.proving.curves import ONE, ZERO, piece_at, pieces
+from fuzzytree.proving.elements import Element, places
 from fuzzytree.proving.polynomials import (
     Polynomial,
     composed,
@@ -26,13 +24,10 @@ from fuzzytree.proving.polynomials import (
     roots,
     value_at,
 )
-from fuzzytree.proving.ranges import shape_ranges
 from fuzzytree.rulebase import Shape
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
-
-_CELLS = 256  # on which degrees are enclosed before areas are asked exactly
+    pass
 
 
 class Bounds(NamedTuple):
@@ -223,14 +218,14 @@ def walk(of: Line, one: int) -> Iterator[Seen]:
         at = (a + b) / 2
         has_here = number > 0 or not of.is_open or len(zones) == 1
         if has_here:
-            yield _seen(of, one, number), at
+            yield seen(of, one, number), at
         if number + 1 < len(zones):
-            after = _seen(of, one, number, is_after=True)
-            if not has_here or after != _seen(of, one, number):
+            after = seen(of, one, number, is_after=True)
+            if not has_here or after != seen(of, one, number):
                 yield after, at
 
 
-def _seen(of: Line, one: int, zone: int, *, is_after: bool = False) -> Bounds:
+def seen(of: Line, one: int, zone: int, *, is_after: bool = False) -> Bounds:
     """Return a curve's value at a place, or its limit from above."""
     low, high = of.cells.zones[zone]
     if low == high:
@@ -239,220 +234,3 @@ def _seen(of: Line, one: int, zone: int, *, is_after: bool = False) -> Bounds:
         return Bounds(value, value)
     values = (of.cells.right if is_after else of.cells.left)[:, one, zone]
     return Bounds(Fraction(values[0]), Fraction(values[1]))
-
-
-class Overlap(NamedTuple):
-    """How much two curves share on a line.
-
-    Attributes:
-        shared: The area under both, the integral of their minimum.
-        joined: The area under either, the integral of their maximum.
-        possibility: The supremum of their minimum.
-        at: A point near where it is reached.
-        crossings: Points at which they cross, each with the degree there.
-        is_within: Whether the first is nowhere above the second.
-        is_around: Whether the first is nowhere below the second.
-    """
-
-    shared: Bounds
-    joined: Bounds
-    possibility: Bounds
-    at: Fraction
-    crossings: tuple[tuple[Fraction, Bounds], ...]
-    is_within: bool
-    is_around: bool
-
-    @property
-    def jaccard(self) -> Bounds | None:
-        """The shared area over the joined area; None if that may be 0."""
-        if self.joined.low <= 0:
-            return None
-        high = self.shared.high / self.joined.low
-        return Bounds(self.shared.low / self.joined.high, min(high, ONE))
-
-
-def overlap(of: Line) -> Overlap:
-    """Return how much the two curves of a line share, exactly but for slivers.
-
-    Raises:
-        ValueError: If the line has not two curves.
-
-    Example:
-        >>> from fuzzytree.rulebase import Points
-        >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
-        >>> found = overlap(line([down, up], Fraction(0), Fraction(1)))
-        >>> found.jaccard.exact, found.possibility.exact
-        ('1/3', '1/2')
-    """
-    if len(of.elements) != 2:
-        raise ValueError(f"two curves overlap, not {len(of.elements)}")
-    rank = of.cells.rank
-    lower = [int(a > b) for a, b in rank]
-    shared = area(of, lambda cell, at: local(of.elements[lower[cell]], at))
-    joined = area(of, lambda cell, at: local(of.elements[1 - lower[cell]], at))
-    met = [
-        (
-            Bounds(min(a.low, b.low), min(a.high, b.high)),
-            at,
-        )
-        for (a, at), (b, _) in _both(of)
-    ]
-    low = max(bounds.low for bounds, _ in met)
-    high = max(bounds.high for bounds, _ in met)
-    start = of.cells.start_rank
-    orders = [] if of.is_open and len(rank) else [int(start[0]) - int(start[1])]
-    orders += [int(a) - int(b) for a, b in rank]
-    return Overlap(
-        shared,
-        joined,
-        Bounds(low, high),
-        next(at for bounds, at in met if bounds.low == low),
-        tuple(_crossings(of)),
-        all(order <= 0 for order in orders),
-        all(order >= 0 for order in orders),
-    )
-
-
-def most_shared(shapes: Sequence[Shape], low: float, high: float) -> FloatArray:
-    """Return bounds from above of the shared by the joined area of each two curves.
-
-    Degrees are enclosed on each of some cells, so nothing is left to chance; only what
-    comes near to an answer is worth the exact areas.
-
-    Returns:
-        Shape (shapes, shapes); 1 where nothing is known.
-    """
-    width = (high - low) / _CELLS
-    if not width > 1e-6 * max(abs(low), abs(high)):
-        return np.ones((len(shapes), len(shapes)))
-    edges = np.linspace(low, high, _CELLS + 1, dtype=np.float64)
-    cells = [shape_ranges(shape, edges)[1] for shape in shapes]
-    least = np.array([one.low for one in cells])
-    most = np.array([one.high for one in cells])
-    found = np.ones((len(shapes), len(shapes)))
-    for place in range(len(shapes)):
-        shared = np.minimum(most, most[place]).sum(axis=1)
-        joined = np.maximum(least, least[place]).sum(axis=1)
-        # Edges and sums are off by roundings, which are far below this.
-        found[place] = (shared + 1e-6) / np.maximum(joined - 1e-6, 1e-12)
-    return np.minimum(found, 1.0)
-
-
-def _both(
-    of: Line,
-) -> Iterator[tuple[tuple[Bounds, Fraction], tuple[Bounds, Fraction]]]:
-    """Yield the values of two curves at the same places, seen from both sides."""
-    zones = of.cells.zones
-    for number, (a, b) in enumerate(zones):
-        at = (a + b) / 2
-        for is_after, is_asked in (
-            (False, number > 0 or not of.is_open or len(zones) == 1),
-            (True, number + 1 < len(zones)),
-        ):
-            if is_asked:
-                one, other = (
-                    _seen(of, which, number, is_after=is_after) for which in (0, 1)
-                )
-                yield (one, at), (other, at)
-
-
-def _crossings(of: Line) -> Iterator[tuple[Fraction, Bounds]]:
-    before = 0
-    since = 0
-    for cell, (a, b) in enumerate(of.cells.rank):
-        order = int(a > b) - int(a < b)
-        if order and before and order != before:
-            low, high = of.cells.zones[since]
-            yield (low + high) / 2, _seen(of, 0, since)
-        if order:
-            before, since = order, cell + 1
-
-
-def dips(values: Sequence[Seen], least: Fraction) -> Iterator[tuple[Seen, Seen, Seen]]:
-    """Yield where a walk falls and rises again by at least some amount.
-
-    Args:
-        values: A walk.
-        least: The least depth that counts, above 0.
-
-    Yields:
-        The peak before, the valley, and the peak behind it.
-
-    Example:
-        >>> walked = [(Bounds(Fraction(v), Fraction(v)), Fraction(k))
-        ...           for k, v in enumerate((0, 3, 1, 2, 0))]
-        >>> [[int(at) for _, at in dip] for dip in dips(walked, Fraction(1, 2))]
-        [[1, 2, 3]]
-    """
-    before: Seen | None = None
-    peak = valley = bottom = values[0]
-    is_rising = True
-    for value in values:
-        height = value[0].low
-        if is_rising:
-            if height > peak[0].low:
-                peak = value
-            elif peak[0].low - height >= least:
-                if before is not None:
-                    yield before, bottom, peak
-                before, valley, is_rising = peak, value, False
-        elif height < valley[0].low:
-            valley = value
-        elif height - valley[0].low >= least:
-            bottom, peak, is_rising = valley, value, True
-    if is_rising and before is not None:
-        yield before, bottom, peak
-
-
-def outside(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
-    """Yield where a shape's polynomials leave [0, 1] before they are clipped.
-
-    Example:
-        >>> from fuzzytree.rulebase import Band, Flank
-        >>> bulge = Band(0.0, 1.0, right=Flank(1.0, 2.0, (4.0, -3.0)))
-        >>> [(round(float(e.depth), 3), e.is_above)
-        ...  for e in outside(bulge, Fraction(0), Fraction(3))]
-        [(0.333, True)]
-    """
-    for piece in pieces(shape):
-        if piece.low is None or piece.high is None or len(piece.polynomial) < 2:
-            continue
-        a, b = max(piece.low, low), min(piece.high, high)
-        if a >= b or _is_inside(piece.polynomial, a, b):
-            continue
-        for goal, sign in ((ONE, 1), (ZERO, -1)):
-            over = difference(piece.polynomial, (goal,))
-            ends = [a, *((r.low + r.high) / 2 for r in roots(over, a, b)), b]
-            for start, end in itertools.pairwise(ends):
-                if sign * value_at(over, (start + end) / 2) <= 0:
-                    continue
-                found = [*extremes(over, start, end)]
-                at, depth = max(
-                    ((at, sign * (v.low + v.high) / 2) for at, v in found),
-                    key=lambda one: one[1],
-                )
-                yield Excess(start, end, at, depth, sign > 0)
-
-
-def _is_inside(polynomial: Polynomial, low: Fraction, high: Fraction) -> bool:
-    """Return whether a polynomial is a line within [0, 1]."""
-    ends = value_at(polynomial, low), value_at(polynomial, high)
-    return len(polynomial) == 2 and all(ZERO <= end <= ONE for end in ends)
-
-
-class Excess(NamedTuple):
-    """A stretch on which a polynomial leaves [0, 1].
-
-    Attributes:
-        low: From where.
-        high: To where.
-        at: Where it is farthest outside.
-        depth: How far.
-        is_above: Whether it is above 1, otherwise below 0.
-    """
-
-    low: Fraction
-    high: Fraction
-    at: Fraction
-    depth: Fraction
-    is_above: bool

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.proving.axes import Element
 from fuzzytree.proving.curves import piece_at, pieces
+from fuzzytree.proving.elements import Element
 from fuzzytree.proving.ground import Laid
 from fuzzytree.proving.polynomials import difference, refined, roots, value_at
 

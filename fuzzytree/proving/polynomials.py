@@ -94,6 +94,22 @@ def difference(one: Polynomial, other: Polynomial) -> Polynomial:
     return tuple(found)
 
 
+def divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
+    """Return p / (x - at), where p is 0 at `at` (Horner's scheme).
+
+    Example:
+        >>> square = (Fraction(-1), Fraction(0), Fraction(1))
+        >>> [int(one) for one in divided(square, Fraction(1))]
+        [1, 1]
+    """
+    found: list[Fraction] = []
+    carried = Fraction(0)
+    for one in reversed(polynomial[1:]):
+        carried = one + carried * at
+        found.append(carried)
+    return tuple(reversed(found))
+
+
 def composed(polynomial: Polynomial, offset: Fraction, slope: Fraction) -> Polynomial:
     """Return p(offset + slope x) as a polynomial in x.
 

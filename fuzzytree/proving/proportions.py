@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from fuzzytree.proving.axes import Element
 from fuzzytree.proving.curves import ONE, Piece
+from fuzzytree.proving.elements import Element
 from fuzzytree.proving.ground import Axis, Ground
 from fuzzytree.proving.polynomials import Polynomial
 from fuzzytree.proving.stretches import spread

@@ -9,19 +9,9 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.proving.measures import (
-    Bounds,
-    Line,
-    area,
-    dips,
-    heights,
-    line,
-    local,
-    most_shared,
-    outside,
-    overlap,
-    walk,
-)
+from fuzzytree.proving.defects import dips, outside
+from fuzzytree.proving.measures import Bounds, Line, area, heights, line, local, walk
+from fuzzytree.proving.overlap import most_shared, overlap
 from fuzzytree.rulebase import Points, Shape
 from tests.proving.bases import random_shape
 

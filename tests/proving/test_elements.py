@@ -2,7 +2,7 @@
 
 from fractions import Fraction
 
-from fuzzytree.proving.axes import Place, _apart
+from fuzzytree.proving.elements import Place, _apart
 from fuzzytree.proving.polynomials import Polynomial, Root
 
 SMALL = Fraction(1, 2**70)
