@@ -147,7 +147,7 @@ def meet(
     high = bounds.high
     if joined and _is_never(given, rules, level, joined):
         high = min(high, level * (1 - _NEARLY))
-    why = "where they meet is known nearly, and no point that reaches the level is found"
+    why = "where they meet is known nearly, and no point there reaches the level"
     if joined:
         why = "the inputs of their variables depend on each other"
     most = outwards(high)[1]

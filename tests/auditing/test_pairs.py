@@ -323,7 +323,7 @@ def test_pairs_that_only_touch_are_open_and_take_no_place_of_a_conflict() -> Non
     assert len(answers) == 25
     assert not any(one.is_finding for one in answers)
     states = [one.state for one in answers]
-    why = "where they meet is known nearly, and no point that reaches the level is found"
+    why = "where they meet is known nearly, and no point there reaches the level"
     assert all(isinstance(one, Bracket) and one.why == why for one in states)
 
 
