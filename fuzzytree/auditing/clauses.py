@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.records import Answer, Label, Measure
 from fuzzytree.auditing.subject import Subject
+from fuzzytree.auditing.support import drawn
 from fuzzytree.numerics.oracle import decide
 from fuzzytree.proving.alike import alike
 from fuzzytree.proving.answers import answer_at
@@ -172,7 +173,8 @@ class _Seen:
     def __init__(self, subject: Subject, given: Ground, both: RuleBase) -> None:
         self.rules, self.given = subject.rules, given
         self.count = len(subject.rules.rules)
-        self.values = _drawn(subject)
+        rows, seed = subject.settings.rows, subject.settings.seed
+        self.values = drawn(subject.rules, subject.domain, min(rows, MOST_ROWS), seed)
         strengths = decide(both, self.values).strengths
         assert strengths is not None  # they were asked for
         self.strengths: FloatArray = strengths
@@ -208,19 +210,6 @@ class _Seen:
             if answer_at(self.rules, point).label != answer_at(shorter, point).label:
                 return _witness(self.rules, point)
         return None
-
-
-def _drawn(subject: Subject) -> FloatArray:
-    """Return rows of the domain, drawn evenly."""
-    rows = min(subject.settings.rows, MOST_ROWS)
-    chance = np.random.default_rng(subject.settings.seed)
-    sides = [subject.domain.side(name) for name in subject.rules.inputs]
-    columns = [
-        side.low + (side.high - side.low) * chance.random(rows)
-        for side in sides
-        if side is not None
-    ]
-    return np.array(columns).reshape(len(columns), rows)
 
 
 def _answer(subject: Subject, one: _Dropped, state: State) -> Answer:

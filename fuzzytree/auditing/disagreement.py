@@ -12,6 +12,7 @@ from fuzzytree.auditing.rows import OF_RANGES, Points, distance_measure, points_
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.auditing.trees import NOT_LOOKED_AT, too_many
 from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.answers import answer_at
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.decisions import decision_at, other_decision
 from fuzzytree.proving.domain import Domain
@@ -184,12 +185,7 @@ class Both:
 
     def margin(self, point: Mapping[str, Fraction]) -> Fraction:
         """Return how far the strongest raw rule is ahead of other classes."""
-        rules = self.given.rules.rules
-        strengths = strengths_at(self.given, point)
-        best = max(strengths)
-        label = rules[strengths.index(best)].then
-        rivals = (s for s, r in zip(strengths, rules, strict=True) if r.then != label)
-        return best - max(rivals, default=Fraction(0))
+        return answer_at(self.given.rules, point).margin
 
 
 def nearest_difference(both: Both, points: Points, clock: Clock) -> Iterator[Answer]:

@@ -15,9 +15,11 @@ from typing import Final
 
 import numpy as np
 
+from fuzzytree.proving.answers import answer_at
+from fuzzytree.proving.branching import simplified
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.cover import uncovered
-from fuzzytree.proving.ground import Ground, strengths_at
+from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.proportions import may_tie
 from fuzzytree.proving.seeking import ends_of, near_strengths
 from fuzzytree.proving.states import (
@@ -51,11 +53,7 @@ def decision_at(given: Ground, point: Mapping[str, Fraction]) -> str | None:
         >>> decision_at(ground(rules, box), dict.fromkeys(rules.inputs, Fraction(0)))
         'class 2'
     """
-    strengths = strengths_at(given, point)
-    best = max(strengths)
-    if best == 0:
-        return given.rules.semantics.uncovered
-    return given.rules.rules[strengths.index(best)].then
+    return answer_at(given.rules, point).label
 
 
 def other_decision(
@@ -134,13 +132,7 @@ def _drawn(given: Ground, label: str | None) -> Point | None:
     }
     if not _is_other(given, point, label):
         return None
-    for name, value in point.items():
-        for digits in range(1, 6):
-            plain = {**point, name: Fraction(float(f"{float(value):.{digits}g}"))}
-            if _is_other(given, plain, label):
-                point = plain
-                break
-    return point
+    return simplified(given, point, lambda near: decision_at(given, near) != label)
 
 
 def _is_other(given: Ground, point: Point, label: str | None) -> bool:
