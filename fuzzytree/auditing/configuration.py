@@ -30,7 +30,6 @@ FILE: Final = "fuzzytree-audit.yaml"
 """Read from the current folder if it is there and no other is named."""
 
 FailOn = Literal["error", "warning", "info", "never"]
-FAIL_ON: Final[tuple[FailOn, ...]] = ("error", "warning", "info", "never")
 
 _MOST_BYTES = 2**20
 _Codes = Annotated[tuple[Name, ...], Meta(max_length=1000)]

@@ -17,7 +17,7 @@ from fuzzytree.proving.ground import ground
 from fuzzytree.proving.meeting import Meeting, highest, meet
 from fuzzytree.proving.states import Declined, Proved, State, Witness
 from fuzzytree.proving.witnesses import coupled
-from fuzzytree.proving.wording import short
+from fuzzytree.proving.wording import counted, short
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -153,7 +153,7 @@ def _how(compared: Compared) -> str:
     cells = sum(len(laid.cells.rank) for laid in compared.ground.laid[0])
     means = "ratios of degrees" if compared.is_product else "orders of degrees"
     axes = len(compared.ground.axes)
-    return f"{means} in {cells} cells on {_count(axes, 'axis', 'axes')} were compared"
+    return f"{means} in {cells} cells on {counted(axes, 'axis', 'axes')} were compared"
 
 
 def _rest_of_strengths(
@@ -170,7 +170,7 @@ def _rest_of_strengths(
     silent = len(compared.fires) - int(compared.fires.sum())
     word = "subsumed" if code == "FT104" else "masked"
     kind = f"one {_noun(subject)}" if code == "FT104" else "two classes"
-    among = f"{_count(asked, 'pair', 'pairs')} of {kind}"
+    among = f"{counted(asked, 'pair')} of {kind}"
     rest = "no rule" if not found else "no other rule"
     state: State = Proved(_how(compared))
     sentence = f"{rest} is {word}, among {among}"
@@ -180,9 +180,7 @@ def _rest_of_strengths(
         sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
         state = Declined("FTD04", reason)
     elif undecided:
-        reason = (
-            f"{_count(undecided, 'pair', 'pairs')} of strengths are too near to tell"
-        )
+        reason = f"{counted(undecided, 'pair')} of strengths are too near to tell"
         sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
         state = Declined("FTD02", reason)
     yield Answer(
@@ -253,7 +251,7 @@ def _copied(
     pairs = count * (count - 1) // 2
     if not pairs:
         return
-    among = _count(pairs, "pair", "pairs")
+    among = counted(pairs, "pair")
     rest = "no two rules" if not copies else "no other two rules"
     yield Answer(
         "FT106",
@@ -363,11 +361,11 @@ def _rest_of_conflicts(
 ) -> Answer:
     level, noun = short(subject.settings.level), _noun(subject)
     kind = "classes" if noun == "class" else "conclusions"
-    pairs, reach = _count(clean, "pair", "pairs"), "reaches" if clean == 1 else "reach"
+    pairs, reach = counted(clean, "pair"), "reaches" if clean == 1 else "reach"
     never = f"{pairs} of rules of different {kind} never {reach} {level} together"
     parts = [never] if clean else []
     if hidden:
-        more = _count(hidden, "more pair", "more pairs")
+        more = counted(hidden, "more pair")
         parts.append(f"{more} of rules may reach {level}: they conflict less")
     means = "products" if compared.is_product else "minima"
     return Answer(
@@ -381,7 +379,3 @@ def _rest_of_conflicts(
             Measure("pairs not told one by one", hidden),
         ),
     )
-
-
-def _count(count: int, noun: str, nouns: str) -> str:
-    return f"{count} {noun if count == 1 else nouns}"
