@@ -248,13 +248,13 @@ def _answer(
     claim = Claim("decides", of=decider.of, label=other)
     moved = [axis for axis, value in found.point.items() if value != point[axis]]
     changed = " and ".join(
-        f"{axis!r} {number_text(float(found.point[axis]))}" for axis in moved
+        f"{axis!r} is {_moved(found.point[axis], point[axis])}" for axis in moved
     )
     if len(moved) > _MOST_NAMED:
-        changed = f"{len(moved)} inputs moved by no more than {percent(found.high)}"
+        changed = f"{len(moved)} inputs move by no more than {percent(found.high)}"
     text = (
         f"{name} stays {answer_text(own)} within {percent(found.low)} {OF_RANGES}; "
-        f"with {changed} it is {answer_text(other)}"
+        f"where {changed} it is {answer_text(other)}"
     )
     return Answer(
         code="FT204",
@@ -267,6 +267,16 @@ def _answer(
             distance_measure("distance of the witness", found.high),
         ),
     )
+
+
+def _moved(value: Fraction, own: Fraction) -> str:
+    """Return a value in so many digits that it looks unlike the row's own."""
+    near = float(value)
+    if number_text(near) != number_text(float(own)):
+        return number_text(near)
+    if near != float(own):
+        return repr(near)
+    return f"a hair {'above' if value > own else 'below'} {near!r}"
 
 
 # --- all rows

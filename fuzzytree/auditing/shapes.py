@@ -111,8 +111,8 @@ def _dips(of: Range, term: Term) -> Iterator[Answer | None]:
         term,
         f"has {len(told) + 1} peaks: between {short(left)} and {short(right)} "
         f"its degree falls to {short(bottom.nearest)}, at {short(valley)}",
-        f"its curve is monotone in each of {len(made.cells.rank)} stretches, which "
-        "were visited",
+        f"its curve was visited in {len(made.cells.rank)} stretches, in each of which "
+        "it is monotone",
         (
             Measure("peaks", len(told) + 1),
             Measure("depth of the deepest dip", float(depth)),

@@ -290,7 +290,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         OutOfTimeError: If the budget is spent.
     """
     if subject.rows is None:
-        reason = "no rows were given"
+        reason = "rows are needed (--data TABLE)"
         text = f"what rows say about the rules is not known: {reason}"
         yield Answer("FT701", "rows", text, Declined("FTD06", reason), is_finding=False)
     else:

@@ -67,7 +67,8 @@ def _low_term(
         name,
         sentence,
         Proved(
-            f"its curve is monotone in each of {cells} stretches, which were visited"
+            f"its curve was visited in {counted(cells, 'stretch', 'stretches')}, in "
+            "each of which it is monotone"
         ),
         is_finding=True,
         severity="warning" if height.high else "error",

@@ -210,7 +210,7 @@ def _tell_domain(found: Audit, *, quiet: bool) -> None:
     for one in guessed[:10]:
         say(
             f"limits   {one.variable!r} declares no range; asked from {one.low!r} to "
-            f"{one.high!r}, the span of its curves",
+            f"{one.high!r}, by the span of its curves; --limits NAME=LOW:HIGH sets it",
             quiet=quiet,
         )
     if len(guessed) > 10:

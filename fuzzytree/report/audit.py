@@ -312,29 +312,42 @@ def _by_severity(found: Sequence[Answer]) -> str:
 def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
     """Yield the answers that are no findings and were not declined, a line each.
 
-    Unless all are wanted, only those that are open: the others are counted.
+    Unless all are wanted, only those about the row that was given and those that are
+    open: the others are counted.
     """
     answers = [one for one in audit.answers if not one.is_finding]
     answers = [one for one in answers if not isinstance(one.state, Declined)]
-    unsure = [one for one in answers if isinstance(one.state, Bracket)]
-    shown = answers if is_whole else [*_first(unsure)][:_MOST_CALM]
-    if shown:
-        yield "answers that are no findings" if is_whole else "open"
-    for answer in shown:
+    if is_whole:
+        yield from _brief("answers that are no findings", answers, paint)
+        return
+    given = [one for one in answers if (one.code, one.subject) == ("FT204", "row")]
+    rest = [one for one in answers if one not in given]
+    unsure = [one for one in rest if isinstance(one.state, Bracket)]
+    shown = [*_first(unsure)][:_MOST_CALM]
+    yield from _brief("the row that was given", given, paint)
+    yield from _brief("open", shown, paint, len(unsure) - len(shown))
+    if sure := len(rest) - len(unsure):
+        verb = "is no finding" if sure == 1 else "are no findings"
+        what = "more answer" if given or shown else "answer"
+        yield f"{counted(sure, what)} {verb}; --all tells each"
+        yield ""
+
+
+def _brief(
+    title: str, answers: Sequence[Answer], paint: _Paint, more: int = 0
+) -> Iterator[str]:
+    """Yield answers by their sentences, below a title, and how many more there are."""
+    if not answers:
+        return
+    yield title
+    for answer in answers:
         word = state_word(answer.state)
         first, *rest = _wrapped(answer.sentence, WIDTH - 17) or [""]
         yield f"  {answer.code} {paint(f'{word:8}', word)} {first}".rstrip()
         yield from (f"{' ' * 17}{line}" for line in rest)
-    if len(shown) < len(unsure):
-        yield f"  and {len(unsure) - len(shown)} more; --all tells each"
-    if shown:
-        yield ""
-    sure = len(answers) - len(unsure)
-    if sure and not is_whole:
-        verb = "is no finding" if sure == 1 else "are no findings"
-        what = "more answer" if shown else "answer"
-        yield f"{counted(sure, what)} {verb}; --all tells each"
-        yield ""
+    if more:
+        yield f"  and {more} more; --all tells each"
+    yield ""
 
 
 def _first(answers: Sequence[Answer]) -> Iterator[Answer]:

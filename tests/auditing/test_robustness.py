@@ -31,7 +31,8 @@ def test_the_radius_of_a_row_of_a_tree_is_the_distance_to_its_cut() -> None:
     assert not found.is_finding
     assert (found.measures[0].value, found.measures[0].exact) == (0.25, "1/4")
     assert found.sentence == (
-        "the row stays 'a' within 25 % of each input's range; with 'x' 0.5001 it is 'b'"
+        "the row stays 'a' within 25 % of each input's range; where 'x' is 0.5001 "
+        "it is 'b'"
     )
     assert isinstance(found.state, Witness)
     assert found.state.claims[0].label == "b"

@@ -245,7 +245,7 @@ def test_shares_of_the_domain_are_told_without_rows() -> None:
     found = asked(subject_of(RULES, settings=Settings(rows=4000, seed=3)))
     assert isinstance(found["rows"].state, Declined)
     assert found["rows"].sentence == (
-        "what rows say about the rules is not known: no rows were given"
+        "what rows say about the rules is not known: rows are needed (--data TABLE)"
     )
     state = found["weak points"].state
     assert isinstance(state, Sampled)

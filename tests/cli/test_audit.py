@@ -48,8 +48,8 @@ def test_a_finding_is_told_at_its_place_and_fails(call: Call) -> None:
         "  again    fuzzytree audit grip.yaml --limits force=3:5 --select FT101" in out
     )
     assert err == (
-        "limits   'slip' declares no range; asked from -2.5 to 3.5, the span of its "
-        "curves\n"
+        "limits   'slip' declares no range; asked from -2.5 to 3.5, by the span of "
+        "its curves; --limits NAME=LOW:HIGH sets it\n"
         "1 finding: 1 error; `fuzzytree explain FT101` tells what to do\n"
     )
 
@@ -67,6 +67,15 @@ def test_what_is_no_finding_is_counted_and_told_one_by_one_by_all(call: Call) ->
     _, out, _ = call("audit", "grip.yaml", "--select", "FT101", "--all")
     assert "answers that are no findings\n  FT101 " in out
     assert "--all" not in out
+
+
+def test_the_row_that_was_given_is_answered_without_being_a_finding(call: Call) -> None:
+    words = ("--row", "force=1,slip=0.1", "--select", "FT204", "--quiet")
+    _, out, _ = call("audit", "grip.yaml", *words)
+    _, mark, told = out.partition("the row that was given\n  FT204 WITNESS  ")
+    assert mark
+    assert told.startswith("the row is decided as '")
+    assert "\n  FT204 " in told.partition("\n\n")[0]
 
 
 def test_quiet_says_nothing_unless_something_fails(call: Call) -> None:
