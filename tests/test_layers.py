@@ -31,3 +31,11 @@ def test_every_module_of_the_package_has_its_layer() -> None:
         if path.name != "py.typed" and not path.name.startswith("__")
     }
     assert modules == placed
+
+
+@pytest.mark.parametrize("package", ["auditing", "proving"])
+def test_the_map_of_a_package_names_each_of_its_modules(package: str) -> None:
+    folder = ROOT / "fuzzytree" / package
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    text = (folder / "__init__.py").read_text("utf-8")
+    assert set(re.findall(r"`(\w+)`", text)) == modules

@@ -1,1 +1,42 @@
-"""What is odd in a rule base: one module for each family of questions."""
+"""What is odd in a rule base: one module for each family of questions.
+
+In reading order:
+
+An audit
+    - `records`: an audit, its answers and settings, as frozen values
+    - `codes`: every question and reason, with a stable code
+    - `subject`: what is audited, as each family gets it
+    - `audit`: asks all families, one after another
+    - `domains`, `views`, `conditions`: where a model is asked, and its rules as a rule
+      base; conditions of fuzzy systems as clauses
+    - `alarms`: a budget that is kept where nobody asks the clock
+    - `places`: where rules stand in a file; ids that outlive their order
+    - `limits`: what an audit does not establish, and its digest
+
+What a user chooses
+    - `selecting`: codes and settings
+    - `configuration`: the same from a file
+    - `baselines`: findings that are accepted
+
+Families, each with `answers(subject)`
+    - `deciding`: does a rule ever win, by how much, does it tie
+    - `gaps`: inputs that no rule covers, or none well
+    - `pairs`, with `clauses`: two rules that hide, copy or contradict each other;
+      clauses that nothing needs
+    - `terms`, with `ranges`, `shapes`, `overlaps`: terms that are not reached, ill
+      shaped, hard to tell apart, not used
+    - `complexity`: counts, and the index of Nauck
+    - `trees`: what each leaf decides
+    - `disagreement`, with `rows`: where a tree and its raw rules part
+    - `robustness`: how far a row is from another decision
+    - `support`: what rows say; shares of the domain
+    - `carriers`, with `conventions`: do all forms and runtimes answer alike
+
+Differences
+    - `difference_records`, `drafting`: a change, and what grades it
+    - `matching`: which rule is which, by what it says
+    - `structure`, `structure_terms`: what is said otherwise
+    - `decisions`: where two models decide otherwise
+    - `system_differences`: the same for fuzzy systems
+    - `differences`: all of it, of two models
+"""
