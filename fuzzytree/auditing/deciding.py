@@ -272,5 +272,6 @@ def _needed(subject: Subject, given: Ground, ties: _Ties) -> Iterator[Answer]:
         sentence = (
             f"{name} is superfluous: nowhere is it stronger than all other rules, and "
             "without it no decision changes"
+            + (", but where strengths only touch" if later else "")
         )
         yield Answer("FT103", name, sentence, state, True, "info", rules=(number,))

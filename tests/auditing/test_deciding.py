@@ -106,6 +106,14 @@ def test_a_rule_below_its_own_class_is_superfluous() -> None:
     found = _found(_asked(*CLEAN, ("small", "a"), ("small", "b")), "FT103")
     assert list(found) == [(3,), (4,)]
     assert not _found(_asked(*CLEAN, ("middle", "a")), "FT103")
+    sentence = (
+        "rule 3 is superfluous: nowhere is it stronger than all other rules, and "
+        "without it no decision changes"
+    )
+    # At a point where it is as strong as rule 4, its place would decide.
+    assert found[3,].sentence == f"{sentence}, but where strengths only touch"
+    alone = _found(_asked(*CLEAN, ("small", "a")), "FT103")
+    assert alone[3,].sentence == sentence
 
 
 def test_a_copy_is_superfluous_and_what_decides_by_place_is_not() -> None:
