@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
@@ -31,6 +30,7 @@ from fuzzytree.numerics.enclosures import (
 )
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.curves import (
+    ONE,
     ZERO,
     pieces,
 )
@@ -39,6 +39,7 @@ from fuzzytree.proving.polynomials import (
     Root,
     composed,
     integers,
+    magnitude,
     refined,
 )
 from fuzzytree.rulebase import Clause, Shape
@@ -150,7 +151,7 @@ def _zones(
 def _bits(root: Root) -> int:
     """Return how fine a root is wanted, for its own size and that of its place."""
     size = max(abs(root.low), abs(root.high), root.high - root.low)
-    return _FINE_BITS + max(0, -math.frexp(float(size) or 1.0)[1])
+    return _FINE_BITS + max(0, -magnitude(size or ONE))
 
 
 # --- the order in each cell

@@ -26,6 +26,7 @@ from fuzzytree.proving.polynomials import (
     divided,
     integer_roots,
     integers,
+    magnitude,
     refined,
     roots,
     value_at,
@@ -156,6 +157,8 @@ def _same(one: Place, other: Place) -> Place | None:
 
 def _is_only_root(of: Polynomial, at: Fraction, place: Place) -> bool:
     """Return whether a polynomial is 0 at a value, and nowhere else in a place."""
+    if place.low == place.high:
+        return at == place.low
     if value_at(of, at) != 0:
         return False
     while len(of) > 1 and value_at(of, at) == 0:
@@ -177,7 +180,7 @@ def _narrowed(place: Place, bits: int) -> Place:
     if place.of is None:
         return place
     size = max(abs(place.low), abs(place.high)) or ONE
-    root = refined(*place.of, bits - math.frexp(float(size))[1])
+    root = refined(*place.of, bits - magnitude(size))
     return Place(root.low, root.high, (place.of[0], root))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from fractions import Fraction
 from typing import NamedTuple
@@ -10,7 +9,13 @@ from typing import NamedTuple
 from fuzzytree.proving.curves import piece_at, pieces
 from fuzzytree.proving.elements import Element
 from fuzzytree.proving.ground import Laid
-from fuzzytree.proving.polynomials import difference, refined, roots, value_at
+from fuzzytree.proving.polynomials import (
+    difference,
+    magnitude,
+    refined,
+    roots,
+    value_at,
+)
 
 START = -1  # the number of the option at an axis's lower end itself
 
@@ -87,7 +92,7 @@ def part_of(
     if not found:
         is_met = (element.degree(middle) >= level) is is_high
         return Stretch(low, high) if is_met else Stretch(high, low)
-    size = max(0, -math.frexp(float(high - low) or 5e-324)[1])
+    size = max(0, -magnitude(high - low))
     place = refined(crossed, found[0], size + bits)
     starts_above = value_at(crossed, low) > 0
     if starts_above is (is_high is not element.is_complement):

@@ -353,8 +353,20 @@ def _bernstein_value(row: Sequence[float], at: float) -> float:
     return points[0]
 
 
+def magnitude(number: Fraction) -> int:
+    """Return the power of 2 that a number, not 0, is about; also beyond doubles.
+
+    Example:
+        >>> magnitude(Fraction(10) ** 400), magnitude(Fraction(-1, 1000))
+        (1329, -9)
+    """
+    return abs(number.numerator).bit_length() - number.denominator.bit_length() + 1
+
+
 def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
     """Return a sure root's place, at most 2**-bits wide, by signs in fractions.
+
+    On scales far above 1 the number of bits may be below 0.
 
     Example:
         >>> two = (Fraction(-2), Fraction(0), Fraction(1))
@@ -363,7 +375,7 @@ def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
         True
     """
     low, high = root.low, root.high
-    goal = Fraction(1, 1 << bits)
+    goal = Fraction(2) ** -bits
     rising = value_at(polynomial, high) > 0 or value_at(polynomial, low) < 0
     while root.is_sure and high - low > goal:
         middle = (low + high) / 2

@@ -1,28 +1,23 @@
-"""Places on an axis are joined only where they are one."""
+"""Places of curves are told apart, also where two of them are the same."""
 
+from __future__ import annotations
+
+import itertools
 from fractions import Fraction
 
-from fuzzytree.proving.elements import Place, _apart
-from fuzzytree.proving.polynomials import Polynomial, Root
-
-SMALL = Fraction(1, 2**70)
-
-
-def _touching(of: Polynomial) -> list[Place]:
-    """Return what becomes of a place at 0 and a root from 0 on."""
-    ends = Fraction(0), Fraction(1, 2**60)
-    return _apart([Place(ends[0], ends[0]), Place(*ends, (of, Root(*ends)))])
+from fuzzytree.proving.elements import Element, places
+from fuzzytree.rulebase import LR, Band, Flank
+from fuzzytree.rulebase import Side as Half
 
 
-def test_a_root_beside_an_exact_place_that_is_a_root_too_stays() -> None:
-    other = (Fraction(0), -2 * SMALL / 3, Fraction(1))  # 0 at 0 and just above
-    assert len(_touching(other)) == 2
-
-
-def test_a_double_root_at_an_exact_place_is_that_place() -> None:
-    ends = Fraction(-1), Fraction(1)
-    of = (Fraction(0), Fraction(0), Fraction(1))
-    vague = Place(*ends, (of, Root(*ends, is_sure=False)))
-    assert _apart([vague, Place(Fraction(0), Fraction(0))]) == [
-        Place(Fraction(0), Fraction(0))
-    ]
+def test_a_root_that_is_known_exactly_may_stand_beside_the_end_of_a_piece() -> None:
+    shapes = (
+        LR(1.0, Half(0.5, (-40.0,), 2.0), Half(0.25, (2.0, 2.0), 1.5)),
+        Band(-0.25, 0.25, Flank(0.0, -0.5, (0.5, 0.5))),
+        LR(1.0, Half(0.5, (-2.0, -1.0), 1.5), Half(0.5, (-1.0, 0.5), 1.5)),
+        LR(0.125, Half(0.25, (0.25, -2.0)), Half(1.0, (-2.0, 0.5))),
+    )
+    found = places([Element(shape) for shape in shapes])
+    assert Fraction(9, 8) in {place.low for place in found}
+    for before, after in itertools.pairwise(found):
+        assert before.low <= before.high < after.low

@@ -7,10 +7,12 @@ import pytest
 
 from fuzzytree.proving.polynomials import (
     Polynomial,
+    Root,
     composed,
     derivative,
     difference,
     integral,
+    magnitude,
     refined,
     roots,
     value_at,
@@ -96,3 +98,11 @@ def test_a_polynomial_is_moved_differentiated_and_integrated() -> None:
 def test_no_interval_is_refused() -> None:
     with pytest.raises(ValueError, match="no interval from 1 to 1"):
         roots((Fraction(0), Fraction(1)), Fraction(1), Fraction(1))
+
+
+def test_a_root_far_above_1_is_refined_to_more_than_1() -> None:
+    far = Fraction(10) ** 400
+    square = (-2 * far**2, Fraction(0), Fraction(1))
+    found = refined(square, Root(far, 2 * far), 64 - magnitude(far))
+    assert found.low**2 < 2 * far**2 < found.high**2
+    assert found.high - found.low <= far / 2**60
