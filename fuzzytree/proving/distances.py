@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.proving.curves import ZERO
-from fuzzytree.proving.measures import Bounds, apart, extremes, local
+from fuzzytree.proving.measures import Bounds, apart, local, sizes
 from fuzzytree.proving.polynomials import difference
 from fuzzytree.rulebase import Shape
 
@@ -59,9 +59,7 @@ def _gaps(
     for a, b in laid.cells.between:
         middle = (a + b) / 2
         gap = difference(local(first, middle), local(second, middle))
-        for at, value in extremes(gap, a, b):
-            ends = sorted((abs(value.low), abs(value.high)))
-            yield at, Bounds(ZERO if value.low < 0 < value.high else ends[0], ends[1])
+        yield from sizes(gap, a, b)
     # Where a curve changes at an irrational place, that is known as a narrow interval.
     lows, highs = laid.cells.left
     for number, (a, b) in enumerate(laid.cells.zones):

@@ -20,9 +20,9 @@ from fuzzytree.proving.elements import Element
 from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.measures import (
     Bounds,
-    extremes,
     local,
     multiplied,
+    sizes,
     values_near,
 )
 from fuzzytree.proving.polynomials import (
@@ -391,9 +391,7 @@ def _gaps(
         above, below = (of.polynomial(axis, rule, cell) for rule in (one, other))
         if above == below:
             continue
-        for at, value in extremes(difference(above, below), low, high):
-            ends = sorted((abs(value.low), abs(value.high)))
-            yield at, Bounds(ZERO if value.low < 0 < value.high else ends[0], ends[1])
+        yield from sizes(difference(above, below), low, high)
     lows, highs = of.at_zones[axis]
     for number, (a, b) in enumerate(zones):
         beside = range(max(number - 1, 0), min(number + 1, len(zones) - 1))

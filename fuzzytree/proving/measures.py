@@ -162,6 +162,15 @@ def extremes(
         yield high, values_near(polynomial, high, high)
 
 
+def sizes(
+    polynomial: Polynomial, low: Fraction, high: Fraction
+) -> Iterator[tuple[Fraction, Bounds]]:
+    """Yield what `extremes` does, with how far the values are from 0."""
+    for at, value in extremes(polynomial, low, high):
+        near, far = sorted((abs(value.low), abs(value.high)))
+        yield at, Bounds(ZERO if value.low < 0 < value.high else near, far)
+
+
 def area(of: Line, chosen: Callable[[int, Fraction], Polynomial]) -> Bounds:
     """Return the area under a curve with degrees in [0, 1] on a line.
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fuzzytree.agreement import Agreement, Certified, Comparison
 from fuzzytree.contracts import Format, Runtime
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.proving.wording import counted as counted  # for other reports too
+from fuzzytree.proving.wording import number_text
 from fuzzytree.rulebase import (
     LR,
     Band,
@@ -26,6 +28,10 @@ _MOST_PAIRS = 6  # points that a line of text shows one by one
 _UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))
 
 
+number = number_text
+"""A number with six digits, for people; files have all of them."""
+
+
 def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
     """Return rows of cells as lines with aligned columns.
 
@@ -39,16 +45,6 @@ def aligned(rows: Iterable[Sequence[str]]) -> list[str]:
         "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
         for row in table
     ]
-
-
-def counted(count: int, what: str, many: str | None = None) -> str:
-    """Return a count with its noun, such as `1 rule` or `2 branches`."""
-    return f"{count} {what}" if count == 1 else f"{count} {many or what + 's'}"
-
-
-def number(value: float) -> str:
-    """Return a number with six digits, for people; files have all of them."""
-    return f"{value:.6g}"
 
 
 def duration(ns: float) -> str:
