@@ -297,6 +297,8 @@ def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
             continue
         elif policy.decision == "all" and CODES[code].decision == "strongest":
             yield f"{name}: not asked: every rule takes part in the answer"
+        elif answered and all(one.startswith("FTD") for one in answered):
+            yield f"{name}: nothing is left to ask it of, beside what was declined"
         else:
             yield f"{name}: nothing in this model to ask it of"
 

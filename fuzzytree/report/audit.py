@@ -29,7 +29,6 @@ MOST_FINDINGS: Final = 200
 _MOST_CALM = 40  # lines of answers that are no findings, unless all are wanted
 _MOST_ALIKE = 3  # of one code that are open
 _MOST_INPUTS = 12  # of a point or region on the terminal
-_LEFT_OUT = ": left out by the user"
 _SHOWN = 84  # characters of a source line
 _COLOURS: Mapping[str, str] = {
     "error": "31;1",
@@ -115,6 +114,7 @@ def summary_lines(audit: Audit) -> Iterator[str]:
     for code in codes:
         answers = [one for one in audit.answers if one.code == code]
         title = CODES[code].title if code in CODES else ""
+        title = title.removeprefix("declined: ")
         rows.append((code, title, *_counts(answers)))
     rows.append(("all", "", *_counts(audit.answers)))
     yield from aligned(rows)
@@ -363,7 +363,8 @@ def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
     """Yield what was declined and why; the findings among it were told before."""
     states = [(one, one.state) for one in audit.answers if not one.is_finding]
     texts = [
-        f"{answer.code} {answer.subject}: {state_text(state)}"
+        f"{answer.code} {answer.subject}: "
+        f"{state_text(state).removeprefix(f'{answer.code}: ')}"
         for answer, state in states
         if isinstance(state, Declined)
     ]
@@ -378,11 +379,13 @@ def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
 
 
 def _gathered(unasked: Sequence[str]) -> Iterator[str]:
-    """Yield sentences, those of codes that the user left out as one."""
-    left_out = [text.split()[0] for text in unasked if text.endswith(_LEFT_OUT)]
-    if left_out:
-        yield f"{', '.join(left_out)}{_LEFT_OUT}"
-    yield from (text for text in unasked if not text.endswith(_LEFT_OUT))
+    """Yield sentences, those of codes that have one reason as one."""
+    alike: dict[str, list[str]] = {}
+    for text in unasked:
+        alike.setdefault(text.partition(": ")[2], []).append(text)
+    for reason, texts in alike.items():
+        codes = ", ".join(text.split()[0] for text in texts)
+        yield f"{codes}: {reason}" if reason and len(texts) > 1 else texts[0]
 
 
 def _asked_text(audit: Audit) -> str:

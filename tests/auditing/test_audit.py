@@ -20,6 +20,7 @@ from fuzzytree.auditing.subject import Rows
 from fuzzytree.errors import TableError
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.states import Declined
 from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.testing import random_system, random_tree
 from tests.cli.conftest import GRASPS, grip
@@ -247,3 +248,13 @@ def test_every_random_tree_is_audited_to_its_end(seed: int) -> None:
     assert found.is_complete
     assert digest_of(found) == found.digest
     assert msgspec.json.decode(msgspec.json.encode(found), type=Audit) == found
+
+
+def test_where_all_is_declined_it_is_said_that_nothing_was_left_to_ask() -> None:
+    root = Path(__file__).resolve().parents[2]
+    found = audit(ft.load(root / "examples" / "tipper.fll"), select=["FT101"])
+    assert found.answers
+    assert all(isinstance(one.state, Declined) for one in found.answers)
+    assert found.unasked[0] == (
+        "FT101 dead rule: nothing is left to ask it of, beside what was declined"
+    )

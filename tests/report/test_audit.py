@@ -7,6 +7,7 @@ import re
 from msgspec.structs import replace
 
 from fuzzytree.auditing.limits import LIMITS
+from fuzzytree.proving.states import Declined
 from fuzzytree.report.audit import (
     MOST_FINDINGS,
     WIDTH,
@@ -54,8 +55,8 @@ declined
 - FT401 term 'low' of 'force': FTD02: its curve (gaussian) has no exact method
 
 not asked, or not to the end
-- FT103, FT104: left out by the user
 - FT102 marginal rule: cut short: the budget of 60 s is spent
+- FT103, FT104: left out by the user
 - FT107 irrelevant clause: not asked: the budget of 60 s is spent
 
 """
@@ -86,6 +87,18 @@ def test_what_is_open_is_told_and_the_rest_counted_unless_all_are_wanted() -> No
     sampled = "  FT701 SAMPLED  rule 1 wins 3 of 4 rows\n"
     assert f"\nanswers that are no findings\n{bracket}{sampled}{sampled}\n" in whole
     assert "--all" not in whole
+
+
+def test_what_is_alike_is_said_once() -> None:
+    audit = every_state()
+    state = Declined("FTD02", "its curve (gaussian) has no exact method")
+    answer = replace(audit.answers[3], code="FTD02", state=state)
+    reason = "not asked: every rule takes part in the answer"
+    unasked = (f"FT102 marginal rule: {reason}", f"FT105 a: {reason}", "FT204 b: c")
+    text = "\n".join(audit_lines(replace(audit, answers=(answer,), unasked=unasked)))
+    assert "\n- FTD02 term 'low' of 'force': its curve (gaussian) has no" in text
+    assert "\nFTD02  a curve without an exact method  1 " in text
+    assert f"\n- FT102, FT105: {reason}\n- FT204 b: c\n" in text
 
 
 def test_the_gravest_finding_comes_first() -> None:
