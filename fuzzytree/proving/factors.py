@@ -30,6 +30,7 @@ from fuzzytree.proving.polynomials import (
     derivative,
     difference,
     divided,
+    monic,
     roots,
     value_at,
 )
@@ -267,14 +268,8 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
 def _is_single(laid: Laid, low: Fraction, high: Fraction) -> bool:
     """Return whether a zone is one place: no cell lies hidden in it."""
     met = [p for p in laid.axis.found if p.low <= high and p.high >= low]
-    roots_of = {_monic(p.of[0]) for p in met if p.of}
+    roots_of = {monic(p.of[0]) for p in met if p.of}
     return len(roots_of) == 1 and all(p.of and p.of[1].is_sure for p in met)
-
-
-def _monic(polynomial: Polynomial) -> Polynomial:
-    """Return the multiple of a polynomial, not 0, whose last coefficient is 1."""
-    end = max(n for n, one in enumerate(polynomial, 1) if one)
-    return tuple(one / polynomial[end - 1] for one in polynomial[:end])
 
 
 def quotient(

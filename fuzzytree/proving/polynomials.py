@@ -110,6 +110,19 @@ def divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
     return tuple(reversed(found))
 
 
+def monic(polynomial: Polynomial) -> Polynomial:
+    """Return the multiple of a polynomial whose last coefficient is 1; 0 stays 0.
+
+    Example:
+        >>> [str(one) for one in monic((Fraction(1), Fraction(2), Fraction(0)))]
+        ['1/2', '1']
+    """
+    end = max((n for n, one in enumerate(polynomial, 1) if one), default=0)
+    return tuple(one / polynomial[end - 1] for one in polynomial[:end]) or (
+        Fraction(0),
+    )
+
+
 def composed(polynomial: Polynomial, offset: Fraction, slope: Fraction) -> Polynomial:
     """Return p(offset + slope x) as a polynomial in x.
 
@@ -358,7 +371,7 @@ def magnitude(number: Fraction) -> int:
 
     Example:
         >>> magnitude(Fraction(10) ** 400), magnitude(Fraction(-1, 1000))
-        (1329, -9)
+        (1329, -8)
     """
     return abs(number.numerator).bit_length() - number.denominator.bit_length() + 1
 

@@ -14,7 +14,7 @@ from fractions import Fraction
 from fuzzytree.proving.curves import ONE, Piece
 from fuzzytree.proving.elements import Element
 from fuzzytree.proving.ground import Axis, Ground
-from fuzzytree.proving.polynomials import Polynomial
+from fuzzytree.proving.polynomials import Polynomial, monic
 from fuzzytree.proving.stretches import spread
 
 _Held = tuple[Fraction, Fraction, Piece, Polynomial]
@@ -55,7 +55,7 @@ def _may_be_multiples(
     ours = axis.elements[mine[0][0] if mine else 0]
     rival = axis.elements[theirs[0][0] if theirs else 0]
     return any(
-        _are_multiples(p, q)
+        monic(p) == monic(q)
         for a in _held(ours, low, high)
         for b in _held(rival, low, high)
         if max(a[0], b[0]) < min(a[1], b[1])
@@ -82,17 +82,3 @@ def _forms(element: Element, held: _Held) -> Iterator[Polynomial]:
     is_held = most > piece.cap or least >= piece.cap
     if is_held or (element.is_complement and (least < 0 or most <= 0)):
         yield (ONE,)
-
-
-def _are_multiples(one: Polynomial, other: Polynomial) -> bool:
-    p, q = _trimmed(one), _trimmed(other)
-    return len(p) == len(q) and all(
-        a * q[-1] == b * p[-1] for a, b in zip(p, q, strict=True)
-    )
-
-
-def _trimmed(polynomial: Polynomial) -> Polynomial:
-    end = len(polynomial)
-    while end > 1 and not polynomial[end - 1]:
-        end -= 1
-    return polynomial[:end]
