@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
+from fuzzytree.auditing.alarms import enforced
 from fuzzytree.auditing.domains import inputs_of
 from fuzzytree.auditing.drafting import Evidence
 from fuzzytree.auditing.records import Answer, Settings
@@ -24,9 +25,9 @@ from fuzzytree.auditing.support import drawn, share
 from fuzzytree.contracts import Document
 from fuzzytree.numerics.oracle import MISSING, TIE, UNCOVERED, Decided, decide
 from fuzzytree.probing import probe_values
-from fuzzytree.proving.alike import alike, region
+from fuzzytree.proving.alike import OF, alike, region
 from fuzzytree.proving.answers import Answered, answer_at, difference_at
-from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import (
     Bracket,
@@ -125,7 +126,7 @@ def decisions(
         answers = [*_witness_answers(pair, found), *answers]
     else:
         clock.tell("proving that decisions are equal", 0.3)
-        state = alike(pair.old, pair.new, pair.domain, clock)
+        state = _alike(pair, clock)
         if isinstance(state, Witness):
             found.add_point(point_of(state.point))
             answers = [*_witness_answers(pair, found), *answers]
@@ -135,6 +136,15 @@ def decisions(
     if values.shape[1] and is_open:
         answers.append(_drawn_answer(many, values.shape[1], settings.seed))
     return answers, found.evidence(is_equal=not is_open)
+
+
+def _alike(pair: Pair, clock: Clock) -> State:
+    """Return whether both answer alike; the budget is kept even within a box."""
+    try:
+        with enforced(clock):
+            return alike(pair.old, pair.new, pair.domain, clock)
+    except OutOfTimeError:
+        return Bracket(OF, 0.0, 1.0, "the budget was spent within a box")
 
 
 def _same_everywhere(pair: Pair) -> Answer | None:

@@ -21,7 +21,7 @@ from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from fuzzytree.proving.answers import difference_at
 from fuzzytree.proving.clock import Clock
@@ -39,7 +39,7 @@ MOST_BOXES = 4_000
 TOUCHING = 2.0**-50
 """Where classes are no further apart than this, boxes are not halved any more."""
 
-_OF = "the smaller of both margins where the two answer otherwise"
+OF: Final = "the smaller of both margins where the two answer otherwise"
 _DEEP = 12  # halvings, before which no box is taken for a touching tie
 _HALVINGS = 60  # of what a region may still grow by
 _DEEPEST = 60  # halvings of a box in which both answer otherwise, but no double is met
@@ -190,7 +190,7 @@ class _Search:
                 todo.put(_Open(margin, half, box.depth + 1, found.rules))
         if stuck >= 0.0:
             why = "no double is known that reaches what is open"
-            return Bracket(_OF, 0.0, stuck, why)
+            return Bracket(OF, 0.0, stuck, why)
         noun = "box" if settled == 1 else "boxes"
         return Proved(f"both answer alike in every box: {settled} {noun} settled")
 
@@ -201,7 +201,7 @@ class _Search:
         elif clock.is_over:
             why = "the budget was spent"
         return Bracket(
-            _OF,
+            OF,
             0.0,
             margin,
             f"{why}: {settled} boxes are settled, and {left} are open",

@@ -6,10 +6,15 @@ import signal
 import threading
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 
+from fuzzytree.auditing import decisions
 from fuzzytree.auditing.alarms import enforced
+from fuzzytree.auditing.records import Settings
 from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.states import Bracket
+from tests.proving.bases import random_base, unit_domain
 
 
 @pytest.fixture(autouse=True)
@@ -67,3 +72,15 @@ def test_another_thread_has_no_alarm() -> None:
     thread.start()
     thread.join()
     assert seen == [(0.0, 0.0)]
+
+
+def test_a_comparison_ends_within_a_box_that_never_asks_the_clock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(decisions, "alike", lambda *_: forever())
+    old = random_base(1, 3, 2)
+    new = msgspec.structs.replace(old, rules=old.rules[::-1])
+    pair = decisions.Pair(old, new, old.inputs, unit_domain(old))
+    (answer, *_), _ = decisions.decisions(pair, None, Settings(rows=10), Clock(0.05))
+    assert isinstance(answer.state, Bracket)
+    assert answer.state.why == "the budget was spent within a box"
