@@ -8,7 +8,6 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.disagreement import Both, answers
-from fuzzytree.proving.wording import percent
 from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.numerics.exact import exact_answer
@@ -16,6 +15,7 @@ from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.nearest import distance
 from fuzzytree.proving.regions import regions
 from fuzzytree.proving.states import Bracket, Declined, Proved, Witness, point_of
+from fuzzytree.proving.wording import percent
 from fuzzytree.rulebase import Conjunction
 from fuzzytree.testing import random_tree
 from tests.auditing.small_trees import one_cut, subject_of, two_cuts

@@ -8,12 +8,12 @@ import numpy as np
 
 from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.rows import (
-    Rows,
     box_distance,
     distance_measure,
     points_of,
     ranked,
 )
+from fuzzytree.auditing.subject import Rows
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Claim, Proved, Span, Witness, coordinates
 from tests.auditing.small_trees import subject_of, two_cuts
