@@ -33,7 +33,7 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
         ignore: Beginnings of codes that are left out.
 
     Raises:
-        ValueError: If one is the beginning of no code.
+        ValueError: If one is the beginning of no code, or nothing is left to ask.
 
     Example:
         >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103", "FTD"]))
@@ -45,11 +45,14 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
                 f"no code begins with {text!r}; {name_choice(text, [*CODES])}"
             )
     taken = (*select, "FTD") if select else ("FT",)
-    return {
+    found = {
         code
         for code in CODES
         if code.startswith(taken) and not (ignore and code.startswith(tuple(ignore)))
     }
+    if all(code.startswith("FTD") for code in found):
+        raise ValueError("select and ignore leave no code of which anything is asked")
+    return found
 
 
 def check_settings(settings: Settings) -> None:

@@ -390,13 +390,15 @@ def _gathered(unasked: Sequence[str]) -> Iterator[str]:
 
 def _asked_text(audit: Audit) -> str:
     """Return how many questions were asked, and how many are open or declined."""
+    if not audit.answers:
+        return "nothing in this model to ask it of"
     asked = f"{counted(len(audit.answers), 'question')} asked"
     kinds = {"open": Bracket, "declined": Declined}
     counts = {
         word: sum(isinstance(one.state, kind) for one in audit.answers)
         for word, kind in kinds.items()
     }
-    if counts["declined"] == len(audit.answers) > 0:
+    if counts["declined"] == len(audit.answers):
         return f"{asked}, and every one declined: nothing is known"
     told = [f"{count} {word}" for word, count in counts.items() if count]
     if not told:

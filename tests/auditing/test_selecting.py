@@ -63,3 +63,9 @@ def test_a_budget_of_nothing_or_without_end_is_refused(budget: float) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
         check_settings(Settings(budget_s=budget))
     assert str(caught.value) == message
+
+
+def test_a_choice_that_leaves_nothing_to_ask_is_refused() -> None:
+    message = "^select and ignore leave no code of which anything is asked$"
+    with pytest.raises(ValueError, match=message):
+        chosen_codes(["FT2"], ["FT2"])

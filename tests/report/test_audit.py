@@ -171,6 +171,8 @@ def test_the_verdict_counts_and_says_what_next() -> None:
     )
     calm = replace(audit, answers=audit.answers[3:], accepted=(), is_complete=True)
     assert verdict_text(calm) == "nothing found; 2 questions asked, 1 of them declined"
+    bare = replace(calm, answers=())
+    assert verdict_text(bare) == "nothing found; nothing in this model to ask it of"
     none = replace(calm, answers=calm.answers[:1])
     assert verdict_text(none) == (
         "nothing found; 1 question asked, and every one declined: nothing is known"

@@ -156,7 +156,7 @@ BY_HAND = (
     ),
     Told(
         "fuzzylite mamdani/SimpleDimmer.fll",
-        "no rule fires here",
+        "no rule fires where 'Ambient' is 0",
         "`Ambient` has the range 0 to 1, `DARK` is `Triangle 0 0.25 0.5` and `BRIGHT` "
         "is `Triangle 0.5 0.75 1`: at 0 and at 1 themselves every degree is 0, and the "
         "answer is the default, which the file sets to nan.",
