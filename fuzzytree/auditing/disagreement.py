@@ -34,7 +34,7 @@ from fuzzytree.proving.wording import answer_text, percent
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.tree import FuzzyTree
 
-MOST_ROWS = 1000
+MOST_ROWS = 50
 """Rows around which the nearest disagreement is sought."""
 
 _PART = 0.25  # of the time that is left, for one leaf
@@ -56,7 +56,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield from differing(subject, raw, tree, found)
     if subject.rows is not None:
         both = Both(tree, raw, subject.domain, found)
-        points = points_of(subject, subject.rows, MOST_ROWS)
+        points = points_of(subject, subject.rows)
         yield from nearest_difference(both, points, subject.clock)
 
 
@@ -203,7 +203,7 @@ def nearest_difference(both: Both, points: Points, clock: Clock) -> Iterator[Ans
     alike = [one for one in points.at if one[0] not in aside]
     alike.sort(key=lambda one: both.margin(one[1]))
     search = _Search(both, clock)
-    search.run(alike)
+    search.run(alike[:MOST_ROWS])
     yield _nearest_answer(both, points, search, len(differ), len(alike))
 
 

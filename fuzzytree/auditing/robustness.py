@@ -34,7 +34,7 @@ from fuzzytree.proving.witnesses import is_within
 from fuzzytree.proving.wording import answer_text, number_text, percent
 from fuzzytree.tree import FuzzyTree
 
-MOST_ROWS = 200
+MOST_ROWS = 50
 """Rows whose radius is sought."""
 
 SHOWN_ROWS = 5
@@ -296,10 +296,10 @@ def answers(subject: Subject) -> Iterator[Answer]:
         assert declined is not None  # set above where there are no rows
         yield Answer("FT204", "rows", NOT_SOUGHT, declined, False)
         return
-    points = points_of(subject, subject.rows, MOST_ROWS)
+    points = points_of(subject, subject.rows)
     decider = decider_of(subject)
     asked: list[_Asked] = []
-    for number, point in points.at:
+    for number, point in points.at[:MOST_ROWS]:
         if subject.clock.is_over:
             break
         subject.clock.tell(f"radius of row {number}", len(asked) / len(points.at))
@@ -331,14 +331,15 @@ def _in_all(decider: Decider, points: Points, asked: Sequence[_Asked]) -> Answer
         return Answer("FT204", "rows", NOT_SOUGHT, state, False, measures=(count,))
     first = asked[0]
     least = first.found.low
+    of_all = "" if len(asked) == len(points.at) else "with the smallest margins "
     median = statistics.median_low([one.found.low for one in asked])
     one = _answer(decider, f"row {first.number}", first.point, first.found)
     return Answer(
         code="FT204",
         subject="rows",
-        sentence=f"of {points.text} {len(asked)} different ones were asked: each keeps "
-        f"its decision within at least {percent(least)} {OF_RANGES}, half of them "
-        f"within {percent(median)}",
+        sentence=f"of {points.text} {len(asked)} different ones {of_all}were asked: "
+        f"each keeps its decision within at least {percent(least)} {OF_RANGES}, half "
+        f"of them within {percent(median)}",
         state=one.state,
         is_finding=False,
         measures=(

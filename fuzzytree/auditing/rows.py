@@ -12,6 +12,7 @@ import numpy as np
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Rows, Subject
 from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics.oracle import decide
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import Span, Witness, point_of
 from fuzzytree.proving.variables import contains
@@ -26,62 +27,53 @@ class Points(msgspec.Struct, frozen=True, eq=False):
     """Rows that lie in the domain.
 
     Attributes:
-        at: The row's number, from 1, and its values; equal rows stand once. They are
-            shuffled, so that the first of them stand for all.
-        looked_at: How many rows were looked at.
+        at: The row's number, from 1, and its values; equal rows stand once, close
+            calls first.
         left_out: How many different ones have a value that is missing, or outside the
             domain.
         total: How many rows there are.
     """
 
     at: tuple[tuple[int, dict[str, Fraction]], ...]
-    looked_at: int
     left_out: int
     total: int
 
     @property
     def text(self) -> str:
         """Which rows these are, as sentences show it."""
-        text = f"{self.looked_at} of {self.total} rows"
-        if self.looked_at == self.total:
-            text = f"{self.total} rows"
+        text = f"{self.total} rows"
         if self.left_out:
             text += f" ({self.left_out} incomplete or outside the domain)"
         return text
 
 
-def points_of(subject: Subject, rows: Rows, most: int) -> Points:
-    """Return the user's rows as points of the domain.
+def points_of(subject: Subject, rows: Rows) -> Points:
+    """Return the user's rows as points of the domain, close calls first.
+
+    A call is close where the margin of the rules is small: there another decision tends
+    to be near.
 
     Args:
         subject: The model.
         rows: The rows.
-        most: If there are more, so many are taken at even distances.
     """
     names = subject.rules.inputs
     total = rows.values.shape[1]
-    taken = range(total)
-    if total > most:
-        taken = range(0, total, -(-total // most))
+    margins = decide(subject.rules, rows.values, with_strengths=False).margin
     seen: dict[tuple[float, ...], int] = {}
-    for row in taken:
+    for row in np.argsort(margins, kind="stable").tolist():
         seen.setdefault(tuple(rows.values[:, row].tolist()), row + 1)
-    found = [
+    complete = [
         (number, dict(zip(names, map(Fraction, values), strict=True)))
         for values, number in seen.items()
         if all(map(math.isfinite, values))
     ]
     at = tuple(
         (number, point)
-        for number, point in sorted(found, key=lambda one: _shuffled(one[0]))
+        for number, point in complete
         if contains(subject.domain, subject.rules.variables, point)
     )
-    return Points(at, len(taken), len(seen) - len(at), total)
-
-
-def _shuffled(number: int) -> int:
-    """Return a key that spreads numbers evenly: steps of the golden section."""
-    return number * 0x9E3779B97F4A7C15 % 2**64
+    return Points(at, len(seen) - len(at), total)
 
 
 def distance_measure(name: str, value: Fraction) -> Measure:

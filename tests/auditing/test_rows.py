@@ -14,6 +14,7 @@ from fuzzytree.auditing.rows import (
     ranked,
 )
 from fuzzytree.auditing.subject import Rows
+from fuzzytree.numerics.oracle import decide
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Claim, Proved, Span, Witness, coordinates
 from tests.auditing.small_trees import subject_of, two_cuts
@@ -75,18 +76,20 @@ def test_equal_rows_stand_once_and_those_outside_are_counted() -> None:
     rows = [[0.5, 0.5], [0.5, 0.5], [2.0, 0.5], [np.nan, 0.5], [0.25, 0.5]]
     subject = subject_of(two_cuts(0.75), rows=rows)
     assert subject.rows is not None
-    points = points_of(subject, subject.rows, 10)
+    points = points_of(subject, subject.rows)
     assert sorted(number for number, _ in points.at) == [1, 5]
     assert points.text == "5 rows (2 incomplete or outside the domain)"
 
 
-def test_of_many_rows_some_are_taken_at_even_distances() -> None:
-    rows = [[n / 100, 0.5] for n in range(100)]
+def test_close_calls_come_first() -> None:
+    rows = [[0.1, 0.5], [0.9, 0.5], [0.74, 0.5], [0.76, 0.5]]
     subject = subject_of(two_cuts(0.75), rows=rows)
     assert subject.rows is not None
-    points = points_of(subject, subject.rows, 30)
-    assert sorted(number for number, _ in points.at) == [*range(1, 101, 4)]
-    assert points.text == "25 of 100 rows"
+    points = points_of(subject, subject.rows)
+    margins = [decide(subject.rules, np.array([row]).T).margin[0] for row in rows]
+    wanted = sorted(range(1, 5), key=lambda number: margins[number - 1])
+    assert [number for number, _ in points.at] == wanted
+    assert points.text == "4 rows"
 
 
 def test_a_long_exact_number_is_left_out_and_its_double_is_no_larger() -> None:
