@@ -63,7 +63,7 @@ def test_a_domain_without_such_a_point_has_no_nearest_one() -> None:
 
 def test_a_centre_of_the_kind_has_distance_zero() -> None:
     found = nearest(SQUARE, CENTRE, _ask_right, lambda _: True)
-    assert (found.low, found.high, found.point) == (0, 0, CENTRE)
+    assert (found.low, found.high, found.point) == (Fraction(0), Fraction(0), CENTRE)
 
 
 def test_what_is_left_open_widens_the_bounds_and_says_why() -> None:
