@@ -41,6 +41,7 @@ from fuzzytree.proving.polynomials import (
     integers,
     magnitude,
     refined,
+    value_at,
 )
 from fuzzytree.rulebase import Clause, Shape
 
@@ -129,6 +130,8 @@ def _zones(
     for place in found:
         if place.high <= low or place.low >= high:
             continue
+        if _is_at(place, low) or _is_at(place, high):
+            continue  # an end is a zone already
         a, b = place.low, place.high
         is_vague = place.of is not None and not place.of[1].is_sure
         if is_fine and place.of is not None:
@@ -146,6 +149,15 @@ def _zones(
             merged[-1] = (before[0], max(b, before[1]), True)
     zones = tuple((a, b) for a, b, _ in merged)
     return zones, np.array([is_vague for _, _, is_vague in merged])
+
+
+def _is_at(place: Place, end: Fraction) -> bool:
+    """Return whether a place that is known within bounds is an end, exactly."""
+    if place.of is None or not place.low <= end <= place.high:
+        return False
+    polynomial, root = place.of
+    is_within = root.is_sure and root.low < end < root.high
+    return is_within and not value_at(polynomial, end)
 
 
 def _bits(root: Root) -> int:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.proving.factors import Factored, largest_ratio, least_ratios
+from fuzzytree.proving.factors import Factored, is_single, largest_ratio, least_ratios
 from fuzzytree.proving.ground import Ground, Laid
 
 if TYPE_CHECKING:
@@ -113,9 +113,12 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
     def fires(self) -> BoolArray:
         """Whether each rule fires anywhere, if axes are free."""
         found = np.ones(len(self.ground.rules.rules), dtype=bool)
-        for side in self.sides:
-            zones = side.is_zero_at if side.has_start else side.is_zero_at[:, 1:]
-            found &= ~(side.is_zero.all(axis=1) & zones.all(axis=1))
+        for side, laid in zip(self.sides, self.ground.laid[0], strict=True):
+            # Continuous from the left: one place between two cells is as these are.
+            single = [is_single(laid, *zone) for zone in laid.cells.zones]
+            zones = side.is_zero_at[:, 1:] | np.array(single[1:], bool)
+            start = side.is_zero_at[:, 0] if side.has_start else np.True_
+            found &= ~(side.is_zero.all(axis=1) & zones.all(axis=1) & start)
         return found
 
     @functools.cached_property

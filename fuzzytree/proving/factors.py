@@ -256,7 +256,7 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
         most, least = Fraction(highs[weak, number]), Fraction(lows[strong, number])
         if not most:
             continue
-        if all(beside) and _is_single(of.laid[axis], a, b):
+        if all(beside) and is_single(of.laid[axis], a, b):
             high = max(high, ONE) if low < ONE else high
             continue
         if not least:
@@ -265,8 +265,13 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
     return Bounds(low, high)
 
 
-def _is_single(laid: Laid, low: Fraction, high: Fraction) -> bool:
+def is_single(laid: Laid, low: Fraction, high: Fraction) -> bool:
     """Return whether a zone is one place: no cell lies hidden in it."""
+    if low == high:
+        return True
+    zones = laid.cells.zones
+    if low == zones[0][0] or high == zones[-1][1]:
+        return False  # an end beside a place
     met = [p for p in laid.axis.found if p.low <= high and p.high >= low]
     roots_of = {monic(p.of[0]) for p in met if p.of}
     return len(roots_of) == 1 and all(p.of and p.of[1].is_sure for p in met)

@@ -18,6 +18,7 @@ from fuzzytree.proving.meeting import highest, meet
 from fuzzytree.proving.states import Bracket, Proved, Witness
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import (
+    LR,
     Band,
     Clause,
     Flank,
@@ -28,6 +29,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.rulebase import Side as Half
 from tests.proving.bases import Kind, random_base, unit_domain
 
 KINDS: tuple[Kind, ...] = ("points", "band", "lr")
@@ -210,3 +212,17 @@ def test_curves_whose_leading_coefficients_cancel_are_compared() -> None:
     both = compared(rules)
     assert both.never_weaker(1, 2) == "not"
     assert both.never_weaker(3, 4) == "always"
+
+
+def test_a_rule_that_is_0_on_both_sides_of_an_irrational_place_never_fires() -> None:
+    terms = (
+        Term("far", Points((2.0, 3.0), (0.0, 1.0))),
+        Term("bell", LR(0.5, Half(0.3, (3.0, 1.0), 2.0), Half(0.5, (3.0,), 1.5))),
+    )
+    variable = Variable("x", terms, low=0.0, high=1.0)
+    whens = (
+        (Clause("x", ("bell",)), Clause("x", ("far",))),
+        (Clause("x", ("bell",)),),
+    )
+    rules = RuleBase("r", ("a",), (variable,), tuple(Rule(when, "a") for when in whens))
+    assert compared(rules).fires.tolist() == [False, True]

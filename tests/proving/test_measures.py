@@ -12,7 +12,8 @@ from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.proving.defects import dips, outside
 from fuzzytree.proving.measures import Bounds, Line, area, heights, line, local, walk
 from fuzzytree.proving.overlap import most_shared, overlap
-from fuzzytree.rulebase import Points, Shape
+from fuzzytree.rulebase import LR, Points, Shape
+from fuzzytree.rulebase import Side as Half
 from tests.proving.bases import random_shape
 
 ZERO, ONE = Fraction(0), Fraction(1)
@@ -34,6 +35,13 @@ def test_no_degree_is_above_a_height_and_one_is_near_it(seed: int) -> None:
         near = [exact_degree(shape, at + step) for step in (0, Fraction(1, 2**60))]
         assert height.low - max(near) < Fraction(1, 10**9)
         assert height.high - height.low < Fraction(1, 10**9)
+
+
+def test_a_curve_that_meets_0_at_the_lower_end_is_0_from_there() -> None:
+    rise = Half(0.25, (0.25,), 5.0)
+    fall = LR(-0.125, rise, Half(0.25, (2.0, -1.0), 2.0))  # 32 x**2 - 4 x about 0
+    ((height, _),) = heights(line([fall], ZERO, ONE))
+    assert height == Bounds(ZERO, ZERO)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
