@@ -84,12 +84,14 @@ class Case:
         if not variable.parts and side is not None:
             return Line(Fraction(side.low), Fraction(side.high))
         low = high = ZERO
-        for part in variable.parts:
-            one, weight = self.sides[part.input], Fraction(part.weight)
-            away = (
-                Fraction(end) - Fraction(part.centre) for end in (one.low, one.high)
-            )
-            ends = [weight * end for end in away]
+        weights = dict.fromkeys((part.input for part in variable.parts), ZERO)
+        for part in variable.parts:  # an input may stand several times
+            weight = Fraction(part.weight)
+            weights[part.input] += weight
+            low, high = (end - weight * Fraction(part.centre) for end in (low, high))
+        for name, weight in weights.items():
+            one = self.sides[name]
+            ends = [weight * Fraction(end) for end in (one.low, one.high)]
             low, high = low + min(ends), high + max(ends)
         if side is not None:
             low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
@@ -119,8 +121,7 @@ class Case:
 
     def fire(self, *numbers: int) -> bool:
         """Return whether each of some rules fires somewhere."""
-        gap = self.grid.gap(ZERO, is_above=True)
-        return all(self.grid.leaves(self.asked(n), (), gap) for n in numbers)
+        return all(self.grid.fires(self.asked(n)) for n in numbers)
 
     def beats(self, mine: Asked, rivals: Sequence[Asked]) -> bool:
         """Return whether a rule is somewhere stronger than each rival.

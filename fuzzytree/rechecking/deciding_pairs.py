@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from fuzzytree.rechecking.audit_records import Answer, Witness, fraction
+from fuzzytree.rechecking.audit_records import Answer, Label, Witness, fraction
 from fuzzytree.rechecking.cases import Case, counted
 from fuzzytree.rechecking.claims import point_of
 from fuzzytree.rechecking.meaning import answer_of
@@ -97,7 +97,13 @@ def apart(case: Case, answer: Answer) -> None:
 
 def needless(case: Case, answer: Answer) -> None:
     """Ask whether a rule without a clause is anywhere stronger than with it."""
+    if not answer.rules:
+        raise UndecidedError("which other clauses matter is not known")
     require(len(answer.rules) == 1, "it is of no rule")
+    if not answer.terms:
+        require(not answer.is_finding, "it is of no clause of the rule")
+        require(not case.fire(*answer.rules), "the rule fires somewhere")
+        return
     rest = case.grid.asked(_without(case, answer))
     if case.beats(rest, [case.asked(answer.rules[0])]):
         raise UndecidedError("the rule is stronger without it, if not in its answers")
@@ -106,12 +112,18 @@ def needless(case: Case, answer: Answer) -> None:
 def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:
     """Return a rule's clauses without the one that an answer is about."""
     when = case.rules.rules[answer.rules[0] - 1].when
-    variables = tuple(label.variable for label in answer.terms[:1])
-    asked = (variables, {label.term for label in answer.terms})
-    found = {clause for clause in when if ((clause[0],), {*clause.terms}) == asked}
+    asked = {c: tuple(Label(c.variable, term) for term in c.terms) for c in when}
+    found = {clause for clause, labels in asked.items() if labels == answer.terms}
+    if len(found) > 1:  # one of them is negated: only the subject says which
+        found = {c for c in found if answer.subject.endswith(repr(_text(c)))}
     require(len(found) == 1, "it is of no clause of the rule")
     place = when.index(found.pop())
     return (*when[:place], *when[place + 1 :])
+
+
+def _text(clause: Clause) -> str:
+    verb = "is not" if clause.negated else "is"
+    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
 
 
 def shows_need(case: Case, answer: Answer, state: Witness) -> None:

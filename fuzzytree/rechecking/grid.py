@@ -12,7 +12,8 @@ from fuzzytree.rechecking.outcomes import UndecidedError
 from fuzzytree.rechecking.polynomials import ONE, ZERO
 
 MOST_SETS = 50_000
-Asked = tuple[int, ...]  # what a rule asks of each axis: its functions as bits
+Asked = tuple[int, ...]
+"""What a rule asks of each axis, its functions as bits; and how many stand again."""
 
 
 class Axis(NamedTuple):
@@ -48,13 +49,14 @@ class Grid:
 
     def asked(self, when: Iterable[Clause]) -> Asked:
         """Return what clauses ask of each axis; every one must be of some rule."""
-        bits = [0] * len(self.axes)
+        bits, again = [0] * len(self.axes), 0
         for clause in when:
             for place, axis in enumerate(self.axes):
-                bits[place] |= (
-                    1 << axis.numbers[clause] if clause in axis.numbers else 0
-                )
-        return tuple(bits)
+                if clause in axis.numbers:
+                    bit = 1 << axis.numbers[clause]
+                    again += bool(bits[place] & bit)
+                    bits[place] |= bit
+        return (*bits, again)
 
     def _sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
         """Return per axis which sets of functions can be at a level or above.
@@ -106,6 +108,12 @@ class Grid:
                 raise UndecidedError("two critical levels are too near to tell apart")
         return False
 
+    def fires(self, mine: Asked) -> bool:
+        """Return whether a rule is above 0 somewhere: on each axis in some cell."""
+        asked = zip(self.axes, mine[:-1], strict=True)
+        every = ((self._zeros(axis, is_vague=False), own) for axis, own in asked)
+        return all(any(not own & zeros for zeros in sets) for sets, own in every)
+
     def is_bare(self, rules: Sequence[Asked]) -> bool | None:
         """Return whether all rules are somewhere exactly 0; None if it is not known."""
         found: list[bool] = []
@@ -143,7 +151,9 @@ class Grid:
         That suffices for min and product alike. A rule of several clauses on one
         variable is not looked at.
         """
-        for axis, own, other in zip(self.axes, mine, theirs, strict=True):
+        if mine[-1] or theirs[-1]:
+            return False
+        for axis, own, other in zip(self.axes, mine[:-1], theirs[:-1], strict=True):
             if max(own.bit_count(), other.bit_count()) > 1:
                 return False
             one, two = own.bit_length() - 1, other.bit_length() - 1

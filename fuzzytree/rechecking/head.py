@@ -7,11 +7,12 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from fuzzytree.rechecking.audit_records import Policy
+from fuzzytree.rechecking.audit_records import Answer, Policy
 from fuzzytree.rechecking.cases import Case
 from fuzzytree.rechecking.fingerprints import compact, digest_of, fingerprint, said
 from fuzzytree.rechecking.fixed import LIMITS, SEVERITIES
 from fuzzytree.rechecking.model_records import Rules, Shape, Tree
+from fuzzytree.rechecking.outcomes import UndecidedError
 from fuzzytree.rechecking.report import Report
 
 
@@ -119,6 +120,8 @@ def _complete(case: Case, report: Report) -> None:
     if isinstance(case.model, Tree):
         wanted["FT101"] = dead
         wanted["FT205"] = every - dead
+        told_of = {one.rules[0] for one in by["FT102"] if one.rules}
+        wanted["FT102"] = {n for n in every if n in told_of or _wins(case, n)}
     if len(every) == 1:
         del wanted["FT103"]
     for code, numbers in wanted.items():
@@ -126,10 +129,26 @@ def _complete(case: Case, report: Report) -> None:
         if code not in told and by[code] and found != numbers:
             report.wrong.append(f"{code} was not asked of each rule, or twice")
     clauses = sum(len(rule.when) for rule in case.rules.rules)
-    alone = [one for one in by["FT107"] if one.rules]
-    rest = [m.value for one in by["FT107"] if not one.rules for m in one.measures]
-    is_all = "FT107" in told or not by["FT107"] or len(alone) + sum(rest) == clauses
+    asked = sum(_clauses(case, one) for one in by["FT107"])
+    is_all = "FT107" in told or not by["FT107"] or asked == clauses
     report.expect(is_all, "FT107 was not asked of each clause")
+
+
+def _wins(case: Case, number: int) -> bool:
+    """Return whether a rule is known to beat those of other classes somewhere."""
+    rivals = [case.asked(n) for n in case.numbers if case.then(n) != case.then(number)]
+    try:
+        return case.is_free and case.beats(case.asked(number), rivals)
+    except UndecidedError:
+        return False
+
+
+def _clauses(case: Case, answer: Answer) -> float:
+    """Return of how many clauses an answer is: one, some more, all of a rule."""
+    if not answer.rules:
+        return sum(one.value for one in answer.measures)
+    is_one = answer.terms or answer.rules[0] not in case.numbers
+    return 1 if is_one else len(case.rules.rules[answer.rules[0] - 1].when)
 
 
 def _ids(case: Case, report: Report) -> None:

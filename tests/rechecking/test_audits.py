@@ -12,13 +12,25 @@ from typing import Any
 import pytest
 
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.rechecking import CannotRunError, recheck
 from fuzzytree.rechecking.fingerprints import digest_of
 from fuzzytree.rechecking.fixed import LIMITS
-from fuzzytree.rulebase import Conjunction, RuleBase
+from fuzzytree.rulebase import (
+    Clause,
+    Conjunction,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree
-from tests.proving.bases import random_base
+from tests.proving.bases import Kind, random_base
 from tests.rechecking.audits import audited, small
 
 Facts = dict[str, Any]
@@ -114,6 +126,84 @@ def test_audits_of_every_form_hold(kind: str) -> None:
         model = random_base(3, 4, 2, norm, "points", shared=0.5)
     found = recheck(*audited(model, ignore=["FT6", "FT204"]), ("a.json", "m.yaml"))
     assert found.wrong == []
+
+
+UP, DOWN = Points((0.0, 4.0), (0.0, 1.0)), Points((0.0, 4.0), (1.0, 0.0))
+LATE = Points((4.0, 6.0), (0.0, 1.0))
+X = Variable(
+    "x", (Term("up", UP), Term("down", DOWN), Term("late", LATE)), "", 0.0, 4.0
+)
+
+
+def wrong_of(model: RuleBase | FuzzyTree, **options: Any) -> list[str]:
+    """Return what does not hold of the audit of a model, as it was made."""
+    return recheck(*audited(model, **options), ("a.json", "m.yaml")).wrong
+
+
+def rules_of(*when: tuple[Clause, ...], norm: Conjunction = "min") -> RuleBase:
+    """Return rules of one class on `x` and a sum in which it stands twice."""
+    parts = (Part("x", 1.0), Part("x", -0.5, 1.0))
+    terms = (Term("up", UP), Term("late", LATE))
+    half = Variable("half", terms, parts=parts)
+    made = tuple(Rule(one, "a") for one in when)
+    return RuleBase("r", ("a",), (X, half), made, Semantics(norm))
+
+
+def test_the_audit_of_a_rule_that_never_fires_holds() -> None:
+    late = Clause("x", ("late",)), Clause("x", ("up",))
+    rules = rules_of(late, (Clause("x", ("up",)),))
+    assert wrong_of(rules) == []
+    facts = json.loads(audited(rules)[0])
+    of = next(one for one in facts["answers"] if (one["code"], one["rules"]) == SILENT)
+    of["rules"] = [2]  # which does fire
+    facts["digest"] = digest_of(facts)
+    wrong = wrong_with(facts, audited(rules)[1])
+    assert any(text.endswith("the rule fires somewhere") for text in wrong)
+
+
+SILENT = ("FT107", [1])
+
+
+@pytest.mark.parametrize("terms", [("up",), ("up", "down")])
+def test_the_audit_of_a_rule_with_a_clause_and_its_opposite_holds(
+    terms: tuple[str, ...],
+) -> None:
+    both = Clause("x", terms), Clause("x", terms, negated=True)
+    assert wrong_of(rules_of(both, (Clause("x", ("up",)),))) == []
+    swapped = Clause("x", ("up", "down")), Clause("x", ("down", "up"))
+    assert wrong_of(rules_of(swapped)) == []
+
+
+def test_the_audit_of_a_sum_in_which_an_input_stands_twice_holds() -> None:
+    rules = rules_of((Clause("half", ("up",)),), (Clause("half", ("late",)),))
+    assert wrong_of(rules) == []
+
+
+def test_a_clause_that_stands_twice_weakens_a_product() -> None:
+    up = Clause("x", ("up",))
+    assert wrong_of(rules_of((up, up), (up,), norm="product")) == []
+
+
+def test_a_leaf_that_is_reached_and_whose_rule_wins_nowhere_holds() -> None:
+    for seed in (6, 23):
+        rest = {"domain": unit(random_tree(seed, leaves=4)), "select": ["FT1"]}
+        assert wrong_of(random_tree(seed, leaves=4), **rest) == []
+
+
+def unit(tree: FuzzyTree) -> Domain:
+    """Return -1 to 1 for each input of a tree."""
+    return Domain(tuple(Side(name, -1.0, 1.0) for name in tree.inputs))
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(16))
+def test_audits_of_odd_models_hold(seed: int) -> None:
+    chance = random.Random(seed)
+    norm: Conjunction = chance.choice(["min", "product"])
+    kinds: tuple[Kind, ...] = ("lr", "points", "band", "mixed")
+    kind, sums = chance.choice(kinds), chance.randrange(2)
+    model = random_base(seed, 3, 2, norm, kind, shared=0.7, odd=0.5, combinations=sums)
+    assert wrong_of(model, clock=Clock(2.0)) == []
 
 
 def test_any_edit_is_told_by_the_digest() -> None:
