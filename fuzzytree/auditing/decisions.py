@@ -9,6 +9,7 @@ difference, boxes prove that there is none on the domain, or find it, or leave a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -31,6 +32,7 @@ from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import (
     Bracket,
+    Declined,
     Proved,
     Span,
     State,
@@ -50,6 +52,8 @@ _SEGMENTS = 64  # between points of different decisions, halved down to doubles
 _HALVINGS = 70
 _DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 _MOST_TOLD = 24  # pairs of classes with a witness each
+_POINTS = 0.5  # of the budget is for single points, the rest for proofs
+_PORTION = 64  # rows between two looks at the clock, at first
 _MOST_REGIONS = 4  # of which the box is looked for
 
 
@@ -82,6 +86,11 @@ class Pair(msgspec.Struct, frozen=True, eq=False):
         )
         return one, other
 
+    def old_labels(self, values: FloatArray) -> IntArray:
+        """Return the number of the old model's class for each row; -1 is no class."""
+        inputs = values[[self.inputs.index(name) for name in self.old.inputs]]
+        return decide(self.old, inputs, with_strengths=False).label
+
     def labels(self, found: tuple[Decided, Decided]) -> tuple[IntArray, IntArray]:
         """Return the classes of both answers, numbered alike; -1 is no class."""
         known = list(dict.fromkeys((*self.old.classes, *self.new.classes)))
@@ -113,15 +122,15 @@ def decisions(
     whole = _same_everywhere(pair)
     if whole is not None:
         return [whole], Evidence(is_equal=True)
-    found = _Found(pair)
+    found = _Found(pair, clock.share(_POINTS))
     answers: list[Answer] = []
     if rows is not None:
-        answers.append(_on_rows(pair, rows, found))
+        answers.append(_on_rows(rows, found))
     values = drawn(union(pair.old, pair.new), pair.domain, settings.rows, settings.seed)
-    many = found.add(values)
+    many, seen = found.add(values)
     found.add(_probes(pair))
     if not found.witnesses:
-        found.add(_boundaries(pair, values))
+        found.add(_boundaries(found, values))
     if found.witnesses:
         answers = [*_witness_answers(pair, found), *answers]
     else:
@@ -133,8 +142,10 @@ def decisions(
         else:
             answers.insert(0, _equal_answer(pair, state))
     is_open = not isinstance(answers[0].state, Proved)
-    if values.shape[1] and is_open:
-        answers.append(_drawn_answer(many, values.shape[1], settings.seed))
+    if seen and is_open:
+        answers.append(_drawn_answer(many, seen, settings.seed))
+    if is_open and (found.left or found.is_cut):
+        answers.append(_left_answer(found.left))
     return answers, found.evidence(is_equal=not is_open)
 
 
@@ -173,10 +184,12 @@ def _equal_answer(pair: Pair, state: State) -> Answer:
     return Answer("FT801", "decisions", sentence, state, is_finding=False)
 
 
-def _on_rows(pair: Pair, rows: Rows, found: _Found) -> Answer:
-    count = rows.values.shape[1]
-    hits = found.add(rows.values, name="row")
-    sentence = f"{hits} of {count} rows of {rows.name} are answered otherwise"
+def _on_rows(rows: Rows, found: _Found) -> Answer:
+    hits, count = found.add(rows.values, name="row")
+    of = f"{count} rows"
+    if count < rows.values.shape[1]:
+        of = f"the first {count} of {rows.values.shape[1]} rows"
+    sentence = f"{hits} of {of} of {rows.name} are answered otherwise"
     state = share("rows that are answered otherwise", hits, count, rows.name)
     return Answer(
         "FT801", "rows", sentence, state, is_finding=hits > 0, severity="error"
@@ -188,6 +201,14 @@ def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
     state = share("the domain that is answered otherwise", hits, rows, how)
     sentence = f"{hits} of {rows} points drawn from the domain are answered otherwise"
     return Answer("FT801", "domain", sentence, state, is_finding=hits > 0)
+
+
+def _left_answer(count: int) -> Answer:
+    reason = "the budget for single points was spent"
+    points = f"{count} points" if count else "points beside decision boundaries"
+    sentence = f"{points} were not looked at: {reason}"
+    state = Declined("FTD03", reason)
+    return Answer("FT801", "points", sentence, state, is_finding=False)
 
 
 def _witness_answers(pair: Pair, found: _Found) -> Iterator[Answer]:
@@ -251,10 +272,16 @@ def _answered(one: Answered) -> str:
 
 
 class _Found:
-    """Points at which two models answer otherwise, and how that comes about."""
+    """Points at which two models answer otherwise, and how that comes about.
 
-    def __init__(self, pair: Pair) -> None:
-        self.pair = pair
+    Args:
+        pair: The two models.
+        clock: How long points are looked at; `left` counts those for which it was over,
+            and `is_cut` tells whether some were not even made.
+    """
+
+    def __init__(self, pair: Pair, clock: Clock) -> None:
+        self.pair, self.clock, self.left, self.is_cut = pair, clock, 0, False
         self.witnesses: dict[
             tuple[str | None, str | None], tuple[float, str, dict[str, Fraction]]
         ] = {}
@@ -262,15 +289,24 @@ class _Found:
         self.new_rules: set[int] = set()
         self.has_tie = self.has_none = False
 
-    def add(self, values: FloatArray, name: str = "") -> int:
-        """Compare the answers to some rows, and return how many differ.
+    def add(self, values: FloatArray, name: str = "") -> tuple[int, int]:
+        """Compare the answers to some rows, as long as there is time.
 
         Args:
             values: Shape (inputs, rows).
             name: What to call a row, with its number, if it is the user's.
+
+        Returns:
+            How many differ, of how many that were looked at.
         """
-        if not values.shape[1]:
-            return 0
+        hits = seen = 0
+        for part in _portions(values.shape[1], self.clock):
+            hits += self._add(values[:, part], name, part.start)
+            seen = min(part.stop, values.shape[1])
+        self.left += values.shape[1] - seen
+        return hits, seen
+
+    def _add(self, values: FloatArray, name: str, start: int) -> int:
         found = self.pair.decided(values)
         one, other = self.pair.labels(found)
         rows = np.flatnonzero(one != other)
@@ -286,7 +322,7 @@ class _Found:
             place = int(known[row])
             x = zip(self.pair.inputs, values[:, place].tolist(), strict=True)
             point = {key: Fraction(value) for key, value in x}
-            title = f"{name} {place + 1}" if name else ""
+            title = f"{name} {start + place + 1}" if name else ""
             self.add_point(point, float(margins[place]), title)
         return int(rows.size)
 
@@ -300,7 +336,8 @@ class _Found:
         self.has_tie |= one.is_tie or other.is_tie
         self.has_none |= not (one.rule and other.rule)
         kept = self.witnesses.get((one.label, other.label))
-        if kept is None or (margin > kept[0] and not kept[1]):
+        is_better = kept is not None and margin > kept[0] and (name or not kept[1])
+        if kept is None or is_better:
             self.witnesses[one.label, other.label] = (margin, name, point)
 
     def evidence(self, *, is_equal: bool) -> Evidence:
@@ -312,6 +349,21 @@ class _Found:
             self.has_none,
             is_equal,
         )
+
+
+def _portions(count: int, clock: Clock) -> Iterator[slice]:
+    """Yield parts of some rows until the clock is over: at least one, if there are any.
+
+    Rows in fractions take long: parts grow as long as they take little of what is left.
+    """
+    start, size = 0, _PORTION
+    while start < count and (not start or not clock.is_over):
+        before = clock.left_s
+        yield slice(start, start + size)
+        start += size
+        left = clock.left_s
+        if math.isinf(left) or (before - left) * 16 < left:
+            size *= 2
 
 
 def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
@@ -341,24 +393,32 @@ def _probes(pair: Pair) -> FloatArray:
     return kept
 
 
-def _boundaries(pair: Pair, values: FloatArray) -> FloatArray:
+def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
     """Return points beside the old model's decision boundaries, to the last double.
 
     Points of different decisions are joined, and the line is halved as long as its
-    ends are decided otherwise by the old model.
+    ends are decided otherwise by the old model, or until the clock is over.
     """
     if not values.shape[1]:
         return values
-    labels, _ = pair.labels(pair.decided(values))
-    starts, ends = np.arange(values.shape[1] - 1), np.arange(1, values.shape[1])
-    pairs = np.flatnonzero(labels[starts] != labels[ends])[:_SEGMENTS]
-    low, high = values[:, starts[pairs]], values[:, ends[pairs]]
-    known = labels[starts[pairs]]
+    pair, clock = found.pair, found.clock
+    made: list[IntArray] = []
+    labels = pairs = np.zeros(0, np.int64)
+    for part in _portions(values.shape[1], clock):
+        made.append(pair.old_labels(values[:, part]))
+        labels = np.concatenate(made)
+        pairs = np.flatnonzero(labels[:-1] != labels[1:])[:_SEGMENTS]
+        if pairs.size == _SEGMENTS:
+            break
+    found.is_cut = pairs.size < _SEGMENTS and labels.size < values.shape[1]
+    low, high, known = values[:, pairs], values[:, pairs + 1], labels[pairs]
     seen = [low, high]
     for _ in range(_HALVINGS if pairs.size else 0):
+        if clock.is_over:
+            found.is_cut = True
+            break
         middle = low / 2 + high / 2
-        found, _ = pair.labels(pair.decided(middle))
-        is_low = found == known
+        is_low = pair.old_labels(middle) == known
         low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
         seen.append(middle)
     return np.hstack(seen)

@@ -14,13 +14,24 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.auditing.difference_records import Difference
+from fuzzytree.auditing.differences import difference
+from fuzzytree.auditing.domains import domain_of
 from fuzzytree.auditing.records import Settings
+from fuzzytree.auditing.subject import Rows
 from fuzzytree.casting import as_system
 from fuzzytree.contracts import Document
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.distances import distance
-from fuzzytree.proving.states import Bracket, Proved, Sampled, Witness, point_of
+from fuzzytree.proving.states import (
+    Bracket,
+    Declined,
+    Proved,
+    Sampled,
+    Witness,
+    point_of,
+)
 from fuzzytree.rulebase import (
     Band,
     Clause,
@@ -272,6 +283,32 @@ def test_what_cannot_be_decided_is_left_open_and_said_so() -> None:
     assert (found.verdict, found.ok) == ("open", True)
     assert isinstance(found.answers[0].state, Bracket)
     assert [change.is_proved for change in found.changes] == [False]
+
+
+def test_points_that_a_spent_budget_leaves_out_are_told() -> None:
+    old, new = grip(), replace(grip(), rules=grip().rules[::-1])
+    ticks = itertools.count()
+    clock = Clock(4.0, now=lambda: float(next(ticks)))  # over after a few looks
+    values = np.zeros((len(old.inputs), 5000))
+    found = difference(
+        old, new, domain=domain_of(old), rows=Rows("rows.csv", values), clock=clock
+    )
+    rows = next(one for one in found.answers if one.subject == "rows")
+    assert isinstance(rows.state, Sampled)
+    assert rows.state.rows < 5000
+    assert f"of the first {rows.state.rows} of 5000 rows of rows.csv" in rows.sentence
+    left = next(one for one in found.answers if one.subject == "points")
+    assert isinstance(left.state, Declined)
+    assert left.state.code == "FTD03"
+    assert left.sentence.endswith(
+        " points were not looked at: the budget for single points was spent"
+    )
+    assert int(left.sentence.split()[0]) > 5000 - rows.state.rows
+
+
+def test_nothing_is_left_out_where_there_is_time() -> None:
+    new = replace(grip(), rules=grip().rules[::-1])
+    assert all(one.subject != "points" for one in told(grip(), new).answers)
 
 
 def test_a_curve_that_changed_is_told_with_how_far() -> None:
