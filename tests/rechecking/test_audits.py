@@ -9,8 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from fuzzytree.auditing.subject import Rows
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain, Side
@@ -311,3 +313,8 @@ def test_an_answer_that_names_three_rules_for_two_is_told() -> None:
     answer["rules"] = [1, 2, 3]
     where = f"answer {number} (FT106, pairs of rules)"
     assert f"{where}: it names what there is not" in changed(answers=answers)
+
+
+def test_the_audit_with_rows_that_are_no_table_holds() -> None:
+    rows = Rows("an array", np.array([[0.5, 1.5, 3.5]]))
+    assert wrong_of(rules_of((Clause("x", ("up",)),)), rows=rows) == []
