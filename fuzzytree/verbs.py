@@ -34,7 +34,7 @@ from fuzzytree.rulebase import RuleBase, name_choice
 from fuzzytree.runtimes import chosen_runtimes
 from fuzzytree.runtimes.onnxruntime import OnnxModel
 from fuzzytree.system import FuzzySystem
-from fuzzytree.tables import Table, batches, class_names, read_table
+from fuzzytree.tables import Batch, Table, batches, class_names, read_table
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -263,6 +263,19 @@ def rows_of(
     """
     if data is None:
         return None
+    values, _ = _rows(data, model, columns=columns, delimiter=delimiter)
+    return values
+
+
+def _rows(
+    data: object,
+    model: Document,
+    *,
+    columns: Sequence[str] | None,
+    delimiter: str | None,
+    with_others: bool = False,
+) -> tuple[FloatArray, list[Batch]]:
+    """Return rows for a model, of shape (inputs, rows), and as they came."""
     is_system = isinstance(model, FuzzySystem)
     found = [
         *batches(
@@ -271,12 +284,13 @@ def rows_of(
             trained=() if is_system else model.columns,
             columns=columns,
             delimiter=delimiter,
+            with_others=with_others,
         )
     ]
     values = np.hstack([batch.values for batch in found])
     if not values.shape[1]:
         raise TableError(f"{found[0].piece.name} has no rows")
-    return values
+    return values, found
 
 
 def check(
@@ -634,21 +648,14 @@ def audited_rows(
 
     if data is None:
         return None
-    is_system = isinstance(model, FuzzySystem)
-    found = [
-        *batches(
-            data,
-            model.columns if isinstance(model, FuzzySystem) else model.inputs,
-            trained=() if is_system else model.columns,
-            columns=columns,
-            delimiter=delimiter,
-            with_others=target is not None,
-        )
-    ]
+    values, found = _rows(
+        data,
+        model,
+        columns=columns,
+        delimiter=delimiter,
+        with_others=target is not None,
+    )
     name = found[0].piece.name
-    values = np.hstack([batch.values for batch in found])
-    if not values.shape[1]:
-        raise TableError(f"{name} has no rows")
     if target is None:
         return Rows(name, values)
     known = found[0].piece.columns

@@ -9,7 +9,9 @@ from __future__ import annotations
 import importlib.util
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from typing import Any
 
 import pytest
 
@@ -51,3 +53,30 @@ def _missing(text: str) -> None:
     if os.environ.get("FUZZYTREE_WITNESSES") == "all":
         pytest.fail(text)
     pytest.skip(text)
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[list[Any]]:
+    """Return a list for the one browser of a module, which is closed at the end."""
+    found: list[Any] = []
+    yield found
+    for driver in found:
+        driver.quit()
+
+
+@pytest.fixture
+def browser(program: Need, library: Need, opened: list[Any]) -> Any:
+    """Return a browser; it is started once, for it takes a second."""
+    chromium, driver = program("chromium"), program("chromedriver")
+    webdriver = import_module(f"{library('selenium')}.webdriver")
+    if not opened:
+        options = webdriver.ChromeOptions()
+        options.binary_location = chromium
+        for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
+            options.add_argument(word)
+        options.set_capability(
+            "goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"}
+        )
+        service = webdriver.ChromeService(driver)
+        opened.append(webdriver.Chrome(options=options, service=service))
+    return opened[0]

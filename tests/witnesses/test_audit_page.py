@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,6 @@ from fuzzytree.report.audit_page import page
 from tests.report.page_audits import EVIL, audit_of, rows_of, rule_base
 
 pytestmark = pytest.mark.heavy
-
-Need = Callable[[str], str]
 
 _CONTRAST = 4.5  # of small letters, after the guidelines for accessible pages
 _LARGE = 3.0  # of large letters, and of what is drawn
@@ -69,36 +67,13 @@ class Seen:
         )
 
 
-@pytest.fixture(scope="module")
-def opened() -> Iterator[list[Any]]:
-    """Return a list for the one browser, which is closed at the end."""
-    found: list[Any] = []
-    yield found
-    for driver in found:
-        driver.quit()
-
-
 @pytest.fixture
-def seen(
-    program: Need, library: Need, opened: list[Any], tmp_path: Path
-) -> Iterator[Seen]:
+def seen(browser: Any, tmp_path: Path) -> Iterator[Seen]:
     """Return the page of a hostile audit in a browser."""
-    chromium, driver = program("chromium"), program("chromedriver")
-    webdriver = import_module(f"{library('selenium')}.webdriver")
-    if not opened:
-        options = webdriver.ChromeOptions()
-        options.binary_location = chromium
-        for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
-            options.add_argument(word)
-        options.set_capability(
-            "goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"}
-        )
-        service = webdriver.ChromeService(driver)
-        opened.append(webdriver.Chrome(options=options, service=service))
     rules = rule_base("pressure", EVIL)
     place = tmp_path / "audit.html"
     place.write_text(page(audit_of(rules), rules, rows=rows_of(rules)), "utf-8")
-    found = Seen(opened[0], place)
+    found = Seen(browser, place)
     yield found
     for name, arguments in (
         ("Emulation.setScriptExecutionDisabled", {"value": False}),

@@ -9,7 +9,6 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterator
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -29,8 +28,6 @@ NOTHING = np.zeros((4, 4), np.int64)
 SMALL = np.eye(4, dtype=np.int64) * 90
 LARGE = np.full((4, 4), 90)
 PATIENCE_S = 10.0
-
-Need = Callable[[str], str]
 
 
 class Shown:
@@ -118,33 +115,6 @@ class Seen:
                 if not url.startswith("data:"):
                     found.add(url.split("/")[2])
         return found
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[list[Any]]:
-    """Return a list for the one browser, which is closed at the end."""
-    found: list[Any] = []
-    yield found
-    for driver in found:
-        driver.quit()
-
-
-@pytest.fixture
-def browser(program: Need, library: Need, opened: list[Any]) -> Any:
-    """Return a browser; it is started once, for it takes a second."""
-    chromium, driver = program("chromium"), program("chromedriver")
-    webdriver = import_module(f"{library('selenium')}.webdriver")
-    if not opened:
-        options = webdriver.ChromeOptions()
-        options.binary_location = chromium
-        for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
-            options.add_argument(word)
-        options.set_capability(
-            "goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"}
-        )
-        service = webdriver.ChromeService(driver)
-        opened.append(webdriver.Chrome(options=options, service=service))
-    return opened[0]
 
 
 @pytest.fixture
