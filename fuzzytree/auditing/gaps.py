@@ -43,12 +43,10 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if isinstance(bare, Witness):
         yield from _gaps(subject, given, bare)
         return
+    sentence = "some rule fires everywhere on the domain"
     if not isinstance(bare, Proved):
         sentence = "it is open whether some rule fires everywhere"
-        yield Answer("FT301", "cover", sentence, bare, False)
-    else:
-        sentence = "some rule fires everywhere on the domain"
-        yield Answer("FT301", "cover", sentence, bare, False)
+    yield Answer("FT301", "cover", sentence, bare, False)
     yield _weak(subject, given)
 
 

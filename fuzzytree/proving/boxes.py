@@ -113,19 +113,24 @@ def _span(laid: Laid, x: Fraction, held: Held) -> Span | None:
     return Span(laid.axis.variable.name, first, last)
 
 
-def _zone_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int | None:
+def zone_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int | None:
     """Return the number of the zone that a value is in, None if it is in a cell."""
     place = bisect_left(zones, x, key=lambda zone: zone[1])
     return place if place < len(zones) and zones[place][0] <= x else None
+
+
+def cell_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int:
+    """Return the number of the cell that a value outside all zones is in."""
+    return bisect_left(zones, (x, x)) - 1
 
 
 def _walked(laid: Laid, x: Fraction, held: Held, step: int) -> Fraction:
     """Return how far it holds from a value, in one direction."""
     zones, cells = laid.cells.zones, laid.cells.between
     far = x
-    place = _zone_of(zones, x)
+    place = zone_of(zones, x)
     if place is None:
-        cell = bisect_left(zones, (x, x)) - 1
+        cell = cell_of(zones, x)
     else:
         if step > 0 and not _holds_after(laid, place, held):
             return far

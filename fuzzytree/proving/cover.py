@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.boxes import cell_of, zone_of
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest
 from fuzzytree.proving.covering import cover, maximal
@@ -276,7 +277,7 @@ def _bare_span(laid: Laid, x: Fraction, rules: list[int]) -> Span | None:
     """Return from where to where some rules are 0 along an axis; None if all along."""
     zones, cells = laid.cells.zones, laid.cells.between
     low = high = x
-    place = next((n for n, (a, b) in enumerate(zones) if a <= x <= b), None)
+    place = zone_of(zones, x)
 
     def is_bare(cell: int) -> bool:
         return all(bool(laid.is_zero[laid.of[rule, cell], cell]) for rule in rules)
@@ -285,8 +286,8 @@ def _bare_span(laid: Laid, x: Fraction, rules: list[int]) -> Span | None:
         at = _zero_at(laid, laid.is_zero_at[:, zone])
         return all(at[rule] for rule in rules)
 
-    up = place if place is not None else _cell_of(laid, x)
-    down = (place if place is not None else _cell_of(laid, x) + 1) - 1
+    up = cell_of(zones, x) if place is None else place
+    down = up if place is None else place - 1
     while up < len(cells) and is_bare(up):
         high = cells[up][1]
         up += 1
@@ -307,7 +308,3 @@ def _bare_span(laid: Laid, x: Fraction, rules: list[int]) -> Span | None:
     if is_step and first == low:
         first = math.nextafter(first, math.inf)
     return Span(laid.axis.variable.name, first, last)
-
-
-def _cell_of(laid: Laid, x: Fraction) -> int:
-    return next(n for n, (a, b) in enumerate(laid.cells.between) if a < x < b)
