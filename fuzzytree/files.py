@@ -39,17 +39,23 @@ def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
     return content
 
 
-def write_atomically(path: PathLike, content: bytes) -> None:
+def write_atomically(path: PathLike, content: bytes, *, replace: bool = True) -> None:
     """Write a file whole, or leave what stood there as it was.
 
     The content goes to a new file in the same folder, is flushed to the disk and then
     takes the old file's place and mode. A link is followed: its target is replaced.
     A device or a pipe is written to directly.
 
+    Args:
+        path: The file.
+        content: All of it.
+        replace: Whether a file may be there; without it, whoever comes second fails,
+            whatever the moment.
+
     Raises:
         WriteError: If it cannot be written; nothing is left behind.
     """
-    with open_atomically(path) as file:
+    with open_atomically(path, replace=replace) as file:
         file.write(content)
 
 
@@ -67,19 +73,25 @@ def check_place(path: PathLike) -> None:
 
 
 @contextlib.contextmanager
-def open_atomically(path: PathLike) -> Generator[BinaryIO]:
+def open_atomically(path: PathLike, *, replace: bool = True) -> Generator[BinaryIO]:
     """Open a file that appears under its name only when the block has ended well.
+
+    Args:
+        path: The file.
+        replace: Whether a file may be there.
 
     Raises:
         WriteError: If it cannot be written; nothing is left behind.
     """
     name = os.fspath(path)
     try:
-        target = Path(os.path.realpath(path))
         # Of the path itself: /dev/stdout leads to a pipe that has no name.
         mode = _mode(Path(path))
+        target = Path(os.path.realpath(path))
+        if mode is not None and not replace:
+            raise FileExistsError
         if mode is None or stat.S_ISREG(mode):
-            with _replacing(target, mode) as file:
+            with _appearing(target, mode, replace=replace) as file:
                 yield file
         elif stat.S_ISDIR(mode):
             raise IsADirectoryError(None, "it is a folder")
@@ -88,12 +100,14 @@ def open_atomically(path: PathLike) -> Generator[BinaryIO]:
                 yield device
     except WriteError:
         raise
+    except FileExistsError as error:
+        raise WriteError(f"{name}: is there already") from error
     except OSError as error:
         raise WriteError(f"{name}: cannot be written: {reason(error)}") from error
 
 
 @contextlib.contextmanager
-def _replacing(target: Path, mode: int | None) -> Generator[BinaryIO]:
+def _appearing(target: Path, mode: int | None, *, replace: bool) -> Generator[BinaryIO]:
     if mode is not None and not os.access(target, os.W_OK):
         raise PermissionError(None, "it is write-protected")
     temporary = target.with_name(f".{target.name[:80]}.{secrets.token_hex(8)}.part")
@@ -106,10 +120,33 @@ def _replacing(target: Path, mode: int | None) -> Generator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(target)
+        if replace:
+            temporary.replace(target)
+        else:
+            _name_anew(temporary, target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def _name_anew(temporary: Path, target: Path) -> None:
+    """Give a file its name, unless another one has it.
+
+    Raises:
+        FileExistsError: If another one has it, whenever it came.
+    """
+    if os.name == "nt":
+        temporary.rename(target)  # which there refuses a name that is taken
+        return
+    try:
+        target.hardlink_to(temporary)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links, as a memory card's
+        os.close(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        temporary.replace(target)
+    else:
+        temporary.unlink()
 
 
 def _mode(path: Path) -> int | None:
@@ -117,6 +154,8 @@ def _mode(path: Path) -> int | None:
         return path.stat().st_mode
     except FileNotFoundError:
         return None
+    except ValueError as error:  # a name that no file can have
+        raise OSError(None, str(error)) from error
 
 
 def reason(error: OSError | ValueError) -> str:

@@ -174,6 +174,39 @@ def test_an_interrupted_writer_leaves_the_old_file(tmp_path: Path) -> None:
     assert _names(tmp_path) == ["out.csv"]
 
 
+def test_a_file_that_is_there_is_not_replaced_by_who_may_not(tmp_path: Path) -> None:
+    path = tmp_path / "out.csv"
+    write_atomically(path, b"first", replace=False)
+    with pytest.raises(WriteError) as caught:
+        write_atomically(path, b"second", replace=False)
+    assert str(caught.value) == f"{path}: is there already"
+    assert (path.read_bytes(), path.stat().st_nlink) == (b"first", 1)
+    assert _names(tmp_path) == ["out.csv"]
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_that_comes_meanwhile_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    path = tmp_path / "out.csv"
+    if not links:  # as on a memory card
+        monkeypatch.setattr(Path, "hardlink_to", _no_links)
+    with pytest.raises(WriteError, match="is there already"):
+        _overtaken(path)
+    assert path.read_bytes() == b"first"
+    path.unlink()
+    write_atomically(path, b"third", replace=False)
+    assert path.read_bytes() == b"third"
+    assert _names(tmp_path) == ["out.csv"]
+
+
+def test_a_name_that_no_file_can_have_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "nul\0"
+    with pytest.raises(WriteError) as caught:
+        write_atomically(path, b"new")
+    assert str(caught.value) == f"{path}: cannot be written: embedded null byte"
+
+
 def test_an_error_of_the_block_itself_is_not_renamed(tmp_path: Path) -> None:
     with (
         pytest.raises(ReadError, match="the table"),
@@ -181,6 +214,16 @@ def test_an_error_of_the_block_itself_is_not_renamed(tmp_path: Path) -> None:
     ):
         raise ReadError("the table")
     assert _names(tmp_path) == []
+
+
+def _no_links(path: Path, _: Path) -> None:
+    raise PermissionError(path)
+
+
+def _overtaken(path: Path) -> None:
+    with open_atomically(path, replace=False) as file:
+        file.write(b"second")
+        path.write_bytes(b"first")
 
 
 def _interrupted(path: Path) -> None:

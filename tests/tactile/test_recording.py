@@ -301,6 +301,33 @@ def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     assert str(caught.value) == message
 
 
+@pytest.mark.parametrize("moment", [1, 2, 3])
+def test_who_dies_at_the_beginning_leaves_no_file_or_a_recording(
+    tmp_path: Path, moment: int
+) -> None:
+    """It dies when it asks the disk for the n-th time."""
+    path = tmp_path / "a.ftr"
+    program = (
+        "import sys\n"
+        "sys.path.insert(0, sys.argv[2])\n"
+        "from test_recording import *\n"
+        "moments = iter(range(1, 9))\n"
+        "def ask(file):\n"
+        "    if next(moments) == int(sys.argv[3]):\n"
+        "        os.kill(os.getpid(), 9)\n"
+        "os.fsync = os.fdatasync = ask\n"
+        "with Recorder(sys.argv[1], BOARD) as recorder:\n"
+        "    recorder.write(Frame(np.zeros((3, 4), int), 0.0, 0), Counters())\n"
+    )
+    folder = str(Path(__file__).parent)
+    words = [sys.executable, "-c", program, str(path), folder, str(moment)]
+    assert subprocess.run(words, check=False).returncode == -9
+    if moment == 1:
+        assert not path.exists()
+    else:
+        assert len(read_recording(path).frames) == moment - 2
+
+
 def test_a_full_disk_is_told_and_keeps_what_came_before(tmp_path: Path) -> None:
     """A limit on the size of a file stands for the full disk."""
     path = tmp_path / "a.ftr"

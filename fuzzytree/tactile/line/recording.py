@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.errors import ReadError, WriteError
-from fuzzytree.files import PathLike, reason
+from fuzzytree.files import PathLike, reason, write_atomically
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.line.records import (
@@ -114,19 +114,12 @@ class Recorder:
         self._is_closed = False
         started = time.time_ns() if started_ns is None else started_ns
         begin = header(board, started)  # before a file is made
-        flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if replace else os.O_EXCL)
+        write_atomically(path, begin, replace=replace)
         try:
-            self._file = os.open(path, flags | getattr(os, "O_BINARY", 0), 0o666)
-        except FileExistsError as error:
-            raise WriteError(f"{self._name}: is there already") from error
-        except (OSError, ValueError) as error:
-            raise self._error(error) from error
-        try:
-            self._put(begin)
-            _to_disk(self._file)
             _keep_name(Path(path))
+            flags = os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0)
+            self._file = os.open(path, flags)
         except OSError as error:
-            os.close(self._file)
             raise self._error(error) from error
         self._syncing = threading.Thread(target=self._sync, daemon=True)
         self._syncing.start()
