@@ -24,11 +24,14 @@ class Held(NamedTuple):
 
     Attributes:
         level: A level.
+        bound: What values must reach to reach it: the level, or the least double that
+            does, where values are doubles.
         above: The positions of the rules that must reach it.
         below: The positions of the rules that must stay below it.
     """
 
     level: Fraction
+    bound: Fraction | float
     above: Sequence[int]
     below: Sequence[int]
 
@@ -80,8 +83,9 @@ def region_around(
         left -= low_at[best]
     spans: list[Span] = []
     mine = [number - 1 for number in above]
+    bound = level if given.is_fine else outwards(level)[1]
     for number, laid in enumerate(given.laid[0]):
-        held = Held(level, mine, sorted(wanted.get(number, ())))
+        held = Held(level, bound, mine, sorted(wanted.get(number, ())))
         span = _span(laid, at[number], held)
         if span is None:
             continue
@@ -162,7 +166,7 @@ def _end(
     ends = laid.cells.between[cell]
     found: list[Fraction] = []
     for one, is_high in dict.fromkeys(sides):
-        if _is_sure(laid, cell, one, held.level, is_high=is_high):
+        if _is_sure(laid, cell, one, held.bound, is_high=is_high):
             continue
         part = part_of(elements[one], ends, held.level, is_high=is_high, bits=64)
         if step > 0:
@@ -181,13 +185,13 @@ def _end(
 
 
 def _is_sure(
-    laid: Laid, cell: int, one: int, level: Fraction, *, is_high: bool
+    laid: Laid, cell: int, one: int, bound: Fraction | float, *, is_high: bool
 ) -> bool:
     """Return whether an element keeps to its side in all of a cell, by its bounds."""
     first, last = laid.cells.right[:, one, cell], laid.cells.left[:, one, cell + 1]
     if is_high:
-        return bool(min(first[0], last[0]) >= level)
-    return bool(max(first[1], last[1]) < level)
+        return bool(min(first[0], last[0]) >= bound)
+    return bool(max(first[1], last[1]) < bound)
 
 
 def _holds_at(laid: Laid, place: int, held: Held) -> bool:
@@ -202,12 +206,12 @@ def _holds(laid: Laid, place: int, held: Held, values: Values) -> bool:
     """Return whether it holds at a zone for sure, by the bounds of values there."""
     low, high = values[0][:, place].tolist(), values[1][:, place].tolist()
 
-    def bound(rule: int, of: Sequence[float]) -> float:
+    def degree(rule: int, of: Sequence[float]) -> float:
         groups = laid.axis.asked[rule]
         return min(
             (max(of[one] for one in group) for group in groups), default=math.inf
         )
 
-    return all(bound(rule, low) >= held.level for rule in held.above) and all(
-        bound(rule, high) < held.level for rule in held.below
+    return all(degree(rule, low) >= held.bound for rule in held.above) and all(
+        degree(rule, high) < held.bound for rule in held.below
     )

@@ -127,6 +127,12 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
         return _laid(self.axes, cells)
 
     @functools.cached_property
+    def near_levels(self) -> tuple[list[float], list[float]]:
+        """The lower and the upper ends of all bands, as floats near them."""
+        bands = self.laid[1]
+        return [*map(float, bands.low)], [*map(float, bands.high)]
+
+    @functools.cached_property
     def fine(self) -> Ground:
         """The same ground with levels known as fractions."""
         return Ground(self.rules, self.domain, self.axes, self.ends, is_fine=True)

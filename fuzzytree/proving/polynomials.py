@@ -247,6 +247,11 @@ def _weights(degree: int) -> tuple[int, ...]:
     )
 
 
+@functools.cache
+def _choices(degree: int) -> tuple[int, ...]:
+    return tuple(math.comb(degree, i) for i in range(degree + 1))
+
+
 def _bernstein(numbers: Sequence[int]) -> list[int]:
     """Return degree! times the Bernstein coefficients: sums of C(j, i) over C(n, i)."""
     degree = len(numbers) - 1
@@ -331,10 +336,11 @@ def _sign(numbers: Sequence[int], at: int, shift: int) -> int:
 
 def _guess(bends: Sequence[int]) -> float:
     """Return about where the one root in [0, 1] is, in floats (Illinois' method)."""
-    most = max(abs(one) for one in bends)
+    weighted = [a * b for a, b in zip(bends, _choices(len(bends) - 1), strict=True)]
+    most = max(map(abs, weighted))
     drop = max(most.bit_length() - 1000, 0)
     scale = float(most >> drop)
-    row = [(one >> drop) / scale for one in bends]
+    row = [(one >> drop) / scale for one in weighted]
     low, high = 0.0, 1.0
     below, above = row[0], row[-1]
     if below * above >= 0.0:  # an end is a root, or too near to tell
@@ -345,7 +351,7 @@ def _guess(bends: Sequence[int]) -> float:
         middle = high - above * (high - low) / (above - below)
         if not low < middle < high:
             middle = (low + high) / 2
-        found = _bernstein_value(row, middle)
+        found = _weighted_value(row, middle)
         if found == 0.0 or high - low < 2.0**-_FINE:
             return middle
         if (found > 0.0) == (above > 0.0):
@@ -359,11 +365,14 @@ def _guess(bends: Sequence[int]) -> float:
     return (low + high) / 2
 
 
-def _bernstein_value(row: Sequence[float], at: float) -> float:
-    points = list(row)
-    while len(points) > 1:
-        points = [a + at * (b - a) for a, b in itertools.pairwise(points)]
-    return points[0]
+def _weighted_value(row: Sequence[float], at: float) -> float:
+    """Return the sum of row[i] at**i (1 - at)**(n - i), by Horner's scheme."""
+    near, rest = (row, at) if at > 0.5 else (row[::-1], 1.0 - at)
+    ratio = (1.0 - rest) / rest
+    total = 0.0
+    for one in near:
+        total = total * ratio + one
+    return float(total * rest ** (len(row) - 1))
 
 
 def magnitude(number: Fraction) -> int:

@@ -126,16 +126,16 @@ class _Search:
             if below:
                 yield below[-1], min(ceiling, bands.low_after(below[-1]))
             return
-        found: list[tuple[int, Fraction]] = []
-        above = bands.low[-1]
+        lows, highs = contest.ground.near_levels
+        found: list[tuple[float, int, int]] = []
+        above = len(lows) - 1
         for band in events:
-            if band + 1 < len(bands.low):
-                found.append((band, above))
-                above = bands.low[band]
+            if band + 1 < len(lows):
+                found.append((highs[band] - lows[above], -band, above))
+                above = band
         # Between levels far apart the lead is large, and so is the box around it.
-        yield from sorted(
-            found, key=lambda one: float(bands.high[one[0]]) - float(one[1])
-        )
+        for _, band, above in sorted(found):
+            yield -band, bands.low[above]
 
     def _doubtful(self, contest: Contest) -> Iterator[int]:
         """Yield bands within which the order of levels is not known and matters."""
