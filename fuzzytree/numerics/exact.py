@@ -162,11 +162,14 @@ def exact_flank(flank: Flank, value: Fraction) -> Fraction:
 
 
 def _side_degree(side: Side, distance: Fraction) -> Fraction:
-    reach = Fraction(side.reach)
-    u = _clipped(distance / Fraction(side.spread), reach)
+    if distance <= 0:
+        return _ONE
+    u, reach = distance / Fraction(side.spread), Fraction(side.reach)
+    if u >= reach:
+        return _ZERO
     t = min(u, _ONE)
     body = _clipped(1 - t * _polynomial(side.curve, 2 * t - 1), _ONE)
-    return body * _clipped((reach - u) / (reach - 1), _ONE) ** 4
+    return body if u <= 1 else body * ((reach - u) / (reach - 1)) ** 4
 
 
 def _points_degree(points: Points, value: Fraction) -> Fraction:
