@@ -179,21 +179,26 @@ def _ranks(
     ends = [(a[1], b[0]) for a, b in itertools.pairwise(zones)]
     points = [_between(a, b) for a, b in ends]
     near = np.array([float(point) for point in points])
+    # A point that is no double may be on the other side of a place than the nearest.
+    is_double = np.array(
+        [Fraction(x) == p for x, p in zip(near.tolist(), points, strict=True)],
+        dtype=bool,
+    )
     bounds = [_enclosed(element, near, None) for element in elements]
     low = np.array([one.low for one in bounds]).reshape(len(elements), len(points))
     high = np.array([one.high for one in bounds]).reshape(low.shape)
     order = np.argsort(low, axis=0, kind="stable")
     ranks = np.zeros((len(points), len(elements)), dtype=np.int64)
     for cell, point in enumerate(points):
-        if Fraction(near[cell]) == point:
+        if is_double[cell]:
             given = _order_of_bounds(low[:, cell], high[:, cell], order[:, cell])
         else:
             given = None
         if given is None:
             given = _order([element.degree(point) for element in elements])
         ranks[cell] = given
-    is_zero = high == 0.0
-    for row, cell in np.argwhere((low == 0.0) & ~is_zero).tolist():
+    is_zero = (high == 0.0) & is_double
+    for row, cell in np.argwhere((low == 0.0) & ~is_zero | ~is_double).tolist():
         is_zero[row, cell] = elements[row].degree(points[cell]) == 0
     return ranks, is_zero
 

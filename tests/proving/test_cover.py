@@ -115,3 +115,12 @@ def test_a_gap_behind_a_step_begins_after_it() -> None:
         assert isinstance(found, Witness)
         (span,) = found.region
         assert (span.low, span.high) == (math.nextafter(9.0, 10.0), 10.0)
+
+
+def test_what_is_0_between_two_places_is_told_of_a_point_between_them() -> None:
+    # In this base a cell lies between two doubles; a curve is 0 at the nearer of them.
+    rules = random_base(1, 5, 3, kind="mixed", shared=0.5, odd=0.3)
+    given = ground(rules, unit_domain(rules))
+    found = uncovered(given)
+    assert isinstance(found, Witness)
+    assert not any(strengths_at(given, point_of(found.point)))
