@@ -344,13 +344,16 @@ def degree_errors(
 ) -> Reals:
     """Return the largest error of a degree at each value, which is off by so much.
 
-    An input's own rounding is relative: beyond `active` it changes nothing. Of a shape
-    too steep for doubles to say how steep, no value that is off has a bound.
+    Beyond `active` the degree is level: no error of a value that is there for sure is
+    felt, nor an input's own rounding, which is relative. Of a shape too steep for
+    doubles to say how steep, no value that is off has a bound.
     """
     blur = bound.steps.blur
     if off is None:
         return np.full(x.shape, bound.fixed)
     felt = np.minimum(off, UNIT * bound.active * MORE + 2.0**-149) if is_input else off
+    is_level = np.abs(x) - 2.0 * off > bound.active * MORE + blur
+    felt = np.where(is_level, 0.0, felt)
     found = bound.fixed + felt * bound.per_unit
     if bound.steps.places:
         near = off * MORE + blur

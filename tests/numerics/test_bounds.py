@@ -195,3 +195,19 @@ def test_no_observed_error_exceeds_its_bound(
     assert found is not None
     low, _ = strength_errors(rules, values, found)
     assert (low <= bounds).all()
+
+
+@pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
+def test_rows_far_from_all_curves_cost_no_more_than_near_ones(dtype: Dtype) -> None:
+    mix = Variable("mix", (LOW,), parts=(Part("a", 0.3), Part("b", 0.7)))
+    clauses = (Clause("a", ("low",)), Clause("mix", ("low",)))
+    inputs = (Variable("a", (LOW,)), Variable("b"))
+    rules = RuleBase("grip", ("soft",), (*inputs, mix), (Rule(clauses, "soft"),))
+    near = np.random.default_rng(1).uniform(0.0, 4.0, (2, 50))
+    far = near * np.repeat([1e3, 1e6, -1e9, 1e20, -1e30], 10)
+    bounds = strength_bounds(rules, dtype, near)[0]
+    found = find_runtime(NATIVE[dtype]).load(rules)(far).strengths
+    assert found is not None
+    of_far = strength_bounds(rules, dtype, far)[0]
+    assert (strength_errors(rules, far, found)[0] <= of_far).all()
+    assert of_far.max() <= bounds.max() < 1e-5
