@@ -6,7 +6,7 @@ import contextlib
 import os
 import secrets
 import stat
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -70,6 +70,30 @@ def check_place(path: PathLike) -> None:
         raise WriteError(f"{name}: cannot be written: it is a folder")
     if not target.parent.is_dir():
         raise WriteError(f"{name}: cannot be written: no such file or directory")
+    needed = [target] if target.exists() else []
+    if target.is_file() or not needed:  # a new file takes the old one's place
+        needed.append(target.parent)
+    if not all(os.access(one, os.W_OK) for one in needed):
+        raise WriteError(f"{name}: cannot be written: it is write-protected")
+
+
+def check_places(written: Iterable[PathLike], read: Iterable[PathLike] = ()) -> None:
+    """Refuse places as `check_place`, and those that would end what is still needed.
+
+    Args:
+        written: Where files will be written.
+        read: The files that they are made of.
+
+    Raises:
+        WriteError: If one cannot be written, is read as well, or stands twice.
+    """
+    taken = {os.path.realpath(path): "it is read as well" for path in read}
+    for path in written:
+        check_place(path)
+        key, name = os.path.realpath(path), os.fspath(path)
+        if key in taken and (Path(path).is_file() or not Path(path).exists()):
+            raise WriteError(f"{name}: cannot be written: {taken[key]}")
+        taken[key] = "another output goes there"
 
 
 @contextlib.contextmanager

@@ -33,6 +33,20 @@ _SPELT = {
 }
 
 
+def printable(text: str) -> str:
+    r"""Return a text for a terminal; what that might obey is written as an escape.
+
+    Example:
+        >>> print(printable("a" + chr(27) + "[2J"))
+        a\x1b[2J
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
+
+
 class Names(msgspec.Struct, frozen=True):
     """A map from the names of a model to names of a target, and back.
 

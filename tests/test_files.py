@@ -9,7 +9,13 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.errors import ReadError, WriteError
-from fuzzytree.files import check_place, open_atomically, read_bounded, write_atomically
+from fuzzytree.files import (
+    check_place,
+    check_places,
+    open_atomically,
+    read_bounded,
+    write_atomically,
+)
 
 
 def test_a_file_is_read_whole(tmp_path: Path) -> None:
@@ -163,6 +169,36 @@ def test_an_impossible_place_is_refused_beforehand(
         check_place(path)
     assert str(caught.value) == f"{path}: cannot be written: {why}"
     check_place(tmp_path / "possible.yaml")
+
+
+@pytest.mark.parametrize("name", ["old.yaml", "folder/new.yaml"])
+def test_a_write_protected_place_is_refused_beforehand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "folder").mkdir(mode=0o555)
+    (tmp_path / "old.yaml").touch(mode=0o444)
+    path = tmp_path / name
+    if os.access(tmp_path / "folder", os.W_OK):  # the superuser may write everything
+        monkeypatch.setattr(os, "access", lambda one, _: one not in (path, path.parent))
+    with pytest.raises(WriteError) as caught:
+        check_place(path)
+    assert str(caught.value) == f"{path}: cannot be written: it is write-protected"
+
+
+def test_what_is_read_and_what_is_written_stay_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("in.yaml").touch()
+    Path("link.json").symlink_to("in.yaml")
+    check_places(["a.json", "b.html", "/dev/null", "/dev/null"], ["in.yaml"])
+    for written, why in (
+        (["a.json", "link.json"], "link.json: cannot be written: it is read as well"),
+        (["a", "./a"], "./a: cannot be written: another output goes there"),
+    ):
+        with pytest.raises(WriteError) as caught:
+            check_places(written, ["in.yaml"])
+        assert str(caught.value) == why
 
 
 def test_an_interrupted_writer_leaves_the_old_file(tmp_path: Path) -> None:

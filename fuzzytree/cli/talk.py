@@ -12,6 +12,7 @@ import click
 import msgspec
 
 from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.naming import printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -49,9 +50,9 @@ runtimes_option = click.option(
 
 
 def say(text: str, *, quiet: bool = False) -> None:
-    """Write a line to stderr."""
+    """Write lines to stderr; what a terminal might obey is written as an escape."""
     if not quiet:
-        click.echo(text, err=True)
+        click.echo("\n".join(map(printable, text.split("\n"))), err=True)
 
 
 def say_rows(*rows: tuple[str, str, str], width: int = 0, quiet: bool = False) -> None:

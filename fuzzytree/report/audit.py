@@ -9,6 +9,7 @@ from typing import Final
 
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Severity
+from fuzzytree.naming import printable
 from fuzzytree.proving.states import (
     Bracket,
     Coordinate,
@@ -29,6 +30,7 @@ MOST_FINDINGS: Final = 200
 _MOST_CALM = 40  # lines of answers that are no findings, unless all are wanted
 _MOST_ALIKE = 3  # of one code that are open
 _MOST_INPUTS = 12  # of a point or region on the terminal
+_LONGEST_NAME = 60  # above the findings
 _SHOWN = 84  # characters of a source line
 _COLOURS: Mapping[str, str] = {
     "error": "31;1",
@@ -155,13 +157,13 @@ def _head(audit: Audit) -> Iterator[str]:
     if policy.decision == "all":
         decides = "every rule takes part"
     means = f"AND is {policy.conjunction}, {decides}"
-    yield f"{audit.model}: audited as {audit.form}; {means}"
+    yield f"{_name(audit.model)}: audited as {audit.form}; {means}"
     if audit.data is not None:
-        yield f"rows     {audit.rows} of {audit.data.name}"
+        yield f"rows     {audit.rows} of {_name(audit.data.name)}"
     sides = audit.domain.sides
     rows = [
         (
-            f"  {one.variable}",
+            f"  {_name(one.variable)}",
             f"{number(one.low)} to {number(one.high)}",
             _ORIGINS[one.origin],
         )
@@ -171,6 +173,12 @@ def _head(audit: Audit) -> Iterator[str]:
     yield from aligned(rows) if rows else ["  none: the model has no inputs"]
     if len(sides) > _MOST_INPUTS:
         yield f"  and {counted(len(sides) - _MOST_INPUTS, 'more variable')}"
+
+
+def _name(text: str) -> str:
+    """Return a name as it fits into a line."""
+    shown = text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 1]}…"
+    return printable(shown)
 
 
 def _finding(
@@ -193,11 +201,8 @@ def _finding(
 
 def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
     """Return a text in lines; what a terminal might obey is written as an escape."""
-    shown = "".join(
-        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
-    )
     return textwrap.wrap(
-        shown,
+        printable(text),
         width,
         subsequent_indent=indent,
         break_on_hyphens=False,

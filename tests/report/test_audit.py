@@ -7,6 +7,8 @@ import re
 from msgspec.structs import replace
 
 from fuzzytree.auditing.limits import LIMITS
+from fuzzytree.auditing.records import Source
+from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Declined
 from fuzzytree.report.audit import (
     MOST_FINDINGS,
@@ -132,6 +134,18 @@ def test_what_a_terminal_would_obey_is_written_as_an_escape() -> None:
     lines = [*audit_lines(every_state("a\x1b[2J\nb.yaml", "rule '\x1b[31m\x07' never"))]
     assert not any("\x1b" in line or "\x07" in line for line in lines)
     assert any(r"rule '\x1b[31m\x07' never" in line for line in lines)
+
+
+def test_the_head_shows_no_name_as_it_should_not_be_shown() -> None:
+    audit = every_state()
+    evil = "\x1b[31m\u202e\n"
+    domain = Domain((Side(evil, 0.0, 5.0), Side("L" * 10_000, 0.0, 1.0)))
+    data = Source(evil, "b" * 64)
+    lines = [*audit_lines(replace(audit, model=evil, domain=domain, data=data))]
+    assert all(line.isprintable() for line in lines)
+    assert lines[0].startswith(r"\x1b[31m\u202e\n: audited as rules")
+    assert lines[1] == r"rows     4 of \x1b[31m\u202e\n"
+    assert lines[4] == f"  {'L' * 59}…  0 to 1  given"
 
 
 def test_a_place_beyond_the_file_has_no_caret() -> None:
