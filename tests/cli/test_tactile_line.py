@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fuzzytree.cli.talk import say
 from fuzzytree.exporters.board_yaml import board_text
 from fuzzytree.readers.boards import load_board
 from fuzzytree.tactile.boards import Board, Marker, Start
@@ -373,8 +374,13 @@ def test_a_board_that_is_silent_is_told_and_leaves_no_file(
     monkeypatch.setattr("fuzzytree.tactile.line.watching.PATIENCE_S", 0.05)
     end, host = os.openpty()
     name = os.ttyname(host)
-    timer = threading.Timer(0.4, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
+
+    def said(text: str, *, quiet: bool = False) -> None:
+        say(text, quiet=quiet)
+        if "no frame comes" in text:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("fuzzytree.cli.tactile.record.say", said)
     found = call("tactile", "record", "mat.yaml", name, "-o", "b.ftr")
     os.close(end)
     os.close(host)
