@@ -28,6 +28,7 @@ TOO_MANY: Final = "too many boxes are left"
 
 _BATCH = 4096  # boxes that are parted at a time
 _MOST_BOXES = 3_000_000  # that may wait, for the sake of memory
+_MOST_PARTS = 24_000_000  # of inputs, in all boxes that wait
 _TRIES = 4  # middles of boxes that are evaluated exactly, for each batch
 
 
@@ -89,6 +90,9 @@ def search(
         is_first_enough: Whether any value above the floor ends the search.
     """
     best, point = floor, None
+    most = min(_MOST_BOXES, _MOST_PARTS // len(space.lines))
+    if space.root_count > most:
+        return Found(None, floor, math.inf, 0, TOO_MANY)
     boxes = space.roots()
     new, verdict = len(boxes), judge(space.look(boxes), boxes)
     looked, stuck = len(boxes), -math.inf
@@ -115,7 +119,7 @@ def search(
             why = "no double lies within the boxes that are left"
         elif clock.is_over:
             why = "the budget was spent"
-        elif looked > limit or len(boxes) > _MOST_BOXES:
+        elif looked > limit or len(boxes) > most:
             why = TOO_MANY
         if why is not None:
             return Found(point, best, max(bound, outwards(best)[1]), looked, why)

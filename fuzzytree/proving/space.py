@@ -6,6 +6,7 @@ takes, on a box, values between the sums of its summands' ends, rounded outwards
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
@@ -121,10 +122,19 @@ class Space:
 
         self.limits = [*_limits(mixed, domain, number)]
 
+    @property
+    def root_count(self) -> int:
+        """How many boxes make up the domain."""
+        return math.prod(len(line.roots) for line in self.lines)
+
     def roots(self) -> IntArray:
         """Return the boxes that make up the domain, shape (boxes, inputs)."""
-        grid = np.meshgrid(*(line.roots for line in self.lines), indexing="ij")
-        return np.stack([axis.ravel() for axis in grid], axis=1).astype(np.int64)
+        boxes = np.zeros((1, 0), dtype=np.int64)
+        for line in self.lines:
+            parts = np.tile(line.roots, len(boxes))
+            before = np.repeat(boxes, len(line.roots), axis=0)
+            boxes = np.column_stack([before, parts])
+        return boxes
 
     def halves(self, boxes: IntArray, on: IntArray) -> IntArray:
         """Return both halves of each box, parted on a line: first all lower ones."""

@@ -23,6 +23,7 @@ from fuzzytree.proving.ground import ground
 from fuzzytree.proving.states import Bracket, Coordinate, Proved, Witness, point_of
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import (
+    Band,
     Clause,
     Conjunction,
     Part,
@@ -321,3 +322,37 @@ def test_a_rule_hidden_by_two_others_in_four_inputs_is_proved_or_found() -> None
         rivals = _rivals(planted, 10)
         state = wins_by_boxes(planted, unit_domain(planted), 10, rivals, Clock(20.0))
         assert type(state) is expected
+
+
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_rules_that_ask_a_hundred_inputs_are_asked_too(
+    conjunction: Conjunction,
+) -> None:
+    line, names = Points((0.0, 1.0), (0.0, 1.0)), [f"x{n}" for n in range(100)]
+    rules = RuleBase(
+        "wide",
+        ("soft", "hard"),
+        tuple(Variable(name, (Term("high", line),)) for name in names),
+        (
+            Rule(tuple(Clause(name, ("high",)) for name in names), "soft"),
+            Rule((Clause("x0", ("high",)), Clause("x1", ("high",))), "hard"),
+        ),
+        Semantics(conjunction),
+    )
+    box = unit_domain(rules)
+    assert isinstance(wins_by_boxes(rules, box, 1, {2}, Clock(1.0)), Proved)
+    assert isinstance(wins_by_boxes(rules, box, 2, {1}, Clock(1.0)), Witness)
+
+
+def test_a_step_at_the_lower_end_of_many_inputs_is_a_bracket() -> None:
+    step, names = Band(0.0, 0.5), [f"x{n}" for n in range(80)]
+    rules = RuleBase(
+        "wide",
+        ("soft",),
+        tuple(Variable(name, (Term("low", step),)) for name in names),
+        (Rule(tuple(Clause(name, ("low",)) for name in names), "soft"),),
+    )
+    found = wins_by_boxes(rules, unit_domain(rules), 1, set())
+    assert isinstance(found, Bracket)
+    assert (found.low, found.high) == (0.0, 1.0)
+    assert isinstance(wins(ground(rules, unit_domain(rules)), 1, set()), Witness)
