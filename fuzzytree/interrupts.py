@@ -1,4 +1,4 @@
-"""Ctrl-C is noticed even where a library swallows it."""
+"""Work that is ended from outside: by a Ctrl-C, or between its steps by its caller."""
 
 from __future__ import annotations
 
@@ -6,7 +6,43 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Generator
+from contextvars import ContextVar
 from types import FrameType
+from typing import Final
+
+_ASKED: Final[ContextVar[Callable[[], None] | None]] = ContextVar("asked", default=None)
+
+
+@contextlib.contextmanager
+def watched(ask: Callable[[], None]) -> Generator[None]:
+    """Have `checkpoint` ask a function, in this thread and what it calls.
+
+    It holds until the block ends: a generator must not yield within it.
+
+    Example:
+        >>> def stop() -> None:
+        ...     raise TimeoutError
+        >>> with contextlib.suppress(TimeoutError), watched(stop):
+        ...     checkpoint()
+        ...     print("not reached")
+        >>> checkpoint()
+    """
+    token = _ASKED.set(ask)
+    try:
+        yield
+    finally:
+        _ASKED.reset(token)
+
+
+def checkpoint() -> None:
+    """Ask whether to go on; who works long does so between two steps.
+
+    Nothing happens unless someone watches: it takes no time to speak of. What `watched`
+    was given may raise, so nothing may be left half done here.
+    """
+    ask = _ASKED.get()
+    if ask is not None:
+        ask()
 
 
 @contextlib.contextmanager

@@ -9,7 +9,6 @@ An audit
     - `audit`: asks all families, one after another
     - `domains`, `views`, `conditions`: where a model is asked, and its rules as a rule
       base; conditions of fuzzy systems as clauses
-    - `alarms`: a budget that is kept where nobody asks the clock
     - `places`: where rules stand in a file; ids that outlive their order
     - `limits`: what an audit does not establish, and its digest
 
@@ -23,8 +22,8 @@ Families, each with `answers(subject)`
     - `gaps`: inputs that no rule covers, or none well
     - `pairs`, with `clauses`: two rules that hide, copy or contradict each other;
       clauses that nothing needs
-    - `terms`, with `ranges`, `shapes`, `overlaps`: terms that are not reached, ill
-      shaped, hard to tell apart, not used
+    - `terms`, `shapes`, `overlaps`, with `ranges`: terms that are not reached or not
+      used, ill shaped, hard to tell apart
     - `complexity`: counts, and the index of Nauck
     - `trees`: what each leaf decides
     - `disagreement`, with `rows`: where a tree and its raw rules part

@@ -7,12 +7,12 @@ import hashlib
 import importlib
 import importlib.metadata
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple, cast
 
 import msgspec
 
-from fuzzytree.auditing.alarms import enforced
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.domains import domain_of, inputs_of
 from fuzzytree.auditing.limits import LIMITS, digest_of
@@ -29,9 +29,10 @@ from fuzzytree.auditing.selecting import check_settings, chosen_codes
 from fuzzytree.auditing.subject import Rows, Subject
 from fuzzytree.auditing.views import View, view
 from fuzzytree.contracts import Document
-from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import Declined
+from fuzzytree.proving.wording import counted
 from fuzzytree.rulebase import RuleBase, fingerprint, name_choice
 from fuzzytree.tree import FuzzyTree
 
@@ -44,32 +45,38 @@ class Family(msgspec.Struct, frozen=True):
     Attributes:
         module: Its name; its `answers` yields an answer to each question.
         codes: Of the questions.
+        part: How much it may take of the time that is left. Who needs less leaves the
+            rest to those behind.
     """
 
     module: str
     codes: tuple[str, ...]
+    part: float = 0.5
 
 
 FAMILIES: Final = (
-    Family("terms", ("FT401", "FT402", "FT403", "FT404")),
-    Family("complexity", ("FT501",)),
-    Family("support", ("FT701",)),
-    Family("gaps", ("FT301",)),
+    Family("terms", ("FT401", "FT404"), 0.2),
+    Family("support", ("FT701",), 0.2),
+    Family("gaps", ("FT301",), 0.2),
     Family("deciding", ("FT101", "FT102", "FT103", "FT202")),
-    Family("pairs", ("FT104", "FT105", "FT106", "FT107", "FT201")),
     Family("trees", ("FT101", "FT205")),
+    Family("pairs", ("FT104", "FT105", "FT106", "FT107", "FT201")),
     Family("disagreement", ("FT203",)),
+    Family("shapes", ("FT402",), 0.2),
+    Family("overlaps", ("FT403",), 0.2),
+    Family("complexity", ("FT501",), 0.2),
     Family("robustness", ("FT204",)),
-    Family("carriers", ("FT601", "FT602")),
+    Family("carriers", ("FT601", "FT602"), 1.0),
 )
-"""In the order in which they are asked: the quick ones first, so that a spent budget
-costs as few answers as it can. Each takes at most half of the time that is left."""
+"""In the order in which they are asked: first what is quick and what is grave, so that
+a spent budget costs as little as it can."""
 
 ASKED: Final = frozenset(code for family in FAMILIES for code in family.codes)
 """The codes that an audit asks; the others belong to a comparison, or say why not."""
 
 _OF_A_ROW = "FT204"
 _LATE = "FTD03"
+_TOO_LARGE = "it needs more memory than there is"
 
 
 def audit(
@@ -225,16 +232,18 @@ class _Task(NamedTuple):
 
     codes: Sequence[str]
     ask: Asking
+    part: float
 
 
 def _tasks(wanted: set[str], row: Mapping[str, float] | None) -> Iterator[_Task]:
     """Yield what is asked, in order: the user's row first, then the families."""
     if row is not None and _OF_A_ROW in wanted:
-        yield _Task([_OF_A_ROW], functools.partial(_row_answers, row))
+        yield _Task([_OF_A_ROW], functools.partial(_row_answers, row), 0.5)
     for family in FAMILIES:
         codes = [code for code in family.codes if code in wanted]
         if codes:
-            yield _Task(codes, functools.partial(_answers, family.module))
+            ask = functools.partial(_answers, family.module)
+            yield _Task(codes, ask, family.part)
 
 
 def _answers(module: str, subject: Subject) -> Iterator[Answer]:
@@ -256,7 +265,7 @@ def _ask_all(
     """Ask everything, each task within its part of the budget."""
     why = f"the budget of {subject.settings.budget_s:g} s is spent"
     for position, task in enumerate(tasks):
-        part = 1.0 if position == len(tasks) - 1 else 0.5
+        part = 1.0 if position == len(tasks) - 1 else task.part
         own = clock.share(part, tell=_telling(clock, position, len(tasks)))
         try:
             clock.check()
@@ -268,6 +277,8 @@ def _ask_all(
                         asked.cut[answer.code] = why
         except OutOfTimeError:
             asked.cut |= dict.fromkeys(task.codes, why)
+        except MemoryError:
+            asked.cut |= dict.fromkeys(task.codes, _TOO_LARGE)
         except KeyboardInterrupt:
             rest = [code for one in tasks[position:] for code in one.codes]
             asked.cut |= dict.fromkeys(rest, INTERRUPTED)
@@ -285,13 +296,15 @@ def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], 
 
 def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
     """Yield what was not asked and why, in order of the codes."""
-    answered = {one.code for one in asked.answers}
+    answered = Counter(one.code for one in asked.answers)
     for code in sorted(ASKED):
         name = f"{code} {CODES[code].title}"
         if code not in wanted:
             yield f"{name}: left out by the user"
         elif code in asked.cut:
-            begun = "cut short" if code in answered else "not asked"
+            begun = "not asked"
+            if answered[code]:
+                begun = f"cut short after {counted(answered[code], 'answer')}"
             yield f"{name}: {begun}: {asked.cut[code]}"
         elif code in answered:
             continue

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.alarms import enforced
 from fuzzytree.auditing.domains import inputs_of
 from fuzzytree.auditing.drafting import Evidence
 from fuzzytree.auditing.records import Answer, Settings
@@ -28,7 +27,7 @@ from fuzzytree.numerics.oracle import MISSING, TIE, UNCOVERED, Decided, decide
 from fuzzytree.probing import probe_values
 from fuzzytree.proving.alike import OF, alike, region
 from fuzzytree.proving.answers import Answered, answer_at, difference_at
-from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import (
     Bracket,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.auditing.ranges import Range, labels_of, measure
+from fuzzytree.auditing.ranges import Range, labels_of, measure, ranges
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.curves import pieces
@@ -23,12 +23,12 @@ MOST_SHOWN: Final = 20
 _MOST_PIECES = 4_000  # of two curves whose overlap is asked for
 
 
-def overlap_answers(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[Answer]:
     """Answer which terms share so much of their area that they are hard to tell."""
     limit = Fraction(subject.settings.overlap)
     found: list[tuple[Fraction, Answer]] = []
     apart = points = 0
-    for of in whole:
+    for of in ranges(subject):
         terms = of.variable.terms
         shapes = [term.shape for term in terms]
         most = most_shared(shapes, float(of.low), float(of.high))

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.auditing.ranges import Range, labels_of, measure, term_name
+from fuzzytree.auditing.ranges import (
+    Range,
+    labels_of,
+    measure,
+    ranges,
+    term_name,
+)
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.curves import pieces
@@ -21,10 +27,10 @@ SHALLOW: Final = Fraction(1, 100)
 """Excesses and dips of degrees below this are counted and not told one by one."""
 
 
-def shape_answers(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
+def answers(subject: Subject) -> Iterator[Answer]:
     """Answer whether terms are well shaped."""
     sound = shallow = 0
-    for of in whole:
+    for of in ranges(subject):
         for term in of.variable.terms:
             subject.clock.check()
             found = [*_defects(of, term)]

@@ -1,14 +1,12 @@
-"""Questions about terms: are they reached, well shaped, told apart, and used?"""
+"""Questions about terms: are they reached, and used?"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.overlaps import overlap_answers
 from fuzzytree.auditing.ranges import Range, labels_of, measure, ranges, term_name
 from fuzzytree.auditing.records import Answer, Label, Measure
-from fuzzytree.auditing.shapes import shape_answers
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.measures import Bounds, heights
 from fuzzytree.proving.states import Proved
@@ -18,12 +16,9 @@ from fuzzytree.system import questions
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
-    """Answer whether terms are reached, well shaped, told apart, and used."""
-    whole = ranges(subject)
-    yield from _heights(subject, whole)
-    yield from shape_answers(subject, whole)
-    yield from overlap_answers(subject, whole)
+    """Answer whether terms are reached, and used."""
     yield from _unused(subject)
+    yield from _heights(subject, ranges(subject))
 
 
 # --- FT401: is the term reached?

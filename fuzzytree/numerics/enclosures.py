@@ -39,6 +39,7 @@ from typing import TYPE_CHECKING, NamedTuple, assert_never
 
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.rulebase import LR, Band, Clause, Flank, Points, Shape, Side, Variable
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ def degree_enclosure(shape: Shape, value: Value) -> Enclosure:
         >>> float(low[0]), float(high[0]), bool(low[1] < 1 / 3 < high[1])
         (1.0, 1.0, True)
     """
+    checkpoint()
     with np.errstate(all="ignore"):
         match shape:
             case Band():

@@ -27,6 +27,7 @@ from typing import assert_never
 import msgspec
 
 from fuzzytree.contracts import Model
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.rulebase import (
     LR,
     Band,
@@ -139,6 +140,7 @@ def exact_degree(shape: Shape, value: Fraction) -> Fraction:
         >>> exact_degree(Band(0.0, 1.0, right=Flank(1.0, 4.0)), Fraction(3))
         Fraction(1, 3)
     """
+    checkpoint()
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             if low is not None and value <= low:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.enclosures import (
     Enclosure,
     Value,
@@ -247,6 +248,7 @@ def _order(values: Sequence[Fraction]) -> list[int]:
 
 
 def _enclosed(element: Element, x: FloatArray, slack: FloatArray | None) -> Enclosure:
+    checkpoint()
     found = degree_enclosure(element.shape, Value(x, slack))
     return clause_enclosure(Clause("", ("",), element.is_complement), [found])
 

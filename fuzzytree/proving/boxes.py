@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.curves import ONE
 from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.linear import simple
 from fuzzytree.proving.parts import part_of
@@ -63,14 +64,9 @@ def region_around(
     at = [variable_value(axis.variable, point) for axis in given.axes]
     low_at: list[set[int]] = []
     for axis, value in zip(given.axes, at, strict=True):
+        of = [element.degree(value) for element in axis.elements]
         degrees = [
-            min(
-                (
-                    max(axis.elements[one].degree(value) for one in group)
-                    for group in groups
-                ),
-                default=Fraction(1),
-            )
+            min((max(of[one] for one in group) for group in groups), default=ONE)
             for groups in axis.asked
         ]
         low_at.append({rule for rule in left if degrees[rule] < level})

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from typing import Final
+
+from fuzzytree.interrupts import watched
+
+GRACE_S: Final = 0.25
+"""For who asked the clock to tell what is known."""
 
 Progress = Callable[[str, float], None]
 
@@ -64,3 +71,22 @@ class Clock:
         """Tell what is being done."""
         if self._tell is not None:
             self._tell(text, share)
+
+
+@contextlib.contextmanager
+def enforced(clock: Clock) -> Generator[None]:
+    """Have every step of the work within ask a clock, a moment after it is over.
+
+    Whoever holds the clock asks it first and can keep what is known; the steps below,
+    which know no clock, end what forgets to: curves, roots, cells, boxes.
+
+    Raises:
+        OutOfTimeError: From the step that is late.
+    """
+
+    def ask() -> None:
+        if clock.left_s < -GRACE_S:
+            raise OutOfTimeError
+
+    with watched(ask):
+        yield

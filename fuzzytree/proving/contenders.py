@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.stretches import ALWAYS, NEVER, Axis, Numbered, Seen, Stretch
 from fuzzytree.rulebase import Conjunction, RuleBase
 
@@ -81,6 +82,7 @@ def left_on(
     seen = [axis.seen(s) for axis, s in zip(axes, box, strict=True)]
     made: list[Contender] = []
     for place in range(len(asked)) if among is None else among:
+        checkpoint()
         then = rules.rules[place].then
         found = _on_box(then, asked[place], seen, conjunction, place)
         if found is not None and found.high > 0.0:
@@ -193,6 +195,7 @@ def _is_above(
     conjunction: Conjunction,
 ) -> bool:
     """Return whether each of some clauses has one of others below it."""
+    checkpoint()
     free = list(theirs)
     for axis, clause in mine:
         below = next(

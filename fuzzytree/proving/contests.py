@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.covering import maximal
 from fuzzytree.proving.ground import Bands, Ground, Laid
 from fuzzytree.proving.parts import START
@@ -160,6 +161,7 @@ def weakest(laid: Laid, rules: Sequence[int], cell: int) -> int:
 
 
 def _options(contest: Contest, laid: Laid) -> Options:
+    checkpoint()
     cells = laid.cells
     count = len(cells.rank)
     columns = np.arange(count)
@@ -231,6 +233,7 @@ def _undominated(options: Options) -> Options:
     top, floor = options.top[order], options.floor[order]
     is_better = top[:, np.newaxis] >= top
     for rival in range(floor.shape[1]):
+        checkpoint()
         is_better &= floor[:, np.newaxis, rival] <= floor[:, rival]
     chosen = order[~np.triu(is_better, 1).any(axis=0)]
     return Options(options.where[chosen], options.top[chosen], options.floor[chosen])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.clock import Clock
 
 
@@ -21,6 +22,7 @@ def maximal(masks: Iterable[int]) -> tuple[int, ...]:
     """
     kept: list[int] = []
     for mask in sorted(set(masks), key=lambda one: (-one.bit_count(), one)):
+        checkpoint()
         if all(mask | other != other for other in kept):
             kept.append(mask)
     return tuple(kept)
@@ -60,6 +62,7 @@ def cover(
         clock.check()
         reached: dict[int, tuple[int, int]] = {}
         for before in live:
+            checkpoint()
             for mask in families[axis]:
                 after = (before | mask) & full
                 if after | rest[place + 1] == full:

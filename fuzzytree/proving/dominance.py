@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import msgspec
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.factors import Factored, is_single, largest_ratio, least_ratios
 from fuzzytree.proving.ground import Ground, Laid
 
@@ -184,6 +185,7 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     def _weaker(self, weak: int) -> IntArray:
         """For each rule: 1 if it is somewhere weaker than one, 2 if unknown, else 0."""
+        checkpoint()
         key = "weaker", weak
         if key in self._known:
             return self._known[key]

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.exact import CAP
 from fuzzytree.proving.curves import (
     ONE,
@@ -45,6 +46,7 @@ class Element(NamedTuple):
 
     def degree(self, x: Fraction) -> Fraction:
         """Return the exact degree at a value."""
+        checkpoint()
         found = piece_at(pieces(self.shape), x).degree(x)
         return 1 - found if self.is_complement else found
 
@@ -109,6 +111,7 @@ def places(elements: Sequence[Element]) -> tuple[Place, ...]:
                         met = _crossing(polynomial, (level,))
                         _solve(met, *ends, found, irrational)
     for one, other in itertools.combinations(laid, 2):
+        checkpoint()
         for low, high, p, q in _overlaps(one, other):
             if len(p) > 1 or len(q) > 1:
                 _solve(_crossing(p, q), low, high, found, irrational)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.curves import ONE, ZERO
 from fuzzytree.proving.elements import Element
 from fuzzytree.proving.ground import Ground, Laid
@@ -200,6 +201,7 @@ def least_ratios(of: Factored) -> FloatArray:
     for axis, (low, high) in enumerate(of.at_zones):
         first = 0 if of.has_start(axis) else 1
         for weak in range(count):
+            checkpoint()
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 each = low[weak, first:] / high[:, first:] * (1.0 - 2.0**-50)
                 each = np.nan_to_num(each, nan=0.0, posinf=np.inf)
@@ -242,6 +244,7 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
             low = high = top / bottom
     below: list[bool] = []
     for cell, (a, b) in enumerate(of.laid[axis].cells.between):
+        checkpoint()
         r, q = (of.polynomial(axis, rule, cell) for rule in (weak, strong))
         below.append(of.is_below(axis, weak, strong, cell))
         found = quotient(r, q, a, b)
@@ -389,6 +392,7 @@ def _gaps(
         yield zones[0][0], Bounds(gap, gap)
     for cell, (low, high) in enumerate(of.laid[axis].cells.between):
         above, below = (of.polynomial(axis, rule, cell) for rule in (one, other))
+        checkpoint()
         if above == below:
             continue
         yield from sizes(difference(above, below), low, high)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.proving.axes import Cells, cut
 from fuzzytree.proving.domain import Domain
@@ -214,6 +215,7 @@ def _asked(
     elements: dict[Element, int],
 ) -> tuple[tuple[int, ...], ...]:
     """Return what a rule asks of a variable: the least of the largest of elements."""
+    checkpoint()
     groups: list[tuple[int, ...]] = []
     for clause in when:
         if clause.variable != variable:
@@ -293,6 +295,7 @@ def _chosen(axis: Axis, rank: IntArray) -> IntArray:
     chosen = np.zeros((len(axis.asked), len(rank)), dtype=np.int64)
     every = np.arange(len(rank))
     for number, groups in enumerate(axis.asked):
+        checkpoint()
         best: IntArray | None = None
         for group in groups:
             of = np.array(group)
@@ -325,6 +328,7 @@ def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]
 
 def rule_strengths(rules: RuleBase, point: Mapping[str, Fraction]) -> list[Fraction]:
     """Return every rule's exact strength, without a domain."""
+    checkpoint()
     is_product = rules.semantics.conjunction == "product"
     shapes = shapes_of(rules.variables)
     clauses = dict.fromkeys(c for rule in rules.rules for c in rule.when)

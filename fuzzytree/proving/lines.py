@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.enclosures import LEAST, Enclosure, U
 from fuzzytree.proving.ranges import bends, clause_ranges
 from fuzzytree.rulebase import Clause, RuleBase, Shape, Variable, shapes_of
@@ -194,6 +195,7 @@ class Asked:
         side: int,
     ) -> FloatArray:
         """Return the degree of some clauses together, rounded down, up or not."""
+        checkpoint()
         chosen = [degrees[place] for place in asked]
         if not self.is_product:
             return functools.reduce(np.minimum, chosen, np.ones(size))

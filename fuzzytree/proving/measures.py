@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.axes import Cells, cut
 from fuzzytree.proving.curves import ONE, ZERO, piece_at, pieces
 from fuzzytree.proving.elements import Element, places
@@ -110,6 +111,7 @@ def local(element: Element, at: Fraction) -> Polynomial:
         >>> local(Element(Points((0.0, 2.0), (0.0, 1.0)), True), Fraction(1))
         (Fraction(1, 1), Fraction(-1, 2))
     """
+    checkpoint()
     piece = piece_at(pieces(element.shape), at)
     degree = piece.degree(at)
     clipped = degree in (ZERO, piece.cap)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.bounding import highest_by_boxes
 from fuzzytree.proving.boxes import region_around
@@ -79,6 +80,7 @@ def highest(compared: Compared, one: int) -> FloatArray:
 
 def _bands(compared: Compared, one: int) -> IntArray:
     """Return the bands of the highest levels that a rule reaches with each other."""
+    checkpoint()
     found = np.full(len(compared.ground.rules.rules), FAR)
     for side in compared.sides:
         lower = side.rank <= side.rank[one]

@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.rulebase import Value
 
 Polynomial = tuple[Fraction, ...]
@@ -183,6 +184,7 @@ def integer_roots(
     numbers: Sequence[int], low: Fraction, high: Fraction
 ) -> tuple[Root, ...]:
     """Return what `roots` does, of a polynomial with whole coefficients."""
+    checkpoint()
     while len(numbers) > 1 and not numbers[-1]:
         numbers = numbers[:-1]
     if len(numbers) == 1:

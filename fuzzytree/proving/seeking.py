@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.enclosures import axis_value, clause_enclosure, degree_enclosure
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.ground import Ground, strengths_at
@@ -40,6 +41,7 @@ def near_strengths(rules: RuleBase, values: FloatArray) -> FloatArray:
     known: dict[object, FloatArray] = {}
     strengths = np.ones((len(rules.rules), values.shape[1]))
     for number, rule in enumerate(rules.rules):
+        checkpoint()
         for clause in rule.when:
             if clause not in known:
                 value = axis_value(variables[clause.variable], columns)

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import NamedTuple
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.curves import ONE, ZERO, Piece, piece_at, pieces
 from fuzzytree.proving.polynomials import Polynomial, composed, difference, roots
@@ -92,6 +93,7 @@ class Axis:
         return found
 
     def _see(self, asked: Asked, stretch: Stretch) -> Seen:
+        checkpoint()
         is_negated, shapes = asked
         parts = [_clipped(shape, stretch) for shape in shapes]
         bounds = [_bounds(part) for part in parts]

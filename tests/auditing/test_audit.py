@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from pathlib import Path
 
@@ -140,7 +141,7 @@ def test_codes_that_are_left_out_are_told() -> None:
 
 
 def test_a_spent_budget_leaves_the_rest_unasked_and_says_so() -> None:
-    times = iter([0.0, *[10.0] * 10_000])
+    times = itertools.chain([0.0], itertools.repeat(10.0))
     clock = Clock(1.0, now=lambda: next(times))
     found = audit(grip(), domain=FAR, clock=clock, settings=Settings(budget_s=1.0))
     assert not found.is_complete
@@ -152,13 +153,13 @@ def test_a_spent_budget_leaves_the_rest_unasked_and_says_so() -> None:
 def test_a_budget_that_ends_midway_keeps_what_was_answered() -> None:
     whole = audit(grip(), domain=FAR)
     counts = set[int]()
-    for ticks in range(1, 60, 7):
-        times = iter([0.0] * ticks + [10.0] * 100_000)
+    for ticks in (1, 60, 400, 1000, 2000, 4000):
+        times = itertools.chain(itertools.repeat(0.0, ticks), itertools.repeat(10.0))
         clock = Clock(1.0, now=functools.partial(next, times))
         part = audit(grip(), domain=FAR, clock=clock)
         assert {one.id for one in part.answers} <= {one.id for one in whole.answers}
         counts.add(len(part.answers))
-    assert len(counts) > 1
+    assert len(counts) > 2
 
 
 def test_accepted_findings_are_no_longer_open() -> None:
