@@ -184,12 +184,6 @@ class _Ties:
     def answers(self) -> Iterator[Answer]:
         """Answer for pairs that tie one by one, for all others together."""
         rules = self.subject.rules.rules
-        if self.given.rules.semantics.conjunction == "product":
-            state = self.of(1, 2) if len(rules) > 1 else None
-            if isinstance(state, Declined):
-                sentence = "whether rules of two classes tie is not decided"
-                yield Answer("FT202", "ties", sentence, state, False)
-            return
         told = 0
         left_open: list[State] = []
         pairs = [

@@ -37,7 +37,8 @@ Rules under the product, and any other: boxes
 
 Questions, whatever the conjunction
     - `wins`, `leads`: is a rule ever strongest, and by how much
-    - `ties`, `proportions`: are rules equally strong on a set with an interior
+    - `tied`, `ties`: are rules equally strong on a set with an interior
+    - `proportions`, `products`: where are they one function, under the product
     - `cover`: is there an input without a rule, or with weak ones only
     - `factors`, `dominance`: two rules compared axis by axis
     - `meeting`: the highest level that two rules both reach

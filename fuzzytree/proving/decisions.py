@@ -20,12 +20,10 @@ from fuzzytree.proving.branching import simplified
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.cover import uncovered
 from fuzzytree.proving.ground import Ground
-from fuzzytree.proving.proportions import may_tie
 from fuzzytree.proving.seeking import ends_of, near_strengths
 from fuzzytree.proving.states import (
     Carrier,
     Claim,
-    Declined,
     Proved,
     State,
     Witness,
@@ -105,13 +103,9 @@ def _asked(given: Ground, label: str | None, clock: Clock) -> Iterator[State]:
         yield wins(given, number, own, clock)
     if given.rules.semantics.uncovered != label:
         yield uncovered(given, clock)
-    is_product = given.rules.semantics.conjunction == "product"
     for number in others:
         after = [rival for rival in own if rival > number]
-        if is_product:
-            if any(may_tie(given, number, rival) for rival in after):
-                yield Declined("FTD01", f"rule {number} may tie, under the product")
-        elif after:
+        if after:
             before = [rival for rival in own if rival < number]
             yield decides_by_order(given, number, before, after, clock)
 

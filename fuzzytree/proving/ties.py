@@ -20,20 +20,13 @@ import numpy as np
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest, weakest
 from fuzzytree.proving.covering import cover, maximal
-from fuzzytree.proving.ground import Ground, Laid, strengths_at
+from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.linear import simple
 from fuzzytree.proving.parts import START, Stretch, part_of, stretch
-from fuzzytree.proving.states import (
-    Bracket,
-    Claim,
-    Declined,
-    Proved,
-    State,
-    Witness,
-    coordinates,
-)
-from fuzzytree.proving.variables import Point
-from fuzzytree.proving.witnesses import is_within, point_with
+from fuzzytree.proving.products import tie_of_products
+from fuzzytree.proving.states import Declined, Proved, State, Witness
+from fuzzytree.proving.tied import Asked, checked
+from fuzzytree.proving.witnesses import point_with
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -41,18 +34,6 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import IntArray
 
     BoolArray = npt.NDArray[np.bool_]
-
-
-class _Asked(NamedTuple):
-    """Rules that shall tie, rivals that must be below, rivals that may be equal."""
-
-    ours: tuple[int, ...]
-    strict: tuple[int, ...]
-    weak: tuple[int, ...]
-
-    @property
-    def rivals(self) -> tuple[int, ...]:
-        return self.strict + self.weak
 
 
 class _Pivot(NamedTuple):
@@ -87,12 +68,12 @@ def tie(given: Ground, one: int, other: int, clock: Clock | None = None) -> Stat
         clock: How much time there is; no limit unless given.
 
     Returns:
-        `Proved`: they never do. `Witness`: here they do. `Declined`: the conjunction
-        is not the minimum, or inputs that depend on each other leave it open.
+        `Proved`: they never do. `Witness`: here they do. `Bracket`: the budget leaves
+        it open. `Declined`: inputs that depend on each other do.
     """
     every = range(1, len(given.rules.rules) + 1)
     rest = tuple(n for n in every if n not in (one, other))
-    return _asked(given, _Asked((one, other), (), rest), clock or Clock())
+    return _asked(given, Asked((one, other), (), rest), clock or Clock())
 
 
 def decides_by_order(
@@ -114,29 +95,26 @@ def decides_by_order(
     Returns:
         As `tie`.
     """
-    asked = _Asked((rule,), tuple(sorted(before)), tuple(sorted(behind)))
+    asked = Asked((rule,), tuple(sorted(before)), tuple(sorted(behind)))
     return _asked(given, asked, clock or Clock())
 
 
-def _asked(given: Ground, asked: _Asked, clock: Clock) -> State:
+def _asked(given: Ground, asked: Asked, clock: Clock) -> State:
     if given.is_empty:
         return Proved("the domain has no point")
-    if given.rules.semantics.conjunction == "product":
-        reason = "ties under the product are not decided: it has no exact method here"
-        return Declined("FTD01", reason)
     if not given.axes:
         point = point_with(given, {})
-        found = None if point is None else _checked(given, asked, point)
+        found = None if point is None else checked(given, asked, point)
         return found or Proved("no rule asks anything")
+    if given.rules.semantics.conjunction == "product":
+        return tie_of_products(given, asked, clock)
     try:
         return _searched(given, asked, clock)
     except OutOfTimeError:
-        names = " and ".join(map(str, asked.ours))
-        what = f"whether rules {names} tie (1) or not (0)"
-        return Bracket(what, 0.0, 1.0, "the budget was spent")
+        return asked.open("the budget was spent")
 
 
-def _searched(given: Ground, asked: _Asked, clock: Clock) -> State:
+def _searched(given: Ground, asked: Asked, clock: Clock) -> State:
     contest = Contest(
         given,
         tuple(n - 1 for n in asked.ours),
@@ -243,7 +221,7 @@ def _levels(contest: Contest, least: int, most: int) -> list[int]:
     return sorted({least, *inner})
 
 
-def _pivots(contest: Contest, asked: _Asked, axis: int, laid: Laid) -> list[_Pivot]:
+def _pivots(contest: Contest, asked: Asked, axis: int, laid: Laid) -> list[_Pivot]:
     """Return the cells of an axis in which all of ours are the same curve, not 0."""
     seen = _seen(laid)
     ours = seen.height[np.array(contest.ours)]
@@ -260,7 +238,7 @@ def _pivots(contest: Contest, asked: _Asked, axis: int, laid: Laid) -> list[_Piv
     return list(found.values())
 
 
-def _crossed(contest: Contest, asked: _Asked) -> list[_Pivot]:
+def _crossed(contest: Contest, asked: Asked) -> list[_Pivot]:
     """Return pairs of constants of one level, on two axes, that hold two rules."""
     if len(asked.ours) < 2:
         return []
@@ -274,7 +252,7 @@ def _crossed(contest: Contest, asked: _Asked) -> list[_Pivot]:
     return list(found.values())
 
 
-def _held(contest: Contest, asked: _Asked, rule: int) -> Iterator[tuple[_Pivot, int]]:
+def _held(contest: Contest, asked: Asked, rule: int) -> Iterator[tuple[_Pivot, int]]:
     """Yield where a rule, the least of ours, is constant and not 0, with the band."""
     for axis, laid in enumerate(contest.ground.laid[0]):
         seen = _seen(laid)
@@ -293,7 +271,7 @@ def _held(contest: Contest, asked: _Asked, rule: int) -> Iterator[tuple[_Pivot, 
                 yield _Pivot(axis, cell, element, mask), least
 
 
-def _limits(asked: _Asked) -> IntArray:
+def _limits(asked: Asked) -> IntArray:
     """Return, of each rival, by how many ranks it must stay below: 0, or 1 less."""
     return np.array([0] * len(asked.strict) + [1] * len(asked.weak), dtype=np.int64)[
         :, np.newaxis
@@ -301,7 +279,7 @@ def _limits(asked: _Asked) -> IntArray:
 
 
 def _flat_family(
-    contest: Contest, asked: _Asked, axis: int, band: int
+    contest: Contest, asked: Asked, axis: int, band: int
 ) -> tuple[int, ...]:
     """Return what does not exceed a sharp level where ours reach it.
 
@@ -333,7 +311,7 @@ def _stays(contest: Contest, laid: Laid, cell: int, rival: int, band: int) -> bo
 
 def _witness(
     contest: Contest,
-    asked: _Asked,
+    asked: Asked,
     pivot: _Pivot,
     band: int,
     chosen: Sequence[int],
@@ -371,7 +349,7 @@ def _witness(
         wanted[axis] = found
         left &= ~mask
     point = point_with(given, wanted)
-    return None if point is None else _checked(given, asked, point)
+    return None if point is None else checked(given, asked, point)
 
 
 def _part(
@@ -400,30 +378,3 @@ def _part(
         if found is not None:
             return found
     return None
-
-
-def _checked(given: Ground, asked: _Asked, point: Point) -> Witness | None:
-    strengths = strengths_at(given, point)
-    mine = strengths[asked.ours[0] - 1]
-    holds = (
-        all(strengths[n - 1] == mine for n in asked.ours)
-        and all(strengths[n - 1] < mine for n in asked.strict)
-        and all(strengths[n - 1] <= mine for n in asked.weak)
-        and mine > 0
-        and is_within(given, point)
-    )
-    if not holds:
-        return None
-    return Witness(coordinates(point), _claims(asked, strengths, mine))
-
-
-def _claims(
-    asked: _Asked, strengths: Sequence[Fraction], mine: Fraction
-) -> tuple[Claim, ...]:
-    every = asked.ours + asked.rivals
-    level = tuple(sorted(n for n in every if strengths[n - 1] == mine))
-    below = tuple(sorted(n for n in every if strengths[n - 1] < mine))
-    return (
-        Claim("ties", rules=level, rivals=below),
-        Claim("strength", rules=(asked.ours[0],), level=str(mine)),
-    )

@@ -133,11 +133,13 @@ def test_rules_that_share_their_weakest_clause_are_ambiguous() -> None:
     assert (1, 2) not in _found(_asked(*apart), "FT202")
 
 
-def test_products_are_asked_too_and_ties_of_them_declined() -> None:
+def test_products_are_asked_too_and_tie_where_they_are_one_function() -> None:
     given = _asked(*CLEAN, ("small", "c"), conjunction="product")
     assert list(_found(given, "FT101")) == [(3,)]
     (ties,) = [one for one in given if one.code == "FT202"]
-    assert ties.sentence == "whether rules of two classes tie is not decided"
+    assert isinstance(ties.state, Proved)
+    copied = _asked(*CLEAN, ("low", "c"), conjunction="product")
+    assert list(_found(copied, "FT202")) == [(1, 3)]
 
 
 def test_where_all_rules_take_part_only_firing_is_asked() -> None:

@@ -14,7 +14,6 @@ from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.decisions import decision_at, other_decision
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import Ground, ground, narrowed, strengths_at
-from fuzzytree.proving.proportions import may_tie
 from fuzzytree.proving.states import (
     Bracket,
     Claim,
@@ -23,7 +22,7 @@ from fuzzytree.proving.states import (
     Witness,
     point_of,
 )
-from fuzzytree.proving.ties import decides_by_order
+from fuzzytree.proving.ties import decides_by_order, tie
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import (
     Band,
@@ -145,17 +144,20 @@ def _as_product(rules: RuleBase) -> RuleBase:
 
 
 @pytest.mark.parametrize(
-    ("other", "may"),
+    ("other", "ties"),
     [
         (Points((0.0, 1.0), (1.0, 0.875)), False),
-        (Points((0.0, 1.0), (0.5, 0.375)), True),  # half of the other one
+        (Points((0.0, 1.0), (0.5, 0.375)), False),  # half of the other one
+        (Points((0.0, 0.5, 1.0), (1.0, 0.875, 0.0)), True),  # up to 1/2 the same
         (Points((0.0, 1.0), (0.0, 0.5)), False),
     ],
 )
-def test_a_tie_under_the_product_needs_multiples(other: Points, may: bool) -> None:
+def test_rules_tie_under_the_product_where_they_are_one_function(
+    other: Points, ties: bool
+) -> None:
     rules = _as_product(_shared(other))
-    given = ground(rules, _box(rules))
-    assert may_tie(given, 1, 2) is may
+    found = tie(ground(rules, _box(rules)), 1, 2)
+    assert isinstance(found, Witness if ties else Proved)
 
 
 def test_a_tie_on_a_plateau_under_the_product_is_not_taken_for_none() -> None:
@@ -169,7 +171,7 @@ def test_a_tie_on_a_plateau_under_the_product_is_not_taken_for_none() -> None:
     )
     inside = ground(rules, _box(rules, x=(0.3, 0.7), y=(0.3, 0.7)))
     assert isinstance(other_decision(inside, "b"), Witness)
-    assert may_tie(inside, 1, 2)
+    assert isinstance(tie(inside, 1, 2), Witness)
     assert isinstance(other_decision(inside, "a"), Proved)  # the first one decides
 
 

@@ -16,6 +16,8 @@ from fuzzytree.proving.ties import decides_by_order, tie
 from fuzzytree.rulebase import (
     Band,
     Clause,
+    Conjunction,
+    Part,
     Points,
     Rule,
     RuleBase,
@@ -77,18 +79,82 @@ def test_the_first_of_two_equal_rules_decides_and_the_second_does_not() -> None:
     assert isinstance(decides_by_order(given, 2, (1,), ()), Proved)
 
 
-def test_ties_of_products_are_declined() -> None:
-    given = ground(
-        _rules(("up", "up", "a"), ("up", "down", "b"), conjunction="product"), SQUARE
-    )
+def _products(*rules: tuple[str, str, str]) -> RuleBase:
+    return _rules(*rules, conjunction="product")
+
+
+def test_products_of_the_same_curves_tie_and_those_of_others_do_not() -> None:
+    given = ground(_products(("up", "down", "a"), ("up", "down", "b")), SQUARE)
     found = tie(given, 1, 2)
-    assert isinstance(found, Declined)
-    assert found.code == "FTD01"
+    assert isinstance(found, Witness)
+    one, two = strengths_at(given, point_of(found.point))
+    assert one == two > 0
+    assert isinstance(decides_by_order(given, 1, (), (2,)), Witness)
+    assert isinstance(decides_by_order(given, 2, (1,), ()), Proved)
+    shared = ground(_products(("up", "up", "a"), ("up", "down", "b")), SQUARE)
+    assert isinstance(tie(shared, 1, 2), Proved)  # where y is 1/2, a line
 
 
+def test_products_tie_where_what_they_do_not_share_multiplies_to_the_same() -> None:
+    low, high = (
+        Term("low", Points((0.0,), (0.25,))),
+        Term("high", Points((0.0,), (0.5,))),
+    )
+    rise = Term("rise", Points((0.0, 1.0), (0.0, 0.5)))
+
+    def found(other: Term) -> object:
+        rules = RuleBase(
+            "multiples",
+            ("a", "b"),
+            (Variable("x", (UP, rise)), Variable("y", (low, high))),
+            (
+                Rule((Clause("x", ("up",)), Clause("y", ("low",))), "a"),
+                Rule((Clause("x", ("rise",)), Clause("y", (other.name,))), "b"),
+            ),
+            Semantics("product"),
+        )
+        return tie(ground(rules, SQUARE), 1, 2)
+
+    assert isinstance(found(high), Witness)  # x / 4 is x / 2 * 1 / 2
+    assert isinstance(found(low), Proved)
+
+
+def test_products_tie_on_the_part_that_no_other_rule_exceeds() -> None:
+    rules = (("up", "down", "a"), ("up", "down", "b"))
+    above = _products(*rules, ("half", "down", "c"))
+    given = ground(above, SQUARE)
+    found = tie(given, 1, 2)
+    assert isinstance(found, Witness)
+    assert point_of(found.point)["x"] > Fraction(1, 2)
+    left = Domain((Side("x", 0.0, 0.5), Side("y", 0.0, 1.0)))
+    assert isinstance(tie(ground(above, left), 1, 2), Proved)
+    # A third that is the same function ends no tie.
+    assert isinstance(tie(ground(_products(*rules, rules[0]), SQUARE), 1, 2), Witness)
+
+
+def test_products_of_combinations_of_one_direction_are_declined() -> None:
+    twice = Variable("twice", (UP, HALF), parts=(Part("x", 2.0),))
+    rules = RuleBase(
+        "parallel",
+        ("a", "b"),
+        (Variable("x", (UP, HALF)), twice),
+        (
+            Rule((Clause("x", ("up",)),), "a"),
+            Rule((Clause("twice", ("up",)), Clause("x", ("half",))), "b"),
+        ),
+        Semantics("product"),
+    )
+    found = tie(ground(rules, Domain((Side("x", 0.0, 0.5),))), 1, 2)
+    assert isinstance(found, Declined)  # both are x
+    assert found.code == "FTD04"
+
+
+@pytest.mark.parametrize("conjunction", ["min", "product"])
 @pytest.mark.parametrize("seed", range(8))
-def test_no_row_ties_where_a_tie_is_excluded(seed: int) -> None:
-    rules = random_base(seed, 5, 2, kind="mixed", shared=0.6)
+def test_no_row_ties_where_a_tie_is_excluded(
+    seed: int, conjunction: Conjunction
+) -> None:
+    rules = random_base(seed, 5, 2, conjunction, kind="mixed", shared=0.6)
     given = ground(rules, unit_domain(rules))
     values = np.random.default_rng(seed).random((2, 3000))
     answers = decide(rules, values)

@@ -1,0 +1,176 @@
+"""Ties under the product: on boxes where rules are one function, are they strongest?
+
+Where rules tie on a set with an interior they are one function on a box of cells
+(`fuzzytree.proving.proportions`). Whether they are the strongest somewhere in it, but
+for rivals that are that function too, is asked of branch and bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from msgspec.structs import replace
+
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.bounding import wins_by_boxes
+from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.ground import Ground
+from fuzzytree.proving.proportions import Box, Proportions
+from fuzzytree.proving.states import Declined, Proved, State, Witness, point_of
+from fuzzytree.proving.tied import Asked, checked
+from fuzzytree.proving.variables import Point, variable_value
+from fuzzytree.proving.witnesses import coupled
+from fuzzytree.proving.wording import counted
+
+_MOST_BOXES: Final = 500  # of cells, in one question
+_SHARE: Final = 0.25  # of the time that is left, for one box
+_TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
+
+
+def tie_of_products(given: Ground, asked: Asked, clock: Clock) -> State:
+    """Return whether rules are the strongest on a set with an interior.
+
+    Args:
+        given: The rules, joined by the product, and the box, which is not empty.
+        asked: Which of them.
+        clock: How much time there is.
+
+    Returns:
+        `Proved`: they nowhere are. `Witness`: here they are. `Bracket`: time, or a
+        lead that is too small to tell, leaves it open. `Declined`: axes of one
+        direction do, or places too near to each other.
+    """
+    search = _Search(Proportions(given), asked, clock)
+    every = [rule - 1 for rule in (*asked.ours, *asked.weak)]
+    pairs = [(every[0], other) for other in every[1:]]
+    if not all(search.of.are_free(*pair) for pair in pairs):
+        reason = "the inputs of its variables depend on each other"
+        return Declined("FTD04", reason)
+    if not all(search.of.is_told(*pair) for pair in pairs):
+        search.of = Proportions(given.fine)
+    try:
+        found = search.found()
+    except OutOfTimeError:
+        return asked.open("the budget was spent")
+    if found is not None:
+        return found
+    if search.why:
+        return asked.open(search.why)
+    if not all(search.of.is_told(*pair) for pair in pairs):
+        return Declined("FTD04", "two places of an axis are too near to tell")
+    boxes = counted(len(search.seen), "box", "boxes")
+    return Proved(f"{boxes} of cells visited in which they are one function")
+
+
+class _Search:
+    """One question.
+
+    Attributes:
+        of: The rules.
+        asked: Which of them.
+        clock: How much time there is.
+        seen: The boxes that were asked about.
+        why: What left a box open, if any was.
+    """
+
+    def __init__(self, of: Proportions, asked: Asked, clock: Clock) -> None:
+        self.of, self.asked, self.clock = of, asked, clock
+        self.seen: set[Box] = set()
+        self.why = ""
+        given = of.ground
+        self.joined = {axis for group in coupled(given) for axis in group}
+
+    def found(self) -> Witness | None:
+        """Return a point, or None if there is none, or none was found."""
+        mine, *others = (rule - 1 for rule in self.asked.ours)
+        todo: list[Iterable[Box]] = [
+            self.of.boxes(mine, others[0], self.of.whole) if others else [self.of.whole]
+        ]
+        while todo:
+            for box in todo.pop():
+                self.clock.check()
+                if box in self.seen:
+                    continue
+                if len(self.seen) == _MOST_BOXES:
+                    raise OutOfTimeError
+                self.seen.add(box)
+                same = {
+                    rule
+                    for rule in self.asked.rivals
+                    if self.of.are_one(mine, rule - 1, box)
+                }
+                if same & {*self.asked.strict}:
+                    continue
+                found = self._leads(box, same)
+                if found is not None:
+                    return found
+                todo.append(self._parts(box, same))
+        return None
+
+    def _parts(self, box: Box, same: set[int]) -> Iterator[Box]:
+        """Yield the parts of a box in which more rivals are the same function."""
+        mine = self.asked.ours[0] - 1
+        for rule in self.asked.weak:
+            if rule not in same:
+                yield from self.of.boxes(mine, rule - 1, box)
+
+    def _leads(self, box: Box, same: set[int]) -> Witness | None:
+        """Return a point of a box at which all but some rivals are weaker."""
+        rivals = [rule for rule in self.asked.rivals if rule not in same]
+        rules, rule = self.of.ground.rules, self.asked.ours[0]
+        for is_outer in (True, False):
+            domain = self._domain(box, is_outer=is_outer)
+            if domain is None:
+                break
+            clock = self.clock.share(_SHARE)
+            state = wins_by_boxes(
+                rules, domain, rule, rivals, clock, tolerance=_TOLERANCE
+            )
+            if isinstance(state, Proved) and is_outer:
+                return None
+            if isinstance(state, Witness):
+                point = point_of(state.point)
+                if self._is_inside(box, point):
+                    return checked(self.of.ground, self.asked, point)
+        self.why = "no point is known where they lead, and none is excluded"
+        return None
+
+    def _domain(self, box: Box, *, is_outer: bool) -> Domain | None:
+        """Return a box with doubles for its ends, around it or within it."""
+        domain = self.of.ground.domain
+        sides = {side.variable: side for side in domain.sides}
+        for axis, run in enumerate(box):
+            variable = self.of.laid[axis].axis.variable
+            known = sides.get(variable.name)
+            if run == self.of.whole[axis]:
+                if known is not None and known.low < known.high:
+                    # What holds at an end alone has no interior.
+                    sides[variable.name] = replace(known, is_open=True)
+                continue
+            low, high = self.of.ends(axis, run)
+            (below, first), (last, above) = outwards(low), outwards(high)
+            if is_outer:
+                first, last = below, above
+            # The value at a lower end belongs to the cell before.
+            is_open = first == low
+            if first > last or (first == last and is_open):
+                return None
+            sides[variable.name] = Side(variable.name, first, last, is_open=is_open)
+        return Domain(tuple(sides.values()))
+
+    def _is_inside(self, box: Box, point: Point) -> bool:
+        """Return whether points with an interior about one, or below, are in a box."""
+        for axis, run in enumerate(box):
+            laid = self.of.laid[axis]
+            value = variable_value(laid.axis.variable, point)
+            if axis in self.joined and laid.cells.between:
+                cells = laid.cells.between[run.first : run.last + 1]
+                if not any(low < value < high for low, high in cells):
+                    return False
+                continue
+            low, high = self.of.ends(axis, run)
+            if not (low < value <= high or low == value == high):
+                return False
+        return True
