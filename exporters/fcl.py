@@ -43,7 +43,7 @@ from fuzzytree.exporters.fcl_terms import (
 from fuzzytree.exporters.fll_rules import speakable
 from fuzzytree.losses import refusal
 from fuzzytree.naming import Names, changes_text
-from fuzzytree.readers.fcl import FACTS, read
+from fuzzytree.readers.fcl import FACTS, places, read
 from fuzzytree.readers.fcl_dialects import MARK
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.system import (
@@ -334,6 +334,7 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=read,
+    places=places,
     cannot=(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",

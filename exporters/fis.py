@@ -29,7 +29,7 @@ from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.losses import refusal
 from fuzzytree.naming import Names, changes_text
 from fuzzytree.readers.engines import fuzzylite_losses
-from fuzzytree.readers.fis import DEFAULTS, DIALECT, FACTS, reading
+from fuzzytree.readers.fis import DEFAULTS, DIALECT, FACTS, places, reading
 from fuzzytree.readers.fis_words import (
     DIALECTS,
     METHODS,
@@ -433,6 +433,7 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=reading,
+    places=places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
         "maximum; a rule that asks an output",

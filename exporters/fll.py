@@ -34,7 +34,7 @@ from fuzzytree.exporters.fll_terms import (
 )
 from fuzzytree.losses import refusal
 from fuzzytree.naming import Names, changes_text
-from fuzzytree.readers.fll import FACTS, read
+from fuzzytree.readers.fll import FACTS, places, read
 from fuzzytree.readers.fll_meaning import differences
 from fuzzytree.readers.fll_rules import RULE_WORDS
 from fuzzytree.readers.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
@@ -352,6 +352,7 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=read,
+    places=places,
     cannot=(
         "a combination of columns; it becomes an input, to be given as its sum",
         "polynomial flanks and LR sets; they become points",

@@ -29,7 +29,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
 from fuzzytree.losses import refusal
 from fuzzytree.naming import DIGITS, LETTERS, Names, changes_text
-from fuzzytree.readers.fml import FACTS, reading
+from fuzzytree.readers.fml import FACTS, places, reading
 from fuzzytree.readers.fml_words import FAR, METHODS, NAMESPACE, SNORMS, TNORMS, USUAL
 from fuzzytree.rulebase import Points, RuleBase
 from fuzzytree.system import (
@@ -440,6 +440,7 @@ FORMAT = Format(
     carries=("rules", "system"),
     write=write,
     read=reading,
+    places=places,
     cannot=(
         "a rule that mixes and and or over several inputs, unless rules are joined by "
         "maximum; a rule that asks an output",

@@ -18,7 +18,7 @@ from fuzzytree.exporters.yaml_text import Entry, Noted, Short, joined
 from fuzzytree.readers import layout
 from fuzzytree.readers.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
 from fuzzytree.readers.sentences import Vocabulary, readings, vocabulary_of
-from fuzzytree.readers.yaml import reading
+from fuzzytree.readers.yaml import places, reading
 from fuzzytree.rulebase import (
     Clause,
     RuleBase,
@@ -238,4 +238,11 @@ def _answer(label: str | None) -> str:
     return "no class" if label is None else f"class {label}"
 
 
-FORMAT = Format("yaml", (".yaml", ".yml"), ("tree", "rules", "system"), write, reading)
+FORMAT = Format(
+    name="yaml",
+    suffixes=(".yaml", ".yml"),
+    carries=("tree", "rules", "system"),
+    write=write,
+    read=reading,
+    places=places,
+)

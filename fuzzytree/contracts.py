@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import msgspec
 
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.rulebase import Path, RuleBase
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
@@ -83,6 +83,10 @@ class Writer(Protocol):
         ...
 
 
+Locate = Callable[[Path], tuple[int, int] | None]
+"""Where a part of a model stands in its file: line and column from 1, if known."""
+
+
 class Format(msgspec.Struct, frozen=True):
     """A file format.
 
@@ -97,6 +101,8 @@ class Format(msgspec.Struct, frozen=True):
         extra: The optional packages it needs, if any.
         dtype: The number type in which a file of it computes, unless the writer's
             option of that name says another; None if it only holds the model.
+        places: Bytes and a name to where the parts of their model stand; None if a
+            file of it has no lines.
     """
 
     name: str
@@ -107,6 +113,7 @@ class Format(msgspec.Struct, frozen=True):
     cannot: tuple[str, ...] = ()
     extra: str | None = None
     dtype: Dtype | None = None
+    places: Callable[[bytes, str], Locate] | None = None
 
 
 class Outcome(msgspec.Struct, frozen=True):

@@ -24,6 +24,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain, Side, limited
+from fuzzytree.readers.spots import in_system
 from fuzzytree.rulebase import Path, RuleBase, fingerprint, name_choice
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
@@ -209,6 +210,10 @@ def _placed(
 
 
 def _path(model: Document, path: Path) -> Path:
-    if isinstance(model, FuzzyTree) and path[0] == "rules":
-        return ("leaves", *path[1:])
-    return path
+    match model:
+        case FuzzyTree() if path[0] == "rules":
+            return ("leaves", *path[1:])
+        case FuzzySystem():  # that stands for rules
+            return in_system(path)
+        case _:
+            return path

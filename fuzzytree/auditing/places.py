@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import PurePath
 
 import msgspec
 
 from fuzzytree.auditing.records import Answer, Label, Place
-from fuzzytree.contracts import Document
+from fuzzytree.contracts import Document, Locate
+from fuzzytree.converting import format_of
 from fuzzytree.errors import ReadError
-from fuzzytree.readers.nodes import Node, compose
-from fuzzytree.readers.places import find
 from fuzzytree.rulebase import Path, Rule, RuleBase, Shape, sentence, shapes_of
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
-_YAML = (".yaml", ".yml")
+
+def _nowhere(_: Path) -> None:
+    """Say that no place is known."""
 
 
 class ModelFile(msgspec.Struct, frozen=True, eq=False):
@@ -26,19 +27,17 @@ class ModelFile(msgspec.Struct, frozen=True, eq=False):
     Attributes:
         name: Its path as the user wrote it.
         content: Its bytes.
-        root: What it holds, node by node; None if it is no YAML.
+        locate: Tells where the parts of its model stand.
     """
 
     name: str
     content: bytes
-    root: Node | None = None
+    locate: Locate = _nowhere
 
     def place(self, path: Path) -> Place | None:
         """Return where a part of the model stands, None if that is not known."""
-        if self.root is None:
-            return None
-        node = find(self.root, path)
-        return Place(writable(self.name), node.line, node.column)
+        spot = self.locate(path)
+        return None if spot is None else Place(writable(self.name), *spot)
 
 
 def writable(text: str) -> str:
@@ -47,14 +46,17 @@ def writable(text: str) -> str:
 
 
 def model_file(name: str, content: bytes) -> ModelFile:
-    """Return a file with its places: lines and columns where it is YAML."""
-    root: Node | None = None
-    if PurePath(name).suffix.lower() in _YAML:
+    """Return a file with its places; it is read for them when they are asked for."""
+
+    @functools.cache
+    def known() -> Locate:
         try:
-            root, _ = compose(content, name)
-        except ReadError:  # another format under this suffix: it has no places
-            root = None
-    return ModelFile(name, content, root)
+            find = format_of(name).places
+            return _nowhere if find is None else find(content, name)
+        except ReadError:  # such as another format under this suffix
+            return _nowhere
+
+    return ModelFile(name, content, lambda path: known()(path))
 
 
 def rule_path(model: Document, number: int) -> Path:

@@ -179,6 +179,30 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
     return rules if given == wanted else None
 
 
+def numbers_of(facts: str) -> tuple[int, ...]:
+    """Return for each rule of a rule base the place of the system's rule that holds it.
+
+    Args:
+        facts: A line that `as_rules` took.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0, leaves=2))
+        >>> numbers_of(facts_of(rules)), numbers_of(facts_of(rules, "winner"))
+        ((1, 2), (0, 1))
+    """
+    found = _decoded(facts)
+    if found is None:
+        return ()
+    labels = [label for _, label, _ in found.rules]
+    if found.scores == "class":  # behind the rule that always holds, one for each class
+        used = sorted(set(labels))
+        return tuple(1 + used.index(label) for label in labels)
+    first = 0 if found.scores == "winner" else 1
+    return tuple(range(first, first + len(labels)))
+
+
 def _decoded(facts: str) -> _Facts | None:
     data = facts.encode()
     if len(data) > _MOST:

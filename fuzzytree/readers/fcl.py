@@ -8,12 +8,13 @@ takes it. `docs/fcl.md` lists the differences.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
 from fuzzytree.casting import as_rules
-from fuzzytree.contracts import Document, Reading
+from fuzzytree.contracts import Document, Locate, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers.fcl_blocks import Block, blocks_of
 from fuzzytree.readers.fcl_dialects import detected, is_marked, norm_of
@@ -27,12 +28,14 @@ from fuzzytree.readers.fcl_statements import place
 from fuzzytree.readers.fcl_text import parsed
 from fuzzytree.readers.fcl_variables import (
     Known,
+    Named,
     known_variables,
     read_input,
     read_output,
 )
 from fuzzytree.readers.fll_words import Notes
-from fuzzytree.readers.nodes import Found, report
+from fuzzytree.readers.nodes import report
+from fuzzytree.readers.spots import Group, Spots
 from fuzzytree.system import FuzzySystem, SystemOutput
 
 FACTS = " facts "
@@ -68,6 +71,50 @@ def read(content: bytes, name: str) -> Reading:
         >>> read(text.encode(), "washer.fcl").model.outputs[0].name
         'minutes'
     """
+    return _read(content, name)[0]
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of an FCL file stand.
+
+    A rule stands at its keyword, a term and a variable at their names.
+
+    Raises:
+        ReadError: With all mistakes of the file.
+    """
+    _, parts, facts = _read(content, name)
+    return parts.spots().of_facts(facts).find
+
+
+class _Parts(NamedTuple):
+    """What the parts of a system were made of."""
+
+    known: Known
+    blocks: Sequence[ReadBlock]
+
+    def spots(self) -> Spots:
+        return Spots(
+            _groups(self.known.inputs),
+            _groups(self.known.outputs),
+            tuple(
+                Group(place(one.head), tuple(map(place, one.tokens)))
+                for one in self.blocks
+            ),
+        )
+
+
+def _groups(variables: Mapping[str, Named]) -> tuple[Group, ...]:
+    return tuple(
+        Group(
+            place(one.token),
+            tuple(place(term.name) for term in (one.block.terms if one.block else ())),
+        )
+        for one in variables.values()
+    )
+
+
+def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
+    """Return what a file says, what of, and the facts of a rule base if it is one."""
     text = parsed(content, name)
     notes = Notes(list(text.found), [], [])
     dialect, sentence = detected(text)
@@ -88,31 +135,34 @@ def read(content: bytes, name: str) -> Reading:
         notes.found.append((1, 1, "the file has no VAR_OUTPUT"))
     if notes.found:
         raise report(name, notes.found)
+    parts = _Parts(known, read_blocks)
     try:
         rules = tuple(one.block for one in read_blocks)
         system = FuzzySystem(title or "system", inputs, outputs, rules)
     except InvalidModelError as error:
-        raise report(name, list(_places(error, known, read_blocks))) from error
-    model = _model(system, text.text, notes)
-    return Reading(model, tuple(notes.losses), tuple(notes.remarks))
+        found = parts.spots().placed(error.mistakes)
+        raise report(name, list(found)) from error
+    model, facts = _model(system, text.text, notes)
+    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
+    return reading, parts, facts
 
 
-def _model(system: FuzzySystem, text: str, notes: Notes) -> Document:
-    """Return the rule base that a system stands for, or the system."""
+def _model(system: FuzzySystem, text: str, notes: Notes) -> tuple[Document, str | None]:
+    """Return the rule base that a system stands for and its facts, or the system."""
     if not is_marked(text):
-        return system
+        return system, None
     facts = ""
     for line in text.split("\n", _MOST_LINES)[:_MOST_LINES]:
         if line[:2] in ("//", "(*") and line[2:].startswith(FACTS):
             facts = line[2:].removeprefix(FACTS).removesuffix("*)").strip()
     if not facts:
-        return without_questions(system)
+        return without_questions(system), None
     rules = as_rules(system, facts)
     if rules is not None:
-        return rules
+        return rules, facts
     text = "the facts in a comment belong to other rules; the file is read as a system"
     notes.remarks.append(text)
-    return system
+    return system, None
 
 
 def _rule_blocks(blocks: Sequence[Block], scope: Scope) -> list[ReadBlock]:
@@ -159,21 +209,3 @@ def _aggregated(
     if any(output.name in one.concluded for one in blocks):
         known.loss(where, "ACCU is missing, and engines differ; MAX is taken")
     return replace(output, aggregation="maximum")
-
-
-def _places(
-    error: InvalidModelError, known: Known, blocks: Sequence[ReadBlock]
-) -> Iterator[Found]:
-    """Yield the mistakes of a system where they stand in the file."""
-    for path, sentence in error.mistakes:
-        line, column = 1, 1
-        match path:
-            case ("inputs", int() as k, *_):
-                line, column = place(list(known.inputs.values())[k].token)
-            case ("outputs", int() as k, *_):
-                line, column = place(list(known.outputs.values())[k].token)
-            case ("blocks", int() as b, "rules", int() as r, *_):
-                line, column = place(blocks[b].tokens[r])
-            case _:
-                pass
-        yield line, column, sentence

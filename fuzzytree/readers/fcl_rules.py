@@ -194,9 +194,10 @@ def _is_ambiguous(condition: Condition) -> bool:
 
 
 class ReadBlock(msgspec.Struct, frozen=True):
-    """A block of rules, the token of each, and what it says about ACCU."""
+    """A block of rules, where it and each rule begins, what it says about ACCU."""
 
     block: RuleBlock
+    head: Token
     tokens: tuple[Token, ...]
     accu: SNorm | None
 
@@ -230,7 +231,8 @@ def read_block(block: Block, scope: Scope) -> ReadBlock:
         implication=_implication(block, rules, scope),
         name=raw(block.head.words),
     )
-    return ReadBlock(made, tuple(tokens), norm_of(block, "ACCU", scope.notes))
+    accu = norm_of(block, "ACCU", scope.notes)
+    return ReadBlock(made, block.head.keyword, tuple(tokens), accu)
 
 
 def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:

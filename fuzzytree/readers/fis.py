@@ -8,15 +8,14 @@ has; MATLAB's meaning is the default.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
 from fuzzytree.casting import as_rules
-from fuzzytree.contracts import Document, Loss, Reading
+from fuzzytree.contracts import Document, Locate, Loss, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.naming import numbered
 from fuzzytree.readers import fis_text as text
@@ -27,6 +26,7 @@ from fuzzytree.readers.fis_terms import labels_of
 from fuzzytree.readers.fis_text import Entry, Notes, Section
 from fuzzytree.readers.fis_words import Dialect
 from fuzzytree.readers.nodes import report
+from fuzzytree.readers.spots import Spots
 from fuzzytree.rulebase import name_choice
 from fuzzytree.system import (
     Defuzzifier,
@@ -56,7 +56,6 @@ _SYSTEM_KEYS: Final = (
 )
 _VARIABLE_KEYS: Final = ("Name", "Range", "NumMFs", "MF1")
 _PRIVATE_KEYS: Final = frozenset({"Enabled", "Default", "LockPrevious", "LockRange"})
-_TERM = re.compile(r"MF([0-9]{1,6})")
 DEFAULTS: Final = {
     "matlab": Defuzzifier("centroid", 101, "ends"),
     "octave": Defuzzifier("centroid", 101, "half ends"),
@@ -96,25 +95,59 @@ def reading(content: bytes, name: str, *, dialect: Dialect | None = None) -> Rea
         >>> reading("\n".join(lines).encode(), "tip.fis").model.columns
         ('food',)
     """
+    return _read(content, name, dialect)[0]
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of a FIS file stand.
+
+    A rule stands where its line begins, a term and a variable behind their `=`.
+
+    Raises:
+        ReadError: With every mistake of the file.
+    """
+    _, parts, facts = _read(content, name, None)
+    return parts.spots().of_facts(facts).find
+
+
+class _Parts(NamedTuple):
+    """A system, and what its parts were made of."""
+
+    system: FuzzySystem
+    inputs: Sequence[Section]
+    outputs: Sequence[Section]
+    rules: Sequence[Entry]
+
+    def spots(self) -> Spots:
+        return text.spots_of(self.inputs, self.outputs, self.rules)
+
+
+def _read(
+    content: bytes, name: str, dialect: Dialect | None
+) -> tuple[Reading, _Parts, str | None]:
+    """Return what a file says, what of, and the facts of a rule base if it is one."""
     notes = Notes([], [], [])
     page = text.read_page(content, name, notes.found)
     notes.remarks.extend(page.remarks)
     meant = dialect or _dialect(page, notes)
-    system = _system(page, name, meant, notes)
-    if notes.found or system is None:
+    parts = _system(page, name, meant, notes)
+    if notes.found or parts is None:
         raise report(name, notes.found)
-    return Reading(
-        _as_written(system, page.comments), tuple(notes.losses), tuple(notes.remarks)
-    )
+    model, facts = _as_written(parts.system, page.comments)
+    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
+    return reading, parts, facts
 
 
-def _as_written(system: FuzzySystem, comments: Sequence[str]) -> Document:
-    """Return the rule base that a file of ours was made of, or the system."""
+def _as_written(
+    system: FuzzySystem, comments: Sequence[str]
+) -> tuple[Document, str | None]:
+    """Return the rule base that a file was made of, and its facts, or the system."""
     for comment in comments:
         if comment.startswith(FACTS):
-            rules = as_rules(system, comment.removeprefix(FACTS))
-            return system if rules is None else rules
-    return system
+            facts = comment.removeprefix(FACTS)
+            rules = as_rules(system, facts)
+            return (system, None) if rules is None else (rules, facts)
+    return system, None
 
 
 def _dialect(page: text.Page, notes: Notes) -> Dialect:
@@ -136,7 +169,7 @@ def _signs(page: text.Page) -> tuple[Dialect, str]:
         private = kind.strip(" '")
         if entry.key in _PRIVATE_KEYS:
             return "fuzzylite", f"{entry.key} in line {entry.line} is only fuzzylite's"
-        if _TERM.fullmatch(entry.key) and private in words.PRIVATE:
+        if text.TERM.fullmatch(entry.key) and private in words.PRIVATE:
             return "fuzzylite", f"{private} in line {entry.line} is only fuzzylite's"
     if "fuzzylite" in comments:
         return "fuzzylite", "a comment names it"
@@ -158,7 +191,7 @@ def _indices(rule: str) -> str:
 
 def _system(
     page: text.Page, name: str, dialect: Dialect, notes: Notes
-) -> FuzzySystem | None:
+) -> _Parts | None:
     parts: dict[str, list[Section]] = {"input": [], "output": []}
     single: dict[str, Section] = {}
     for section in page.sections:
@@ -184,13 +217,13 @@ def _system(
         for one in parts["output"]
     )
     lines = single["rules"].entries if "rules" in single else []
-    rules = rules_of(lines, (inputs, outputs), dialect, notes)
+    found = rules_of(lines, (inputs, outputs), dialect, notes)
     _check_counts(methods, (len(inputs), len(outputs), len(lines)), dialect, notes)
     if notes.found:
         return None
     is_weighted = methods.defuzzifier.is_weighted
     block = RuleBlock(
-        rules,
+        tuple(rule for _, rule in found),
         methods.conjunction,
         methods.disjunction,
         None if is_weighted else methods.implication,
@@ -199,11 +232,13 @@ def _system(
     if dialect == "fuzzylite":
         for output in outputs:
             notes.losses.extend(fuzzylite_losses(output))
+    given = parts["input"], parts["output"], [entry for entry, _ in found]
     try:
-        return FuzzySystem(methods.name, inputs, outputs, (block,))
+        system = FuzzySystem(methods.name, inputs, outputs, (block,))
     except InvalidModelError as error:
-        notes.found.extend((1, 1, sentence) for _, sentence in error.mistakes)
+        notes.found.extend(text.spots_of(*given).placed(error.mistakes))
         return None
+    return _Parts(system, *given)
 
 
 def _keyed(
@@ -213,7 +248,7 @@ def _keyed(
     found: dict[str, Entry] = {}
     terms: list[Entry] = []
     for entry in section.entries:
-        if section.kind != "system" and _TERM.fullmatch(entry.key):
+        if section.kind != "system" and text.TERM.fullmatch(entry.key):
             terms.append(entry)
         elif entry.key not in known and entry.key not in _PRIVATE_KEYS:
             what = f"no key {entry.key[:40]!r}; {name_choice(entry.key[:40], known)}"

@@ -45,18 +45,19 @@ class _Code(msgspec.Struct, frozen=True):
 
 def rules_of(
     lines: Sequence[Entry], variables: Variables, dialect: Dialect, notes: Notes
-) -> tuple[SystemRule, ...]:
-    """Return the rules; mistakes, losses and remarks are added to the notes.
+) -> list[tuple[Entry, SystemRule]]:
+    """Return the rules and their lines; what is found is added to the notes.
 
     A rule whose hedges act on several conclusions becomes one rule for each in Octave's
     dialect, where they act on each alone.
     """
-    rules: list[SystemRule] = []
+    rules: list[tuple[Entry, SystemRule]] = []
     for number, entry in enumerate(lines, 1):
         line = _line(entry, variables, notes)
         if line is not None:
-            rules += _rules(line, (number, entry), variables, dialect, notes)
-    return tuple(rules)
+            made = _rules(line, (number, entry), variables, dialect, notes)
+            rules += ((entry, rule) for rule in made)
+    return rules
 
 
 def _line(entry: Entry, variables: Variables, notes: Notes) -> _Line | None:

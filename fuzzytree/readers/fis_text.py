@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Final
 
 import msgspec
@@ -11,9 +12,13 @@ from fuzzytree.contracts import Loss
 from fuzzytree.errors import ReadError
 from fuzzytree.readers.layout import LONGEST_NAME
 from fuzzytree.readers.nodes import Found
+from fuzzytree.readers.spots import Group, Spots
 
 MOST_BYTES: Final = 4 * 2**20
 MOST_LINES: Final = 60_000
+
+TERM: Final = re.compile(r"MF([0-9]{1,6})")
+"""The key of a term."""
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
@@ -229,3 +234,28 @@ def term_of(entry: Entry, found: list[Found]) -> Written | None:
     kind = value[first + 1 : last].strip()
     column = entry.column + open_ + 1
     return Written(name[1:-1], kind, value[open_ + 1 : close], column)
+
+
+def spots_of(
+    inputs: Sequence[Section], outputs: Sequence[Section], rules: Sequence[Entry]
+) -> Spots:
+    """Return where the parts of a system stand.
+
+    Args:
+        inputs: What its inputs were made of.
+        outputs: What its outputs were made of.
+        rules: The line of each rule.
+    """
+    lines = [(one.line, one.value) for one in rules]
+    begins = tuple((n, len(line) - len(line.lstrip()) + 1) for n, line in lines)
+    block = Group(begins[0] if begins else (1, 1), begins)
+    return Spots(tuple(map(_group, inputs)), tuple(map(_group, outputs)), (block,))
+
+
+def _group(section: Section) -> Group:
+    terms = sorted(
+        (int(entry.key[2:]), (entry.line, entry.column))
+        for entry in section.entries
+        if TERM.fullmatch(entry.key)
+    )
+    return Group((section.line, 1), tuple(spot for _, spot in terms))

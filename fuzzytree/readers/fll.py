@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import Final
+from typing import Final, NamedTuple
 
 from fuzzytree.casting import as_rules
-from fuzzytree.contracts import Document, Reading
+from fuzzytree.contracts import Document, Locate, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers.fll_meaning import as_meant, differences, without_disabled
 from fuzzytree.readers.fll_variables import (
@@ -20,10 +20,10 @@ from fuzzytree.readers.fll_variables import (
     read_variables,
     vocabulary_of,
 )
-from fuzzytree.readers.fll_words import MOST_BYTES, Notes, Section, read_page
+from fuzzytree.readers.fll_words import MOST_BYTES, Entry, Notes, Section, read_page
 from fuzzytree.readers.lines import decoded
 from fuzzytree.readers.nodes import MOST_SHOWN, report
-from fuzzytree.rulebase import Path
+from fuzzytree.readers.spots import Group, Spots
 from fuzzytree.system import FuzzySystem, SystemInput
 
 FACTS: Final = "rules of fuzzytree: "
@@ -48,21 +48,51 @@ def read(content: bytes, name: str) -> Reading:
         >>> read("\n".join(lines).encode(), "tip.fll").model.columns
         ('food',)
     """
+    return _read(content, name)[0]
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of an FLL file stand: their values.
+
+    Raises:
+        ReadError: With every mistake of the file.
+    """
+    _, parts, facts = _read(content, name)
+    return parts.spots().of_facts(facts).find
+
+
+class _Parts(NamedTuple):
+    """A system, and what its parts were made of."""
+
+    system: FuzzySystem
+    inputs: Sequence[Known]
+    outputs: Sequence[Known]
+    blocks: Sequence[ReadBlock]
+
+    def spots(self) -> Spots:
+        return _spots(self.inputs, self.outputs, self.blocks)
+
+
+def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
+    """Return what a file says, what of, and the facts of a rule base if it is one."""
     notes = Notes([], [], [])
     page = read_page(decoded(content, name, MOST_BYTES), notes)
-    system = None
+    parts = None
     if not notes.is_full:
-        system = _system(page.sections, PurePath(name).stem, notes)
-    if notes.found or system is None:
+        parts = _system(page.sections, PurePath(name).stem, notes)
+    if notes.found or parts is None:
         raise report(name, notes.found)
-    model: Document = system
+    rules, facts = None, None
     for comment in page.comments:
         if comment.startswith(FACTS):
-            model = as_rules(system, comment.removeprefix(FACTS)) or system
-    return Reading(model, tuple(notes.losses), tuple(notes.remarks))
+            facts = comment.removeprefix(FACTS)
+            rules = as_rules(parts.system, facts)
+    model: Document = rules or parts.system
+    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
+    return reading, parts, facts if rules else None
 
 
-def _system(sections: Sequence[Section], stem: str, notes: Notes) -> FuzzySystem | None:
+def _system(sections: Sequence[Section], stem: str, notes: Notes) -> _Parts | None:
     """Return the system; None where it has mistakes, which are noted."""
     variables = read_variables(sections, notes)
     vocabulary = vocabulary_of(variables)
@@ -92,12 +122,11 @@ def _system(sections: Sequence[Section], stem: str, notes: Notes) -> FuzzySystem
             described.value if described else "",
         )
     except InvalidModelError as error:
-        for path, sentence in error.mistakes[: MOST_SHOWN + 1]:
-            place = _place_of(path, inputs, outputs, blocks)
-            notes.found.append((*place, sentence))
+        mistakes = error.mistakes[: MOST_SHOWN + 1]
+        notes.found.extend(_spots(inputs, outputs, blocks).placed(mistakes))
         return None
     notes.remarks.extend(differences(system))
-    return system
+    return _Parts(system, inputs, outputs, blocks)
 
 
 def _tell_descriptions(sections: Sequence[Section], notes: Notes) -> None:
@@ -111,26 +140,17 @@ def _tell_descriptions(sections: Sequence[Section], notes: Notes) -> None:
         notes.remarks.append(f"descriptions have no place here: of {names}")
 
 
-def _place_of(
-    path: Path,
-    inputs: Sequence[Known],
-    outputs: Sequence[Known],
-    blocks: Sequence[ReadBlock],
-) -> tuple[int, int]:
-    """Return the line and column of a part of the system."""
-    match path:
-        case ("inputs", int(place), "labels", int(index), *_):
-            entry = inputs[place].lines[index]
-        case ("outputs", int(place), "labels", int(index), *_):
-            entry = outputs[place].lines[index]
-        case ("inputs", int(place), *_):
-            entry = inputs[place].section.head
-        case ("outputs", int(place), *_):
-            entry = outputs[place].section.head
-        case ("blocks", int(place), "rules", int(index), *_):
-            entry = blocks[place].lines[index]
-        case ("blocks", int(place), *_):
-            entry = blocks[place].section.head
-        case _:
-            return 1, 1
-    return entry.line, entry.start
+def _spots(
+    inputs: Sequence[Known], outputs: Sequence[Known], blocks: Sequence[ReadBlock]
+) -> Spots:
+    """Return where the parts of the system stand."""
+    return Spots(
+        tuple(_group(one.section, one.lines) for one in inputs),
+        tuple(_group(one.section, one.lines) for one in outputs),
+        tuple(_group(one.section, one.lines) for one in blocks),
+    )
+
+
+def _group(section: Section, lines: Sequence[Entry]) -> Group:
+    spots = tuple((one.line, one.start) for one in lines)
+    return Group((section.head.line, section.head.start), spots)

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from fuzzytree.casting import as_rules
-from fuzzytree.contracts import Document, Reading
+from fuzzytree.contracts import Document, Locate, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.naming import numbered
 from fuzzytree.readers import fml_words as words
@@ -20,6 +20,7 @@ from fuzzytree.readers import xml
 from fuzzytree.readers.fml_rules import Variables, blocks_of
 from fuzzytree.readers.fml_terms import CIRCULAR, Notes, curve_of, number
 from fuzzytree.readers.nodes import report
+from fuzzytree.readers.spots import Group, Spots
 from fuzzytree.readers.xml import Element
 from fuzzytree.rulebase import Points, name_choice
 from fuzzytree.system import (
@@ -56,6 +57,52 @@ def reading(content: bytes, name: str) -> Reading:
         Traceback (most recent call last):
         fuzzytree.errors.ReadError: a.xml:1:1: <fuzzySystem> has no <knowledgeBase>
     """
+    return _read(content, name)[0]
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of an FML file stand: their elements.
+
+    Raises:
+        ReadError: With every mistake of the file.
+    """
+    _, parts, facts = _read(content, name)
+    return parts.spots().of_facts(facts).find
+
+
+class _Parts(NamedTuple):
+    """A system, and what its parts were made of: each rule with its rule base."""
+
+    system: FuzzySystem
+    inputs: Sequence[Element]
+    outputs: Sequence[Element]
+    rules: Sequence[tuple[Element, Element]]
+    variables: Variables
+
+    def spots(self) -> Spots:
+        """Return where its parts stand."""
+        waiting = iter(self.rules)
+        blocks: list[Group] = []
+        for block in self.system.blocks:
+            rules = [next(waiting) for _ in block.rules]
+            places = tuple(_place(rule) for _, rule in rules)
+            blocks.append(Group(_place(rules[0][0]) if rules else (1, 1), places))
+        inputs = map(self._group, self.inputs, self.system.inputs)
+        outputs = map(self._group, self.outputs, self.system.outputs)
+        return Spots(tuple(inputs), tuple(outputs), tuple(blocks))
+
+    def _group(self, element: Element, variable: SystemInput | SystemOutput) -> Group:
+        names = self.variables.labels[variable.name]
+        terms = {
+            names[name]: _place(child)
+            for child in element.children
+            if (name := child.attributes.get("name")) in names
+        }
+        return Group(_place(element), tuple(terms[one.name] for one in variable.labels))
+
+
+def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
+    """Return what a file says, what of, and the facts of a rule base if it is one."""
     document = xml.parse(content, name)
     notes = Notes([], [], [])
     root = document.root
@@ -68,23 +115,27 @@ def reading(content: bytes, name: str) -> Reading:
             f"the namespace is {given} and not {words.NAMESPACE!r}; read as if it was"
         )
         notes.remarks.append(what)
-    system = None if notes.found else _system(root, name, notes)
-    if notes.found or system is None:
+    parts = None if notes.found else _system(root, name, notes)
+    if notes.found or parts is None:
         raise report(name, notes.found)
-    model = _as_written(system, document.comments)
-    return Reading(model, tuple(notes.losses), tuple(notes.remarks))
+    model, facts = _as_written(parts.system, document.comments)
+    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
+    return reading, parts, facts
 
 
-def _as_written(system: FuzzySystem, comments: Sequence[str]) -> Document:
-    """Return the rule base that a file of ours was made of, or the system."""
+def _as_written(
+    system: FuzzySystem, comments: Sequence[str]
+) -> tuple[Document, str | None]:
+    """Return the rule base that a file was made of, and its facts, or the system."""
     for comment in comments:
         if comment.strip().startswith(FACTS):
-            rules = as_rules(system, comment.strip().removeprefix(FACTS))
-            return system if rules is None else rules
-    return system
+            facts = comment.strip().removeprefix(FACTS)
+            rules = as_rules(system, facts)
+            return (system, None) if rules is None else (rules, facts)
+    return system, None
 
 
-def _system(root: Element, name: str, notes: Notes) -> FuzzySystem | None:
+def _system(root: Element, name: str, notes: Notes) -> _Parts | None:
     bases = root.all("knowledgeBase")
     if len(bases) != 1:
         has = f"has {len(bases)} <knowledgeBase>" if bases else "has no <knowledgeBase>"
@@ -120,11 +171,13 @@ def _system(root: Element, name: str, notes: Notes) -> FuzzySystem | None:
     if notes.found:
         return None
     title = root.attributes.get("name", "") or name.rpartition(".")[0] or "system"
+    rules = [(base, child) for base in rule_bases for child in base.children]
     try:
-        return FuzzySystem(title, found_inputs, found_outputs, blocks)
+        system = FuzzySystem(title, found_inputs, found_outputs, blocks)
     except InvalidModelError as error:
         notes.found.extend((1, 1, sentence) for _, sentence in error.mistakes)
         return None
+    return _Parts(system, inputs, outputs, rules, variables)
 
 
 def _is_output(element: Element) -> bool:

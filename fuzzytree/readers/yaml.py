@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final, TypeVar
 
-from fuzzytree.contracts import Document, Reading
+from fuzzytree.contracts import Document, Locate, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers import layout, values
 from fuzzytree.readers.binding import Entries, entries, record
@@ -20,7 +20,7 @@ from fuzzytree.readers.nodes import (
     compose,
     report,
 )
-from fuzzytree.readers.places import located, record_at, records_at, value_of
+from fuzzytree.readers.places import find, located, record_at, records_at, value_of
 from fuzzytree.readers.references import (
     clauses_of_nodes,
     clauses_of_rules,
@@ -86,6 +86,21 @@ def reading(content: bytes, name: str) -> Reading:
         ReadError: As `read`.
     """
     return Reading(read(content, name))
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of a YAML file stand, or what holds them.
+
+    Raises:
+        ReadError: If the file is no YAML.
+    """
+    root, _ = compose(content, name)
+
+    def at(path: Path) -> tuple[int, int]:
+        node = find(root, path)
+        return node.line, node.column
+
+    return at
 
 
 class _UnreadableError(Exception):

@@ -91,10 +91,16 @@ def test_each_label_of_a_system_is_found(seed: int) -> None:
             assert "name:" in text_at(file, file.place(path))
 
 
-def test_other_formats_have_no_places() -> None:
+def test_a_rule_of_another_format_has_its_place() -> None:
     rules = ft.rules_from_tree(random_tree(1))
     file = model_file("rules.fll", ft.export(rules, "fll", allow_loss=True).content)
-    assert file.place(rule_path(rules, 1)) is None
+    for number in range(1, len(rules.rules) + 1):
+        assert text_at(file, file.place(rule_path(rules, number))).startswith("if ")
+
+
+def test_a_file_that_is_written_for_others_has_no_places() -> None:
+    content = ft.export(random_tree(1), "onnx", allow_loss=True).content
+    assert model_file("tree.onnx", content).place(("rules", 0)) is None
 
 
 def test_a_damaged_yaml_file_has_no_places() -> None:
