@@ -297,7 +297,7 @@ def test_each_rule_and_term_of_every_file_of_others_stands_where_it_is_said_to()
             content = path.read_bytes()
             assert [*astray(content, path.name)] == [], name
             counts[corpus.kind] += 1
-            if corpus.kind == "fll":  # the same systems as the others, for the most part
+            if corpus.kind == "fll":  # the same systems, for the most part
                 continue
             model = load_content(content, path.name, allow_loss=True)
             try:
