@@ -30,6 +30,7 @@ from fuzzytree.proving.polynomials import (
     magnitude,
     refined,
     roots,
+    squarefree,
     value_at,
 )
 from fuzzytree.rulebase import Band, Points, Shape
@@ -124,19 +125,22 @@ def _apart(found: Iterable[Place]) -> list[Place]:
     Two that cannot be told apart are left to touch.
     """
     kept: list[Place] = []
-    for place in sorted(found, key=lambda one: (one.low, one.high)):
-        after = place
-        while kept and after.low <= kept[-1].high:
-            before = kept.pop()
-            same = _same(before, after)
-            if same is not None:
-                after = same
-                continue
-            one, other = _told_apart(before, after)
-            kept += [one, other] if one.low <= other.low else [other, one]
-            break
-        else:
+    todo = sorted(found, key=lambda one: (one.low, one.high), reverse=True)
+    while todo:
+        after = todo.pop()
+        if not kept or after.low > kept[-1].high:
             kept.append(after)
+            continue
+        before = kept.pop()
+        same = _same(before, after)
+        if same is not None:
+            todo.append(same)
+            continue
+        pair = sorted(_told_apart(before, after), key=lambda one: one.low)
+        if pair[1].low > pair[0].high:
+            todo += reversed(pair)  # the lower one may meet those before
+        else:
+            kept += pair
     return kept
 
 
@@ -205,7 +209,11 @@ def _solve(
 ) -> None:
     if low is None or high is None:
         return
-    for root in integer_roots(numbers, low, high):
+    met = integer_roots(numbers, low, high)
+    if not all(root.is_sure for root in met):  # it may be a double one
+        numbers = integers(squarefree(tuple(map(Fraction, numbers))))[0]
+        met = integer_roots(numbers, low, high)
+    for root in met:
         if root.low == root.high:
             found.add(root.low)
         else:

@@ -436,6 +436,24 @@ def common_factor(one: Polynomial, other: Polynomial) -> Polynomial:
     return tuple(map(Fraction, a))
 
 
+def squarefree(polynomial: Polynomial) -> Polynomial:
+    """Return a polynomial with the same zeros, each of which it has only once.
+
+    Example:
+        >>> square = tuple(map(Fraction, (4, 0, -4, 0, 1)))  # (x**2 - 2)**2
+        >>> [int(one) for one in squarefree(square)]
+        [-2, 0, 1]
+    """
+    repeated = common_factor(polynomial, derivative(polynomial))
+    rest, found = list(difference(polynomial, (Fraction(0),))), list[Fraction]()
+    while len(rest) >= len(repeated):
+        found.append(rest[-1] / repeated[-1])
+        for place in range(1, len(repeated) + 1):
+            rest[-place] -= found[-1] * repeated[-place]
+        rest.pop()
+    return tuple(map(Fraction, _primitive(integers(tuple(reversed(found)))[0])))
+
+
 def _primitive(numbers: Sequence[int]) -> list[int]:
     """Return coefficients without zeros at the end and without a common divisor."""
     found = list(numbers)
