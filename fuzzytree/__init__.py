@@ -97,7 +97,7 @@ if not TYPE_CHECKING:  # a type checker knows the names above, and no others
     def __getattr__(name: str) -> object:
         """Load a public name from its module, once."""
         if name == "__version__":
-            value: object = _version()
+            value: object = importlib.import_module(_HOMES["Agreement"]).version()
         elif name in _HOMES:
             value = getattr(importlib.import_module(_HOMES[name]), name)
         else:
@@ -109,12 +109,3 @@ if not TYPE_CHECKING:  # a type checker knows the names above, and no others
 def __dir__() -> list[str]:
     """Return the public names."""
     return sorted(__all__)
-
-
-def _version() -> str:
-    import importlib.metadata
-
-    try:
-        return importlib.metadata.version("fuzzytree-toolkit")
-    except importlib.metadata.PackageNotFoundError:
-        return "uninstalled"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import msgspec
 
@@ -10,6 +10,16 @@ from fuzzytree.errors import DisagreementError
 
 Basis = Literal["file", "proof", "all cells", "rows", "calls"]
 Verdict = Literal["agrees", "DISAGREES", "differs by design"]
+
+
+def version() -> str:
+    """Return the version of fuzzytree, by which a result is known."""
+    import importlib.metadata
+
+    try:
+        return importlib.metadata.version("fuzzytree-toolkit")
+    except importlib.metadata.PackageNotFoundError:
+        return "uninstalled"
 
 
 class Comparison(msgspec.Struct, frozen=True):
@@ -116,6 +126,8 @@ class Agreement(msgspec.Struct, frozen=True):
         certificates: What each number type that was run can change, and did.
     """
 
+    FORMAT: ClassVar[str] = "fuzzytree-check/1"
+
     model: str
     fingerprint: str
     comparisons: tuple[Comparison, ...]
@@ -132,7 +144,8 @@ class Agreement(msgspec.Struct, frozen=True):
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""
-        raw = msgspec.json.encode({"ok": self.ok, **msgspec.to_builtins(self)})
+        head = {"format": self.FORMAT, "version": version(), "ok": self.ok}
+        raw = msgspec.json.encode({**head, **msgspec.to_builtins(self)})
         return msgspec.json.format(raw, indent=2).decode()
 
     def raise_if_not_ok(self) -> None:

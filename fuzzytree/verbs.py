@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import stat
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from fuzzytree.auditing.domains import Within
     from fuzzytree.auditing.records import Audit, Source
     from fuzzytree.auditing.records import Settings as AuditSettings
-    from fuzzytree.auditing.subject import Rows
+    from fuzzytree.auditing.subject import Material, Rows
     from fuzzytree.contracts import FloatArray
     from fuzzytree.criteria.results import Stability
     from fuzzytree.learning import Learnt, Settings
@@ -67,6 +68,7 @@ __all__ = [
     "learn",
     "learn_table",
     "load",
+    "material",
     "opened",
     "read",
     "rows_of",
@@ -273,6 +275,7 @@ def _rows(
     *,
     columns: Sequence[str] | None,
     delimiter: str | None,
+    name: str | None = None,
     with_others: bool = False,
 ) -> tuple[FloatArray, list[Batch]]:
     """Return rows for a model, of shape (inputs, rows), and as they came."""
@@ -284,6 +287,7 @@ def _rows(
             trained=() if is_system else model.columns,
             columns=columns,
             delimiter=delimiter,
+            name=name,
             with_others=with_others,
         )
     ]
@@ -506,12 +510,13 @@ def _data_name(data: object) -> str:
 
 
 def audit(
-    model: Document | str | os.PathLike[str],
+    model: Document | str | os.PathLike[str] | Material,
     *,
     data: object = None,
     target: str | None = None,
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
+    results: Sequence[str | os.PathLike[str]] = (),
     within: Within = "model",
     spreads: float | None = None,
     limits: Mapping[str, tuple[float, float]] | None = None,
@@ -529,11 +534,14 @@ def audit(
     Ctrl-C ends it early and keeps what is proved; see `Audit.was_interrupted`.
 
     Args:
-        model: A tree, a rule base or a fuzzy system, or the path of one.
+        model: A tree, a rule base or a fuzzy system, or the path of one; or all that
+            `material` has read, and then nothing of the next five besides.
         data: A table with rows of one's own.
         target: The column of the classes, if the table has one.
         columns: The names of an array's columns.
         delimiter: Of a CSV file, if its first line does not tell.
+        results: Paths of what `Agreement.to_json` and `Stability.to_json` told of the
+            same model; the audit names them.
         within: Where everything is asked: the ranges of the `model`, or of the `data`.
         spreads: Instead, so many spreads around the fitted sets of each input.
         limits: The ends of some variables, which go before the others.
@@ -547,7 +555,7 @@ def audit(
         progress: Told what is done and which share of it.
 
     Raises:
-        ReadError: If the file cannot be read.
+        ReadError: If the file cannot be read, or a result is not of this model.
         LossError: As `load`.
         TableError: If a column is absent or holds text, or the table has no row.
         ValueError: If a limit, a code or a setting is none, or an input has no limits.
@@ -559,38 +567,101 @@ def audit(
     """
     from fuzzytree.auditing import audit as auditing
     from fuzzytree.auditing.domains import domain_of
-    from fuzzytree.auditing.places import model_file
     from fuzzytree.auditing.records import Settings
+    from fuzzytree.auditing.results import with_results
     from fuzzytree.auditing.selecting import check_settings
+    from fuzzytree.auditing.subject import Material
     from fuzzytree.proving.clock import Clock
     from fuzzytree.proving.domain import limited
 
     chosen = settings or Settings()
     check_settings(chosen)
-    file = None
-    if isinstance(model, str | os.PathLike):
-        file = model_file(os.fspath(model), _bytes_of(model))
-        model = load_content(file.content, file.name, allow_loss=allow_loss)
-    source = _source_of(data)
-    rows = audited_rows(
-        data, model, target=target, columns=columns, delimiter=delimiter
+    if not isinstance(model, Material):
+        model = material(
+            model,
+            data=data,
+            target=target,
+            columns=columns,
+            delimiter=delimiter,
+            results=results,
+            allow_loss=allow_loss,
+        )
+    elif results or allow_loss or any((data is not None, target, columns, delimiter)):
+        raise ValueError("a material is read already: give what it holds to material()")
+    read, ends = model, limits or {}
+    box = domain_of(
+        read.model, within=within, spreads=spreads, rows=read.rows, limited=ends
     )
-    ends = limits or {}
-    box = domain_of(model, within=within, spreads=spreads, rows=rows, limited=ends)
-    return auditing.audit(
-        model,
-        rows=rows,
-        domain=limited(box, ends, model),
+    found = auditing.audit(
+        read.model,
+        rows=read.rows,
+        domain=limited(box, ends, read.model),
         settings=chosen,
         select=select,
         ignore=ignore,
         clock=Clock(chosen.budget_s, tell=progress),
-        file=file,
-        data=source,
+        file=read.file,
+        data=read.data,
         row=row,
         accepted=accepted,
         repeat=repeat,
     )
+    return with_results(found, read.given) if read.given else found
+
+
+def material(
+    model: Document | str | os.PathLike[str],
+    *,
+    data: object = None,
+    target: str | None = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    results: Sequence[str | os.PathLike[str]] = (),
+    allow_loss: bool = False,
+) -> Material:
+    """Return all that an audit is about, each file read once.
+
+    Args:
+        model: As in `audit`, as all others.
+        data: A table.
+        target: The column of the classes.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file.
+        results: Paths of results.
+        allow_loss: As in `load`.
+
+    Raises:
+        ReadError: If a file cannot be read, or a result is not of this model.
+        LossError: As `load`.
+        TableError: If a column is absent or holds text, the table has no row, or it
+            changes while it is read.
+    """
+    from fuzzytree.auditing.places import model_file
+    from fuzzytree.auditing.results import read_results
+    from fuzzytree.auditing.subject import Material
+
+    file = None
+    if isinstance(model, str | os.PathLike):
+        file = model_file(os.fspath(model), _bytes_of(model))
+        model = load_content(file.content, file.name, allow_loss=allow_loss)
+    given = read_results(results, model)
+    name = os.fspath(data) if isinstance(data, str | os.PathLike) else None
+    if name is not None and stat.S_ISFIFO(_mode(name)):
+        data = io.BytesIO(read_bounded(name))  # nobody can read it twice
+    source = _source_of(data, name)
+    rows = audited_rows(
+        data, model, target=target, columns=columns, delimiter=delimiter, name=name
+    )
+    if _source_of(data, name) != source:
+        raise TableError(f"{name}: was changed while it was read")
+    return Material(model, file, rows, source, given)
+
+
+def _mode(path: str) -> int:
+    try:
+        return Path(path).stat().st_mode
+    except (OSError, ValueError):  # which is told where it is read
+        return 0
 
 
 def _bytes_of(path: str | os.PathLike[str]) -> bytes:
@@ -603,14 +674,14 @@ def _bytes_of(path: str | os.PathLike[str]) -> bytes:
     return read_bounded(path)
 
 
-def _source_of(data: object) -> Source | None:
+def _source_of(data: object, name: str | None = None) -> Source | None:
     """Return the name and the hash of a table that is a file, None for another."""
     from fuzzytree.auditing.audit import source_of
     from fuzzytree.auditing.places import writable
     from fuzzytree.auditing.records import Source
 
     if isinstance(data, io.BytesIO):
-        return source_of("standard input", data.getvalue())
+        return source_of(name or "standard input", data.getvalue())
     if isinstance(data, str | os.PathLike):
         try:
             with Path(data).open("rb") as file:
@@ -630,6 +701,7 @@ def audited_rows(
     target: str | None = None,
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
+    name: str | None = None,
 ) -> Rows | None:
     """Return the rows of a table for an audit, with their classes; None without one.
 
@@ -639,6 +711,7 @@ def audited_rows(
         target: The column of the classes. A class that the model does not know is -1.
         columns: The names of an array's columns.
         delimiter: Of a CSV file, if its first line does not tell.
+        name: What messages call the table; its path unless given.
 
     Raises:
         TableError: If a column is absent or holds text, or the table has no row, or
@@ -653,6 +726,7 @@ def audited_rows(
         model,
         columns=columns,
         delimiter=delimiter,
+        name=name,
         with_others=target is not None,
     )
     name = found[0].piece.name

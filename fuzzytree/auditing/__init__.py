@@ -10,6 +10,7 @@ An audit
     - `domains`, `views`, `conditions`: where a model is asked, and its rules as a rule
       base; conditions of fuzzy systems as clauses
     - `places`: where rules stand in a file; ids that outlive their order
+    - `results`: what other verbs found of the same model
     - `limits`: what an audit does not establish, and its digest
 
 What a user chooses

@@ -113,6 +113,22 @@ class Source(Value, frozen=True):
     sha256: str
 
 
+class Result(Value, frozen=True):
+    """What another verb found of the same model, as the user gave it.
+
+    Attributes:
+        verb: Which verb.
+        file: Where it was read from.
+        parts: How many comparisons, or criteria, it is of.
+        wrong: How many of them disagree, or fail.
+    """
+
+    verb: Literal["check", "stability"]
+    file: Source
+    parts: int
+    wrong: int
+
+
 class Policy(Value, frozen=True):
     """How the audited rules decide, which says which questions apply.
 
@@ -151,6 +167,7 @@ class Audit(Value, frozen=True):
         limits: What this audit does not establish: fixed sentences.
         is_complete: Whether nothing was cut short.
         accepted: The ids of findings that the user's baseline accepts.
+        results: What other verbs found of the same model, if that was given.
         digest: The SHA-256 of all else, as canonical JSON; see `digest_of`.
     """
 
@@ -169,6 +186,7 @@ class Audit(Value, frozen=True):
     limits: tuple[str, ...]
     is_complete: bool
     accepted: tuple[str, ...] = ()
+    results: tuple[Result, ...] = ()
     digest: str = ""
     format: Literal["fuzzytree-audit/1"] = FORMAT
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fuzzytree.auditing.records import Answer, Policy, Settings
+from fuzzytree.auditing.records import Answer, Policy, Settings, Source
+from fuzzytree.contracts import Document
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain
 from fuzzytree.rulebase import RuleBase
@@ -14,6 +15,8 @@ from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
+    from fuzzytree.auditing.places import ModelFile
+    from fuzzytree.auditing.results import Given
     from fuzzytree.contracts import FloatArray, IntArray
 
 
@@ -30,6 +33,24 @@ class Rows(msgspec.Struct, frozen=True, eq=False):
     name: str
     values: FloatArray
     codes: IntArray | None = None
+
+
+class Material(msgspec.Struct, frozen=True, eq=False):
+    """What an audit is about, each file of it read once: it may change meanwhile.
+
+    Attributes:
+        model: The model.
+        file: Where it was read from; None if from memory.
+        rows: The user's rows.
+        data: The table that they come from, if it is a file.
+        given: What other verbs found of the model.
+    """
+
+    model: Document
+    file: ModelFile | None = None
+    rows: Rows | None = None
+    data: Source | None = None
+    given: tuple[Given, ...] = ()
 
 
 class Subject(msgspec.Struct, frozen=True, eq=False):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -32,11 +31,13 @@ from fuzzytree.cli.talk import (
     say,
     wrong_options,
 )
-from fuzzytree.files import check_place, read_bounded, write_atomically
+from fuzzytree.files import check_places, write_atomically
+from fuzzytree.naming import printable
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.configuration import FailOn
     from fuzzytree.auditing.records import Audit
+    from fuzzytree.auditing.subject import Material
 
 Form = Literal["text", "json", "sarif", "github"]
 
@@ -68,6 +69,12 @@ Form = Literal["text", "json", "sarif", "github"]
 )
 @click.option("-o", "--output", metavar="FILE", help="Instead of stdout.")
 @click.option("--page", metavar="FILE", help="Write a page for a browser as well.")
+@click.option(
+    "--results",
+    metavar="FILE",
+    multiple=True,
+    help="Show what `check --json` or `stability --json` found, too (repeat).",
+)
 @delimiter_option
 @allow_loss_option
 @json_option
@@ -84,6 +91,7 @@ def command(
     is_whole: bool,
     output: str | None,
     page: str | None,
+    results: tuple[str, ...],
     delimiter: str | None,
     allow_loss: bool,
     as_json: bool,
@@ -106,24 +114,28 @@ def command(
     from fuzzytree import verbs
     from fuzzytree.auditing.baselines import baseline_of, gone, read_baseline
 
-    for place in (output, page, write_baseline):
-        if place is not None:
-            check_place(place)
     if target is not None and data is None:
         raise click.UsageError(
             "--target names a column of a table; give it with --data"
         )
+    read = [one for one in (model, data, config, *results) if one is not None]
+    places = [one for one in (output, page, write_baseline) if one is not None]
+    check_places(places, read)
     asked = Options(within, spreads, limits, row, select, ignore, budget, settings)
     known = configured(config, quiet=quiet)
     path = baseline or known.baseline
     accepted: Mapping[str, str] = {} if path is None else read_baseline(path)
-    table = table_of(data)
     with wrong_options(), progress_bar(quiet=quiet) as tell:
-        found = verbs.audit(
+        material = verbs.material(
             model,
-            data=table,
+            data=table_of(data),
             target=target,
             delimiter=delimiter,
+            results=results,
+            allow_loss=allow_loss,
+        )
+        found = verbs.audit(
+            material,
             within=within,
             spreads=spreads,
             limits={**{n: (a, b) for n, a, b in known.limits}, **limits_of(limits)},
@@ -132,14 +144,13 @@ def command(
             ignore=codes_of(ignore) or known.ignore,
             settings=settings_of(asked, known),
             accepted=accepted,
-            allow_loss=allow_loss,
             repeat=repeating(model, data, target, config, asked),
             progress=tell,
         )
     _tell_domain(found, quiet=quiet)
     form = "json" if as_json else form
     known_ids = accepted if path else None
-    text = _told(found, form, model, known_ids, is_whole=is_whole)
+    text = _told(found, form, material, known_ids, is_whole=is_whole)
     if output is None:
         if text:  # no finding is no annotation
             answer(text)
@@ -147,7 +158,7 @@ def command(
         write_atomically(output, f"{text}\n".encode())
         say(f"wrote    {output}", quiet=quiet)
     if page is not None:
-        _write_page(found, model, page, table, target, delimiter, allow_loss=allow_loss)
+        _write_page(found, material, page)
         say(f"wrote    {page}", quiet=quiet)
     if write_baseline is not None:
         write_atomically(write_baseline, baseline_of(found))
@@ -155,7 +166,7 @@ def command(
         say(f"wrote    {write_baseline} {said}", quiet=quiet)
     lost = [*gone(accepted, found)]
     for name in lost:
-        say(f"gone     {name} {accepted[name]}", quiet=quiet)
+        say(f"gone     {name} {printable(accepted[name])}", quiet=quiet)
     fails = write_baseline is None and _fails(found, fail_on or known.fail_on)
     _tell_verdict(found, lost, quiet=quiet and not fails)
     return 130 if found.was_interrupted else int(fails)
@@ -167,7 +178,7 @@ def command(
 def _told(
     found: Audit,
     form: Form,
-    model: str,
+    material: Material,
     baseline: Mapping[str, str] | None,
     *,
     is_whole: bool,
@@ -188,16 +199,17 @@ def _told(
         case "text":
             lines = audit_lines(
                 found,
-                _lines_of(model),
+                _lines_of(material),
                 is_coloured=_is_coloured(),
                 is_whole=is_whole,
             )
             return "\n".join(lines)
 
 
-def _lines_of(model: str) -> list[str]:
-    """Return the lines of a file, for people."""
-    return read_bounded(model).decode("utf-8-sig", "replace").split("\n")
+def _lines_of(material: Material) -> list[str]:
+    """Return the lines of a model's file, for people."""
+    content = material.file.content if material.file else b""
+    return content.decode("utf-8-sig", "replace").split("\n")
 
 
 def _is_coloured() -> bool:
@@ -217,24 +229,20 @@ def _tell_domain(found: Audit, *, quiet: bool) -> None:
         say(f"limits   and {len(guessed) - 10} more so", quiet=quiet)
 
 
-def _write_page(
-    found: Audit,
-    model: str,
-    page: str,
-    table: str | io.BytesIO | None,
-    target: str | None,
-    delimiter: str | None,
-    *,
-    allow_loss: bool,
-) -> None:
-    from fuzzytree import verbs
+def _write_page(found: Audit, material: Material, page: str) -> None:
+    from fuzzytree.agreement import Agreement
+    from fuzzytree.criteria.results import Stability
     from fuzzytree.report import audit_page
 
-    if isinstance(table, io.BytesIO):
-        table.seek(0)
-    document = verbs.load(model, allow_loss=allow_loss)
-    rows = verbs.audited_rows(table, document, target=target, delimiter=delimiter)
-    write_atomically(page, audit_page.page(found, document, rows=rows).encode())
+    given = [one.found for one in material.given]
+    text = audit_page.page(
+        found,
+        material.model,
+        rows=material.rows,
+        agreement=next((one for one in given if isinstance(one, Agreement)), None),
+        stability=next((one for one in given if isinstance(one, Stability)), None),
+    )
+    write_atomically(page, text.encode())
 
 
 def _fails(found: Audit, least: FailOn | None) -> bool:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 import msgspec
+
+from fuzzytree.agreement import version
 
 Verdict = Literal["holds", "FAILS", "not applicable"]
 
@@ -149,6 +151,8 @@ class Stability(msgspec.Struct, frozen=True):
         offsets: What a distance from zero costs.
     """
 
+    FORMAT: ClassVar[str] = "fuzzytree-stability/1"
+
     model: str
     fingerprint: str
     probes: int
@@ -168,7 +172,8 @@ class Stability(msgspec.Struct, frozen=True):
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""
-        raw = msgspec.json.encode({"ok": self.ok, **msgspec.to_builtins(self)})
+        head = {"format": self.FORMAT, "version": version(), "ok": self.ok}
+        raw = msgspec.json.encode({**head, **msgspec.to_builtins(self)})
         return msgspec.json.format(raw, indent=2).decode()
 
 

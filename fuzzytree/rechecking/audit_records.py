@@ -143,6 +143,13 @@ class Source(NamedTuple):
     sha256: str
 
 
+class Result(NamedTuple):
+    verb: Literal["check", "stability"]
+    file: Source
+    parts: int
+    wrong: int
+
+
 class Audit(NamedTuple):
     version: str
     model: str
@@ -159,6 +166,7 @@ class Audit(NamedTuple):
     limits: tuple[str, ...]
     is_complete: bool
     accepted: tuple[str, ...]
+    results: tuple[Result, ...]
     digest: str
     format: Literal["fuzzytree-audit/1"]
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final
 
 from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Severity
+from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Result, Severity
 from fuzzytree.naming import printable
 from fuzzytree.proving.states import (
     Bracket,
@@ -160,6 +160,8 @@ def _head(audit: Audit) -> Iterator[str]:
     yield f"{_name(audit.model)}: audited as {audit.form}; {means}"
     if audit.data is not None:
         yield f"rows     {audit.rows} of {_name(audit.data.name)}"
+    for result in audit.results:
+        yield f"results  {_name(result.file.name)}: {result_text(result)}"
     sides = audit.domain.sides
     rows = [
         (
@@ -173,6 +175,23 @@ def _head(audit: Audit) -> Iterator[str]:
     yield from aligned(rows) if rows else ["  none: the model has no inputs"]
     if len(sides) > _MOST_INPUTS:
         yield f"  and {counted(len(sides) - _MOST_INPUTS, 'more variable')}"
+
+
+def result_text(result: Result) -> str:
+    """Return what another verb found, in words.
+
+    Example:
+        >>> from fuzzytree.auditing.records import Source
+        >>> result_text(Result("stability", Source("s.json", ""), 10, 1))
+        '1 of 10 criteria fails'
+    """
+    what, wrong = ("comparisons", "disagree")
+    if result.verb == "stability":
+        what, wrong = ("criteria", "fail")
+    if not result.wrong:
+        return f"none of {result.parts} {what} {wrong}s"
+    verb = f"{wrong}s" if result.wrong == 1 else wrong
+    return f"{result.wrong} of {result.parts} {what} {verb}"
 
 
 def _name(text: str) -> str:

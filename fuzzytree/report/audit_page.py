@@ -21,6 +21,7 @@ from fuzzytree.auditing.records import Answer, Audit
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.auditing.views import view
 from fuzzytree.proving.states import Declined
+from fuzzytree.report.audit import result_text
 from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
     anchors,
@@ -193,6 +194,9 @@ def _head(audit: Audit, model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
     elif audit.rows:
         data = counted(audit.rows, "row")
     facts.append(("rows", data))
+    for result in audit.results:
+        section = "agreement" if result.verb == "check" else result.verb
+        facts.append((section, tag("a", result_text(result), href=f"#{section}")))
     pairs = [tag("div", tag("dt", name), tag("dd", said)) for name, said in facts]
     return joined(
         [
@@ -292,7 +296,10 @@ def _repeat(audit: Audit) -> Markup:
         facts.insert(0, ("command", tag("code", command, class_="copied")))
     facts.append(("the model", audit.model))
     facts.append(("its content, SHA-256", tag("code", audit.fingerprint)))
-    for what, source in (("model", audit.file), ("table", audit.data)):
+    sources = [("model", audit.file), ("table", audit.data)]
+    names = {"check": "check", "stability": "study of stability"}
+    sources += [(names[one.verb], one.file) for one in audit.results]
+    for what, source in sources:
         if source is not None:
             facts.append((f"the {what}'s file", tag("code", source.name)))
             facts.append(("its bytes, SHA-256", tag("code", source.sha256)))

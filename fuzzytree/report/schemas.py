@@ -13,6 +13,7 @@ from typing import Final, get_args
 
 import msgspec
 
+from fuzzytree.agreement import Agreement
 from fuzzytree.auditing.difference_records import Difference, Verdict
 from fuzzytree.auditing.records import Audit
 from fuzzytree.criteria.results import Stability
@@ -26,6 +27,7 @@ FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
     {
         "audit.schema.json": Audit,
         "bench.schema.json": Study,
+        "check.schema.json": Agreement,
         "diff.schema.json": Difference,
         "experiment.schema.json": Experiment,
         "needs.schema.json": Report,
@@ -47,7 +49,11 @@ def generate(name: str) -> bytes:
         True
     """
     kind = FILES[name]
-    added: dict[str, Json] = {**_OK} if hasattr(kind, "ok") else {}
+    added: dict[str, Json] = {}
+    if issubclass(kind, Agreement | Stability):
+        added |= {"format": {"const": kind.FORMAT}, "version": {"type": "string"}}
+    if hasattr(kind, "ok"):
+        added |= _OK
     if kind is Difference:
         added["verdict"] = {"enum": [*get_args(Verdict)]}
     return of_result(kind, **added)
