@@ -23,8 +23,9 @@ from fuzzytree.rechecking.audit_records import Audit
 from fuzzytree.rechecking.building import built, read_json
 from fuzzytree.rechecking.cases import Case
 from fuzzytree.rechecking.head import check_files, check_head
+from fuzzytree.rechecking.model_records import System
 from fuzzytree.rechecking.models import read_model
-from fuzzytree.rechecking.outcomes import MOST_BYTES, CannotRunError
+from fuzzytree.rechecking.outcomes import MOST_BYTES, CannotRunError, DoesNotHoldError
 from fuzzytree.rechecking.report import Report
 
 __all__ = ["CannotRunError", "Report", "recheck", "recheck_files"]
@@ -42,10 +43,16 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
         CannotRunError: If one of them cannot be read.
     """
     facts = read_json(audit, names[0])
-    case = Case(built(Audit, facts, names[0]), read_model(model, names[1]))
-    if case.audit.form == "system":
-        raise CannotRunError(f"{names[0]}: audits of systems are not checked again")
+    found, whole = built(Audit, facts, names[0]), read_model(model, names[1])
+    if isinstance(whole, System) and found.policy.decision == "strongest":
+        text = "a system that stands for rules is not checked again; audit these"
+        raise CannotRunError(f"{names[0]}: {text}")
     report = Report()
+    try:
+        case = Case(found, whole)
+    except DoesNotHoldError as error:
+        report.wrong.append(str(error))
+        return report
     check_files(case, report, facts, model, names[1])
     check_head(case, report)
     for number, answer in enumerate(case.audit.answers, 1):

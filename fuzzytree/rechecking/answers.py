@@ -56,6 +56,9 @@ def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     terms = {(v.name, t.name) for v in variables for t in v.terms}
     for label in answer.terms:
         expect(tuple(label) in terms, f"{where}: there is no {label.term!r}")
+    if case.view is not None:
+        inputs = case.view.system.inputs
+        terms = {(v.name, label.name) for v in inputs for label in v.labels}
     units = {"", *(v.unit for v in case.variables.values())}
     for measure in answer.measures:
         _measure(report, measure, where)

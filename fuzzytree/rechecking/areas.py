@@ -7,7 +7,7 @@ from fractions import Fraction
 from fuzzytree.rechecking.cells import FINE, Levels, Line, between, cells, stretches
 from fuzzytree.rechecking.model_records import Shape
 from fuzzytree.rechecking.outcomes import UndecidedError
-from fuzzytree.rechecking.polynomials import ZERO, at
+from fuzzytree.rechecking.polynomials import ONE, ZERO, at
 from fuzzytree.rechecking.roots import Root
 
 
@@ -15,7 +15,7 @@ def height(shape: Shape, line: Line, level: Fraction) -> Fraction:
     """Return the largest degree on a line, from below; exactly at or below a level."""
     levels = Levels()
     mark = levels.add((level,), ZERO)
-    found = cells([((shape,), False)], line, levels)
+    found = cells([((shape,), False, ONE)], line, levels)
     levels.sort()
     most = max(levels.band[end] for cell in found for end in (*cell.left, *cell.right))
     bounds = levels.bands[most]
@@ -29,7 +29,7 @@ def shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] | 
     least = most = slack = ZERO
     if line.low == line.high:
         return None
-    both = [((one,), False), ((other,), False)]
+    both = [((one,), False, ONE), ((other,), False, ONE)]
     for left, right, curves in stretches(both, line):
         inside = between(left, right)
         for root in (end for end in (left, right) if isinstance(end, Root)):

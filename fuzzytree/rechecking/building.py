@@ -24,6 +24,8 @@ def built(kind: Any, value: Any, where: str) -> Any:
     Raises:
         CannotRunError: If a fact has another type.
     """
+    if hasattr(value, "_fields"):
+        return value  # a record already
     if kind in TAGS:
         name, kinds = TAGS[kind]
         rest = dict(value) if isinstance(value, dict) else {}

@@ -10,18 +10,25 @@ from functools import cached_property
 from fuzzytree.rechecking.areas import height, shared
 from fuzzytree.rechecking.audit_records import Answer, Audit, Label
 from fuzzytree.rechecking.cells import Line
+from fuzzytree.rechecking.enclosing import Between
 from fuzzytree.rechecking.grid import Asked, Grid
-from fuzzytree.rechecking.model_records import Model, Tree, Variable
+from fuzzytree.rechecking.meaning import Point, strengths
+from fuzzytree.rechecking.model_records import Model, Rules, System, Tree, Variable
 from fuzzytree.rechecking.outcomes import UndecidedError, require
-from fuzzytree.rechecking.polynomials import ZERO
+from fuzzytree.rechecking.polynomials import ONE, ZERO
 from fuzzytree.rechecking.trees import Steps, paths, rules_of
+from fuzzytree.rechecking.views import View
 
 
 class Case:
     """An audit and its model in every form.
 
     Attributes:
-        rules: The rules of the model; of a tree, its relative ones.
+        rules: The rules of the model; of a tree, its relative ones; of a system, the
+            ways of its conditions.
+        view: A system as it is audited; None for what is none.
+        weights: What the strength of each rule is multiplied by.
+        terms: The terms that are asked about.
         carriers: Everything that a claim can be of, by name.
         variables: The variables of the model by name.
         sides: The sides of the domain by name.
@@ -29,7 +36,11 @@ class Case:
         numbers: The numbers of the rules, from 1.
     """
 
-    def __init__(self, audit: Audit, model: Model) -> None:
+    def __init__(self, audit: Audit, model: Model | System) -> None:
+        self.view: View | None = None
+        if isinstance(model, System):
+            self.view = View(model, audit)
+            model = self.view.rules
         self.audit, self.model = audit, model
         self.carriers: dict[str, Model] = {}
         if isinstance(model, Tree):
@@ -44,13 +55,25 @@ class Case:
         self.sides = {side.variable: side for side in audit.domain.sides}
         self.is_free = not any(v.parts for v in model.variables)
         self.numbers = range(1, len(self.rules.rules) + 1)
+        self.weights = [ONE] * len(self.numbers)
+        self.terms = [
+            Label(v.name, t.name) for v in self.rules.variables for t in v.terms
+        ]
+        if self.view is not None:
+            self.weights = [owner.weight for owner in self.view.owners]
+            self.terms = self.view.labels
 
     @cached_property
     def grid(self) -> Grid:
         """The rules in cells."""
+        when = zip(self.rules.rules, self.weights, strict=True)
+        if not all(weight == 1 or rule.when for rule, weight in when):
+            raise UndecidedError("a rule without clauses is not weighted here")
+        if self.view is not None and not self.view.is_plain:
+            raise UndecidedError("a condition does not hold by its ways")
         lines = {v.name: self.line(v) for v in self.rules.variables}
-        given = self.audit.settings
-        return Grid(self.rules, lines, map(Fraction, (given.epsilon, given.level)))
+        given = map(Fraction, (self.audit.settings.epsilon, self.audit.settings.level))
+        return Grid(self.rules, lines, given, self.weights)
 
     @cached_property
     def paths(self) -> dict[int, Steps]:
@@ -65,6 +88,7 @@ class Case:
             Label(v.name, term.name): height(term.shape, self.line(v), level)
             for v in self.rules.variables
             for term in v.terms
+            if Label(v.name, term.name) in self.terms
         }
 
     @cached_property
@@ -76,6 +100,7 @@ class Case:
             )
             for v in self.rules.variables
             for a, b in itertools.combinations(v.terms, 2)
+            if {Label(v.name, a.name), Label(v.name, b.name)} <= {*self.terms}
         }
 
     def line(self, variable: Variable) -> Line:
@@ -117,7 +142,19 @@ class Case:
     def pairs(self, *, alike: bool) -> list[tuple[int, int]]:
         """Return the pairs of rules of one class, or of two."""
         every = itertools.combinations(self.numbers, 2)
-        return [p for p in every if (self.then(p[0]) == self.then(p[1])) is alike]
+        found = [p for p in every if (self.then(p[0]) == self.then(p[1])) is alike]
+        return [p for p in found if not self.is_one(*p)]
+
+    def is_one(self, one: int, other: int) -> bool:
+        """Return whether two rules are ways of one rule of a system."""
+        owners = self.view.owners if self.view else ()
+        return bool(owners) and owners[one - 1] is owners[other - 1]
+
+    def strengths(self, rules: Rules, point: Point) -> list[Between]:
+        """Return between which numbers the strength of each rule lies."""
+        if self.view is not None:
+            return self.view.strengths(point)
+        return [(one, one) for one in strengths(rules, point)]
 
     def fire(self, *numbers: int) -> bool:
         """Return whether each of some rules fires somewhere."""

@@ -18,14 +18,23 @@ from typing import NamedTuple
 from fuzzytree.rechecking.curves import Piece, piece_at, pieces
 from fuzzytree.rechecking.model_records import Shape
 from fuzzytree.rechecking.outcomes import UndecidedError
-from fuzzytree.rechecking.polynomials import ONE, ZERO, Poly, at, derivative, plus
+from fuzzytree.rechecking.polynomials import (
+    ONE,
+    ZERO,
+    Poly,
+    at,
+    derivative,
+    plus,
+    times,
+)
 from fuzzytree.rechecking.roots import Root, is_same, roots
 
 MOST_ROOTS, MOST_CRITICAL = 4_000, 4_000
 FINE = Fraction(1, 2**50)
 
 End = Root | Fraction
-Function = tuple[tuple[Shape, ...], bool]  # the largest of some degrees, or 1 minus it
+Function = tuple[tuple[Shape, ...], bool, Fraction]
+"""The largest of some degrees, or 1 minus it; and what that is multiplied by."""
 
 
 class Cell(NamedTuple):
@@ -96,7 +105,7 @@ def cells(functions: Sequence[Function], line: Line, levels: Levels) -> list[Cel
         inside = between(left, right)
         ends = [[levels.add(poly, end) for poly in polys] for end in (left, right)]
         found.append(Cell(_ranks([at(poly, inside) for poly in polys]), *ends))
-    here = {s: piece_at(s, line.low) for group, _ in functions for s in group}
+    here = {s: piece_at(s, line.low) for group, *_ in functions for s in group}
     values = [at(_chosen(f, here, line.low), line.low) for f in functions]
     lowest = [levels.add((value,), ZERO) for value in values]
     return [*found, Cell(_ranks(values), lowest, lowest)]
@@ -112,7 +121,7 @@ def stretches(
     functions: Sequence[Function], line: Line
 ) -> Iterator[tuple[End, End, list[Poly]]]:
     """Yield the parts of an axis, from left to right, and what functions are there."""
-    shapes = dict.fromkeys(shape for group, _ in functions for shape in group)
+    shapes = dict.fromkeys(shape for group, *_ in functions for shape in group)
     ends = {e for s in shapes for p in pieces(s) for e in p[:2] if e is not None}
     inner = sorted(end for end in ends if line.low < end < line.high)
     cuts = [line.low, *inner, line.high]
@@ -138,16 +147,18 @@ def _chosen(function: Function, here: Mapping[Shape, Piece], x: Fraction) -> Pol
         value = at(piece.poly, x)
         part = () if value <= 0 else piece.poly if value < piece.cap else (piece.cap,)
         best = max(best, (at(part, x), part), key=lambda pair: pair[0])
-    return plus((ONE,), best[1], -1) if function[1] else best[1]
+    found = plus((ONE,), best[1], -1) if function[1] else best[1]
+    return found if function[2] == 1 else times(found, (function[2],))
 
 
 def _curves(functions: Sequence[Function], here: Mapping[Shape, Piece]) -> list[Poly]:
     """Return every polynomial that a function can be in a part of the axis."""
     found: dict[Poly, None] = {}
-    for group, negated in functions:
+    for group, negated, weight in functions:
         for shape in group:
             for part in (here[shape].poly, (here[shape].cap,), ()):
-                found[plus((ONE,), part, -1) if negated else part] = None
+                one = plus((ONE,), part, -1) if negated else part
+                found[one if weight == 1 else times(one, (weight,))] = None
     return list(found)
 
 

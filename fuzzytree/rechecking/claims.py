@@ -8,11 +8,15 @@ from fractions import Fraction
 
 from fuzzytree.rechecking.audit_records import Claim, Coordinate, Span, fraction
 from fuzzytree.rechecking.cases import Case
-from fuzzytree.rechecking.curves import degree
-from fuzzytree.rechecking.meaning import Point, answer_of, strengths, value_of
+from fuzzytree.rechecking.enclosing import Between, bounds
+from fuzzytree.rechecking.meaning import Point, answer_of, value_of
 from fuzzytree.rechecking.model_records import Model, Rules
-from fuzzytree.rechecking.outcomes import DoesNotHoldError, require
-from fuzzytree.rechecking.polynomials import ONE, ZERO
+from fuzzytree.rechecking.outcomes import (
+    DoesNotHoldError,
+    UndecidedError,
+    require,
+)
+from fuzzytree.rechecking.polynomials import ZERO
 from fuzzytree.rechecking.report import Report
 
 FIELDS = {
@@ -112,36 +116,54 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
         return answer_of(model, point) == claim.label
     level = None if claim.level is None else fraction(claim.level)
     if claim.kind == "degree":
-        return _degree(model, claim, point) == level
+        low, high = _degree(model, claim, point)
+        return level is not None and low <= level <= high
     if not isinstance(model, Rules):
         raise DoesNotHoldError("a tree has no strengths")
-    every = strengths(model, point)
+    every = case.strengths(model, point)
     is_known = all(1 <= n <= len(every) for n in (*claim.rules, *claim.rivals))
     require(is_known, "a claim of an unknown rule")
     ours = [every[n - 1] for n in claim.rules]
     rivals = [every[n - 1] for n in claim.rivals]
     require(bool(ours) or claim.kind == "covered", "a claim of no rule")
-    match claim.kind:
-        case "covered":
-            return max(every) > 0
-        case "beats":
-            return min(ours) > max(rivals, default=ZERO)  # alone: it fires
-        case "ties":
-            return min(ours) == max(ours) > max(rivals, default=-ONE)
-        case "strength":
-            return ours[0] == level
-        case "below":
-            if level is None:
-                raise DoesNotHoldError("a claim without its level")
-            return max(ours) < level or max(ours) == level == 0
-        case "reaches":
-            return level is not None and min(ours) >= level
+    if claim.kind == "strength":
+        return level is not None and ours[0][0] <= level <= ours[0][1]
+    if claim.kind == "covered":
+        return _certain(ZERO, max(every))
+    least = min(low for low, _ in ours), min(high for _, high in ours)
+    most = max(low for low, _ in ours), max(high for _, high in ours)
+    top = max(rivals, default=(ZERO, ZERO))[0], max([h for _, h in rivals] or [ZERO])
+    if claim.kind == "beats":
+        return _certain(top, least)  # alone: it fires
+    if claim.kind == "ties":
+        is_one = least == most and least[0] == least[1]
+        return is_one and (not rivals or _certain(top, least))
+    if level is None:
+        raise DoesNotHoldError("a claim without its level")
+    if claim.kind == "below":
+        return most[1] == level == 0 or _certain(most, level)
+    return least[0] >= level or _certain(level, least)
 
 
-def _degree(model: Model, claim: Claim, point: Point) -> Fraction:
+def _certain(small: Between | Fraction, large: Between | Fraction) -> bool:
+    """Return whether one number is below another one, each between two ends.
+
+    Raises:
+        UndecidedError: If the ends do not tell.
+    """
+    one = small if isinstance(small, tuple) else (small, small)
+    other = large if isinstance(large, tuple) else (large, large)
+    if one[1] < other[0]:
+        return True
+    if one[0] < other[1]:
+        raise UndecidedError("two strengths are too near to tell apart")
+    return False
+
+
+def _degree(model: Model, claim: Claim, point: Point) -> Between:
     """Return the degree of the term that a claim is about."""
     for variable in model.variables:
         for term in variable.terms:
             if (variable.name, term.name) == (claim.variable, claim.term):
-                return degree(term.shape, value_of(variable, point))
+                return bounds(term.shape, value_of(variable, point))
     raise DoesNotHoldError("a claim of an unknown term")

@@ -64,7 +64,9 @@ def copied(case: Case, answer: Answer) -> None:
         raise UndecidedError(text)
     first, second = answer.rules
     is_one = case.then(first) == case.then(second)
-    require((answer.severity == "error") != is_one, "the classes are not so")
+    graver = "error" if case.view is None else "info"
+    severity = "warning" if is_one else graver
+    require(answer.severity == severity, "the classes are not so")
     if not _is_copy(answer):
         raise UndecidedError("the distance of curves that differ is not measured here")
     one, other = case.asked(first), case.asked(second)
@@ -80,6 +82,8 @@ def apart(case: Case, answer: Answer) -> None:
     told = {one.rules for one in case.coded("FT201")}
     level, grid = Fraction(case.audit.settings.level), case.grid
     rest = [pair for pair in case.pairs(alike=False) if pair not in told]
+    if case.view is not None:
+        rest = [pair for pair in rest if case.view.may_conflict(*pair)]
     untold = next((m.value for m in answer.measures if "not told" in m.name), 0)
     require(answer.is_finding == (untold > 0), "a finding that is none")
     counted(answer, {"pairs that never do": len(rest) - untold}, 1)

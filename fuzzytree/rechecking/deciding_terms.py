@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from fuzzytree.rechecking.audit_records import Answer, Declined
+from fuzzytree.rechecking.audit_records import Answer, Declined, Label
 from fuzzytree.rechecking.cases import Case, counted
 from fuzzytree.rechecking.cells import FINE
 from fuzzytree.rechecking.model_records import Rules, Tree
@@ -50,16 +50,26 @@ def overlaps(case: Case, answer: Answer) -> None:
 
 def unused(case: Case, answer: Answer) -> None:
     """Compare the terms and variables that no rule asks with what is told."""
-    rules, asked = case.rules, _asked(case.rules)
+    every, asked = case.terms, _asked(case.rules)
+    if case.view is not None:  # the system itself is read, rules left out or not
+        every = [
+            Label(v.name, label.name)
+            for v in case.view.system.inputs
+            for label in v.labels
+        ]
+        asked = case.view.questions()
     needed = {variable for variable, _ in asked}
-    for variable in rules.variables:
+    names = [v.name for v in case.rules.variables]
+    for variable in case.rules.variables:
         if variable.name in needed:
             needed |= {part.input for part in variable.parts}
-    idle = [f"variable {v.name!r}" for v in rules.variables if v.name not in needed]
-    for v in rules.variables:
-        names = [t.name for t in v.terms if (v.name, t.name) not in asked]
-        if v.name in needed:
-            idle += [f"term {name!r} of {v.name!r}" for name in names]
+    idle = [f"variable {name!r}" for name in names if name not in needed]
+    idle += [
+        f"term {term!r} of {name!r}"
+        for name, term in every
+        if name in needed and (name, term) not in asked
+    ]
+    needed, asked = needed.intersection(names), asked.intersection(every)
     told = [one.subject for one in case.coded("FT404") if one.is_finding]
     require(told == idle, "other terms or variables are unused")
     counts = {"variables in use": len(needed), "terms in use": len(asked)}

@@ -12,6 +12,7 @@ from fuzzytree.rechecking.meaning import strengths
 from fuzzytree.rechecking.model_records import Tree
 from fuzzytree.rechecking.outcomes import UndecidedError, require
 from fuzzytree.rechecking.polynomials import ZERO
+from fuzzytree.rechecking.views import View
 
 
 def dead(case: Case, answer: Answer) -> None:
@@ -19,11 +20,23 @@ def dead(case: Case, answer: Answer) -> None:
     if isinstance(case.model, Tree):
         dead_leaf(case, case.model, answer)
         return
+    if case.view is not None:
+        silent(case, case.view, answer)
+        return
     require(len(answer.rules) > 0, "no rule is named")
     number = answer.rules[0]
     rivals = [case.asked(n) for n in case.numbers if case.then(n) != case.then(number)]
     wins = case.beats(case.asked(number), rivals)
     case.never(wins, "the rule wins somewhere")
+
+
+def silent(case: Case, view: View, answer: Answer) -> None:
+    """Ask whether a rule of a system fires, in any of its ways."""
+    require(answer.is_finding, "a finding that is none")
+    if not answer.rules:
+        require(answer.subject in view.silent, "its text lets it fire")
+        return
+    case.never(case.fire(*answer.rules), "the rule fires somewhere")
 
 
 def superfluous(case: Case, answer: Answer) -> None:
@@ -73,6 +86,11 @@ def shows_win(case: Case, answer: Answer, state: Witness) -> None:
     """Ask that a claim compares the rule with every rule that it is about."""
     require(len(answer.rules) == 1, "it is of no rule")
     number = answer.rules[0]
+    if case.view is not None:
+        fired = [claim.rules for claim in state.claims if claim.kind == "beats"]
+        is_found = (number,) in fired and not answer.is_finding
+        require(is_found, "it is not claimed that the rule fires")
+        return
     rivals = {n for n in case.numbers if n != number}
     if answer.code != "FT103":
         rivals = {n for n in rivals if case.then(n) != case.then(number)}

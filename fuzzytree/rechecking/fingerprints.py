@@ -8,11 +8,27 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from fuzzytree.rechecking.building import TAGS
-from fuzzytree.rechecking.model_records import Model, Rule, Shape
+from fuzzytree.rechecking.model_records import (
+    LR,
+    And,
+    Band,
+    Curve,
+    Is,
+    Model,
+    Not,
+    Or,
+    Points,
+    Rule,
+    Shape,
+    System,
+)
+
+_TAGS: dict[type, str] = {
+    kind: kind.__name__.lower() for kind in (Band, LR, Points, Is, And, Or, Not)
+}
 
 
-def fingerprint(model: Model) -> str:
+def fingerprint(model: Model | System) -> str:
     """Return the SHA-256 of a model's content, written as compact JSON."""
     return hashlib.sha256(compact(model).encode()).hexdigest()
 
@@ -33,9 +49,12 @@ def compact(value: Any) -> str:
     names: tuple[str, ...] = getattr(value, "_fields", ())
     if not names:
         return f"[{','.join(map(compact, value))}]"
-    tags = [(k, t) for t, k in TAGS[Shape][1].items() if isinstance(value, k)]
-    pairs = [f'"type":"{tag}"' for _, tag in tags]
-    pairs += [f'"{n}":{compact(v)}' for n, v in zip(names, value, strict=True)]
+    given: list[tuple[str, Any]] = [*zip(names, value, strict=True)]
+    tag = _TAGS.get(type(value))
+    if isinstance(value, Curve):
+        tag, given = value.kind, [*value.facts]
+    pairs = [f'"type":"{tag}"'] if tag else []
+    pairs += [f'"{n.rstrip("_")}":{compact(v)}' for n, v in given]
     return f"{{{','.join(pairs)}}}"
 
 

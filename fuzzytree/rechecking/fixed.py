@@ -33,7 +33,7 @@ SEVERITIES = {
     **dict.fromkeys([f"FTD0{n}" for n in range(1, 9)], "info"),
     "FT101": "error warning",  # it decides by its place alone
     "FT301": "warning info",  # the model answers a class where no rule fires
-    "FT106": "warning error",  # of another class: a contradiction
+    "FT106": "warning error info",  # of another class: a contradiction, or a note
     "FT401": "warning error",  # never reached at all
 }
 """Every code, and the severities that a finding of it can have."""

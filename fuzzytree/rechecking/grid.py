@@ -19,7 +19,7 @@ Asked = tuple[int, ...]
 class Axis(NamedTuple):
     """A variable: the numbers of the functions that rules ask, and its cells."""
 
-    numbers: dict[Clause, int]
+    numbers: dict[tuple[Clause, Fraction], int]
     cells: list[Cell]
 
 
@@ -27,14 +27,24 @@ class Grid:
     """Rules on a box, cut into cells, with their critical levels in order."""
 
     def __init__(
-        self, rules: Rules, lines: Mapping[str, Line], extra: Iterable[Fraction]
+        self,
+        rules: Rules,
+        lines: Mapping[str, Line],
+        extra: Iterable[Fraction],
+        weights: Sequence[Fraction],
     ) -> None:
+        self.is_product = rules.semantics.conjunction == "product"
         self.levels = Levels()
         self.marks = {one: self.levels.add((one,), ZERO) for one in (ZERO, ONE, *extra)}
         self.axes: list[Axis] = []
-        every = [clause for rule in rules.rules for clause in rule.when]
+        pairs = zip(rules.rules, weights, strict=True)
+        every = [
+            one for rule, weight in pairs for one in self._weighted(rule.when, weight)
+        ]
         for variable in rules.variables:
-            clauses = [c for c in dict.fromkeys(every) if c.variable == variable.name]
+            clauses = [
+                c for c in dict.fromkeys(every) if c[0].variable == variable.name
+            ]
             if clauses:
                 functions = _functions(variable, clauses)
                 known = {
@@ -44,13 +54,23 @@ class Grid:
                 found = cells([*known], lines[variable.name], self.levels)
                 self.axes.append(Axis(numbers, found))
         self.levels.sort()
-        self.of = [self.asked(rule.when) for rule in rules.rules]
+        pairs = zip(rules.rules, weights, strict=True)
+        self.of = [self.asked(rule.when, weight) for rule, weight in pairs]
         self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
 
-    def asked(self, when: Iterable[Clause]) -> Asked:
+    def _weighted(
+        self, when: Iterable[Clause], weight: Fraction
+    ) -> list[tuple[Clause, Fraction]]:
+        """Return clauses with their weights: all of a minimum, one of a product."""
+        return [
+            (clause, ONE if place and self.is_product else weight)
+            for place, clause in enumerate(when)
+        ]
+
+    def asked(self, when: Iterable[Clause], weight: Fraction = ONE) -> Asked:
         """Return what clauses ask of each axis; every one must be of some rule."""
         bits, again = [0] * len(self.axes), 0
-        for clause in when:
+        for clause in self._weighted(when, weight):
             for place, axis in enumerate(self.axes):
                 if clause in axis.numbers:
                     bit = 1 << axis.numbers[clause]
@@ -183,9 +203,14 @@ class Grid:
         return _reach(axes, len(rivals))
 
 
-def _functions(variable: Variable, clauses: Iterable[Clause]) -> list[Function]:
+def _functions(
+    variable: Variable, clauses: Iterable[tuple[Clause, Fraction]]
+) -> list[Function]:
     shapes = {term.name: term.shape for term in variable.terms}
-    return [(tuple(shapes[t] for t in c.terms), c.negated) for c in clauses]
+    return [
+        (tuple(shapes[term] for term in clause.terms), clause.negated, weight)
+        for clause, weight in clauses
+    ]
 
 
 def _bits(flags: Iterable[int]) -> int:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 
 class Flank(NamedTuple):
@@ -38,7 +38,22 @@ class Points(NamedTuple):
     degrees: tuple[float, ...]
 
 
-Shape = Band | LR | Points
+class Curve(NamedTuple):
+    """A curve of a fuzzy system that is none of the shapes: its kind and its facts."""
+
+    kind: str
+    facts: tuple[tuple[str, Any], ...]
+
+
+class Scaled(NamedTuple):
+    """A shape that is multiplied by a height, and then changed by hedges."""
+
+    shape: Shape
+    height: float
+    hedges: tuple[str, ...]
+
+
+Shape = Band | LR | Points | Curve | Scaled
 
 
 class Term(NamedTuple):
@@ -123,6 +138,98 @@ class Tree(NamedTuple):
     sets: tuple[Sets, ...]
     semantics: Semantics
     columns: tuple[str, ...]
+
+
+class Label(NamedTuple):
+    name: str
+    curve: Shape
+    height: float
+
+
+class Input(NamedTuple):
+    name: str
+    labels: tuple[Label, ...]
+    low: float | None
+    high: float | None
+    clips: bool
+    unit: str
+    parts: tuple[Part, ...]
+
+
+class Defuzzifier(NamedTuple):
+    method: str
+    samples: int
+    grid: str
+
+
+class Output(NamedTuple):
+    name: str
+    labels: tuple[Label, ...]
+    low: float | None
+    high: float | None
+    defuzzifier: Defuzzifier
+    aggregation: str | None
+    default: float | None
+    clips: bool
+    unit: str
+
+
+class Is(NamedTuple):
+    variable: str
+    label: str | None
+    hedges: tuple[str, ...]
+
+
+class And(NamedTuple):
+    parts: tuple[Condition, ...]
+
+
+class Or(NamedTuple):
+    parts: tuple[Condition, ...]
+
+
+class Not(NamedTuple):
+    part: Condition
+
+
+Condition = Is | And | Or | Not
+
+
+class Conclusion(NamedTuple):
+    output: str
+    label: str
+    hedges: tuple[str, ...]
+
+
+class SystemRule(NamedTuple):
+    when: Condition | None
+    then: tuple[Conclusion, ...]
+    weight: float
+    name: str
+
+
+class Activation(NamedTuple):
+    method: str
+    count_: int  # `count` is a method of tuples
+    threshold: float
+    relation: str
+
+
+class Block(NamedTuple):
+    rules: tuple[SystemRule, ...]
+    conjunction: str | None
+    disjunction: str | None
+    implication: str | None
+    activation: Activation
+    name: str
+
+
+class System(NamedTuple):
+    name: str
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    blocks: tuple[Block, ...]
+    note: str
 
 
 Model = Rules | Tree

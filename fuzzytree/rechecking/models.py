@@ -8,24 +8,29 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 from fuzzytree.rechecking.building import built
-from fuzzytree.rechecking.model_records import Clause, Model, Rules, Tree
+from fuzzytree.rechecking.facts import keys_of, term_facts, variable_facts
+from fuzzytree.rechecking.model_records import Clause, Model, Rules, System, Tree
 from fuzzytree.rechecking.outcomes import CannotRunError
+from fuzzytree.rechecking.systems import read_system
 from fuzzytree.rechecking.yaml import read_yaml
 
 _HEAD = "format, kind, name, classes, semantics"
 
 
-def read_model(content: bytes, name: str) -> Model:
-    """Return the rule base or tree of a YAML file.
+def read_model(content: bytes, name: str) -> Model | System:
+    """Return the rule base, tree or fuzzy system of a YAML file.
 
     Raises:
         CannotRunError: If it is something else, or holds what is not known here.
     """
     top = read_yaml(content, name)
     kind = top.get("kind") if isinstance(top, dict) else None
-    if kind not in ("rule base", "tree"):
-        raise CannotRunError(f"{name}: rule bases and trees are checked, not {kind!r}")
+    if kind not in ("rule base", "tree", "system"):
+        text = f"{name}: rule bases, trees and systems are checked, not {kind!r}"
+        raise CannotRunError(text)
     try:
+        if kind == "system" and isinstance(top, dict):
+            return read_system(top, name)
         if kind == "tree":
             model = built(Tree, _tree_facts(top), name)
             _check_numbers(model, name)
@@ -42,22 +47,13 @@ def read_model(content: bytes, name: str) -> Model:
     return found
 
 
-def _keys(found: Any, needed: str, allowed: str = "") -> dict[str, Any]:
-    """Return a mapping that has some keys, may have others, and no more."""
-    must, may = set(needed.split(", ")), set(allowed.split(", "))
-    wrong = must - found.keys() | found.keys() - must - may
-    if wrong - {""}:
-        raise CannotRunError(f"missing or unknown keys: {', '.join(sorted(wrong))}")
-    return dict(found)
-
-
 def _rule_facts(found: Any) -> dict[str, Any]:
-    top = _keys(found, f"{_HEAD}, rules", "columns, variables, terms")
+    top = keys_of(found, f"{_HEAD}, rules", "columns, variables, terms")
     facts = _head(
         top, {"or": "max", "not": "1 - degree"}, "first of the strongest rules"
     )
     known = {v["name"]: [t["name"] for t in v["terms"]] for v in facts["variables"]}
-    rules = [_keys(one, "if, then", "support") for one in top["rules"]]
+    rules = [keys_of(one, "if, then", "support") for one in top["rules"]]
     facts["rules"] = [
         {
             "when": [_clause(one, known) for one in rule["if"]],
@@ -70,21 +66,21 @@ def _rule_facts(found: Any) -> dict[str, Any]:
 
 
 def _tree_facts(found: Any) -> dict[str, Any]:
-    top = _keys(found, f"{_HEAD}, leaves", "columns, variables, nodes, sets")
+    top = keys_of(found, f"{_HEAD}, leaves", "columns, variables, nodes, sets")
     cuts = {"cuts": "a value equal to a cut lies below it"}
     facts = _head(top, cuts, "leaf that the nodes lead to")
     facts["nodes"] = [_node(n, one) for n, one in enumerate(top.get("nodes", []), 1)]
     facts["leaves"] = [_leaf(n, one) for n, one in enumerate(top["leaves"], 1)]
-    groups = [_keys(one, "variable, terms") for one in top.get("sets", [])]
+    groups = [keys_of(one, "variable, terms") for one in top.get("sets", [])]
     facts["sets"] = [
-        {"variable": one["variable"], "terms": [*map(_term, one["terms"])]}
+        {"variable": one["variable"], "terms": [*map(term_facts, one["terms"])]}
         for one in groups
     ]
     return facts
 
 
 def _head(top: dict[str, Any], fixed: dict[str, str], decides: str) -> dict[str, Any]:
-    meant = _keys(
+    meant = keys_of(
         top["semantics"], f"and, uncovered, missing, answer, {', '.join(fixed)}"
     )
     fixed["answer"] = f"the class of the {decides}"
@@ -103,64 +99,15 @@ def _head(top: dict[str, Any], fixed: dict[str, str], decides: str) -> dict[str,
         "name": top["name"],
         "classes": top["classes"],
         "columns": top.get("columns", []),
-        "variables": [*map(_variable, top.get("variables", []))],
+        "variables": [*map(variable_facts, top.get("variables", []))],
         "semantics": semantics | {"uncovered": answers[0], "missing": answers[1]},
     }
-
-
-def _variable(found: Any) -> dict[str, Any]:
-    one = _keys(found, "name", "unit, range, sum of, terms")
-    ends = _keys(one.get("range", {}), "", "from, to")
-    parts = [_keys(p, "input, weight", "centre") for p in one.get("sum of", [])]
-    return {
-        "name": one["name"],
-        "terms": [*map(_term, one.get("terms", []))],
-        "unit": one.get("unit", ""),
-        "low": ends.get("from"),
-        "high": ends.get("to"),
-        "parts": [{"centre": 0.0} | part for part in parts],
-    }
-
-
-def _term(found: Any) -> dict[str, Any]:
-    shape: dict[str, Any]
-    if "points" in found:
-        one = _keys(found, "name, points")
-        values, degrees = zip(*one["points"], strict=True)
-        shape = {"type": "points", "values": values, "degrees": degrees}
-    elif "left" in found:
-        one = _keys(found, "name, mean, left, right")
-        sides = {
-            side: _keys(one[side], "spread, curve, reach") for side in ("left", "right")
-        }
-        shape = {"type": "lr", "mean": one["mean"], **sides}
-    elif "mean" in found:
-        one = _keys(found, "name, mean, spread, curve, reach")
-        side = {key: one[key] for key in ("spread", "curve", "reach")}
-        shape = {"type": "lr", "mean": one["mean"], "left": side, "right": side}
-    else:
-        one = _keys(found, "name", "above, up to, left flank, right flank, degree")
-        rest = one.keys() - {"name", "degree"}
-        if one.get("degree", 1) != 1 or ("degree" in one) == bool(rest):
-            raise CannotRunError(f"term {one['name']!r:.60} has no shape")
-        shape = {"type": "band", "low": one.get("above"), "high": one.get("up to")}
-        shape["left"] = _flank(one.get("left flank"))
-        shape["right"] = _flank(one.get("right flank"))
-    return {"name": one["name"], "shape": shape}
-
-
-def _flank(found: Any) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    one = _keys(found, "from, to", "curve, fit error")
-    ends = {"start": one["from"], "end": one["to"]}
-    return ends | {"curve": one.get("curve", [1.0]), "error": one.get("fit error")}
 
 
 def _clause(found: Any, known: Mapping[str, Collection[str]]) -> dict[str, Any]:
     if isinstance(found, dict):
         verb = "is not" if "is not" in found else "is"
-        one = _keys(found, f"variable, {verb}")
+        one = keys_of(found, f"variable, {verb}")
         return Clause(one["variable"], one[verb], verb == "is not")._asdict()
     read = [*itertools.islice(readings(found, known), 2)]
     if len(read) != 1:
@@ -203,8 +150,8 @@ def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
 
 
 def _node(number: int, found: Any) -> dict[str, Any]:
-    one = _keys(found, "node, ask, cuts, branches", "interval owners")
-    ways = [_keys(way, "is, go to", "sets") for way in one["branches"]]
+    one = keys_of(found, "node, ask, cuts, branches", "interval owners")
+    ways = [keys_of(way, "is, go to", "sets") for way in one["branches"]]
     owners = [owner - 1 for owner in one.get("interval owners", [])]
     if one["node"] != number:
         raise CannotRunError(f"node {number} has another number")
@@ -224,7 +171,7 @@ def _target(text: str) -> dict[str, int | None]:
 
 
 def _leaf(number: int, found: Any) -> dict[str, Any]:
-    one = _keys(found, "leaf, class", "pattern, support")
+    one = keys_of(found, "leaf, class", "pattern, support")
     if one["leaf"] != number:
         raise CannotRunError(f"leaf {number} has another number")
     rest = {"pattern": one.get("pattern", ""), "support": one.get("support")}

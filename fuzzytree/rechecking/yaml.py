@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -17,6 +18,7 @@ _ESCAPE = re.compile(r"\\(x[0-9a-fA-F]{2}|u[0-9a-fA-F]{4}|U[0-9a-fA-F]{8}|.)")
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "0": "\0", "\\": "\\", '"': '"', "/": "/"}
 _INTEGER = re.compile(r"[-+]?[0-9]{1,300}")
 _NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_INFINITE = {".inf": math.inf, "-.inf": -math.inf}
 _ALIEN = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)|0[ox].*")
 _NOTHING = re.compile("~?|null|Null|NULL|true|True|TRUE|false|False|FALSE")
 _FORBIDDEN = re.compile(
@@ -216,6 +218,8 @@ class _Flow:
     def scalar(self, text: str) -> str | int | float:
         if text[:1] in "'\"" and text:
             return self._unquoted(text)
+        if text in _INFINITE:  # an open end of a trapezoid; no number elsewhere
+            return _INFINITE[text]
         if _NOTHING.fullmatch(text) or _ALIEN.fullmatch(text):
             raise self.error(f"{text!r} has no place in a model")
         if text[0] in "&*!|>@%`?,[]{}#" or text[:2] in ("- ", "--") or ": " in text:

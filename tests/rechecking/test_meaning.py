@@ -40,7 +40,12 @@ def wins_of(base: RuleBase) -> tuple[model_records.Rules, list[bool]]:
     found = read(base)
     assert isinstance(found, model_records.Rules)
     line = Line(Fraction(0), Fraction(1))
-    grid = Grid(found, dict.fromkeys((v.name for v in found.variables), line), [])
+    grid = Grid(
+        found,
+        dict.fromkeys((v.name for v in found.variables), line),
+        [],
+        [Fraction(1)] * len(found.rules),
+    )
     return found, [
         grid.wins(
             grid.of[number],

@@ -86,7 +86,7 @@ def test_the_records_of_an_audit_are_ours() -> None:
         ("a: {b: 1, b: 2}", "x.yaml:1: the key 'b' stands twice"),
         ("a: [1, 2", "x.yaml:1: ']' or ',' is missing"),
         ("a: null", "x.yaml:1: 'null' has no place in a model"),
-        ("a: .inf", "x.yaml:1: '.inf' has no place in a model"),
+        ("a: .nan", "x.yaml:1: '.nan' has no place in a model"),
         ("a: 'b", 'x.yaml:1: a quote that does not end: "\'b"'),
         ("a:\n- [" + "[" * 40, "x.yaml:2: more than 32 levels"),
         ("a:\tb", "x.yaml:1: character U+0009 is not read"),
