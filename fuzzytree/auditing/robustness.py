@@ -18,7 +18,8 @@ from fuzzytree.proving.decisions import decision_at, other_decision
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.ground import ground, narrowed, strengths_at
 from fuzzytree.proving.nearest import Nearest, nearest, nearest_box
-from fuzzytree.proving.regions import boxes, leaf_at, point_in, regions
+from fuzzytree.proving.polytopes import Polytope, Polytopes, polytope_of
+from fuzzytree.proving.regions import boxes, leaf_at, regions
 from fuzzytree.proving.states import (
     Bracket,
     Carrier,
@@ -69,13 +70,15 @@ class CrispDecider:
 
     def __init__(self, subject: Subject, tree: FuzzyTree) -> None:
         self.tree, self.domain = tree, subject.domain
-        self.found = regions(tree)
+        self.boxes: list[tuple[str, Domain]] = []
+        parts: list[Polytope] = []
+        variables = {variable.name: variable for variable in tree.variables}
+        for region in regions(tree):
+            for box in boxes(region, tree, subject.domain):
+                self.boxes.append((region.label, box))
+                parts.append(polytope_of(box, tree.inputs, variables))
         self.is_plain = not any(variable.parts for variable in tree.variables)
-        self.boxes = [
-            (region.label, box)
-            for region in self.found
-            for box in (boxes(region, tree, subject.domain) if self.is_plain else ())
-        ]
+        self.polytopes = Polytopes(subject.domain, tree.inputs, parts)
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
         """Return the class of the leaf that a point reaches, and the leaf."""
@@ -85,30 +88,11 @@ class CrispDecider:
     def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
         """Return how far the nearest region of another class is."""
         label, _ = self.decided(point)
+        chosen = [n for n, (other, _) in enumerate(self.boxes) if other != label]
         if self.is_plain:
-            others = [box for other, box in self.boxes if other != label]
+            others = [self.boxes[number][1] for number in chosen]
             return nearest_box(self.domain, point, others)
-        return nearest(
-            self.domain,
-            point,
-            lambda box: self._ask(box, label),
-            lambda other: self._is_inside(other) and self.decided(other)[0] != label,
-            clock,
-        )
-
-    def _is_inside(self, point: Mapping[str, Fraction]) -> bool:
-        return contains(self.domain, self.tree.variables, point)
-
-    def _ask(self, ball: Domain, label: str | None) -> State:
-        for region in self.found:
-            if region.label == label:
-                continue
-            for box in boxes(region, self.tree, ball):
-                point = point_in(box, self.tree)
-                if point is not None:
-                    claim = Claim("decides", of="tree", label=region.label)
-                    return Witness(coordinates(point), (claim,))
-        return Proved("all leaves of other classes asked")
+        return self.polytopes.nearest(point, chosen, clock)
 
 
 class RuleDecider:

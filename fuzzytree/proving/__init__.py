@@ -45,6 +45,7 @@ Questions, whatever the conjunction
     - `decisions`: is a box decided alike everywhere
     - `nearest`: how far it is to the nearest point of a kind
     - `regions`: the crisp regions of a tree
+    - `polytopes`: how far the nearest of them is where combinations are asked
 
 Two models
     - `answers`: what a rule base answers at a point; where two differ

@@ -59,10 +59,36 @@ def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | N
     """
     if any(low > high for low, high in ranges):
         return None
+    found = solved(ranges, rows)
+    return None if isinstance(found, Row) else found
+
+
+def solved(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | Row | None:
+    """Return a point that satisfies all inequalities, or why there is none.
+
+    Args:
+        ranges: The closed range of each variable; none is empty.
+        rows: The inequalities.
+
+    Returns:
+        As `feasible`; but where the rows have nothing in common with the ranges, even
+        with their ends, a sum of multiples of rows that no point of the ranges
+        satisfies (Farkas), as a lower bound. It holds wherever the rows hold, so it
+        tells how much wider the ranges must be, at least.
+
+    Example:
+        >>> unit = (Fraction(0), Fraction(1))
+        >>> one = Row({0: Fraction(1), 1: Fraction(1)}, low=Fraction(3))
+        >>> two = Row({0: Fraction(1), 1: Fraction(-1)}, low=Fraction(0))
+        >>> found = solved([unit, unit], [one, two])
+        >>> {place: str(w) for place, w in found.weights.items()}, str(found.low)
+        ({0: '1', 1: '1'}, '3')
+    """
     reaches = [_reach(ranges, row) for row in rows]
     tableau = _Tableau(ranges, rows, reaches)
-    if not tableau.repair():
-        return None
+    broken = tableau.repair()
+    if broken is not None:
+        return tableau.against(broken)
     slack = ZERO
     if any(row.is_open_low or row.is_open_high for row in rows):
         slack = tableau.raise_slack()
@@ -74,6 +100,18 @@ def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | N
         for row, reach in zip(rows, reaches, strict=True)
     ]
     return _simplified(point, ranges, kept)
+
+
+def holds(row: Row, values: Sequence[Fraction]) -> bool:
+    """Return whether an inequality holds for some values of the variables."""
+    total = sum((w * values[i] for i, w in row.weights.items()), ZERO)
+    if row.low is not None and (
+        total < row.low or (row.is_open_low and total == row.low)
+    ):
+        return False
+    return row.high is None or not (
+        total > row.high or (row.is_open_high and total == row.high)
+    )
 
 
 def _reach(ranges: Sequence[Range], row: Row) -> Fraction:
@@ -144,9 +182,10 @@ class _Tableau:
             (ZERO, ONE),
         ]
         self.values = [(low + high) / 2 for low, high in ranges]
+        self.sides = dict(enumerate(sides, len(ranges)))
         self.sums: dict[int, dict[int, int]] = {}
         self.scales: dict[int, int] = {}
-        for number, (weights, constant, share) in enumerate(sides, len(ranges)):
+        for number, (weights, constant, share) in self.sides.items():
             # The side's number is constant + sum - share * slack >= 0; the constant
             # moves into the bound.
             total = sum((w * self.values[i] for i, w in weights.items()), ZERO)
@@ -158,19 +197,39 @@ class _Tableau:
             self.sums[number] = {i: int(w * scale) for i, w in terms.items() if w}
         self.values.append(ZERO)
 
-    def repair(self) -> bool:
-        """Bring every sum within its bounds; False if that is impossible."""
+    def repair(self) -> int | None:
+        """Bring every sum within its bounds; return one for which it is impossible."""
         while True:
             broken = next((one for one in sorted(self.sums) if self._gap(one)), None)
             if broken is None:
-                return True
+                return None
             gap = self._gap(broken)
             entering = self._helpful(broken, is_up=gap > 0)
             if entering is None:
-                return False
+                return broken
             step = gap * self.scales[broken] / self.sums[broken][entering]
             self._move(entering, step)
             self._pivot(broken, entering)
+
+    def against(self, broken: int) -> Row:
+        """Return the sum of sides of rows that keeps a variable out of its bounds.
+
+        The variable is a sum of others, all of which are at the end that helps it most.
+        Sides have a lower end only, so that those in the sum have the sign that makes
+        the multiples of all of them, the broken one's too, be 0 or more.
+        """
+        sign = 1 if self._gap(broken) > 0 else -1
+        terms, scale = self.sums[broken], self.scales[broken]
+        multiples = {i: Fraction(-sign * w, scale) for i, w in terms.items()}
+        multiples[broken] = Fraction(sign)
+        weights: dict[int, Fraction] = {}
+        low = ZERO
+        for number, (given, constant, _) in self.sides.items():
+            times = multiples.get(number, ZERO)
+            low -= times * constant
+            for place, weight in given.items():
+                weights[place] = weights.get(place, ZERO) + times * weight
+        return Row({place: w for place, w in weights.items() if w}, low)
 
     def raise_slack(self) -> Fraction:
         """Make the slack as large as possible, from a point that satisfies all."""

@@ -29,7 +29,9 @@ from fuzzytree.rulebase import Value
 NARROW = Fraction(1, 1000)
 """The two bounds differ by this share of the upper one, unless something stops it."""
 
-_LEAST = Fraction(1, 2**40)  # radii below it are taken for 0
+LEAST = Fraction(1, 2**40)
+"""Radii below it are taken for 0."""
+
 _HALVINGS = 10  # of the way from the point to a witness
 
 
@@ -55,7 +57,7 @@ class Nearest(Value, frozen=True):
         """Whether the distance is known as well as it was asked for."""
         if self.high is None:
             return self.is_none
-        return self.high - self.low <= max(2 * NARROW * self.high, 2 * _LEAST)
+        return self.high - self.low <= max(2 * NARROW * self.high, 2 * LEAST)
 
 
 def distance(
@@ -73,7 +75,7 @@ def distance(
     """
     return max(
         (
-            abs(one[side.variable] - other[side.variable]) / _width(side)
+            abs(one[side.variable] - other[side.variable]) / width_of(side)
             for side in domain.sides
             if side.variable in one and side.low < side.high
         ),
@@ -81,7 +83,8 @@ def distance(
     )
 
 
-def _width(side: Side) -> Fraction:
+def width_of(side: Side) -> Fraction:
+    """Return how wide a side is."""
     return Fraction(side.high) - Fraction(side.low)
 
 
@@ -99,7 +102,7 @@ def ball(domain: Domain, centre: Mapping[str, Fraction], radius: Fraction) -> Do
 def _near(side: Side, centre: Mapping[str, Fraction], radius: Fraction) -> Side:
     if side.variable not in centre:  # a combination
         return side
-    at, reach = centre[side.variable], radius * _width(side)
+    at, reach = centre[side.variable], radius * width_of(side)
     low = max(side.low, outwards(at - reach)[0])
     high = min(side.high, outwards(at + reach)[1])
     is_open = side.is_open and low == side.low
@@ -160,9 +163,9 @@ def nearest_box(
             best, chosen = rank, target
     if best is None or chosen is None:
         return Nearest(Fraction(1), is_none=True)
-    slack = max(best[0] * NARROW, _LEAST) / 2
+    slack = max(best[0] * NARROW, LEAST) / 2
     point = {
-        side.variable: _closest(side, centre[side.variable], slack * _width(whole))
+        side.variable: _closest(side, centre[side.variable], slack * width_of(whole))
         for side in chosen.sides
         if (whole := wholes[side.variable])
     }
@@ -173,7 +176,7 @@ def _gap(side: Side, whole: Side, centre: Mapping[str, Fraction]) -> Fraction:
     """Return how far a value is from a side, in shares of the whole side's width."""
     at = centre[side.variable]
     gap = max(Fraction(side.low) - at, at - Fraction(side.high), Fraction(0))
-    return gap / _width(whole) if gap else gap
+    return gap / width_of(whole) if gap else gap
 
 
 def _closest(side: Side, at: Fraction, slack: Fraction) -> Fraction:
@@ -219,7 +222,7 @@ class _Search:
     def _bisect(self, top: Fraction) -> None:
         """Narrow the bounds; `top` is the least radius that is not clear, as known."""
         is_tight = self.high is not None
-        while top > _LEAST and top - self.low > NARROW * top:
+        while top > LEAST and top - self.low > NARROW * top:
             # A witness drawn near is often all but the nearest: try just below it.
             radius = top * (1 - NARROW) if is_tight else (self.low + top) / 2
             if self._is_clear(self._ball(radius)):
