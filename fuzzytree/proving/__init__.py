@@ -12,7 +12,8 @@ What is asked and answered
 Curves, in fractions
     - `polynomials`: their roots, isolated in integers
     - `curves`: shapes as polynomials on intervals
-    - `elements`: the curves of one axis, and where something changes
+    - `elements`, `crowds`: the curves of one axis, and where something changes; how
+      often many of them cross
     - `axes`: an axis cut into cells in which no order changes
     - `measures`, `overlap`, `defects`, `distances`: heights and areas; what two curves
       share; dips and clipping; how far two curves are apart

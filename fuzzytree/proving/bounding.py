@@ -7,7 +7,6 @@ Only where different rivals are ahead at different places must boxes become smal
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Collection, Mapping
 from fractions import Fraction
@@ -44,10 +43,6 @@ _PATIENCE = 100_000  # boxes, before a lead that may be none is left open
 
 TINY: Final = 2.0**-50
 """A lead that roundings of doubles can feign."""
-
-
-# Many questions are asked about the same rules on the same domain.
-_ground = functools.lru_cache(maxsize=4)(ground)
 
 
 # --- the lead of a rule
@@ -129,7 +124,7 @@ class _Lead:
         self, rules: RuleBase, domain: Domain, rule: int, rivals: Collection[int]
     ) -> None:
         self.rule, self.rivals = rule, tuple(sorted(rivals))
-        self.given = _ground(rules, domain)
+        self.given = ground(rules, domain)
         self.chosen = (rule - 1, *(number - 1 for number in self.rivals))
         self.pairs = [Pair(rule - 1, other) for other in self.chosen[1:]]
         self.space = Space(self.given, self.chosen, self.pairs)
@@ -280,7 +275,7 @@ class _Cover:
     def __init__(
         self, rules: RuleBase, domain: Domain, *, is_zero_wanted: bool = False
     ) -> None:
-        self.given = _ground(rules, domain)
+        self.given = ground(rules, domain)
         self.numbers = tuple(range(1, len(rules.rules) + 1))
         self.space = Space(self.given, range(len(rules.rules)))
         self.is_zero_wanted = is_zero_wanted
@@ -366,7 +361,7 @@ def highest_by_boxes(
     Returns:
         A bracket; its point is where both reach `low`.
     """
-    given = _ground(rules, domain)
+    given = ground(rules, domain)
     space = Space(given, (one - 1, other - 1))
 
     def judge(seen: Seen, boxes: IntArray) -> Verdict:

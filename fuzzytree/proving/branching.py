@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 TOO_MANY: Final = "too many boxes are left"
 
 _BATCH = 4096  # boxes that are parted at a time
+_MOST_SEEN = 1 << 22  # degrees of rules on lines, in the boxes of one batch
 _MOST_BOXES = 3_000_000  # that may wait, for the sake of memory
 _MOST_PARTS = 24_000_000  # of inputs, in all boxes that wait
 _TRIES = 4  # middles of boxes that are evaluated exactly, for each batch
@@ -93,6 +94,8 @@ def search(
     most = min(_MOST_BOXES, _MOST_PARTS // len(space.lines))
     if space.root_count > most:
         return Found(None, floor, math.inf, 0, TOO_MANY)
+    size = len(space.lines) * len(space.lines[0].asked.rules)
+    batch = min(_BATCH, max(_MOST_SEEN // size, 64))
     boxes = space.roots()
     new, verdict = len(boxes), judge(space.look(boxes), boxes)
     looked, stuck = len(boxes), -math.inf
@@ -123,7 +126,7 @@ def search(
             why = TOO_MANY
         if why is not None:
             return Found(point, best, max(bound, outwards(best)[1]), looked, why)
-        chosen = _highest(verdict.bound, _BATCH)
+        chosen = _highest(verdict.bound, batch)
         taken, rest = boxes[chosen], np.ones(len(boxes), dtype=bool)
         rest[chosen] = False
         worth = np.where(space.can_part(taken), verdict.worth[chosen], -1.0)

@@ -57,7 +57,7 @@ def below(given: Ground, epsilon: Fraction, clock: Clock | None = None) -> State
     clock = clock or Clock()
     if given.is_empty:
         return Proved("the domain has no point")
-    if given.rules.semantics.conjunction == "product":
+    if given.rules.semantics.conjunction == "product" or not given.is_kept:
         from fuzzytree.proving.bounding import below_by_boxes
 
         return below_by_boxes(given.rules, given.domain, epsilon, clock)
@@ -74,7 +74,7 @@ def least_cover(given: Ground, clock: Clock | None = None) -> Bracket:
     each other the lower one treats them as free, and the upper one is of a point.
     """
     clock = clock or Clock()
-    if given.rules.semantics.conjunction == "product":
+    if given.rules.semantics.conjunction == "product" or not given.is_kept:
         from fuzzytree.proving.bounding import least_cover_by_boxes
 
         return least_cover_by_boxes(given.rules, given.domain, clock)
@@ -118,6 +118,10 @@ def uncovered(given: Ground, clock: Clock | None = None) -> State:
     clock = clock or Clock()
     if given.is_empty:
         return Proved("the domain has no point")
+    if not given.is_kept:
+        from fuzzytree.proving.bounding import below_by_boxes
+
+        return below_by_boxes(given.rules, given.domain, 0, clock)
     every = tuple(range(len(given.rules.rules)))
     contest = Contest(given, (), every)
     sure = [

@@ -35,6 +35,8 @@ from fuzzytree.proving.polynomials import (
 )
 from fuzzytree.rulebase import Band, Points, Shape
 
+_ENDS = ((ZERO,), (ONE,))
+
 ALWAYS = Band()
 """The curve of a rule that asks nothing of a variable."""
 
@@ -114,7 +116,8 @@ def places(elements: Sequence[Element]) -> tuple[Place, ...]:
     for one, other in itertools.combinations(laid, 2):
         checkpoint()
         for low, high, p, q in _overlaps(one, other):
-            if len(p) > 1 or len(q) > 1:
+            is_asked = p in _ENDS or q in _ENDS  # where one meets 0 or 1 is known
+            if (len(p) > 1 or len(q) > 1) and not is_asked:
                 _solve(_crossing(p, q), low, high, found, irrational)
     return tuple(_apart([*(Place(x, x) for x in found), *irrational]))
 

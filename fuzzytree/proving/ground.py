@@ -13,7 +13,7 @@ import functools
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -21,6 +21,7 @@ import numpy as np
 from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.proving.axes import Cells, cut
+from fuzzytree.proving.crowds import crossings
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.elements import ALWAYS, Element, Place, places
 from fuzzytree.proving.variables import span, variable_value
@@ -34,6 +35,17 @@ if TYPE_CHECKING:
     BoolArray = npt.NDArray[np.bool_]
 
 
+MOST_NUMBERS: Final = 1 << 24
+"""The most values of curves and rules in cells that are kept, as doubles."""
+
+MOST_FRACTIONS: Final = 1 << 21
+"""The same as fractions."""
+
+
+class TooManyCellsError(MemoryError):
+    """Curves cross so often that their cells are too many to be kept."""
+
+
 class Axis(msgspec.Struct, frozen=True, eq=False):
     """What the rules ask of one variable.
 
@@ -42,13 +54,13 @@ class Axis(msgspec.Struct, frozen=True, eq=False):
         elements: The distinct curves; the first is that of a rule that asks nothing.
         asked: For each rule its clauses here, each as the elements of which it takes
             the largest; the rule takes the least of its clauses.
-        found: All places where something changes.
+        found: All places where something changes; None if they are too many.
     """
 
     variable: Variable
     elements: tuple[Element, ...]
     asked: tuple[tuple[tuple[int, ...], ...], ...]
-    found: tuple[Place, ...]
+    found: tuple[Place, ...] | None
 
 
 class Laid(NamedTuple):
@@ -119,13 +131,36 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     @functools.cached_property
     def laid(self) -> tuple[tuple[Laid, ...], Bands]:
-        """The axes on the box, and the critical levels of all of them."""
+        """The axes on the box, and the critical levels of all of them.
+
+        Raises:
+            TooManyCellsError: If they would be too large.
+        """
         assert self.ends is not None  # of a box that is not empty
-        cells = [
-            cut(axis.elements, axis.found, low, high, is_fine=self.is_fine)
-            for axis, (low, high) in zip(self.axes, self.ends, strict=True)
-        ]
-        return _laid(self.axes, cells)
+        if not self.is_kept:
+            raise TooManyCellsError("its curves cross more often than can be kept")
+        for axis, (low, high) in zip(self.axes, self.ends, strict=True):
+            name = axis.variable.name
+            assert axis.found is not None  # seen above
+            if name not in self._cut:  # who comes back after a spent budget goes on
+                self._cut[name] = cut(
+                    axis.elements, axis.found, low, high, is_fine=self.is_fine
+                )
+        return _laid(self.axes, [*self._cut.values()])
+
+    @functools.cached_property
+    def _cut(self) -> dict[str, Cells]:
+        return {}
+
+    @functools.cached_property
+    def is_kept(self) -> bool:
+        """Whether all values of curves and rules in cells can be kept."""
+        size = 0
+        for axis in self.axes:
+            if axis.found is None:
+                return False
+            size += (len(axis.found) + 1) * (len(axis.elements) + len(axis.asked))
+        return size <= (MOST_FRACTIONS if self.is_fine else MOST_NUMBERS)
 
     @functools.cached_property
     def near_levels(self) -> tuple[list[float], list[float]]:
@@ -149,6 +184,7 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
         return self.ends is None
 
 
+@functools.lru_cache(maxsize=4)  # many questions are asked of the same
 def ground(rules: RuleBase, domain: Domain) -> Ground:
     """Return a rule base made ready for questions on a box.
 
@@ -192,6 +228,13 @@ def _ends(
     return tuple(ends)
 
 
+@functools.lru_cache(maxsize=1 << 12)
+def _places(elements: tuple[Element, ...], rules: int) -> tuple[Place, ...] | None:
+    """Return the places of some curves, None if they are too many to be kept."""
+    most = MOST_NUMBERS // (len(elements) + rules)
+    return None if crossings(elements) > most else places(elements)
+
+
 @functools.lru_cache(maxsize=64)
 def _axes(rules: RuleBase) -> tuple[Axis, ...]:
     shapes = shapes_of(rules.variables)
@@ -204,7 +247,7 @@ def _axes(rules: RuleBase) -> tuple[Axis, ...]:
         is_last = variable is rules.variables[-1]
         if any(asked) or (is_last and not made):  # rules that ask nothing have one too
             of = tuple(elements)
-            made.append(Axis(variable, of, asked, places(of)))
+            made.append(Axis(variable, of, asked, _places(of, len(rules.rules))))
     return tuple(made)
 
 

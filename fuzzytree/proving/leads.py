@@ -57,7 +57,7 @@ def largest_lead(
     )
     high, why = Fraction(1), "a lead that large is enough"
     if low < enough:
-        if given.rules.semantics.conjunction == "product":
+        if given.rules.semantics.conjunction == "product" or not given.is_kept:
             from fuzzytree.proving.bounding import largest_lead_by_boxes
 
             wide = largest_lead_by_boxes(given.rules, given.domain, rule, others, clock)

@@ -24,7 +24,7 @@ from fuzzytree.proving.boxes import region_around
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest, Options, weakest
 from fuzzytree.proving.covering import cover
-from fuzzytree.proving.ground import Ground, strengths_at
+from fuzzytree.proving.ground import Ground, TooManyCellsError, strengths_at
 from fuzzytree.proving.parts import START, Stretch, stretch, widest
 from fuzzytree.proving.seeking import leader, plainer
 from fuzzytree.proving.states import (
@@ -92,6 +92,8 @@ class _Search:
                     )
         except OutOfTimeError:
             return self._bracket(1.0, "the budget was spent")
+        except TooManyCellsError as error:
+            return self._bracket(1.0, str(error))
         if found is not None:
             return found
         if self.is_open:

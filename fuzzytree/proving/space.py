@@ -233,7 +233,7 @@ def _ordered(given: Ground, pairs: Sequence[Pair]) -> dict[str, list[Spans]]:
 
     Only where each of both is one curve: a product of several has no order there.
     """
-    if not pairs or given.is_empty:
+    if not pairs or given.is_empty or not given.is_kept:
         return {}
     is_product = given.rules.semantics.conjunction == "product"
     found: dict[str, list[Spans]] = {}

@@ -20,7 +20,7 @@ import numpy as np
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest, weakest
 from fuzzytree.proving.covering import cover, maximal
-from fuzzytree.proving.ground import Ground, Laid
+from fuzzytree.proving.ground import Ground, Laid, TooManyCellsError
 from fuzzytree.proving.linear import simple
 from fuzzytree.proving.parts import START, Stretch, part_of, stretch
 from fuzzytree.proving.products import tie_of_products
@@ -112,6 +112,8 @@ def _asked(given: Ground, asked: Asked, clock: Clock) -> State:
         return _searched(given, asked, clock)
     except OutOfTimeError:
         return asked.open("the budget was spent")
+    except TooManyCellsError as error:
+        return asked.open(str(error))
 
 
 def _searched(given: Ground, asked: Asked, clock: Clock) -> State:

@@ -50,7 +50,7 @@ def wins(
     by_boxes = partial(
         wins_by_boxes, given.rules, given.domain, rule, others, tolerance=_TOLERANCE
     )
-    if given.rules.semantics.conjunction == "product":
+    if given.rules.semantics.conjunction == "product" or not given.is_kept:
         return by_boxes(clock)
     question = Question((rule,), others, None, f"the largest lead of rule {rule}")
     # Half of the time for cells, the rest for boxes: they see that clauses cancel, and
