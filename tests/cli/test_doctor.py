@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import json
 import re
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from fuzzytree.abilities import abilities
 from fuzzytree.answers import Answers
 from fuzzytree.cli.doctor import CORE, EXTRAS
 from fuzzytree.exporters import TABLE, all_formats
@@ -18,6 +20,12 @@ from fuzzytree.runtimes import all_runtimes
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+TRIED = functools.cache(abilities)
+
+
+@pytest.fixture(autouse=True)
+def _each_format_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fuzzytree.abilities.abilities", TRIED)
 
 
 def _without(monkeypatch: pytest.MonkeyPatch, module: str) -> None:
