@@ -590,7 +590,12 @@ def audit(
         raise ValueError("a material is read already: give what it holds to material()")
     read, ends = model, limits or {}
     box = domain_of(
-        read.model, within=within, spreads=spreads, rows=read.rows, limited=ends
+        read.model,
+        within=within,
+        spreads=spreads,
+        rows=read.rows,
+        limited=ends,
+        row=row,
     )
     found = auditing.audit(
         read.model,

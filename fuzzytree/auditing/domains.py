@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Literal, assert_never
 
 import msgspec
 import numpy as np
@@ -13,14 +13,37 @@ from fuzzytree.auditing.subject import Rows
 from fuzzytree.contracts import Document
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.rulebase import LR, Band, Points, Variable
-from fuzzytree.system import FuzzySystem, Gaussian, SystemInput, Trapezoid
-from fuzzytree.system.curves import Curve
+from fuzzytree.system import FuzzySystem, SystemInput
+from fuzzytree.system.curves import (
+    Arc,
+    Bell,
+    Binary,
+    Concave,
+    Cosine,
+    Curve,
+    Formula,
+    Gaussian,
+    Linear,
+    PiCurve,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Spike,
+    Trapezoid,
+    TwoGaussians,
+)
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
 
 Within = Literal["model", "data"]
+
+_MOST_FAULTS = 10
+_STEEP = 5.0  # a sigmoid is within 0.7 % of its ends so many times 1 / slope away
 
 
 def domain_of(
@@ -30,6 +53,7 @@ def domain_of(
     spreads: float | None = None,
     rows: Rows | None = None,
     limited: Iterable[str] = (),
+    row: Mapping[str, float] | None = None,
 ) -> Domain:
     """Return where a model is asked, a side for each input.
 
@@ -41,26 +65,45 @@ def domain_of(
             smallest and largest value of the rows.
         spreads: If given, so many spreads around the means of the fitted sets of
             each input instead, and around the mean of the rows for an input without.
+            An input of which none of this is known, and on which nothing depends,
+            is asked from 0 to 1 (or to the row's value), and any number would do.
         rows: The rows, in the order of the model's inputs.
         limited: Inputs whose limits come from elsewhere; they are left out.
+        row: A row that is asked about besides.
 
     Raises:
         ValueError: If an input has no such values; the sentence says what to give.
     """
     if spreads is not None and not (math.isfinite(spreads) and spreads > 0.0):
         raise ValueError(f"spreads must be above 0 and finite, not {spreads!r}")
+    if within == "data" and spreads is None and rows is None:
+        raise ValueError("limits from data need rows (--data TABLE)")
     left_out = set(limited)
     sides: list[Side] = []
+    faults: list[str] = []
     for position, axis in enumerate(_axes(model)):
         values = None if rows is None else rows.values[position]
         if axis.name in left_out:
             continue
-        if spreads is not None:
-            sides.append(_around(axis, spreads, values))
-        elif within == "data":
-            sides.append(_seen(axis, values))
-        else:
-            sides.append(_declared(axis, values))
+        try:
+            if spreads is not None:
+                sides.append(_around(axis, spreads, values))
+            elif within == "data":
+                sides.append(_seen(axis, values))
+            else:
+                sides.append(_declared(axis, values))
+        except ValueError as error:
+            if axis.is_used:
+                faults.append(str(error))
+            else:
+                value = (row or {}).get(axis.name, 0.0)
+                ends = (0.0, 1.0, value if math.isfinite(value) else 0.0)
+                sides.append(Side(axis.name, min(ends), max(ends), "unused"))
+    if faults:
+        more = [f"and {len(faults) - _MOST_FAULTS} more such inputs"]
+        raise ValueError(
+            "\n".join(faults[:_MOST_FAULTS] + (more if faults[_MOST_FAULTS:] else []))
+        )
     return Domain(tuple(sides))
 
 
@@ -84,7 +127,7 @@ def _declared(axis: _Axis, values: FloatArray | None) -> Side:
     if not axis.ends:
         raise ValueError(
             f"input {name!r} has neither a range nor a curve to take its limits from; "
-            f"give {_limits_of(name)}, or rows (--within data)"
+            f"give {_limits_of(name)}, or rows (--data TABLE)"
         )
     width = 0.0
     if axis.is_open or max(ends) == min(ends):
@@ -105,9 +148,7 @@ def _seen(axis: _Axis, values: FloatArray | None) -> Side:
     Raises:
         ValueError: If there is none.
     """
-    if values is None:
-        raise ValueError("limits from data need rows (--data TABLE)")
-    finite = values[np.isfinite(values)]
+    finite = np.empty(0) if values is None else values[np.isfinite(values)]
     if not finite.size:
         raise ValueError(
             f"the rows have no value of input {axis.name!r}; "
@@ -159,15 +200,21 @@ class _Axis(msgspec.Struct, frozen=True):
     ends: tuple[float, ...]
     is_open: bool
     sets: tuple[LR, ...]
+    is_used: bool
 
 
 def _axes(model: Document) -> Iterator[_Axis]:
     """Yield the inputs of a model, in its order."""
     if isinstance(model, FuzzySystem):
+        curves = [label.curve for one in model.inputs for label in one.labels]
+        summed = _summed(model.inputs)
+        if any(isinstance(curve, Formula | Linear) for curve in curves):
+            summed = {one.name for one in model.inputs}  # which they may name
         for one in model.inputs:
             if not one.parts:
-                yield _axis(one, [label.curve for label in one.labels])
+                yield _axis(one, [label.curve for label in one.labels], summed)
         return
+    summed = _summed(model.variables)
     fitted = model.sets if isinstance(model, FuzzyTree) else ()
     for variable in model.variables:
         if not variable.parts:
@@ -175,15 +222,23 @@ def _axes(model: Document) -> Iterator[_Axis]:
                 *variable.terms,
                 *(t for s in fitted if s.variable == variable.name for t in s.terms),
             ]
-            yield _axis(variable, [term.shape for term in terms])
+            yield _axis(variable, [term.shape for term in terms], summed)
 
 
-def _axis(one: Variable | SystemInput, curves: Iterable[Curve]) -> _Axis:
+def _summed(variables: Iterable[Variable | SystemInput]) -> set[str]:
+    """Return the inputs that combinations are made of."""
+    return {part.input for one in variables for part in one.parts}
+
+
+def _axis(
+    one: Variable | SystemInput, curves: Iterable[Curve], summed: Collection[str]
+) -> _Axis:
     curves = tuple(curves)
     ends = tuple(end for curve in curves for end in _ends(curve))
     sets = tuple(curve for curve in curves if isinstance(curve, LR))
     is_open = any(map(_is_open, curves))
-    return _Axis(one.name, one.low, one.high, ends, is_open, sets)
+    is_used = one.name in summed or any(curve != Band() for curve in curves)
+    return _Axis(one.name, one.low, one.high, ends, is_open, sets, is_used)
 
 
 def _is_open(curve: Curve) -> bool:
@@ -196,11 +251,11 @@ def _is_open(curve: Curve) -> bool:
         case Trapezoid(a=a, d=d):
             return a is None or d is None
         case _:
-            return False
+            return isinstance(curve, Sigmoid | SCurve | Concave | Arc | Binary)
 
 
 def _ends(curve: Curve) -> Iterator[float]:
-    """Yield the values between which a curve changes; of other curves, none."""
+    """Yield the values between which a curve changes; of formulas, none."""
     match curve:
         case Band(low=low, high=high, left=left, right=right):
             yield from (one for one in (low, high) if one is not None)
@@ -210,10 +265,36 @@ def _ends(curve: Curve) -> Iterator[float]:
             yield mean + right_side.spread * right_side.reach
         case Points(values=values):
             yield from (values[0], values[-1])
-        case Trapezoid():
+        case Trapezoid() | PiCurve():
             corners = (curve.a, curve.b, curve.c, curve.d)
             yield from (one for one in corners if one is not None)
         case Gaussian(mean=mean, deviation=deviation):
-            yield from (mean - 3 * deviation, mean + 3 * deviation)
-        case _:
+            yield from _about(mean, 3 * deviation)
+        case TwoGaussians(left=low, right=high):
+            yield low - 3 * curve.left_deviation
+            yield high + 3 * curve.right_deviation
+        case Sigmoid(inflection=middle, slope=slope):
+            yield from _about(middle, _STEEP / slope if slope else 0.0)
+        case (
+            SigmoidDifference(first=one, second=other)
+            | SigmoidProduct(first=one, second=other)
+        ):
+            yield from (*_ends(one), *_ends(other))
+        case Bell(center=middle, width=width):
+            yield from _about(middle, 3 * width)
+        case Cosine(center=middle, width=width) | Spike(center=middle, width=width):
+            yield from _about(middle, width / 2)
+        case SCurve(start=start, end=end) | Arc(start=start, end=end):
+            yield from (start, end)
+        case SemiEllipse(start=start, end=end) | Concave(inflection=start, end=end):
+            yield from (start, end)
+        case Binary(start=value) | Singleton(value=value):
+            yield value
+        case Linear() | Formula():
             return
+        case _:
+            assert_never(curve)
+
+
+def _about(middle: float, reach: float) -> tuple[float, float]:
+    return middle - reach, middle + reach

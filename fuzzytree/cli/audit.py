@@ -225,6 +225,11 @@ def _tell_domain(found: Audit, *, quiet: bool) -> None:
             f"{one.high!r}, by the span of its curves; --limits NAME=LOW:HIGH sets it",
             quiet=quiet,
         )
+    unused = [one.variable for one in found.domain.sides if one.origin == "unused"]
+    if unused:
+        names = ", ".join(map(repr, unused[:10])) + (", ..." if unused[10:] else "")
+        said = "no range is known, and nothing depends on it"
+        say(f"limits   {names}: {said}; any number will do", quiet=quiet)
     if len(guessed) > 10:
         say(f"limits   and {len(guessed) - 10} more so", quiet=quiet)
 

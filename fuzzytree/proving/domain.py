@@ -14,9 +14,10 @@ from fuzzytree.contracts import Document
 from fuzzytree.rulebase import Value, name_choice
 from fuzzytree.system import FuzzySystem
 
-Origin = Literal["model", "data", "spreads", "curves", "limits"]
+Origin = Literal["model", "data", "spreads", "curves", "unused", "limits"]
 """Where a side comes from: the range in the model, the rows' smallest and largest
-value, k spreads around the fitted sets, the span of the curves, the user."""
+value, k spreads around the fitted sets, the span of the curves, nowhere (no answer
+depends on the variable), the user."""
 
 
 class Side(Value, frozen=True):

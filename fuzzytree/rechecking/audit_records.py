@@ -112,7 +112,7 @@ class DomainSide(NamedTuple):
     variable: str
     low: float
     high: float
-    origin: Literal["model", "data", "spreads", "curves", "limits"]
+    origin: Literal["model", "data", "spreads", "curves", "unused", "limits"]
     is_open: bool
 
 

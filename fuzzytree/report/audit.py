@@ -47,6 +47,7 @@ _ORIGINS: Mapping[str, str] = {
     "data": "the rows",
     "spreads": "spreads around the fitted sets",
     "curves": "the span of the curves",
+    "unused": "any number: nothing depends on it",
     "limits": "given",
 }
 _GRAVE: Mapping[Severity, tuple[str, str]] = {

@@ -78,6 +78,7 @@ _ORIGINS = {
     "data": "the rows",
     "spreads": "spreads around the fitted sets",
     "curves": "the span of the curves",
+    "unused": "any number: nothing depends on it",
     "limits": "given",
 }
 

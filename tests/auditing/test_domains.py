@@ -36,9 +36,33 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
 )
+from fuzzytree.system.curves import (
+    Arc,
+    Bell,
+    Binary,
+    Concave,
+    Cosine,
+    Curve,
+    Formula,
+    Name,
+    PiCurve,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    Spike,
+    TwoGaussians,
+)
 from tests.cli.conftest import grip
 
 SET = LR(5.0, SideOfSet(1.0, (0.5,), 4.0), SideOfSet(2.0, (0.5,), 4.0))
+POWER = SystemOutput(
+    "power",
+    (Label("on", Singleton(1.0)),),
+    0.0,
+    1.0,
+    Defuzzifier("weighted average"),
+)
 ROWS = Rows("rows", np.array([[1.0, 3.0, np.nan]]))
 
 
@@ -98,19 +122,12 @@ def test_spreads_are_counted_from_the_rows_where_there_are_no_sets() -> None:
 
 
 def test_a_system_is_asked_on_its_ranges_and_curves() -> None:
-    power = SystemOutput(
-        "power",
-        (Label("on", Singleton(1.0)),),
-        0.0,
-        1.0,
-        Defuzzifier("weighted average"),
-    )
     inputs = (
         SystemInput("dirt", (Label("much", Gaussian(5.0, 1.0)),)),
         SystemInput("load", (), 0.0, 3.0),
     )
     rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
-    system = FuzzySystem("wash", inputs, (power,), (RuleBlock((rule,)),))
+    system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
     assert domain_of(system).sides == (
         Side("dirt", 2.0, 8.0, "curves"),
         Side("load", 0.0, 3.0, "model"),
@@ -136,7 +153,7 @@ EMPTY = Rows("rows", np.array([[np.nan]]))
             SUM,
             {},
             "input 'x' has neither a range nor a curve to take its limits from; "
-            "give its limits (--limits 'x=LOW:HIGH'), or rows (--within data)",
+            "give its limits (--limits 'x=LOW:HIGH'), or rows (--data TABLE)",
         ),
         (
             SUM,
@@ -167,6 +184,68 @@ def test_an_input_without_limits_is_one_sentence(
     with pytest.raises(ValueError, match=r".") as caught:
         side(model, **options)
     assert str(caught.value) == message
+
+
+def test_all_inputs_without_limits_are_named_at_once() -> None:
+    names = [f"x{k}" for k in range(12)]
+    parts = tuple(Part(name, 1.0) for name in names)
+    total = Variable("y", (Term("t", Band(high=1.0)),), parts=parts)
+    rule = Rule((Clause("y", ("t",)),), "a")
+    model = RuleBase("sum", ("a",), (*map(Variable, names), total), (rule,))
+    with pytest.raises(ValueError, match=r".") as caught:
+        domain_of(model)
+    lines = str(caught.value).splitlines()
+    assert [line.split("'")[1] for line in lines[:10]] == names[:10]
+    assert lines[10:] == ["and 2 more such inputs"]
+
+
+@pytest.mark.parametrize("options", [{}, {"spreads": 2.0}], ids=["model", "spreads"])
+def test_an_input_on_which_nothing_depends_may_be_any_number(
+    options: dict[str, object],
+) -> None:
+    assert side(asking(), **options) == Side("x", 0.0, 1.0, "unused")
+    assert side(asking(Band()), **options) == Side("x", 0.0, 1.0, "unused")
+    far = side(asking(), row={"x": -7.0}, **options)
+    assert far == Side("x", -7.0, 1.0, "unused")
+    assert side(asking(), rows=ROWS, **options).origin != "unused"
+
+
+@pytest.mark.parametrize(
+    ("curve", "low", "high"),
+    [
+        (Sigmoid(10.0, 5.0), 7.0, 13.0),
+        (SigmoidDifference(Sigmoid(0.0, 5.0), Sigmoid(9.0, -5.0)), -1.0, 10.0),
+        (Bell(10.0, 2.0, 1.0), 4.0, 16.0),
+        (TwoGaussians(0.0, 1.0, 5.0, 2.0), -3.0, 11.0),
+        (PiCurve(0.0, 1.0, 2.0, 4.0), 0.0, 4.0),
+        (Cosine(10.0, 4.0), 8.0, 12.0),
+        (Spike(10.0, 4.0), 8.0, 12.0),
+        (SemiEllipse(1.0, 2.0), 1.0, 2.0),
+        (SCurve(1.0, 2.0), 0.0, 3.0),
+        (Arc(2.0, 1.0), 0.0, 3.0),
+        (Concave(1.0, 2.0), 0.0, 3.0),
+        (Binary(2.0), 0.0, 4.0),
+        (Singleton(0.0), -1.0, 1.0),
+    ],
+    ids=lambda one: type(one).__name__,
+)
+def test_every_curve_of_a_system_has_a_span(
+    curve: Curve, low: float, high: float
+) -> None:
+    inputs = (SystemInput("dirt", (Label("much", curve),)),)
+    rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
+    system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
+    found = side(system)
+    assert (found.low, found.high) == pytest.approx((low, high))
+
+
+def test_an_input_that_a_formula_may_name_needs_limits() -> None:
+    label = Label("much", Formula(Name("load")))
+    inputs = (SystemInput("dirt", (label,), 0.0, 1.0), SystemInput("load", ()))
+    rule = SystemRule(Is("dirt", "much"), (Conclusion("power", "on"),))
+    system = FuzzySystem("wash", inputs, (POWER,), (RuleBlock((rule,)),))
+    with pytest.raises(ValueError, match="input 'load' has neither a range nor"):
+        domain_of(system)
 
 
 def test_an_input_whose_limits_are_given_needs_no_others() -> None:

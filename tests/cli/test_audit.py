@@ -18,6 +18,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.auditing.limits import LIMITS, digest_of
 from fuzzytree.auditing.records import Audit
+from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 
@@ -51,6 +52,21 @@ def test_a_finding_is_told_at_its_place_and_fails(call: Call) -> None:
         "limits   'slip' declares no range; asked from -2.5 to 3.5, by the span of "
         "its curves; --limits NAME=LOW:HIGH sets it\n"
         "1 finding: 1 error; `fuzzytree explain FT101` tells what to do\n"
+    )
+
+
+def test_an_input_on_which_nothing_depends_may_be_any_number(call: Call) -> None:
+    high = Term("high", Band(low=2.0))
+    inputs = (Variable("free"), Variable("force", (high,), low=0.0, high=5.0))
+    rule = Rule((Clause("force", ("high",)),), "firm")
+    ft.save(RuleBase("one", ("firm",), inputs, (rule,)), "one.yaml")
+    words = ("--select", "FT204", "--row", "free=57,force=4")
+    code, out, err = call("audit", "one.yaml", *words)
+    assert code == 0
+    assert "\n  free   0 to 57  any number: nothing depends on it\n" in out
+    assert err.startswith(
+        "limits   'free': no range is known, and nothing depends on it; "
+        "any number will do\n"
     )
 
 
