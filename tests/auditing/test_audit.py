@@ -157,7 +157,9 @@ def test_a_budget_that_ends_midway_keeps_what_was_answered() -> None:
         times = itertools.chain(itertools.repeat(0.0, ticks), itertools.repeat(10.0))
         clock = Clock(1.0, now=functools.partial(next, times))
         part = audit(grip(), domain=FAR, clock=clock)
-        assert {one.id for one in part.answers} <= {one.id for one in whole.answers}
+        # Of what is left open, a sum of pairs may be told that the whole audit has not.
+        known = {one.id for one in part.answers if one.rules or one.terms}
+        assert known <= {one.id for one in whole.answers}
         counts.add(len(part.answers))
     assert len(counts) > 2
 

@@ -75,7 +75,10 @@ def test_every_thread_has_a_clock_of_its_own() -> None:
 def test_a_comparison_ends_within_a_box_that_holds_no_clock(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(decisions, "alike", lambda *_: forever())
+    def endless(*_: object) -> None:
+        forever()
+
+    monkeypatch.setattr(decisions, "alike", endless)
     old = random_base(1, 3, 2)
     new = msgspec.structs.replace(old, rules=old.rules[::-1])
     pair = decisions.Pair(old, new, old.inputs, unit_domain(old))
