@@ -8,7 +8,7 @@ never findings: here the facts that they tell move with the model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +18,32 @@ from msgspec.structs import replace
 import fuzzytree as ft
 from fuzzytree.auditing.audit import ASKED
 from fuzzytree.auditing.records import Answer, Severity
+from fuzzytree.contracts import Document
 from fuzzytree.proving.states import Bracket, Proved, Sampled, State, Witness
-from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.rulebase import (
+    LR,
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Side,
+    Term,
+    Variable,
+)
+from fuzzytree.system import (
+    Conclusion,
+    Defuzzifier,
+    FuzzySystem,
+    Is,
+    Label,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    Trapezoid,
+)
 from fuzzytree.tree import FuzzyTree
 from tests.auditing.small_trees import one_cut, two_cuts
 
@@ -62,11 +86,12 @@ class Planted(NamedTuple):
     """A defect, and how its finding is to be told."""
 
     code: str
-    model: RuleBase | FuzzyTree
+    model: Document
     severity: Severity
     state: type[State]
     about: tuple[int | str, ...] = ()  # rules or terms
-    clean: RuleBase | FuzzyTree = CLEAN
+    clean: Document = CLEAN
+    says: str = ""  # where a code is told in several ways: a part of the sentence
 
 
 def points(*of: tuple[float, float]) -> Points:
@@ -83,11 +108,53 @@ ALIKE = Term("alike", Points((0.0, 1.0, 2.6), (1.0, 1.0, 0.0)))
 WIDE = Term("low", Points((0.0, 2.0, 3.0), (1.0, 1.0, 0.0)))
 
 TWO_SOFT = with_rule("high", "soft")
+NARROW = with_terms(
+    Term("low", points((0.0, 1.0), (1.0, 1.0), (2.0, 0.0))),
+    Term("high", points((1.9, 0.0), (3.0, 1.0), (4.0, 1.0))),
+)
+OVER = Side(2.0, (0.0, 1.0), 1.5)  # 1 - t (2 t - 1) is above 1 up to the middle
+OUTSIDE = Term("beyond", points((3.5, 0.0), (4.0, 1.0), (20.0, 0.0)))
+SPARE = replace(
+    CLEAN, variables=(*CLEAN.variables, Variable("spare", (LOW,), low=0.0, high=1.0))
+)
+
+
+def multiplied(rules: RuleBase) -> RuleBase:
+    """Return rules that join their clauses by the product."""
+    return replace(rules, semantics=Semantics("product"))
+
 
 PLANTED = (
     Planted("FT101", with_rule("faint", "other", FAINT), "error", Proved, (3,)),
     Planted("FT101", two_cuts(0.25), "error", Proved, (2,), clean=two_cuts(0.75)),
     Planted("FT102", with_rule("edge", "other", EDGE), "warning", Bracket, (3,)),
+    Planted(
+        "FT101", with_rule("low", "hard"), "warning", Witness, (1,), says="by its place"
+    ),
+    Planted(
+        "FT101",
+        with_rule("beyond", "hard", BEYOND),
+        "error",
+        Proved,
+        (3,),
+        says="never fires",
+    ),
+    Planted(
+        "FT101",
+        multiplied(with_rule("faint", "other", FAINT)),
+        "error",
+        Proved,
+        (3,),
+        multiplied(CLEAN),
+    ),
+    Planted(
+        "FT102",
+        multiplied(with_rule("edge", "other", EDGE)),
+        "warning",
+        Bracket,
+        (3,),
+        multiplied(CLEAN),
+    ),
     Planted("FT103", with_rule("faint", "soft", FAINT), "info", Proved, (3,)),
     Planted(
         "FT104", with_rule("faint", "soft", FAINT), "warning", Proved, (3, 1), TWO_SOFT
@@ -100,45 +167,111 @@ PLANTED = (
     Planted("FT202", with_rule("low", "hard"), "warning", Witness, (1, 3)),
     Planted("FT203", one_cut(0.25), "warning", Witness, (1, 2), clean=one_cut(0.5)),
     Planted("FT301", replace(CLEAN, rules=CLEAN.rules[:1]), "warning", Witness),
+    Planted("FT301", NARROW, "warning", Witness, says="no rule has a strength of 0.1"),
     Planted("FT401", with_rule("beyond", "hard", BEYOND), "error", Proved, ("beyond",)),
     Planted("FT402", with_terms(PEAKS), "warning", Proved, ("low",)),
+    Planted(
+        "FT402",
+        with_terms(Term("high", LR(3.5, OVER, OVER))),
+        "warning",
+        Proved,
+        ("high",),
+        says="is clipped",
+    ),
+    Planted(
+        "FT402",
+        with_rule("faint", "soft", FAINT),
+        "warning",
+        Proved,
+        ("faint",),
+        says="no point of degree 1",
+    ),
+    Planted(
+        "FT402",
+        with_rule("beyond", "hard", OUTSIDE),
+        "warning",
+        Proved,
+        ("beyond",),
+        says="outside of the domain",
+    ),
     Planted(
         "FT403", with_rule("alike", "soft", ALIKE), "info", Proved, ("low", "alike")
     ),
     Planted("FT404", with_terms(FAINT), "info", Proved, ("faint",)),
+    Planted("FT404", SPARE, "info", Proved, ("low",), says="variable 'spare'"),
     Planted("FT701", replace(CLEAN, rules=CLEAN.rules[:1]), "info", Sampled),
+)
+
+
+def system(
+    *others: tuple[str, str, float],
+    falls: tuple[float, float] = (1.0, 2.5),
+    more: tuple[Label, ...] = (),
+) -> FuzzySystem:
+    """Return the clean rules as a system, with more rules: term, conclusion, weight."""
+    low = Label("low", Trapezoid(None, 0.0, *falls))
+    high = Label("high", Trapezoid(1.5, 3.0, 4.0, None))
+    asked = (("low", "weak", 1.0), ("high", "strong", 1.0), *others)
+    rules = tuple(
+        SystemRule(Is("force", term), (Conclusion("grip", then),), weight)
+        for term, then, weight in asked
+    )
+    ends = Label("weak", Singleton(0.0)), Label("strong", Singleton(1.0))
+    output = SystemOutput("grip", ends, None, None, Defuzzifier("weighted average"))
+    force = SystemInput("force", (low, high, *more), 0.0, 4.0)
+    return FuzzySystem("grip", (force,), (output,), (RuleBlock(rules),))
+
+
+FAR = Label("far", Trapezoid(120.0, 130.0, 140.0, 150.0))
+LIKE = Label("like", Trapezoid(None, 0.0, 1.0, 2.6))
+OF_SYSTEMS = (
+    Planted("FT101", system(("low", "strong", 0.0)), "error", Proved),
+    Planted("FT106", system(("low", "strong", 1.0)), "info", Proved, (1, 3)),
+    Planted("FT201", system(falls=(2.0, 3.0)), "info", Witness, (1, 2)),
+    Planted("FT301", system(falls=(0.5, 1.0)), "warning", Witness),
+    Planted(
+        "FT401", system(("far", "weak", 1.0), more=(FAR,)), "error", Proved, ("far",)
+    ),
+    Planted("FT403", system(more=(LIKE,)), "info", Proved, ("low", "like")),
+    Planted("FT404", system(more=(LIKE,)), "info", Proved, ("like",)),
 )
 NEVER_FOUND = {"FT204", "FT205", "FT501"}
 OF_FORMS = {"FT601", "FT602"}
 
 
-def limits(model: RuleBase | FuzzyTree) -> Mapping[str, tuple[float, float]]:
-    """Return the ends of a tree's inputs, which its variables do not have."""
-    return (
-        {} if isinstance(model, RuleBase) else dict.fromkeys(model.inputs, (0.0, 1.0))
-    )
-
-
-def asked(model: RuleBase | FuzzyTree, code: str) -> list[Answer]:
-    """Return what a whole audit, without carriers, answers to one kind of question."""
-    data = ROWS if isinstance(model, RuleBase) else None
-    columns = list(model.inputs) if data is not None else None
-    found = ft.audit(
-        model, data=data, columns=columns, limits=limits(model), ignore=["FT6"]
-    )
+@functools.cache
+def answers(model: Document) -> tuple[Answer, ...]:
+    """Return what a whole audit, without carriers, answers."""
+    data, columns, limits = None, None, {}
+    match model:
+        case RuleBase(inputs=inputs):
+            data, columns = np.repeat(ROWS, len(inputs), axis=1), inputs
+        case FuzzyTree(inputs=inputs):
+            limits = dict.fromkeys(inputs, (0.0, 1.0))
+        case FuzzySystem():
+            pass
+    found = ft.audit(model, data=data, columns=columns, limits=limits, ignore=["FT6"])
     assert found.is_complete
-    return [one for one in found.answers if one.code == code]
+    return found.answers
+
+
+def asked(model: Document, code: str) -> list[Answer]:
+    """Return what a whole audit answers to one kind of question."""
+    return [one for one in answers(model) if one.code == code]
 
 
 def test_every_code_of_an_audit_is_planted_or_said_why_not() -> None:
     assert {one.code for one in PLANTED} | NEVER_FOUND | OF_FORMS == ASKED
 
 
-@pytest.mark.parametrize("planted", PLANTED, ids=lambda one: one.code)
+@pytest.mark.parametrize(
+    "planted",
+    [*PLANTED, *(one._replace(clean=system()) for one in OF_SYSTEMS)],
+    ids=lambda one: f"{one.code}-{type(one.model).__name__}",
+)
 def test_a_planted_defect_is_found_and_gone_without_it(planted: Planted) -> None:
     found = [one for one in asked(planted.model, planted.code) if one.is_finding]
-    assert found
-    first = found[0]
+    first = next(one for one in found if planted.says in one.sentence)
     assert first.severity == planted.severity
     assert isinstance(first.state, planted.state)
     assert (*first.rules, *(one.term for one in first.terms)) == planted.about
@@ -169,3 +302,19 @@ def test_the_nearest_other_decision_and_the_regions_move_with_a_cut() -> None:
         (last,) = (one for one in found.answers if one.subject == "leaf 3")
         (span,) = last.region
         assert span.low == cut
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [
+        ([[0.5], [9.0]], "on 1 of 2 rows a value is outside the domain"),
+        ([[0.5], [np.nan]], "on 1 of 2 rows a value is missing"),
+    ],
+)
+def test_a_planted_row_is_found_and_gone_without_it(
+    rows: list[list[float]], text: str
+) -> None:
+    for data, count in ((rows, 1), ([[0.5], [3.5]], 0)):
+        found = ft.audit(CLEAN, data=np.array(data), columns=["force"], select=["FT7"])
+        told = [one.sentence for one in found.findings]
+        assert told.count(text) == count

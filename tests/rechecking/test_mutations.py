@@ -19,6 +19,7 @@ from fuzzytree.auditing.subject import Rows
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.rechecking import CannotRunError, recheck
 from fuzzytree.rechecking.fingerprints import digest_of
+from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 from tests.auditing.test_mutations import PLANTED, ROWS, Planted
 from tests.rechecking.audits import audited
@@ -49,6 +50,7 @@ def is_open(facts: Facts, content: bytes, code: str) -> bool:
 def audit_of(planted: Planted) -> tuple[Facts, bytes]:
     """Return the facts of an audit of a planted defect, and the model's file."""
     model = planted.model
+    assert not isinstance(model, FuzzySystem)  # these have tests of their own
     options: Facts = {"select": [planted.code]}
     if isinstance(model, FuzzyTree):
         sides = tuple(Side(name, 0.0, 1.0) for name in model.inputs)
