@@ -133,9 +133,13 @@ def audit(
     kept = sorted(
         (one for one in asked.answers if one.code in wanted), key=lambda one: one.code
     )
-    carriers = [rules for rules in (viewed.rules, viewed.raw) if rules is not None]
+    held = viewed.held
+    whole = (viewed.rules, viewed.raw) if held is None else (held.lower,)
+    carriers = [rules for rules in whole if rules is not None]
+    curves = {name: one.key for name, one in held.terms.items()} if held else {}
     answers = tuple(
-        _placed(one, viewed, model, file, repeat) for one in with_ids(kept, carriers)
+        _placed(one, viewed, model, file, repeat)
+        for one in with_ids(kept, carriers, curves)
     )
     ids = {one.id for one in answers if one.is_finding}
     found = Audit(
@@ -204,6 +208,7 @@ def _ask_view(
         places=found.places,
         declined=found.declined,
         is_whole=found.is_whole,
+        held=found.held,
     )
     _ask_all([*_tasks(wanted, row)], subject, clock, asked)
     return asked

@@ -96,9 +96,12 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
     Integrals are taken exactly, not on a grid.
 
     Returns:
-        None if no rule uses a variable, or a range is a point.
+        None if no rule uses a variable, a range is a point, or a term has no exact
+        shape.
     """
     asked = _terms(subject.rules)
+    if subject.held and not asked.isdisjoint(subject.held.terms):
+        return None
     names = {variable for variable, _ in asked}
     used = [of for of in ranges(subject) if of.variable.name in names]
     lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]

@@ -12,7 +12,8 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, Literal, NoReturn
 
-from fuzzytree.rulebase import Clause, Conjunction, Shape
+from fuzzytree.auditing.system_terms import Terms
+from fuzzytree.rulebase import Clause, Conjunction
 from fuzzytree.system import And, Condition, Is, Not, Or, RuleBlock
 
 MOST_WAYS: Final = 64
@@ -26,10 +27,6 @@ NORMS: Mapping[str | None, Conjunction] = {"minimum": "min", "product": "product
 
 Way = tuple[Clause, ...]
 """Clauses that all hold."""
-
-Terms = Mapping[str, Mapping[str, Shape]]
-"""The exact terms of each input."""
-
 
 _ALWAYS: tuple[Way, ...] = ((),)
 _NEVER: tuple[Way, ...] = ()
@@ -59,13 +56,13 @@ class Conditions:
 
     Args:
         conjunction: The AND of the rules that ways become part of.
-        terms: The exact terms of each input.
+        terms: The terms of each input.
         block: The block, whose norms join the conditions.
 
     Example:
         >>> from fuzzytree.rulebase import Points
         >>> line = Points((0.0, 1.0), (0.0, 1.0))
-        >>> terms = {"a": {"high": line}, "b": {"high": line}}
+        >>> terms = Terms({"a": {"high": line}, "b": {"high": line}})
         >>> made = Conditions("min", terms, RuleBlock(()))
         >>> len(made.ways(Or((Is("a", "high"), Is("b", "high")))))
         2
@@ -116,10 +113,9 @@ class Conditions:
             return [*(_NEVER if negated else _ALWAYS)]
         if hedges:
             decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
-        terms = self.terms.get(asked.variable)
-        if terms is None:
+        if asked.variable not in self.terms.plain:
             decline("FTD07", f"it asks the output {asked.variable!r}")
-        if asked.label is None or asked.label not in terms:
+        if asked.label is None or not self.terms.knows(asked.variable, asked.label):
             name = f"{asked.label!r} of {asked.variable!r}"
             decline("FTD02", f"the curve of {name} has no exact method")
         return [(Clause(asked.variable, (asked.label,), negated),)]

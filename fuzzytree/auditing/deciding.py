@@ -8,8 +8,9 @@ from fractions import Fraction
 from typing import Final
 
 from fuzzytree.auditing.records import Answer, Measure
+from fuzzytree.auditing.sides import Sides, sides_of
 from fuzzytree.auditing.subject import Subject
-from fuzzytree.proving.ground import Ground, ground
+from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.leads import largest_lead
 from fuzzytree.proving.states import (
     Bracket,
@@ -32,11 +33,12 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
     Where every rule that fires takes part in the answer, it is asked whether it fires.
     """
-    given = ground(subject.rules, subject.domain)
+    sides = sides_of(subject)
+    given = sides.ground
     if given.is_empty:
         return
     if subject.policy.decision == "all":
-        yield from _firing(subject, given)
+        yield from _firing(subject, sides)
         return
     yield from _winning(subject, given)
     ties = _Ties(subject, given)
@@ -44,7 +46,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield from ties.answers()
 
 
-def _firing(subject: Subject, given: Ground) -> Iterator[Answer]:
+def _firing(subject: Subject, sides: Sides) -> Iterator[Answer]:
     """Answer whether each rule fires; a rule of several ways, whether one of them."""
     ways: dict[str, list[int]] = {}
     for number in range(1, len(subject.rules.rules) + 1):
@@ -53,7 +55,7 @@ def _firing(subject: Subject, given: Ground) -> Iterator[Answer]:
         states: list[State] = []
         for number in numbers:
             subject.clock.check()
-            states.append(wins(given, number, (), subject.clock.share(_PART)))
+            states.append(sides.firing(number, subject.clock.share(_PART)))
             if isinstance(states[-1], Witness):
                 break
         state = next((s for s in states if not isinstance(s, Proved)), states[0])

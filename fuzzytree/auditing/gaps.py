@@ -12,12 +12,13 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.records import Answer, Measure, Severity
 from fuzzytree.auditing.rows import ranked
+from fuzzytree.auditing.sides import Sides, sides_of
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.clock import OutOfTimeError
-from fuzzytree.proving.cover import below, least_cover, uncovered
+from fuzzytree.proving.cover import uncovered
 from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.ground import Ground, ground, narrowed
+from fuzzytree.proving.ground import Ground, narrowed
 from fuzzytree.proving.states import Declined, Proved, Span, State, Witness
 from fuzzytree.proving.variables import span
 
@@ -36,25 +37,25 @@ def answers(subject: Subject) -> Iterator[Answer]:
         sentence = "whether an input is covered by no rule is not decided"
         yield Answer("FT301", "cover", sentence, Declined("FTD07", reason), False)
         return
-    given = ground(subject.rules, subject.domain)
-    if given.is_empty:
+    sides = sides_of(subject)
+    if sides.ground.is_empty:
         return
-    bare = uncovered(given, subject.clock.share(_PART))
+    bare = sides.uncovered(subject.clock.share(_PART))
     if isinstance(bare, Witness):
-        yield from _gaps(subject, given, bare)
+        yield from _gaps(subject, sides.upper, bare)
         return
     sentence = "some rule fires everywhere on the domain"
     if not isinstance(bare, Proved):
         sentence = "it is open whether some rule fires everywhere"
     yield Answer("FT301", "cover", sentence, bare, False)
-    yield _weak(subject, given)
+    yield _weak(subject, sides)
 
 
-def _weak(subject: Subject, given: Ground) -> Answer:
+def _weak(subject: Subject, sides: Sides) -> Answer:
     """Answer whether some rule reaches epsilon everywhere, and how little is least."""
     epsilon = subject.settings.epsilon
-    state = below(given, Fraction(epsilon), subject.clock.share(_PART))
-    least = least_cover(given, subject.clock.share(_PART))
+    state = sides.below(Fraction(epsilon), subject.clock.share(_PART))
+    least = sides.least_cover(subject.clock.share(_PART))
     measures = (
         Measure("strength where it is least, at least", least.low),
         Measure("strength where it is least, at most", least.high),

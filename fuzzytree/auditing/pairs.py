@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Final
 from fuzzytree.auditing.clauses import clause_answers
 from fuzzytree.auditing.ranges import measure
 from fuzzytree.auditing.records import Answer, Measure, Severity
+from fuzzytree.auditing.sides import Sides, sides_of
 from fuzzytree.auditing.subject import Subject
-from fuzzytree.proving.dominance import Compared
-from fuzzytree.proving.factors import Distance, distance
-from fuzzytree.proving.ground import ground
-from fuzzytree.proving.meeting import Meeting, highest, meet
+from fuzzytree.proving.factors import Distance
+from fuzzytree.proving.meeting import Meeting
 from fuzzytree.proving.states import Declined, Proved, State, Witness
 from fuzzytree.proving.witnesses import coupled
 from fuzzytree.proving.wording import counted, short
@@ -33,10 +32,9 @@ Pair = tuple[int, int]
 
 def answers(subject: Subject) -> Iterator[Answer]:
     """Answer what is to be said of pairs of rules, and of single clauses."""
-    given = ground(subject.rules, subject.domain)
-    if given.is_empty:
+    compared = sides_of(subject)
+    if compared.ground.is_empty:
         return
-    compared = Compared(given)
     copies = [*_copies(subject, compared)]
     same = {pair for pair, found in copies if not found.each.high}
     yield from _subsumed(subject, compared, same)
@@ -76,9 +74,7 @@ def _noun(subject: Subject) -> str:
 # --- FT104 and FT105: is one rule at least as strong everywhere?
 
 
-def _subsumed(
-    subject: Subject, compared: Compared, same: set[Pair]
-) -> Iterator[Answer]:
+def _subsumed(subject: Subject, compared: Sides, same: set[Pair]) -> Iterator[Answer]:
     asked = undecided = 0
     found: dict[int, list[int]] = {}
     for pair in _pairs(subject, is_alike=True):
@@ -113,7 +109,7 @@ def _subsumed(
     yield from _rest_of_strengths("FT104", subject, compared, *counts)
 
 
-def _masked(subject: Subject, compared: Compared, same: set[Pair]) -> Iterator[Answer]:
+def _masked(subject: Subject, compared: Sides, same: set[Pair]) -> Iterator[Answer]:
     asked = undecided = 0
     found: dict[int, list[tuple[int, bool]]] = {}
     for first, second in _pairs(subject, is_alike=False):
@@ -126,7 +122,7 @@ def _masked(subject: Subject, compared: Compared, same: set[Pair]) -> Iterator[A
         undecided += verdict == "open"
         if verdict == "always":
             found.setdefault(second, []).append((first, True))
-        elif compared.is_above(second, first):
+        elif compared.from_below.is_above(second, first):
             found.setdefault(first, []).append((second, False))
     for weak, strong in sorted(found.items()):
         number, is_before = strong[0]
@@ -149,7 +145,7 @@ def _masked(subject: Subject, compared: Compared, same: set[Pair]) -> Iterator[A
     yield from _rest_of_strengths("FT105", subject, compared, *counts)
 
 
-def _how(compared: Compared) -> str:
+def _how(compared: Sides) -> str:
     cells = sum(len(laid.cells.rank) for laid in compared.ground.laid[0])
     means = "ratios of degrees" if compared.is_product else "orders of degrees"
     axes = len(compared.ground.axes)
@@ -159,7 +155,7 @@ def _how(compared: Compared) -> str:
 def _rest_of_strengths(
     code: str,
     subject: Subject,
-    compared: Compared,
+    compared: Sides,
     asked: int,
     found: int,
     undecided: int,
@@ -200,19 +196,19 @@ def _rest_of_strengths(
 # --- FT106: do two rules ask the same?
 
 
-def _copies(subject: Subject, compared: Compared) -> Iterator[tuple[Pair, Distance]]:
+def _copies(subject: Subject, compared: Sides) -> Iterator[tuple[Pair, Distance]]:
     count = len(subject.rules.rules)
     for one, other in itertools.combinations(range(count), 2):
         subject.clock.check()
         if _is_one(subject, one + 1, other + 1):
             continue
-        found = distance(compared.factored, one, other, NEARLY)
+        found = compared.distance(one + 1, other + 1, NEARLY)
         if found is not None and found.whole <= NEARLY:
             yield (one + 1, other + 1), found
 
 
 def _copied(
-    subject: Subject, compared: Compared, copies: list[tuple[Pair, Distance]]
+    subject: Subject, compared: Sides, copies: list[tuple[Pair, Distance]]
 ) -> Iterator[Answer]:
     decides = subject.policy.decision == "strongest"
     for pair, found in copies:
@@ -253,11 +249,21 @@ def _copied(
         return
     among = counted(pairs, "pair")
     rest = "no two rules" if not copies else "no other two rules"
+    sentence = f"{rest} have nearly the same antecedent, among {among}"
+    state: State = Proved(
+        f"somewhere their degrees differ by more than {short(NEARLY)}"
+    )
+    near = compared.count_near({pair for pair, _ in copies}, NEARLY)
+    if near:
+        reason = f"{counted(near, 'pair')} of degrees are too near to tell"
+        sentence = f"{rest} are shown to have nearly the same antecedent, among "
+        sentence += f"{among}: {reason}"
+        state = Declined("FTD02", reason)
     yield Answer(
         "FT106",
         "pairs of rules",
-        f"{rest} have nearly the same antecedent, among {among}",
-        Proved(f"somewhere their degrees differ by more than {short(NEARLY)}"),
+        sentence,
+        state,
         is_finding=False,
         measures=(Measure("pairs", pairs),),
     )
@@ -266,7 +272,7 @@ def _copied(
 # --- FT201: do rules of different classes reach a level together?
 
 
-def _conflicts(subject: Subject, compared: Compared) -> Iterator[Answer]:
+def _conflicts(subject: Subject, compared: Sides) -> Iterator[Answer]:
     level = subject.settings.level
     near: list[tuple[float, Pair]] = []
     clean = 0
@@ -275,7 +281,7 @@ def _conflicts(subject: Subject, compared: Compared) -> Iterator[Answer]:
         if not _may_conflict(subject, one, other):
             continue
         if one not in bounds:
-            bounds[one] = highest(compared, one)
+            bounds[one] = compared.highest(one)
         most = float(bounds[one][other - 1])
         if most < level:
             clean += 1
@@ -289,7 +295,7 @@ def _conflicts(subject: Subject, compared: Compared) -> Iterator[Answer]:
             hidden += len(near) - place
             break
         subject.clock.check()
-        found = meet(compared, *pair, Fraction(level), subject.clock.share(0.05))
+        found = compared.meet(*pair, Fraction(level), subject.clock.share(0.05))
         is_shown = isinstance(found.state, Witness)
         if found.level.high < level:
             clean += 1
@@ -357,7 +363,7 @@ def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
 
 
 def _rest_of_conflicts(
-    subject: Subject, compared: Compared, clean: int, hidden: int
+    subject: Subject, compared: Sides, clean: int, hidden: int
 ) -> Answer:
     level, noun = short(subject.settings.level), _noun(subject)
     kind = "classes" if noun == "class" else "conclusions"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
@@ -12,7 +12,7 @@ from fuzzytree.auditing.records import Answer, Label, Place
 from fuzzytree.contracts import Document, Locate
 from fuzzytree.converting import format_of
 from fuzzytree.errors import ReadError
-from fuzzytree.rulebase import Path, Rule, RuleBase, Shape, sentence, shapes_of
+from fuzzytree.rulebase import Path, Rule, RuleBase, sentence, shapes_of
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
@@ -132,7 +132,9 @@ def places_of(
 
 
 def with_ids(
-    answers: Iterable[Answer], carriers: Sequence[RuleBase]
+    answers: Iterable[Answer],
+    carriers: Sequence[RuleBase],
+    curves: Mapping[tuple[str, str], object] | None = None,
 ) -> Iterator[Answer]:
     """Yield answers with ids: the code and a hash of what it is about.
 
@@ -144,10 +146,12 @@ def with_ids(
         answers: The answers.
         carriers: The rules that their numbers mean, if there are any; then others
             whose terms may be concerned as well.
+        curves: What terms are in truth whose shape is another.
     """
-    shapes: dict[tuple[str, str], Shape] = {}
+    shapes: dict[tuple[str, str], object] = {}
     for carrier in reversed(carriers):
         shapes |= shapes_of(carrier.variables)
+    shapes |= curves or {}
     rules = carriers[0].rules if carriers else ()
     counts: dict[str, int] = {}
     for answer in answers:
@@ -162,7 +166,7 @@ def with_ids(
         yield msgspec.structs.replace(answer, id=name)
 
 
-def _rule_facts(rule: Rule, shapes: dict[tuple[str, str], Shape]) -> list[object]:
+def _rule_facts(rule: Rule, shapes: Mapping[tuple[str, str], object]) -> list[object]:
     """Return what a rule says, with its clauses in an order of their own."""
     curves = [
         [
@@ -181,5 +185,7 @@ def _rule_facts(rule: Rule, shapes: dict[tuple[str, str], Shape]) -> list[object
     return [text, sorted(curves, key=str)]
 
 
-def _label_facts(label: Label, shapes: dict[tuple[str, str], Shape]) -> list[object]:
+def _label_facts(
+    label: Label, shapes: Mapping[tuple[str, str], object]
+) -> list[object]:
     return [label.variable, label.term, shapes.get((label.variable, label.term))]

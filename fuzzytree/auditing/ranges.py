@@ -5,6 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from fuzzytree.auditing.records import Label, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.measures import Bounds, Line, line
@@ -34,7 +36,22 @@ class Range(NamedTuple):
 
 
 def ranges(subject: Subject) -> tuple[Range, ...]:
-    """Return the range of each variable that has terms; none if the domain is empty."""
+    """Return the range of each variable that has terms; none if the domain is empty.
+
+    Terms that are held between two lines are left out.
+    """
+    held = subject.held.terms if subject.held else {}
+    found: list[Range] = []
+    for of in whole_ranges(subject):
+        name, terms = of.variable.name, of.variable.terms
+        plain = tuple(term for term in terms if (name, term.name) not in held)
+        if plain:
+            found.append(of._replace(variable=replace(of.variable, terms=plain)))
+    return tuple(found)
+
+
+def whole_ranges(subject: Subject) -> tuple[Range, ...]:
+    """Return the same with all terms; of those that are held the lower line."""
     found: list[Range] = []
     for variable in subject.rules.variables:
         low, high = span(variable, subject.domain)

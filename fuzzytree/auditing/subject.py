@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from fuzzytree.auditing.held import Held
 from fuzzytree.auditing.records import Answer, Policy, Settings, Source
 from fuzzytree.contracts import Document
 from fuzzytree.proving.clock import Clock
@@ -73,6 +74,7 @@ class Subject(msgspec.Struct, frozen=True, eq=False):
         is_whole: Whether no rule is left out of the view that may fire. Otherwise what
             no rule of it covers may be covered all the same, and a term that no rule of
             it asks may be asked.
+        held: The rules from below and from above; None if they are as they stand here.
     """
 
     rules: RuleBase
@@ -87,6 +89,7 @@ class Subject(msgspec.Struct, frozen=True, eq=False):
     places: tuple[str, ...] = ()
     declined: tuple[Answer, ...] = ()
     is_whole: bool = True
+    held: Held | None = None
 
     def rule_name(self, number: int) -> str:
         """Return what messages call a rule."""

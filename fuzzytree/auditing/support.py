@@ -301,7 +301,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
 def _of_rows(subject: Subject, rows: Rows) -> Iterator[Answer]:
     """Yield what the user's rows say, of all rules together and of each."""
     codes = None if subject.system else rows.codes  # a view has classes of its own
-    found = counted(subject, rows.values, codes)
+    found, most = _both(subject, rows.values, codes)
     how = f"every row of {rows.name}"
     total = found.rows
     for name, hits, text in (
@@ -315,10 +315,14 @@ def _of_rows(subject: Subject, rows: Rows) -> Iterator[Answer]:
         return
     if found.missing:
         how += " without a missing value"
-    for answer in _shares(subject, found, "rows", how):
+    for answer in _shares(subject, (found, most), "rows", how):
         is_finding = isinstance(answer.state, Sampled) and answer.state.hits > 0
         yield msgspec.structs.replace(answer, is_finding=is_finding)
     for number in range(1, len(subject.rules.rules) + 1):
+        fired = int(most.fired[number - 1])
+        if fired > found.fired[number - 1]:
+            yield _nearly_fired(subject, found, number, fired)
+            continue
         yield _of_rule(subject, found, number, how)
 
 
@@ -331,19 +335,52 @@ def _of_domain(subject: Subject) -> Iterator[Answer]:
         text = f"shares of the domain are not known: {reason}"
         yield Answer("FT701", "domain", text, Declined("FTD04", reason), False)
         return
-    found = counted(subject, points)
+    found, most = _both(subject, points)
     how = f"points drawn evenly from the domain, seed {settings.seed}"
     if found.known:  # a combination may overflow everywhere
-        yield from _shares(subject, found, "points", how)
+        yield from _shares(subject, (found, most), "points", how)
 
 
-def _shares(subject: Subject, found: Counted, noun: str, how: str) -> Iterator[Answer]:
+def _both(
+    subject: Subject, values: FloatArray, codes: IntArray | None = None
+) -> tuple[Counted, Counted]:
+    """Count what the rules say from below, and from above; see `counted`."""
+    if subject.held is None:
+        found = counted(subject, values, codes)
+        return found, found
+    lower, upper = (
+        msgspec.structs.replace(subject, rules=rules)
+        for rules in (subject.held.lower, subject.held.upper)
+    )
+    return counted(lower, values, codes), counted(upper, values, codes)
+
+
+def _nearly_fired(subject: Subject, found: Counted, number: int, most: int) -> Answer:
+    """Return on how many rows a rule fires, as far as its curves are known."""
+    name, least = subject.rule_name(number), int(found.fired[number - 1])
+    reason = f"it fires on {least} of {found.known} at least, and on {most} at most"
+    sentence = f"on how many rows {name} fires is not decided: {reason}"
+    return Answer("FT701", name, sentence, Declined("FTD02", reason), is_finding=False)
+
+
+def _shares(
+    subject: Subject, counts: tuple[Counted, Counted], noun: str, how: str
+) -> Iterator[Answer]:
     """Yield in which share of some rows or points the rules are weak or undecided."""
+    found, most = counts
     settings, total = subject.settings, found.known
     questions = [
         ("uncovered", found.uncovered, "no rule fires"),
         ("weak", found.weak, f"no rule reaches {settings.epsilon!r}"),
     ]
+    for name, fewest in (("uncovered", most.uncovered), ("weak", most.weak)):
+        hits = next(h for n, h, _ in questions if n == name)
+        if fewest < hits and subject.is_whole:
+            reason = f"there are {fewest} at least, and {hits} at most"
+            text = f"how many {noun} are {name} is not decided: {reason}"
+            state = Declined("FTD02", reason)
+            yield Answer("FT701", f"{name} {noun}", text, state, False)
+            questions = [one for one in questions if one[0] != name]
     if not subject.is_whole:
         reason = "rules are left out, and they may cover what the others do not"
         text = f"how many {noun} are covered is not known: {reason}"

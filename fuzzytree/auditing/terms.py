@@ -5,11 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.ranges import Range, labels_of, measure, ranges, term_name
+from fuzzytree.auditing.ranges import (
+    Range,
+    labels_of,
+    measure,
+    term_name,
+    whole_ranges,
+)
 from fuzzytree.auditing.records import Answer, Label, Measure
 from fuzzytree.auditing.subject import Subject
+from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.measures import Bounds, heights
-from fuzzytree.proving.states import Proved
+from fuzzytree.proving.states import Bracket, Proved
 from fuzzytree.proving.wording import counted, short
 from fuzzytree.rulebase import Term
 from fuzzytree.system import questions
@@ -18,7 +25,7 @@ from fuzzytree.system import questions
 def answers(subject: Subject) -> Iterator[Answer]:
     """Answer whether terms are reached, and used."""
     yield from _unused(subject)
-    yield from _heights(subject, ranges(subject))
+    yield from _heights(subject, whole_ranges(subject))
 
 
 # --- FT401: is the term reached?
@@ -26,16 +33,23 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
 def _heights(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
     level = Fraction(subject.settings.level)
+    held = subject.held.terms if subject.held else {}
     clean, lowest = 0, Fraction(1)
     for of in whole:
         for term in of.variable.terms:
             subject.clock.check()
             made = of.line(term)
             ((height, at),) = heights(made)
+            lines = held.get((of.variable.name, term.name))
+            if lines is not None:
+                upper = of.line(Term(term.name, lines.upper))
+                height = Bounds(height.low, heights(upper)[0][0].high)
             if height.low >= level:
                 clean, lowest = clean + 1, min(lowest, height.low)
-                continue
-            yield _low_term(of, term, height, at, len(made.cells.rank))
+            elif lines is not None and height.high:
+                yield _low_curve(of, term, height, is_low=height.high < level)
+            else:
+                yield _low_term(of, term, height, at, len(made.cells.rank))
     if clean:
         terms = "1 term reaches" if clean == 1 else f"{clean} terms reach"
         yield Answer(
@@ -69,6 +83,26 @@ def _low_term(
         severity="warning" if height.high else "error",
         terms=labels_of(of, term),
         measures=(measure("height", height),),
+    )
+
+
+def _low_curve(of: Range, term: Term, height: Bounds, *, is_low: bool) -> Answer:
+    """Return that a curve that is held between lines is hardly reached, or may be."""
+    name = term_name(of.variable, term)
+    low, high = outwards(height.low)[0], outwards(height.high)[1]
+    where = f"from {short(of.low)} to {short(of.high)}"
+    begins = "is hardly reached" if is_low else "may hardly be reached"
+    largest = f"its largest degree {where}"
+    why = "its curve was held between two lines of points"
+    return Answer(
+        "FT401",
+        name,
+        f"{name} {begins}: {largest} lies between {short(low)} and {short(high)}",
+        Bracket(f"the largest degree of {name}", low, high, why),
+        is_finding=is_low,
+        severity="warning",
+        terms=labels_of(of, term),
+        measures=(Measure("height at least", low), Measure("height at most", high)),
     )
 
 

@@ -4,8 +4,10 @@ Rule bases and trees are asked as they are. A fuzzy system that only stands for 
 base of ours is asked as that one. Of any other system a *view* is made: its conditions
 as rules whose classes are the texts of what they conclude. A rule that asks `a and (b
 or c)` becomes two rules, one for each way in which it can hold: under minimum or
-product, and maximum, its strength is that of the stronger one, exactly. What has no
-exact counterpart is left out, and an answer says so for each term and each rule.
+product, and maximum, its strength is that of the stronger one, exactly. A curve
+without an exact counterpart is held between two lines of points, and a weight is part
+of a rule (`fuzzytree.auditing.held`). What has no place here is left out, and an answer
+says so for each term and each rule.
 
 A view tells how strongly conditions hold, at every double. What outputs make of it,
 their curves and numbers, is not part of it.
@@ -13,9 +15,7 @@ their curves and numbers, is not part of it.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Mapping
-from fractions import Fraction
+from collections.abc import Iterable
 
 import msgspec
 
@@ -24,26 +24,21 @@ from fuzzytree.auditing.conditions import (
     NORMS,
     Conditions,
     DecliningError,
-    Terms,
     decline,
 )
-from fuzzytree.auditing.records import Answer, Label, Policy
+from fuzzytree.auditing.held import Held, held
+from fuzzytree.auditing.records import Answer, Policy
+from fuzzytree.auditing.system_terms import Terms, ranges_of, terms_of
 from fuzzytree.casting import as_rules
-from fuzzytree.casting.shapes import shape_of
 from fuzzytree.contracts import Document
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Declined, Proved
 from fuzzytree.rulebase import (
     Conjunction,
-    Points,
     Rule,
     RuleBase,
     Semantics,
-    Shape,
-    Term,
-    Variable,
-    shape_mistakes,
 )
 from fuzzytree.system import (
     And,
@@ -55,7 +50,6 @@ from fuzzytree.system import (
     joints,
     questions,
 )
-from fuzzytree.system import Label as SystemLabel
 from fuzzytree.tree import FuzzyTree
 
 
@@ -63,7 +57,9 @@ class View(msgspec.Struct, frozen=True, eq=False):
     """A model's rules as they are audited.
 
     Attributes:
-        rules: The rules; None if not one rule of a system could be taken over.
+        rules: The rules as people read them, without weights, each curve that is held
+            between lines as the lower one; None if not one rule of a system could be
+            taken over.
         policy: How they decide.
         domain: Where they are asked: where inputs are moved into their range, not
             beyond it.
@@ -76,6 +72,7 @@ class View(msgspec.Struct, frozen=True, eq=False):
         declined: What was left out, and why; and rules that can never fire.
         is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
             the view fires another one may.
+        held: The rules from below and from above; None if they are plain.
     """
 
     rules: RuleBase | None
@@ -88,6 +85,7 @@ class View(msgspec.Struct, frozen=True, eq=False):
     numbers: tuple[int, ...] = ()
     declined: tuple[Answer, ...] = ()
     is_whole: bool = True
+    held: Held | None = None
 
 
 def view(model: Document, domain: Domain) -> View:
@@ -130,8 +128,9 @@ def _of_rules(rules: RuleBase, domain: Domain) -> View:
 
 def _of_system(system: FuzzySystem, domain: Domain) -> View:
     conjunction = _conjunction(system)
-    terms, declined = _terms(system)
     sides, moved = _within(system, domain)
+    ranges = ranges_of(system, sides)
+    terms, declined = terms_of(system, ranges)
     taken = _Taken(conjunction, terms, [*moved, *declined])
     number = 0
     for position, block in enumerate(system.blocks, 1):
@@ -141,15 +140,16 @@ def _of_system(system: FuzzySystem, domain: Domain) -> View:
             number += 1
             of_block = f" of block {position}" if len(system.blocks) > 1 else ""
             taken.take(f"rule {index}{of_block}", number, rule, block)
-    rules = None
+    rules = both = None
     if taken.rules:
         rules = RuleBase(
             system.name,
             tuple(dict.fromkeys(rule.then for rule in taken.rules)),
-            tuple(_variable(one, terms[one.name]) for one in system.inputs),
+            tuple(terms.variable(one) for one in system.inputs),
             tuple(taken.rules),
             Semantics(conjunction),
         )
+        both = held(rules, taken.weights, terms.held, ranges)
     return View(
         rules,
         Policy(conjunction, "all"),
@@ -159,6 +159,7 @@ def _of_system(system: FuzzySystem, domain: Domain) -> View:
         numbers=tuple(taken.numbers),
         declined=tuple(taken.answers),
         is_whole=taken.is_whole,
+        held=both,
     )
 
 
@@ -170,56 +171,6 @@ def _conjunction(system: FuzzySystem) -> Conjunction:
         if norm:
             counts[norm] += sum(And in joints(rule.when) for rule in block.rules)
     return "product" if counts["product"] > counts["min"] else "min"
-
-
-def _terms(system: FuzzySystem) -> tuple[Terms, list[Answer]]:
-    """Return the terms of the inputs that have an exact shape, and the others."""
-    terms: dict[str, dict[str, Shape]] = {}
-    others: list[Answer] = []
-    asking = Counter(
-        key
-        for rule in system.rules
-        for key in {(asked.variable, asked.label) for asked in questions(rule.when)}
-    )
-    for one in system.inputs:
-        terms[one.name] = {}
-        for label in one.labels:
-            shape = None if one.parts and one.clips else _shape(label)
-            if shape is not None:
-                terms[one.name][label.name] = shape
-                continue
-            kind = str(label.curve.__struct_config__.tag)
-            reason = f"its curve ({kind}) has no exact method"
-            if one.parts and one.clips:
-                reason = "a combination that is moved into a range has no exact method"
-            rules = asking[one.name, label.name]
-            count = "1 rule asks" if rules == 1 else f"{rules} rules ask"
-            name = f"term {label.name!r} of {one.name!r}"
-            found = _declined("FTD02", name, f"{reason}; {count} for it")
-            terms_of = (Label(one.name, label.name),)
-            others.append(msgspec.structs.replace(found, terms=terms_of))
-    return terms, others
-
-
-def _shape(label: SystemLabel) -> Shape | None:
-    """Return the exact shape of a term, with its height; None if there is none."""
-    shape = shape_of(label.curve)
-    if shape is None or label.height == 1.0:
-        return None if shape is None or any(shape_mistakes(shape)) else shape
-    if not isinstance(shape, Points):
-        return None
-    degrees = tuple(degree * label.height for degree in shape.degrees)
-    height = Fraction(label.height)
-    is_exact = all(
-        Fraction(scaled) == Fraction(degree) * height
-        for scaled, degree in zip(degrees, shape.degrees, strict=True)
-    )
-    return Points(shape.values, degrees) if is_exact else None
-
-
-def _variable(one: SystemInput, terms: Mapping[str, Shape]) -> Variable:
-    found = tuple(Term(name, shape) for name, shape in terms.items())
-    return Variable(one.name, found, one.unit, one.low, one.high, one.parts)
 
 
 def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[Answer]]:
@@ -266,6 +217,7 @@ class _Taken:
         self.terms = terms
         self.answers = answers
         self.rules: list[Rule] = []
+        self.weights: list[float] = []
         self.places: list[str] = []
         self.numbers: list[int] = []
         self.is_whole = True
@@ -284,8 +236,8 @@ class _Taken:
         try:
             if sum(1 for _ in questions(rule.when)) > MOST_QUESTIONS:
                 decline("FTD05", f"it asks more than {MOST_QUESTIONS} questions")
-            if rule.weight != 1.0:
-                decline("FTD07", f"its weight of {rule.weight!r} has no exact method")
+            if rule.weight != 1.0 and not self.terms.plain:
+                decline("FTD07", "there is no input that its weight could stand for")
             ways = Conditions(self.conjunction, self.terms, block).ways(rule.when)
         except DecliningError as error:
             self.is_whole = False
@@ -295,6 +247,7 @@ class _Taken:
             self._never(name, "its condition is never true")
         for position, way in enumerate(ways, 1):
             self.rules.append(Rule(way, _text(rule.then)))
+            self.weights.append(rule.weight)
             self.places.append(name if len(ways) == 1 else f"way {position} of {name}")
             self.numbers.append(number)
 

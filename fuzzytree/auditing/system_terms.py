@@ -1,0 +1,153 @@
+"""The terms that conditions of a system ask: exact shapes, and curves between lines."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from fractions import Fraction
+
+from fuzzytree.auditing.enclosing import Enclosed, Range, enclosed, gap, scaled
+from fuzzytree.auditing.records import Answer, Label
+from fuzzytree.casting.shapes import shape_of
+from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.states import Declined
+from fuzzytree.proving.variables import span
+from fuzzytree.rulebase import Points, Shape, Term, Variable, shape_mistakes
+from fuzzytree.system import FuzzySystem, SystemInput, questions
+from fuzzytree.system import Label as SystemLabel
+
+Name = tuple[str, str]
+"""A variable and one of its terms."""
+
+
+class Terms:
+    """The terms of each input.
+
+    Args:
+        plain: Those with an exact shape, by variable and name.
+        held: Those between two lines.
+
+    Attributes:
+        plain: As given.
+        held: As given, and those that conditions make of them.
+    """
+
+    def __init__(
+        self,
+        plain: Mapping[str, Mapping[str, Shape]],
+        held: Mapping[Name, Enclosed] | None = None,
+    ) -> None:
+        self.plain = plain
+        self.held = {**(held or {})}
+
+    def knows(self, variable: str, term: str) -> bool:
+        """Return whether rules can ask a term."""
+        return term in self.plain[variable] or (variable, term) in self.held
+
+    def variable(self, one: SystemInput) -> Variable:
+        """Return an input as a variable; what is held is there as its lower line."""
+        shapes = {**self.plain[one.name]}
+        shapes |= {
+            t: found.lower for (v, t), found in self.held.items() if v == one.name
+        }
+        terms = tuple(Term(name, shape) for name, shape in shapes.items())
+        return Variable(one.name, terms, one.unit, one.low, one.high, one.parts)
+
+
+def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Range | None]:
+    """Return the values of each input on a domain, None where they are not known."""
+    found: dict[str, Range | None] = {}
+    for one in system.inputs:
+        needed = [part.input for part in one.parts] or [one.name]
+        found[one.name] = None
+        if all(domain.side(name) is not None for name in needed):
+            low, high = span(Variable(one.name, parts=one.parts), domain)
+            found[one.name] = (low, high) if low <= high else None
+    return found
+
+
+def terms_of(
+    system: FuzzySystem, ranges: Mapping[str, Range | None]
+) -> tuple[Terms, tuple[Answer, ...]]:
+    """Return the terms of a system's inputs, and what is to be said of some.
+
+    Args:
+        system: The system.
+        ranges: The values of each input.
+    """
+    plain: dict[str, dict[str, Shape]] = {}
+    held: dict[Name, Enclosed] = {}
+    answers: list[Answer] = []
+    asking = Counter(
+        key
+        for rule in system.rules
+        for key in {(asked.variable, asked.label) for asked in questions(rule.when)}
+    )
+    for one in system.inputs:
+        plain[one.name] = {}
+        for label in one.labels:
+            is_moved = bool(one.parts) and one.clips
+            shape = None if is_moved else _shape(label)
+            if shape is not None:
+                plain[one.name][label.name] = shape
+                continue
+            found = None if is_moved else _between(label, ranges[one.name])
+            if found is not None:
+                held[one.name, label.name] = found
+            count = asking[one.name, label.name]
+            asks = "1 rule asks" if count == 1 else f"{count} rules ask"
+            told = _told(one, label, found, ranges[one.name])
+            answers.append(_answer(one, label, told, f"{asks} for it"))
+    return Terms(plain, held), tuple(answers)
+
+
+def _shape(label: SystemLabel) -> Shape | None:
+    """Return the exact shape of a term, with its height; None if there is none."""
+    shape = shape_of(label.curve)
+    if shape is None or label.height == 1.0:
+        return None if shape is None or any(shape_mistakes(shape)) else shape
+    if not isinstance(shape, Points):
+        return None
+    found = scaled(Enclosed(shape, shape, (shape,)), label.height)
+    return found.lower if found is not None and found.is_exact else None
+
+
+def _between(label: SystemLabel, of: Range | None) -> Enclosed | None:
+    shape = shape_of(label.curve)
+    if shape is not None and any(shape_mistakes(shape)):
+        return None
+    found = enclosed(label.curve, of)
+    return found and (found if label.height == 1.0 else scaled(found, label.height))
+
+
+def _told(
+    one: SystemInput, label: SystemLabel, found: Enclosed | None, of: Range | None
+) -> tuple[str, str]:
+    """Return what becomes of a term, and why."""
+    kind = str(label.curve.__struct_config__.tag)
+    reason = f"its curve ({kind}) has no exact method"
+    if one.parts and one.clips:
+        reason = "a combination that is moved into a range has no exact method"
+    if found is None:
+        return "is not taken over", reason
+    if of is None and isinstance(found.lower, Points):
+        of = Fraction(found.lower.values[0]), Fraction(found.lower.values[-1])
+    apart = f" {float(gap(found, of)):.2g} apart" if of else ""
+    return (
+        f"is asked between two lines{apart} at most",
+        f"{reason}; its shape and its overlaps are not asked",
+    )
+
+
+def _answer(
+    one: SystemInput, label: SystemLabel, told: tuple[str, str], asks: str
+) -> Answer:
+    name, (what, reason) = f"term {label.name!r} of {one.name!r}", told
+    return Answer(
+        "FTD02",
+        name,
+        f"{name} {what}: {reason}; {asks}",
+        Declined("FTD02", f"{reason}; {asks}"),
+        is_finding=False,
+        terms=(Label(one.name, label.name),),
+    )
