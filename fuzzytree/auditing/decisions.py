@@ -299,7 +299,7 @@ class _Found:
             How many differ, of how many that were looked at.
         """
         hits = seen = 0
-        for part in _portions(values.shape[1], self.clock):
+        for part in portions(values.shape[1], self.clock):
             hits += self._add(values[:, part], name, part.start)
             seen = min(part.stop, values.shape[1])
         self.left += values.shape[1] - seen
@@ -350,7 +350,7 @@ class _Found:
         )
 
 
-def _portions(count: int, clock: Clock) -> Iterator[slice]:
+def portions(count: int, clock: Clock) -> Iterator[slice]:
     """Yield parts of some rows until the clock is over: at least one, if there are any.
 
     Rows in fractions take long: parts grow as long as they take little of what is left.
@@ -403,7 +403,7 @@ def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
     pair, clock = found.pair, found.clock
     made: list[IntArray] = []
     labels = pairs = np.zeros(0, np.int64)
-    for part in _portions(values.shape[1], clock):
+    for part in portions(values.shape[1], clock):
         made.append(pair.old_labels(values[:, part]))
         labels = np.concatenate(made)
         pairs = np.flatnonzero(labels[:-1] != labels[1:])[:_SEGMENTS]

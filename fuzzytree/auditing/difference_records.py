@@ -98,7 +98,10 @@ class Difference(Value, frozen=True):
         """Whether decisions are proved equal, known to change, or neither."""
         if any(one.is_finding for one in self.answers):
             return "changed"
-        proved = any(isinstance(one.state, Proved) for one in self.answers)
+        proved = any(
+            isinstance(one.state, Proved) and one.subject == "decisions"
+            for one in self.answers
+        )
         unsure = any(isinstance(one.state, Bracket | Declined) for one in self.answers)
         return "equal" if proved and not unsure else "open"
 

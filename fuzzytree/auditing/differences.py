@@ -93,9 +93,10 @@ def joined_domain(
             asked = Rows(rows.name, rows.values[places])
         for side in domain_of(model, rows=asked, limited=limits).sides:
             known = sides.get(side.variable)
-            if known is None or (known.origin == "curves" and side.origin == "model"):
+            origins = (known.origin if known else "unused", side.origin)
+            if origins[0] == "unused" or origins == ("curves", "model"):
                 sides[side.variable] = side
-            elif known.origin == side.origin:
+            elif known is not None and known.origin == side.origin:
                 low, high = min(known.low, side.low), max(known.high, side.high)
                 sides[side.variable] = Side(side.variable, low, high, side.origin)
     given = Domain(tuple(sides.values()))
@@ -144,7 +145,7 @@ def difference(
     if _give_numbers(old) and _give_numbers(new):
         assert isinstance(old, FuzzySystem)  # no other model gives numbers
         assert isinstance(new, FuzzySystem)
-        told, answers = compared(old, new, domain, rows, settings)
+        told, answers = compared(old, new, domain, rows, settings, clock)
     else:
         titles = [
             file.name if file else model.name

@@ -1,27 +1,21 @@
 """What changed from one fuzzy system to another, whose outputs are numbers.
 
-Structure is compared by identity; outputs are compared on probes of both systems, on
-points drawn from the domain and on rows of data. Nothing is proved of numbers, so a
-difference is told as a share that was sampled, and none as none that was seen.
+Structure is compared by identity, numbers by `fuzzytree.auditing.system_numbers`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
-import numpy as np
 
 from fuzzytree.auditing.difference_records import Change, Grade
-from fuzzytree.auditing.records import Answer, Measure, Settings
+from fuzzytree.auditing.records import Answer, Settings
 from fuzzytree.auditing.subject import Rows
-from fuzzytree.auditing.support import share
-from fuzzytree.probing import system_probes
+from fuzzytree.auditing.system_numbers import Pair, number_answers
+from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain
-from fuzzytree.proving.states import Proved
 from fuzzytree.rulebase import Path
-from fuzzytree.runtimes.systems import run_system
 from fuzzytree.system import (
     FuzzySystem,
     RuleBlock,
@@ -29,12 +23,6 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
 )
-
-if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
-
-_PROBES = 2_000  # of each system
-_DRAWN = 4_000  # at most, for numbers take longer than decisions
 
 Found = tuple[list[tuple[Change, Path | None, Path | None]], list[Answer]]
 
@@ -45,6 +33,7 @@ def compared(
     domain: Domain,
     rows: Rows | None,
     settings: Settings,
+    clock: Clock,
 ) -> Found:
     """Return what a new system says otherwise, with places, and how numbers differ.
 
@@ -57,19 +46,23 @@ def compared(
         domain: A side for each column of either.
         rows: Rows of the columns of either, the old one's first.
         settings: How many points are drawn, and their seed.
+        clock: How much time there is.
 
     Example:
         >>> from fuzzytree.auditing.domains import domain_of
         >>> from fuzzytree.testing import random_system
         >>> system = random_system(2)
         >>> changes, answers = compared(
-        ...     system, system, domain_of(system), None, Settings()
+        ...     system, system, domain_of(system), None, Settings(), Clock()
         ... )
         >>> changes, answers[0].sentence
         ([], 'both systems compute alike')
     """
-    answers = [*_answers(old, new, domain, rows, settings)]
+    columns = tuple(dict.fromkeys((*old.columns, *new.columns)))
+    pair = Pair(old, new, columns, domain)
+    answers = number_answers(pair, rows, settings, clock)
     moves = any(answer.is_finding for answer in answers)
+    is_equal = any(answer.subject == "decisions" for answer in answers)  # proved
     found: Found = ([], answers)
     for shown, part, sentence, one, other in _drafts(old, new):
         grade: Grade = "breaking" if shown == "always" else "non-breaking"
@@ -77,117 +70,9 @@ def compared(
             grade = "breaking"
         elif shown == "cosmetic":
             grade = "cosmetic"
-        is_proved = grade != "non-breaking" or shown == "never"
+        is_proved = is_equal or grade != "non-breaking" or shown == "never"
         found[0].append((Change(grade, is_proved, part, sentence), one, other))
     return found
-
-
-# --- numbers
-
-
-def _answers(
-    old: FuzzySystem,
-    new: FuzzySystem,
-    domain: Domain,
-    rows: Rows | None,
-    settings: Settings,
-) -> Iterator[Answer]:
-    if _bare(old) == _bare(new):
-        state = Proved("both systems say the same in every part")
-        sentence = "both systems compute alike"
-        yield Answer("FT801", "decisions", sentence, state, is_finding=False)
-        return
-    columns = tuple(dict.fromkeys((*old.columns, *new.columns)))
-    outputs = [one.name for one in old.outputs]
-    both = [name for name in outputs if name in {one.name for one in new.outputs}]
-    sides = [domain.side(name) for name in columns]
-    low, high = (
-        np.array([getattr(side, end) for side in sides if side])[:, None]
-        for end in ("low", "high")
-    )
-    chance = np.random.default_rng(settings.seed)
-    u = chance.random((len(columns), min(settings.rows, _DRAWN)))
-    probes = np.hstack([_probes(model, columns, low, high) for model in (old, new)])
-    asked: list[tuple[str, FloatArray, str]] = [
-        ("probes", probes, "probes of both systems within the domain"),
-        (
-            "domain",
-            low * (1.0 - u) + high * u,
-            f"points drawn evenly from the domain, seed {settings.seed}",
-        ),
-    ]
-    if rows is not None:
-        asked.append(("rows", rows.values, f"rows of {rows.name}"))
-    for subject, values, how in asked:
-        if values.shape[1]:
-            yield _answer(old, new, columns, both, values, subject, how)
-
-
-def _bare(system: FuzzySystem) -> FuzzySystem:
-    return msgspec.structs.replace(system, name="system", note="")
-
-
-def _probes(
-    system: FuzzySystem, columns: Sequence[str], low: FloatArray, high: FloatArray
-) -> FloatArray:
-    known = system_probes(system, limit=_PROBES)
-    middle = (low / 2 + high / 2)[:, 0].tolist()
-    table = [
-        [row.get(name, at) for row in known]
-        for name, at in zip(columns, middle, strict=True)
-    ]
-    values = np.array(table, np.float64).reshape(len(columns), len(known))
-    inside = ((values >= low) & (values <= high)).all(axis=0)
-    kept: FloatArray = values[:, inside]
-    return kept
-
-
-def _answer(
-    old: FuzzySystem,
-    new: FuzzySystem,
-    columns: Sequence[str],
-    outputs: Sequence[str],
-    values: FloatArray,
-    subject: str,
-    how: str,
-) -> Answer:
-    """Return how the outputs that both have differ on some rows."""
-    one, other = (
-        run_system(system)(values[[columns.index(n) for n in system.columns]])
-        .outputs[[[o.name for o in system.outputs].index(n) for n in outputs]]
-        for system in (old, new)
-    )  # fmt: skip
-    with np.errstate(invalid="ignore"):
-        gap = np.abs(one - other)
-    gap[(one == other) | (np.isnan(one) & np.isnan(other))] = 0.0
-    gap[np.isnan(gap)] = np.inf
-    differs = (gap > 0.0).any(axis=0)
-    hits, count = int(differs.sum()), values.shape[1]
-    state = share("rows in which an output differs", hits, count, f"{count} {how}")
-    sentence = f"no output differs on {count} {how}"
-    measures: tuple[Measure, ...] = ()
-    if hits:
-        place, row = np.unravel_index(int(gap.argmax()), gap.shape)
-        name = outputs[int(place)]
-        at = ", ".join(
-            f"{column} = {value!r}"
-            for column, value in zip(columns, values[:, row].tolist(), strict=True)
-        )
-        was, now = float(one[place, row]), float(other[place, row])
-        sentence = (
-            f"an output differs on {hits} of {count} {how}, most at {at}: {name!r} is "
-            f"{now!r}, and was {was!r}"
-        )
-        measures = (Measure("largest difference", float(gap[place, row])),)
-    return Answer(
-        "FT801",
-        subject,
-        sentence,
-        state,
-        is_finding=hits > 0,
-        severity="error" if hits else "info",
-        measures=measures,
-    )
 
 
 # --- structure
