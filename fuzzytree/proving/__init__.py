@@ -27,6 +27,7 @@ Points
 
 Rules under the minimum: levels
     - `ground`: a rule base on a box; cells and critical levels of all axes
+    - `levels`: irrational levels that coincide
     - `contests`, `parts`: the options of each axis, and the values where one holds
     - `covering`: a choice on each axis that leaves all rivals below
     - `questions`: the search for a point at which a level parts rules from rivals

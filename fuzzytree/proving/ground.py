@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import functools
 import math
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import msgspec
@@ -24,6 +26,7 @@ from fuzzytree.proving.axes import Cells, cut
 from fuzzytree.proving.crowds import crossings
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.elements import ALWAYS, Element, Place, places
+from fuzzytree.proving.levels import Level, level_at, told_apart
 from fuzzytree.proving.variables import span, variable_value
 from fuzzytree.rulebase import Clause, RuleBase, Variable, shapes_of
 
@@ -146,7 +149,7 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
                 self._cut[name] = cut(
                     axis.elements, axis.found, low, high, is_fine=self.is_fine
                 )
-        return _laid(self.axes, [*self._cut.values()])
+        return _laid(self.axes, [*self._cut.values()], is_fine=self.is_fine)
 
     @functools.cached_property
     def _cut(self) -> dict[str, Cells]:
@@ -276,7 +279,7 @@ def _asked(
 
 
 def _laid(
-    axes: Sequence[Axis], cells: Sequence[Cells]
+    axes: Sequence[Axis], cells: Sequence[Cells], *, is_fine: bool
 ) -> tuple[tuple[Laid, ...], Bands]:
     if not axes:  # rules that ask nothing, and have a strength of 1
         one = [Fraction(1)]
@@ -286,6 +289,9 @@ def _laid(
     low = np.concatenate([[0.0], *(side[0].ravel() for side in ends)])
     high = np.concatenate([[0.0], *(side[1].ravel() for side in ends)])
     band, bands = _bands(low, high)
+    if is_fine:
+        sure = told_apart(band, low, high, partial(_level, axes, cells))
+        band, bands = _bands(low, high, sure)
     made: list[Laid] = []
     start = 1
     for axis, of in zip(axes, cells, strict=True):
@@ -317,8 +323,12 @@ def _laid(
 def _bands(
     low: npt.NDArray[np.float64] | npt.NDArray[np.object_],
     high: npt.NDArray[np.float64] | npt.NDArray[np.object_],
+    sure: Sequence[int] = (),
 ) -> tuple[IntArray, Bands]:
-    """Return the band of each interval, and the bands."""
+    """Return the band of each interval, and the bands.
+
+    Those in `sure` are one number each, and the same one where they are equal.
+    """
     order = np.argsort(low, kind="stable")
     reach = np.maximum.accumulate(high[order])
     starts = np.concatenate([[True], low[order][1:] > reach[:-1]])
@@ -330,7 +340,29 @@ def _bands(
     lows = [Fraction(one) for one in low[order][first]]
     highs = [Fraction(one) for one in reach[last]]
     sharp = np.array([a == b for a, b in zip(lows, highs, strict=True)])
+    sharp[band[list(sure)]] = True
     return band, Bands(lows, highs, sharp)
+
+
+def _level(
+    axes: Sequence[Axis], cells: Sequence[Cells], number: int
+) -> Level | Fraction | None:
+    """Return a critical level by its number: 0, then all of each axis and side."""
+    number -= 1
+    for axis, of in zip(axes, cells, strict=True):
+        size = of.left[0].size
+        if number < 2 * size:
+            row, zone = divmod(number % size, len(of.zones))
+            low, high = of.zones[zone]
+            if low == high:
+                return Fraction((of.right if number >= size else of.left)[0, row, zone])
+            if of.is_vague[zone]:
+                return None
+            found = axis.found or ()  # they were cut there
+            place = found[bisect_right(found, low, key=lambda one: one.low) - 1]
+            return level_at(axis.elements[row], place, low, high)
+        number -= 2 * size
+    return Fraction(0)
 
 
 def _chosen(axis: Axis, rank: IntArray) -> IntArray:

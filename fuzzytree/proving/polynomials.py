@@ -400,16 +400,30 @@ def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
     """
     low, high = root.low, root.high
     goal = Fraction(2) ** -bits
-    rising = value_at(polynomial, high) > 0 or value_at(polynomial, low) < 0
-    while root.is_sure and high - low > goal:
-        middle = (low + high) / 2
-        found = value_at(polynomial, middle)
-        if found == 0:
-            return Root(middle, middle)
-        if (found > 0) == rising:
-            high = middle
-        else:
-            low = middle
+    if not root.is_sure or high - low <= goal:
+        return root
+    below, above = value_at(polynomial, low), value_at(polynomial, high)
+    rising = above > 0 or below < 0
+    power = 2  # the interval is cut into 2**power parts
+    while (size := high - low) > goal:
+        power = max(min(power, magnitude(size / goal)), 1)
+        share = Fraction(1, 2)
+        if below * above < 0:  # an end that is 0 is another root
+            share = below / (below - above)
+        part = size / (1 << power)
+        place = min(max(math.floor(share * (1 << power)), 0), (1 << power) - 1)
+        first = low + place * part
+        for at in (first, first + part):  # where the chord crosses, if it is straight
+            if not low < at < high:
+                continue
+            found = value_at(polynomial, at)
+            if found == 0:
+                return Root(at, at)
+            if (found > 0) == rising:
+                high, above = at, found
+                break
+            low, below = at, found
+        power = power * 2 if high - low <= part else power // 2
     return Root(low, high, root.is_sure)
 
 
@@ -445,13 +459,27 @@ def squarefree(polynomial: Polynomial) -> Polynomial:
         [-2, 0, 1]
     """
     repeated = common_factor(polynomial, derivative(polynomial))
-    rest, found = list(difference(polynomial, (Fraction(0),))), list[Fraction]()
-    while len(rest) >= len(repeated):
-        found.append(rest[-1] / repeated[-1])
-        for place in range(1, len(repeated) + 1):
-            rest[-place] -= found[-1] * repeated[-place]
+    found, _ = division(polynomial, repeated)
+    return tuple(map(Fraction, _primitive(integers(found)[0])))
+
+
+def division(polynomial: Polynomial, by: Polynomial) -> tuple[Polynomial, Polynomial]:
+    """Return a polynomial divided by another one, and the rest.
+
+    Example:
+        >>> cube, golden = (0, 0, 0, 1), (-1, -1, 1)
+        >>> parts = division(tuple(map(Fraction, cube)), tuple(map(Fraction, golden)))
+        >>> [[int(one) for one in part] for part in parts]
+        [[1, 1], [1, 2]]
+    """
+    rest, found = list(polynomial), list[Fraction]()
+    while len(rest) >= len(by):
+        found.append(rest[-1] / by[-1])
+        for place in range(1, len(by) + 1):
+            rest[-place] -= found[-1] * by[-place]
         rest.pop()
-    return tuple(map(Fraction, _primitive(integers(tuple(reversed(found)))[0])))
+    zero = (Fraction(0),)
+    return tuple(reversed(found)) or zero, difference(tuple(rest) or zero, zero)
 
 
 def _primitive(numbers: Sequence[int]) -> list[int]:
