@@ -119,7 +119,7 @@ class Result(Value, frozen=True):
     Attributes:
         verb: Which verb.
         file: Where it was read from.
-        parts: How many comparisons, or criteria, it is of.
+        parts: How many comparisons and bounds, or criteria, it is of.
         wrong: How many of them disagree, or fail.
     """
 

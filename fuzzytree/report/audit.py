@@ -104,7 +104,7 @@ def audit_lines(
     if audit.unasked:
         yield ""
         yield "not asked, or not to the end"
-        yield from (line for text in _gathered(audit.unasked) for line in _item(text))
+        yield from (line for text in gathered(audit.unasked) for line in _item(text))
     yield ""
     yield "this audit does not establish"
     yield from (line for text in audit.limits for line in _item(text))
@@ -186,7 +186,7 @@ def result_text(result: Result) -> str:
         >>> result_text(Result("stability", Source("s.json", ""), 10, 1))
         '1 of 10 criteria fails'
     """
-    what, wrong = ("comparisons", "disagree")
+    what, wrong = ("comparisons and bounds", "disagree")
     if result.verb == "stability":
         what, wrong = ("criteria", "fail")
     if not result.wrong:
@@ -403,8 +403,13 @@ def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
         yield f"- and {len(texts) - _MOST_CALM} more; --all tells each"
 
 
-def _gathered(unasked: Sequence[str]) -> Iterator[str]:
-    """Yield sentences, those of codes that have one reason as one."""
+def gathered(unasked: Sequence[str]) -> Iterator[str]:
+    """Yield sentences, those of codes that have one reason as one.
+
+    Example:
+        >>> [*gathered(["FT101 dead rule: left out", "FT102 marginal rule: left out"])]
+        ['FT101, FT102: left out']
+    """
     alike: dict[str, list[str]] = {}
     for text in unasked:
         alike.setdefault(text.partition(": ")[2], []).append(text)

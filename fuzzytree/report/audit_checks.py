@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.agreement import Agreement
+from fuzzytree.agreement import Agreement, Comparison
 from fuzzytree.report.markup import Content, Markup, folded, joined, listed, table, tag
 from fuzzytree.report.stability import advice
 from fuzzytree.report.text import counted, verdict_text
@@ -12,33 +13,22 @@ from fuzzytree.report.text import counted, verdict_text
 if TYPE_CHECKING:
     from fuzzytree.criteria.results import Stability
 
+_MOST_CALM = 12  # comparisons that agree and are not folded
 _MOST_TOLD = 200  # sentences
 
 
 def agreement_section(found: Agreement) -> Markup:
     """Return the result of a check as a table."""
-    rows = [
-        (
-            one.carrier,
-            one.against,
-            one.basis,
-            str(one.rows),
-            f"{one.largest_difference:.2g}",
-            f"{one.allowed:.2g}",
-            str(one.flips),
-            one.verdict,
-        )
-        for one in found.comparisons
-    ]
-    head = ("carrier", "against", "on", "rows", "largest difference", "allowed")
-    compared = table(
-        (*head, "flips", "verdict"),
-        rows,
-        caption="What was held against what",
-        right=(3, 4, 5, 6),
-        sorts=True,
-    )
-    parts: list[Content] = [tag("p", verdict_text(found), class_="lead"), compared]
+    calm = [one for one in found.comparisons if one.verdict == "agrees"]
+    if len(calm) <= _MOST_CALM:
+        calm = []
+    shown = [one for one in found.comparisons if one not in calm]
+    parts: list[Content] = [tag("p", verdict_text(found), class_="lead")]
+    if shown:
+        parts.append(_compared(shown, "What was held against what"))
+    if calm:
+        said = f"{counted(len(calm), 'comparison')} agree"
+        parts.append(folded(said, _compared(calm, "What agrees")))
     if found.certificates:
         bounds = [
             (
@@ -58,6 +48,25 @@ def agreement_section(found: Agreement) -> Markup:
     told += [line for one in found.certificates for line in one.detail]
     parts += [_folded("What differed", told), _folded("Not examined", found.skipped)]
     return joined(parts)
+
+
+def _compared(found: Sequence[Comparison], caption: str) -> Markup:
+    rows = [
+        (
+            one.carrier,
+            one.against,
+            one.basis,
+            str(one.rows),
+            f"{one.largest_difference:.2g}",
+            f"{one.allowed:.2g}",
+            str(one.flips),
+            one.verdict,
+        )
+        for one in found
+    ]
+    head = ("carrier", "against", "on", "rows", "largest difference", "allowed")
+    whole = (*head, "flips", "verdict")
+    return table(whole, rows, caption=caption, right=(3, 4, 5, 6), sorts=True)
 
 
 def stability_section(found: Stability) -> Markup:

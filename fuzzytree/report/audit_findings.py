@@ -34,6 +34,9 @@ MOST_PICTURED = 30
 MOST_MAPPED = 10
 """That have maps of the decision: one takes up to a second."""
 
+MOST_WHOLE = 3
+"""Of a code that are shown whole; of the others all but errors are folded."""
+
 MOST_FACTS = 8
 """Of a code, beside the findings, that are told."""
 
@@ -67,7 +70,7 @@ def findings_section(
         accepted: The ids of those that a baseline accepts.
     """
     if not findings:
-        return tag("p", "There is no finding.", class_="calm")
+        return tag("p", "There is no finding.")
     names = anchors(findings)
     told = [*zip(findings, names, strict=True)][:MOST_FINDINGS]
     groups: dict[tuple[Severity, str], list[Markup]] = {}
@@ -76,8 +79,11 @@ def findings_section(
         drawn: Drawn = "nothing" if place >= MOST_PICTURED else "bars"
         if place < MOST_MAPPED:
             drawn = "maps"
-        shown = _finding(answer, name, scene, drawn, is_known=known)
-        groups.setdefault((answer.severity, answer.code), []).append(shown)
+        group = groups.setdefault((answer.severity, answer.code), [])
+        is_whole = answer.severity == "error" or len(group) < MOST_WHOLE
+        group.append(
+            _finding(answer, name, scene, drawn, is_known=known, is_whole=is_whole)
+        )
     parts = [_group(code, shown) for (_, code), shown in groups.items()]
     more = len(findings) - len(told)
     if more > 0:
@@ -126,12 +132,7 @@ def _title(code: str) -> str:
 
 def _group(code: str, shown: Sequence[Markup]) -> Markup:
     known = CODES.get(code)
-    head = tag(
-        "h3",
-        tag("span", code, class_="code"),
-        f" {_title(code)}",
-        id=f"code-{_slug(code)}",
-    )
+    head = tag("h3", tag("span", code, class_="code"), f" {_title(code)}")
     parts: list[Content] = [head]
     if known and (known.what or known.why or known.example or known.remedy):
         named = (
@@ -160,12 +161,14 @@ def _with_code(line: str) -> Markup:
     )
 
 
-def _slug(code: str) -> str:
-    return code if _PLAIN.fullmatch(code) else "other"
-
-
 def _finding(
-    answer: Answer, name: str, scene: Scene, drawn: Drawn, *, is_known: bool
+    answer: Answer,
+    name: str,
+    scene: Scene,
+    drawn: Drawn,
+    *,
+    is_known: bool,
+    is_whole: bool,
 ) -> Markup:
     places = joined((tag("code", _place(one)) for one in answer.places[:6]), ", ")
     facts: list[Content] = [
@@ -177,11 +180,12 @@ def _finding(
         facts.append(tag("span", "accepted", class_="accepted"))
     if places:
         facts.append(tag("span", places, class_="places"))
-    parts: list[Content] = [
+    head: list[Content] = [
         tag("h4", answer.sentence),
         tag("p", *facts, class_="facts"),
         _concerned(answer, scene),
     ]
+    parts: list[Content] = []
     if answer.region:
         where = _region_text(answer.region, scene)
         parts.append(tag("p", f"Where {where}", class_="how"))
@@ -192,7 +196,10 @@ def _finding(
     repeat = tag("code", answer.repeat, class_="copied") if answer.repeat else None
     if named or repeat:
         parts.append(tag("p", named, repeat, class_="repeat"))
-    return tag("article", *parts, id=name, class_=f"finding {answer.severity}")
+    if not is_whole:
+        whole = tag("div", *parts, class_="rest")
+        parts = [folded("Where it is, and how it is known", whole)]
+    return tag("article", *head, *parts, id=name, class_=f"finding {answer.severity}")
 
 
 def _place(place: Place) -> str:

@@ -21,7 +21,7 @@ from fuzzytree.auditing.records import Answer, Audit
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.auditing.views import view
 from fuzzytree.proving.states import Declined
-from fuzzytree.report.audit import result_text
+from fuzzytree.report.audit import gathered, result_text
 from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
     anchors,
@@ -258,7 +258,7 @@ def _questions(audit: Audit) -> Markup:
     summary = table(head, rows, caption="Questions by code", right=right, sorts=True)
     parts: list[Content] = [summary]
     if audit.unasked:
-        parts += [tag("h3", "Not asked"), listed(audit.unasked, class_="unasked")]
+        parts += [tag("h3", "Not asked"), listed(gathered(audit.unasked))]
     declined = [one for one in audit.answers if isinstance(one.state, Declined)]
     if declined:
         lines = (f"{one.subject}: {state_note(one.state)}" for one in declined)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from fuzzytree.auditing.records import Answer, Audit
@@ -17,6 +18,7 @@ from fuzzytree.report.markup import Content, Markup, joined, listed, tag, text
 from fuzzytree.report.text import counted
 
 _MOST_URGENT = 12  # findings that are named
+_MOST_ALIKE = 3  # of one code and severity
 
 
 def verdict(audit: Audit) -> Markup:
@@ -79,8 +81,12 @@ def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | Non
     if not urgent:
         return None
     items: list[Content] = []
-    for alike in [*urgent.values()][:_MOST_URGENT]:
+    kinds: Counter[tuple[str, str]] = Counter()
+    for alike in urgent.values():
         one, name = alike[0]
+        kinds[one.code, one.severity] += 1
+        if kinds[one.code, one.severity] > _MOST_ALIKE or len(items) == _MOST_URGENT:
+            continue
         times = f" {len(alike)} times" if len(alike) > 1 else ""
         parts = [
             tag("span", icon(one.severity), class_=one.severity),
@@ -90,7 +96,7 @@ def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | Non
             tag("span", one.code, class_="code"),
         ]
         items.append(joined(parts))
-    more = len(urgent) - _MOST_URGENT
+    more = len(urgent) - len(items)
     if more > 0:
         items.append(tag("a", f"and {more} more", href="#findings"))
     return listed(items, class_="urgent")

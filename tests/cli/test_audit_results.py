@@ -42,14 +42,14 @@ def test_results_are_told_in_the_text_the_json_and_on_the_page(call: Call) -> No
     code, out, _ = call(*ASKED, *words, "--page", "audit.html")
     assert code == 0
     assert (
-        "\nresults  check.json: 1 of 2 comparisons disagrees\n"
+        "\nresults  check.json: 1 of 2 comparisons and bounds disagrees\n"
         "results  stability.json: none of 2 criteria fails\n"
     ) in out
     page = Path("audit.html").read_text("utf-8")
     for part in (
         '<section id="agreement" ',
         '<section id="stability" ',
-        '<a href="#agreement">1 of 2 comparisons disagrees</a>',
+        '<a href="#agreement">1 of 2 comparisons and bounds disagrees</a>',
         "no C compiler",
         "the check&#x27;s file",
     ):

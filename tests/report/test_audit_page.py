@@ -324,6 +324,52 @@ def test_agreement_and_stability_are_on_the_page_where_they_are_given() -> None:
     assert "Agreement" not in Outline(page(audit_of(rules), rules)).text
 
 
+def test_many_comparisons_that_agree_are_folded_below_those_that_do_not() -> None:
+    rules = rule_base()
+    alike = tuple(
+        Comparison(f"carrier {k}", "tree", "rows", 9, "agrees") for k in range(13)
+    )
+    wrong = Comparison("x.onnx", "tree", "rows", 9, "DISAGREES")
+    found = page(audit_of(rules), rules, agreement=Agreement("g", "", (*alike, wrong)))
+    text = Outline(found).text
+    order = ["1 of 14 comparisons disagrees", "x.onnx", "13 comparisons agree"]
+    places = [text.index(said) for said in (*order, "carrier 0", "carrier 12")]
+    assert places == sorted(places)
+
+
+def test_of_many_findings_of_a_code_the_first_are_whole() -> None:
+    gap = next(one for one in answers() if one.code == "FT301")
+    gaps = tuple(
+        msgspec.structs.replace(gap, id=f"FT301-{k}", sentence=f"gap {k}")
+        for k in range(5)
+    )
+    rules = rule_base()
+    content = page(audit_of(rules, gaps), rules)
+    assert content.count('<div class="rest">') == 2
+    whole, folded = (content.split(f'id="FT301-{k}"')[1] for k in (2, 3))
+    assert whole.index("8.666666666666666") < whole.index('<div class="rest">')
+    assert folded.index('<div class="rest">') < folded.index("8.666666666666666")
+    found = Outline(content)
+    assert found.text.count("Where it is, and how it is known") == 2
+    assert "and 2 more" in found.text
+    assert found.links.count("#FT301-3") == 0
+    errors = [msgspec.structs.replace(one, severity="error") for one in gaps]
+    assert '<div class="rest">' not in page(audit_of(rules, tuple(errors)), rules)
+
+
+def test_a_code_of_two_severities_has_two_groups_and_no_id_twice() -> None:
+    first, second = answers()[0], answers()[3]
+    second = msgspec.structs.replace(second, code="FT101", id="FT101-00000007")
+    found = shown(found=(first, second))
+    assert found.text.count("What this means and what to do") == 2
+    assert len(set(found.ids)) == len(found.ids)
+
+
+def test_what_was_not_asked_is_gathered_by_its_reason() -> None:
+    unasked = ("FT102 marginal rule: left out", "FT103 redundant rule: left out")
+    assert "Not asked FT102, FT103: left out" in shown(unasked=unasked).text
+
+
 def test_what_is_too_much_is_left_out_and_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
