@@ -23,6 +23,7 @@ Points
     - `linear`: linear inequalities, decided in fractions
     - `witnesses`: from values of the axes to a point of the inputs
     - `seeking`: points worth a look, by doubles
+    - `around`: what rules reach on many boxes at once, by doubles
     - `boxes`: the region around a witness
 
 Rules under the minimum: levels

@@ -4,23 +4,25 @@ A class decides where the first of the strongest rules is one of its rules. So a
 decision than a class's is made where some rule of another class is stronger than all of
 its rules (`fuzzytree.proving.wins`); where such a rule is as strong as some that stand
 behind it, and stronger than the others (`fuzzytree.proving.ties`); or where no
-rule fires and that is answered otherwise (`fuzzytree.proving.cover`).
+rule fires and that is answered otherwise (`fuzzytree.proving.cover`). Rules that do not
+come up to the class anywhere on the box, by bounds of doubles, are not asked about.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from fuzzytree.proving.answers import answer_at
+from fuzzytree.proving.around import Around
 from fuzzytree.proving.branching import simplified
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.cover import uncovered
 from fuzzytree.proving.ground import Ground
-from fuzzytree.proving.seeking import ends_of, near_strengths
+from fuzzytree.proving.seeking import drawn_in, ends_of, near_strengths
 from fuzzytree.proving.states import (
     Carrier,
     Claim,
@@ -34,6 +36,9 @@ from fuzzytree.proving.ties import decides_by_order
 from fuzzytree.proving.variables import Point
 from fuzzytree.proving.wins import wins
 from fuzzytree.proving.witnesses import is_within
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
 
 _DRAWN: Final = 256  # points in which another decision is looked for first
 
@@ -76,13 +81,19 @@ def other_decision(
     clock = clock or Clock()
     if given.is_empty:
         return Proved("the domain has no point")
-    drawn = _drawn(given, label)
+    contest = _Contest(given, label)
+    if contest.is_over:
+        return Proved("bounds on the box leave no other decision")
+    values = drawn_in(given, _DRAWN)
+    if values is None:
+        return Proved("the domain has no point")
+    drawn = _drawn(given, label, values)
     if drawn is not None:
         claim = Claim("decides", of=of, label=decision_at(given, drawn))
         return Witness(coordinates(drawn), (claim,))
     left_open: State | None = None
     asked = 0
-    for state in _asked(given, label, clock):
+    for state in contest.asked(clock):
         asked += 1
         if isinstance(state, Witness):
             other = decision_at(given, point_of(state.point))
@@ -94,27 +105,58 @@ def other_decision(
     return left_open or Proved(f"{asked} questions about other decisions answered no")
 
 
-def _asked(given: Ground, label: str | None, clock: Clock) -> Iterator[State]:
-    """Yield the answer to each question of which one must be yes, the quick first."""
-    numbered = [*enumerate(given.rules.rules, 1)]
-    own = [number for number, rule in numbered if rule.then == label]
-    others = [number for number, rule in numbered if rule.then != label]
-    for number in others:
-        yield wins(given, number, own, clock)
-    if given.rules.semantics.uncovered != label:
-        yield uncovered(given, clock)
-    for number in others:
-        after = [rival for rival in own if rival > number]
-        if after:
-            before = [rival for rival in own if rival < number]
-            yield decides_by_order(given, number, before, after, clock)
+class _Contest:
+    """The rules that may matter to whether a class decides everywhere on a box.
+
+    Args:
+        given: The rules and the box.
+        label: The class.
+    """
+
+    def __init__(self, given: Ground, label: str | None) -> None:
+        self.given = given
+        self.is_own = np.array([rule.then == label for rule in given.rules.rules])
+        ends = ends_of(given.rules, given.domain)
+        reached = Around(given.rules, given.domain).reached(*ends)
+        self.low, self.high = reached.low[:, 0], reached.high[:, 0]
+        own = self.low[self.is_own]
+        self.least = float(own.max(initial=0.0))
+        self.may_be_bare = (
+            given.rules.semantics.uncovered != label and not self.low.max() > 0.0
+        )
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no rule of another class comes up to the class's own."""
+        return not self.may_be_bare and not self._others(is_tie=True)
+
+    def asked(self, clock: Clock) -> Iterator[State]:
+        """Yield the answer to each question of which one must be yes, quick ones first.
+
+        Own rules that are below another one on all of the box are no rivals.
+        """
+        own = (np.flatnonzero(self.is_own & (self.high >= self.least)) + 1).tolist()
+        for number in self._others(is_tie=False):
+            yield wins(self.given, number, own, clock)
+        if self.may_be_bare:
+            yield uncovered(self.given, clock)
+        for number in self._others(is_tie=True):
+            after = [rival for rival in own if rival > number]
+            if after:
+                before = [rival for rival in own if rival < number]
+                yield decides_by_order(self.given, number, before, after, clock)
+
+    def _others(self, *, is_tie: bool) -> list[int]:
+        """Return the numbers of other rules that may be as strong, or stronger."""
+        least = self.least
+        fits = (self.high >= least) if is_tie else (self.high > least)
+        fits &= ~self.is_own & (self.high > 0.0)
+        return [number + 1 for number in np.flatnonzero(fits).tolist()]
 
 
-def _drawn(given: Ground, label: str | None) -> Point | None:
+def _drawn(given: Ground, label: str | None, values: FloatArray) -> Point | None:
     """Return a point that is decided otherwise, if one of some that are drawn is."""
-    chance = np.random.default_rng(0)
     low, high = ends_of(given.rules, given.domain)
-    values = low + chance.random((len(low), _DRAWN)) * (high - low)
     strengths = near_strengths(given.rules, np.clip(values, low, high))
     is_own = np.array([rule.then == label for rule in given.rules.rules])
     own = np.max(strengths, axis=0, where=is_own[:, np.newaxis], initial=0.0)

@@ -117,6 +117,8 @@ def nearest(
     clock: Clock | None = None,
     *,
     within: Fraction | None = None,
+    clear: Fraction | None = None,
+    near: Iterable[Point] = (),
 ) -> Nearest:
     """Return how far the nearest point of a kind is.
 
@@ -129,8 +131,13 @@ def nearest(
             exactly.
         clock: How much time there is.
         within: Only points up to this distance matter; all of the domain unless given.
+        clear: A radius within which there is known to be none.
+        near: Points that may be of the kind, and near.
     """
-    return _Search(domain, centre, ask, is_one, clock or Clock()).found(within)
+    search = _Search(domain, centre, ask, is_one, clock or Clock())
+    if clear is not None:
+        search.low = clear
+    return search.found(within, near)
 
 
 def nearest_box(
@@ -207,14 +214,19 @@ class _Search:
         self.point: Point | None = None
         self.why = ""
 
-    def found(self, within: Fraction | None) -> Nearest:
+    def found(self, within: Fraction | None, near: Iterable[Point]) -> Nearest:
         try:
             if self.is_one(self.centre):
                 return Nearest(Fraction(0), Fraction(0), dict(self.centre))
             top = Fraction(1) if within is None else within
-            if self._is_clear(self.domain if within is None else self._ball(top)):
+            for point in near:
+                if self.is_one(point):
+                    self._keep(self._drawn(point))
+            is_met = self.high is not None and self.high <= top
+            whole = self.domain if within is None else self._ball(top)
+            if not is_met and self._is_clear(whole):
                 return Nearest(top, is_none=within is None)
-            self._bisect(top if self.high is None else self.high)
+            self._bisect(top if self.high is None else min(top, self.high))
         except OutOfTimeError:
             self.why = "the budget was spent"
         return Nearest(self.low, self.high, self.point, self.why)

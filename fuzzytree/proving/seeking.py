@@ -14,7 +14,7 @@ from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.ground import Ground, strengths_at
 from fuzzytree.proving.linear import simple
 from fuzzytree.proving.variables import Point
-from fuzzytree.proving.witnesses import is_within
+from fuzzytree.proving.witnesses import is_within, point_with
 from fuzzytree.rulebase import RuleBase, shapes_of
 
 if TYPE_CHECKING:
@@ -63,6 +63,49 @@ def ends_of(rules: RuleBase, domain: Domain) -> tuple[FloatArray, FloatArray]:
     low = np.array([[0.0 if side is None else side.low] for side in sides])
     high = np.array([[0.0 if side is None else side.high] for side in sides])
     return low, high
+
+
+def drawn_in(given: Ground, count: int, seed: int = 0) -> FloatArray | None:
+    """Return points of a box that are drawn; None if it has no point.
+
+    Where combinations are limited, points are drawn on the ways from one point inside
+    to points of the inputs' box, as far as the limits let them.
+
+    Args:
+        given: Where.
+        count: How many points.
+        seed: Of what is drawn.
+
+    Returns:
+        Shape (inputs, count); about within the sides of combinations.
+    """
+    chance = np.random.default_rng(seed)
+    low, high = ends_of(given.rules, given.domain)
+    values = low + chance.random((len(low), count)) * (high - low)
+    limited = [
+        (variable, side)
+        for variable in given.rules.variables
+        if variable.parts and (side := given.domain.side(variable.name)) is not None
+    ]
+    if not limited:
+        return values
+    inside = point_with(given, {})
+    if inside is None:
+        return None
+    names = given.rules.inputs
+    start = np.array([[float(inside[name])] for name in names])
+    corners = np.where(chance.random(values.shape) < 0.5, low, high)
+    values[:, ::2] = corners[:, ::2]
+    room = np.ones(count)
+    for variable, side in limited:
+        here = axis_value(variable, dict(zip(names, start, strict=True))).x
+        step = axis_value(variable, dict(zip(names, values, strict=True))).x - here
+        with np.errstate(divide="ignore", invalid="ignore"):
+            most = np.where(step > 0.0, side.high - here, side.low - here) / step
+        room = np.where(step != 0.0, np.clip(most, 0.0, room), room)
+    share = room * chance.random(count) ** (1.0 / len(names))
+    found: FloatArray = start + (values - start) * share
+    return found
 
 
 def leader(
