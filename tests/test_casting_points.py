@@ -43,6 +43,7 @@ from fuzzytree.system import (
     TwoGaussians,
 )
 from fuzzytree.testing import random_tree
+from tests.seeds import seeds
 
 TOLERANCES = (0.3, 1e-2, 1e-4)
 
@@ -72,7 +73,7 @@ def curves(seed: int) -> Iterator[Curve]:
 
 
 @pytest.mark.parametrize("tolerance", TOLERANCES)
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(8, 0, 3, 6))
 def test_points_are_no_further_off_than_they_say(seed: int, tolerance: float) -> None:
     chance = random.Random(seed)
     for curve in curves(seed):

@@ -97,7 +97,7 @@ def test_an_unknown_class_at_a_leaf_is_found() -> None:
 
 
 def test_a_big_tree_is_made_and_checked_without_recursion_limits() -> None:
-    assert len(random_tree(0, leaves=800, inputs=8).leaves) == 800
+    assert len(random_tree(0, leaves=400, inputs=8).leaves) == 400
 
 
 @given(
