@@ -191,7 +191,8 @@ def _is_exact(curve: Curve, points: Points, place: int) -> bool:
     if _is_step(points, place):
         return True
     found = degree_between(curve, Fraction(points.values[place]))
-    return found == (points.degrees[place],) * 2
+    degree = Fraction(points.degrees[place])
+    return found is not None and found.low == found.high == degree
 
 
 def _is_smooth(curve: Curve) -> bool:

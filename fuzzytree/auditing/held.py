@@ -28,7 +28,7 @@ from fuzzytree.auditing.enclosing import (
     scaled,
 )
 from fuzzytree.numerics.exact import outwards
-from fuzzytree.proving.states import Bracket, Claim, State, Witness
+from fuzzytree.proving.states import Bracket, State, Witness
 from fuzzytree.rulebase import (
     Clause,
     Points,
@@ -86,20 +86,16 @@ class Held(msgspec.Struct, frozen=True, eq=False):
     def certified(self, state: State) -> State:
         """Return what a state of the lower rules says of the true ones.
 
-        A strength there is one that the rule reaches.
+        Strengths of rules that are held are not told: they are larger in truth.
         """
-        match state:
-            case Witness() | Bracket():
-                claims = tuple(self._claim(one) for one in state.claims)
-                return msgspec.structs.replace(state, claims=claims)
-            case _:
-                return state
-
-    def _claim(self, claim: Claim) -> Claim:
-        if claim.kind != "strength" or not self.rules.intersection(claim.rules):
-            return claim
-        level = Fraction(outwards(Fraction(claim.level or 0))[0])
-        return msgspec.structs.replace(claim, kind="reaches", level=str(level))
+        if not isinstance(state, Witness | Bracket):
+            return state
+        claims = tuple(
+            one
+            for one in state.claims
+            if one.kind != "strength" or self.rules.isdisjoint(one.rules)
+        )
+        return msgspec.structs.replace(state, claims=claims)
 
 
 def held(

@@ -41,7 +41,7 @@ from fuzzytree.proving.factors import Distance, distance
 from fuzzytree.proving.ground import Ground, ground
 from fuzzytree.proving.measures import Bounds
 from fuzzytree.proving.meeting import Meeting, highest, meet
-from fuzzytree.proving.states import Bracket, Proved, State, Witness
+from fuzzytree.proving.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.proving.variables import span
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import Clause, Points, RuleBase, Term, Variable, shapes_of
@@ -245,9 +245,19 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
         if isinstance(found.state, Witness):
             state = self.held.certified(found.state)
             return Meeting(Bounds(found.level.low, max(most, found.level.low)), state)
+        if most < level:
+            return Meeting(Bounds(Fraction(0), most), found.state)
+        # What is reached nearly is told, with its point.
+        easier = max(level - 4 * Fraction(self.held.gap), Fraction(0))
+        near = meet(self.from_below, one, other, easier, clock)
+        low = near.level.low if isinstance(near.state, Witness) else Fraction(0)
         name = f"the highest level that rules {one} and {other} both reach"
-        state = Bracket(name, 0.0, outwards(most)[1], self.held.why)
-        return Meeting(Bounds(Fraction(0), most), state)
+        ends = outwards(low)[0], outwards(most)[1]
+        state = Bracket(name, *ends, self.held.why)
+        if isinstance(near.state, Witness):
+            claim = Claim("reaches", rules=(one, other), level=str(Fraction(ends[0])))
+            state = replace(state, point=near.state.point, claims=(claim,))
+        return Meeting(Bounds(low, most), state)
 
 
 def sides_of(subject: Subject) -> Sides:

@@ -378,8 +378,8 @@ def _shares(
         if fewest < hits and subject.is_whole:
             reason = f"there are {fewest} at least, and {hits} at most"
             text = f"how many {noun} are {name} is not decided: {reason}"
-            state = Declined("FTD02", reason)
-            yield Answer("FT701", f"{name} {noun}", text, state, False)
+            unknown = Declined("FTD02", reason)
+            yield Answer("FT701", f"{name} {noun}", text, unknown, False)
             questions = [one for one in questions if one[0] != name]
     if not subject.is_whole:
         reason = "rules are left out, and they may cover what the others do not"
