@@ -275,7 +275,7 @@ def _copied(
 def _conflicts(subject: Subject, compared: Sides) -> Iterator[Answer]:
     level = subject.settings.level
     near: list[tuple[float, Pair]] = []
-    clean = 0
+    clean = touching = 0
     bounds: dict[int, FloatArray] = {}
     for one, other in _pairs(subject, is_alike=False):
         if not _may_conflict(subject, one, other):
@@ -297,15 +297,16 @@ def _conflicts(subject: Subject, compared: Sides) -> Iterator[Answer]:
         subject.clock.check()
         found = compared.meet(*pair, Fraction(level), subject.clock.share(0.05))
         is_shown = isinstance(found.state, Witness)
-        if found.level.high < level:
+        if found.level.high < level or isinstance(found.state, Proved):
             clean += 1
+            touching += found.is_touch
         elif is_shown and told == MOST_SHOWN:
             hidden += 1
         else:
             told += is_shown
             yield _conflict(subject, pair, found)
     if clean or hidden:
-        yield _rest_of_conflicts(subject, compared, clean, hidden)
+        yield _rest_of_conflicts(subject, compared, (clean, touching), hidden)
 
 
 def _may_conflict(subject: Subject, one: int, other: int) -> bool:
@@ -363,13 +364,17 @@ def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
 
 
 def _rest_of_conflicts(
-    subject: Subject, compared: Sides, clean: int, hidden: int
+    subject: Subject, compared: Sides, told: tuple[int, int], hidden: int
 ) -> Answer:
+    clean, touching = told
     level, noun = short(subject.settings.level), _noun(subject)
     kind = "classes" if noun == "class" else "conclusions"
     pairs, reach = counted(clean, "pair"), "reaches" if clean == 1 else "reach"
     never = f"{pairs} of rules of different {kind} never {reach} {level} together"
     parts = [never] if clean else []
+    if touching:
+        touch = "touches" if touching == 1 else "touch"
+        parts.append(f"{touching} of them {touch} it, at irrational values only")
     if hidden:
         more = counted(hidden, "more pair")
         parts.append(f"{more} of rules may reach {level}: they conflict less")

@@ -96,7 +96,11 @@ def level_at(
         return min(max(own[0], least), most)
     level = Level(own, polynomial, root, least, most)
     low, high = level.between(_BITS[0])
-    return level if least < low and high < most else _clipped(level)
+    known = level if least < low and high < most else _clipped(level)
+    # A fraction of few digits in so narrow an interval is hardly there by chance.
+    near = ((low + high) / 2).limit_denominator(1 << 64)
+    is_near = isinstance(known, Level) and low <= near <= high
+    return near if is_near and _compared(level, near) == 0 else known
 
 
 def _clipped(level: Level) -> Level | Fraction | None:

@@ -30,6 +30,7 @@ from fuzzytree.proving.parts import START, Stretch, stretch, widest
 from fuzzytree.proving.states import (
     Bracket,
     Claim,
+    Proved,
     Span,
     State,
     Witness,
@@ -53,11 +54,14 @@ class Meeting(NamedTuple):
 
     Attributes:
         level: The highest level that both reach.
-        state: A witness, or a bracket of the level.
+        state: A witness, or a bracket of the level; `Proved` where no fractions are a
+            point at which both reach the level that is asked for.
+        is_touch: Whether both reach that level at irrational values alone.
     """
 
     level: Bounds
     state: State
+    is_touch: bool = False
 
 
 def highest(compared: Compared, one: int) -> FloatArray:
@@ -140,12 +144,18 @@ def meet(
     near = max(bounds.low - (bounds.low - below) * _NEARLY, ZERO)
     given, rules = compared.ground, (one, other)
     joined = {axis for group in coupled(given) for axis in group}
-    for goal in dict.fromkeys((bounds.low, near, min(level, near))):
+    goals = (goal for goal in (bounds.low, near, level) if goal >= level)
+    for goal in dict.fromkeys(goals):
         witness = _witness(given, rules, goal, level, joined)
         if witness is not None and joined:
             return _raised(given, rules, witness, bounds, level, joined)
         if witness is not None:
-            return Meeting(bounds, witness)
+            low = max(bounds.low, _reached(witness))
+            return Meeting(Bounds(low, bounds.high), witness)
+    if not joined and not given.is_fine:
+        return meet(compared.fine, one, other, level, clock)
+    if not joined and not _may_be_hidden(given, rules, level):
+        return _never(given, rules, bounds, level)
     high = bounds.high
     if joined and _is_never(given, rules, level, joined):
         high = min(high, level * (1 - _NEARLY))
@@ -154,6 +164,47 @@ def meet(
         why = "the inputs of their variables depend on each other"
     most = outwards(high)[1]
     return Meeting(Bounds(ZERO, high), Bracket(name, 0.0, most, why))
+
+
+def _may_be_hidden(given: Ground, rules: tuple[int, int], level: Fraction) -> bool:
+    """Return whether places too near to tell may hold values that reach a level."""
+    bands = given.laid[1]
+    return any(
+        bands.high[min(int(laid.at[laid.of[rule - 1, place], zone]) for rule in rules)]
+        >= level
+        for laid in given.laid[0]
+        for zone in np.flatnonzero(laid.cells.is_vague).tolist()
+        for place in (max(zone - 1, 0), min(zone, laid.of.shape[1] - 1))
+    )
+
+
+def _never(
+    given: Ground, rules: tuple[int, int], bounds: Bounds, level: Fraction
+) -> Meeting:
+    """Return that no fractions are a point at which rules reach a level.
+
+    On some axis both reach it at irrational places alone, or come near it only.
+    """
+    names: list[str] = []
+    is_touch = bounds.high >= level
+    for laid in given.laid[0]:
+        of = [rule - 1 for rule in rules]
+        if next(_parts(laid, of, level), None) is None:
+            names.append(repr(laid.axis.variable.name))
+            is_touch = is_touch and _touches(given, laid, of, level)
+    text = "is reached at irrational values alone" if is_touch else "is not reached"
+    how = f"{float(level)!r} {text}, by the values of {' and '.join(names)}"
+    return Meeting(bounds, Proved(how), is_touch)
+
+
+def _touches(given: Ground, laid: Laid, rules: Sequence[int], level: Fraction) -> bool:
+    """Return whether rules reach a level at an irrational place of an axis."""
+    lows = given.laid[1].low
+    return any(
+        low < high
+        and all(lows[laid.at[laid.of[rule, zone - 1], zone]] >= level for rule in rules)
+        for zone, (low, high) in enumerate(laid.cells.zones)
+    )
 
 
 def _raised(

@@ -13,8 +13,10 @@ from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.proving.answers import answer_at
 from fuzzytree.proving.states import Bracket, Declined, Proved, Witness, point_of
 from fuzzytree.rulebase import (
+    Band,
     Clause,
     Conjunction,
+    Flank,
     Part,
     Points,
     Rule,
@@ -311,20 +313,37 @@ def test_many_conflicts_are_told_up_to_a_number_and_counted() -> None:
     assert rest.sentence == ("16 more pairs of rules may reach 0.5: they conflict less")
 
 
-def test_pairs_that_only_touch_are_open_and_take_no_place_of_a_conflict() -> None:
+def test_pairs_that_cross_at_the_level_itself_conflict() -> None:
     # ramps down and up that cross at 0.1 + 0.2, which is no short fraction
     third = 0.1 + 0.2
     ramps = (
         Term("down", Points((0.0, 2.0 * third), (1.0, 0.0))),
         Term("up", Points((0.0, 2.0 * third), (0.0, 1.0))),
     )
-    rules = base(*(("force is down", "soft"), ("force is up", "hard")) * 5, more=ramps)
-    answers = [one for one in asked(rules, "FT201") if one.rules]
-    assert len(answers) == 25
-    assert not any(one.is_finding for one in answers)
-    states = [one.state for one in answers]
-    why = "where they meet is known nearly, and no point there reaches the level"
-    assert all(isinstance(one, Bracket) and one.why == why for one in states)
+    rules = base(("force is down", "soft"), ("force is up", "hard"), more=ramps)
+    (answer,) = asked(rules, "FT201")
+    assert answer.is_finding
+    assert isinstance(answer.state, Witness)
+    assert point_of(answer.state.point)["force"] == Fraction(third)
+    assert answer.measures[0].value == 0.5
+    above = Settings(level=0.5 + 2.0**-53)
+    assert not any(one.is_finding for one in asked(rules, "FT201", above))
+
+
+def test_pairs_that_cross_at_the_level_at_an_irrational_value_are_counted() -> None:
+    square = Term("square", Band(1.0, None, Flank(1.0, 0.0, (0.0, 1.0))))
+    rules = base(("force is square", "soft"), more=(square,))
+    apart = Rule((Clause("force", ("square",), negated=True),), "hard")
+    rules = replace(rules, rules=(*rules.rules, apart))
+    (answer,) = asked(rules, "FT201")
+    assert not answer.is_finding
+    assert isinstance(answer.state, Proved)
+    assert answer.sentence == (
+        "1 pair of rules of different classes never reaches 0.5 together; "
+        "1 of them touches it, at irrational values only"
+    )
+    below = asked(rules, "FT201", Settings(level=0.5 - 2.0**-53))
+    assert below[0].is_finding
 
 
 def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:
