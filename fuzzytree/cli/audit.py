@@ -151,19 +151,23 @@ def command(
     form = "json" if as_json else form
     known_ids = accepted if path else None
     text = _told(found, form, material, known_ids, is_whole=is_whole)
-    if output is None:
-        if text:  # no finding is no annotation
+    wrote: list[str] = []
+    try:  # a reader who leaves early costs no file, and a full disk not the text
+        if output is not None:
+            write_atomically(output, f"{text}\n".encode())
+            wrote.append(output)
+        if page is not None:
+            _write_page(found, material, page)
+            wrote.append(page)
+        if write_baseline is not None:
+            write_atomically(write_baseline, baseline_of(found))
+            said = f"{len(found.findings)} accepted with --baseline {write_baseline}"
+            wrote.append(f"{write_baseline} {said}")
+    finally:
+        if output is None and text:  # no finding is no annotation
             answer(text)
-    else:
-        write_atomically(output, f"{text}\n".encode())
-        say(f"wrote    {output}", quiet=quiet)
-    if page is not None:
-        _write_page(found, material, page)
-        say(f"wrote    {page}", quiet=quiet)
-    if write_baseline is not None:
-        write_atomically(write_baseline, baseline_of(found))
-        said = f"{len(found.findings)} accepted with --baseline {write_baseline}"
-        say(f"wrote    {write_baseline} {said}", quiet=quiet)
+        for one in wrote:
+            say(f"wrote    {one}", quiet=quiet)
     lost = [*gone(accepted, found)]
     for name in lost:
         say(f"gone     {name} {printable(accepted[name])}", quiet=quiet)

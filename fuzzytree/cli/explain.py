@@ -25,7 +25,7 @@ def command(code: str | None, as_json: bool) -> None:
     # An id such as FT101-1a2b3c4d names its code, too.
     name = code.upper().partition("-")[0]
     if name not in CODES:
-        raise click.UsageError(f"no code {code!r}; {name_choice(name, [*CODES])}")
+        raise click.UsageError(f"no code {code[:40]!r}; {name_choice(name, [*CODES])}")
     if as_json:
         answer_json(CODES[name])
     else:

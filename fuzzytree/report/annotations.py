@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Audit, Severity
+from fuzzytree.naming import printable
 from fuzzytree.report.audit_states import state_word
 
 _COMMANDS: Mapping[Severity, str] = {
@@ -48,4 +49,4 @@ def _annotation(answer: Answer, audit: Audit) -> str:
 
 
 def _escaped(text: str, escapes: Mapping[str, str]) -> str:
-    return "".join(escapes.get(character, character) for character in text)
+    return "".join(escapes.get(one) or printable(one) for one in text)

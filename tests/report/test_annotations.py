@@ -21,11 +21,12 @@ def test_each_open_finding_is_a_command_and_an_incomplete_audit_another() -> Non
 
 
 def test_hostile_names_stay_where_they_belong() -> None:
-    said = "rule\n::error::50% of 'a,b:c'\r never"
+    said = "rule\n::error::50% of 'a,b:c'\r \x1b[2J\u202enever"
     first = next(annotation_lines(every_state("a,b:c%\n.yaml", said)))
     assert first == (
         "::error file=a%2Cb%3Ac%25%0A.yaml,line=4,col=3,title=FT101 dead rule::"
-        "rule%0A::error::50%25 of 'a,b:c'%0D never (PROVED, FT101-00000001)"
+        r"rule%0A::error::50%25 of 'a,b:c'%0D \x1b[2J\u202enever "
+        "(PROVED, FT101-00000001)"
     )
 
 
