@@ -42,20 +42,34 @@ if TYPE_CHECKING:
 Form = Literal["text", "json", "sarif", "github"]
 
 
-@click.command("audit", short_help="Find what is odd in a rule base, and prove it.")
+_EXAMPLES = """\b
+For example:
+  fuzzytree audit wine.yaml
+  fuzzytree audit wine.yaml --data wine.csv --target cultivar --page wine.html
+  fuzzytree audit wine.yaml --write-baseline known.json
+"""
+
+
+@click.command(
+    "audit",
+    short_help="Find what is odd in a rule base, and prove it.",
+    epilog=_EXAMPLES,
+)
 @click.argument("model", metavar="MODEL")
 @with_options
 @click.option(
     "--config",
     metavar="FILE",
-    help="fuzzytree-audit.yaml, if it is here, unless given.",
+    help="Options from a file; fuzzytree-audit.yaml, if it is here.",
 )
-@click.option("--baseline", metavar="FILE", help="Findings that are accepted.")
-@click.option("--write-baseline", metavar="FILE", help="Accept all that is found.")
+@click.option("--baseline", metavar="FILE", help="Accept the findings in this file.")
+@click.option(
+    "--write-baseline", metavar="FILE", help="Write all that is found, for --baseline."
+)
 @click.option(
     "--fail-on",
     type=click.Choice(["error", "warning", "info", "never"]),
-    help="Exit 1 from this severity on; warning.",
+    help="Exit 1 from this severity on; from warning, unless given.",
 )
 @click.option(
     "--output-format",
@@ -63,11 +77,12 @@ Form = Literal["text", "json", "sarif", "github"]
     type=click.Choice(["text", "json", "sarif", "github"]),
     default="text",
     show_default=True,
+    help="How it is told: to people, programs, code hosts.",
 )
 @click.option(
     "--all", "is_whole", is_flag=True, help="Tell also what is no finding, one by one."
 )
-@click.option("-o", "--output", metavar="FILE", help="Instead of stdout.")
+@click.option("-o", "--output", metavar="FILE", help="Write there, and not to stdout.")
 @click.option("--page", metavar="FILE", help="Write a page for a browser as well.")
 @click.option(
     "--results",
@@ -108,8 +123,11 @@ def command(
     """Ask MODEL, any file that can be read, for rules that never win, gaps, conflicts.
 
     Each answer is PROVED on all of the domain, shown by a WITNESS, a BRACKET around a
-    number, SAMPLED or DECLINED. Ctrl-C keeps what is proved. Exit 1 if something is
-    found that is not accepted; `fuzzytree explain CODE` tells what to do about it.
+    number, SAMPLED or DECLINED; `fuzzytree explain CODE` tells what a finding means and
+    what to do. Ctrl-C keeps what is proved.
+
+    Exit 0 if nothing fails, 1 if something is found that is not accepted, 2 if it could
+    not run, 130 if interrupted.
     """
     from fuzzytree import verbs
     from fuzzytree.auditing.baselines import baseline_of, gone, read_baseline

@@ -43,8 +43,12 @@ class Options(msgspec.Struct, frozen=True):
 
 
 _OPTIONS = (
-    click.option("--data", metavar="TABLE", help="Rows of your own."),
-    click.option("--target", metavar="COLUMN", help="The classes in TABLE."),
+    click.option(
+        "--data", metavar="TABLE", help="Rows of your own; `-` is standard input."
+    ),
+    click.option(
+        "--target", metavar="COLUMN", help="The column of TABLE that has the classes."
+    ),
     click.option(
         "--within",
         type=click.Choice(["model", "data"]),
@@ -53,7 +57,10 @@ _OPTIONS = (
         help="Ask on the model's ranges, or on those of TABLE.",
     ),
     click.option(
-        "--spreads", type=float, metavar="K", help="Ask K spreads around the sets."
+        "--spreads",
+        type=float,
+        metavar="K",
+        help="Ask up to K spreads around the fitted sets.",
     ),
     click.option(
         "--limits",
@@ -67,16 +74,21 @@ _OPTIONS = (
     click.option(
         "--select", metavar="CODES", multiple=True, help="Ask these only, as FT1,FT301."
     ),
-    click.option("--ignore", metavar="CODES", multiple=True, help="Leave these out."),
     click.option(
-        "--budget", type=float, metavar="SECONDS", help="Begin nothing after; 60."
+        "--ignore", metavar="CODES", multiple=True, help="Leave these out, as FT5."
+    ),
+    click.option(
+        "--budget",
+        type=float,
+        metavar="SECONDS",
+        help="Begin nothing new after these; 60.",
     ),
     click.option(
         "--set",
         "settings",
         metavar="NAME=VALUE",
         multiple=True,
-        help="epsilon, margin, lead, level, overlap, rows or seed (repeat).",
+        help="epsilon, margin, lead, level, overlap: what is small; rows, seed.",
     ),
 )
 

@@ -11,22 +11,29 @@ from fuzzytree.cli.talk import answer, answer_json, json_option
 @click.argument("code", metavar="[CODE]", required=False)
 @json_option
 def command(code: str | None, as_json: bool) -> None:
-    """Say what CODE means, why it matters, and what to do; list all codes without."""
+    """Say what CODE means, why it matters, and what to do; list all codes without.
+
+    CODE is a code such as FT101, the id of a finding such as FT101-1a2b3c4d, or how
+    codes begin, such as FT1: those are listed.
+    """
     from fuzzytree.auditing.codes import CODES
     from fuzzytree.report.explanations import code_lines, explanation_lines
     from fuzzytree.rulebase import name_choice
 
-    if code is None:
+    name = (code or "FT").upper().partition("-")[0]
+    if name in CODES:
+        found = CODES[name]
         if as_json:
-            answer_json([*CODES.values()])
+            answer_json(found)
         else:
-            answer("\n".join(code_lines()))
+            answer("\n".join(explanation_lines(found)))
         return
-    # An id such as FT101-1a2b3c4d names its code, too.
-    name = code.upper().partition("-")[0]
-    if name not in CODES:
-        raise click.UsageError(f"no code {code[:40]!r}; {name_choice(name, [*CODES])}")
+    begin = [one for one in CODES.values() if one.code.startswith(name)]
+    if not begin:
+        raise click.UsageError(
+            f"no code {(code or '')[:40]!r}; {name_choice(name[:40], [*CODES])}"
+        )
     if as_json:
-        answer_json(CODES[name])
+        answer_json(begin)
     else:
-        answer("\n".join(explanation_lines(CODES[name])))
+        answer("\n".join(code_lines(begin)))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -37,12 +37,10 @@ def explanation_lines(code: Code) -> Iterator[str]:
             ) or [""]
 
 
-def code_lines() -> Iterator[str]:
-    """Yield every code with its severity and title."""
+def code_lines(codes: Iterable[Code]) -> Iterator[str]:
+    """Yield codes with their severities and titles."""
     rows = [("code", "severity", "a finding says")]
-    yield from aligned(
-        [*rows, *((c.code, c.severity, c.title) for c in CODES.values())]
-    )
+    yield from aligned([*rows, *((c.code, c.severity, c.title) for c in codes)])
 
 
 def page_lines() -> Iterator[str]:

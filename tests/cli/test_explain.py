@@ -24,6 +24,18 @@ def test_without_a_code_all_are_listed(call: Call) -> None:
     assert [line.split()[0] for line in out.splitlines()[1:]] == [*CODES]
 
 
+@pytest.mark.parametrize(
+    ("begin", "codes"),
+    [("FT2", ["FT201", "FT202", "FT203", "FT204", "FT205"]), ("ft70", ["FT701"])],
+)
+def test_how_codes_begin_lists_them(call: Call, begin: str, codes: list[str]) -> None:
+    code, out, err = call("explain", begin)
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines()[1:]] == codes
+    found = json.loads(call("explain", begin, "--json")[1])
+    assert [one["code"] for one in found] == codes
+
+
 def test_programs_get_the_same(call: Call) -> None:
     found = json.loads(call("explain", "--json")[1])
     assert [one["code"] for one in found] == [*CODES]
@@ -35,3 +47,9 @@ def test_an_unknown_code_is_one_sentence(call: Call) -> None:
     assert (code, out) == (2, "")
     assert err.startswith("no code 'FT1O1'; there is FT101, ")
     assert "(did you mean 'FT101'?)" in err
+
+
+def test_a_long_word_is_not_told_whole(call: Call) -> None:
+    code, out, err = call("explain", "x" * 5000)
+    assert (code, out) == (2, "")
+    assert len(err) < 300
