@@ -8,18 +8,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final
 
 from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Result, Severity
+from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Severity
 from fuzzytree.naming import printable
-from fuzzytree.proving.states import (
-    Bracket,
-    Coordinate,
-    Declined,
-    Proved,
-    Sampled,
-    State,
-    Witness,
-)
-from fuzzytree.report.audit_states import claim_text, sampled_text, state_word
+from fuzzytree.proving.states import Bracket, Coordinate, Declined, Witness
+from fuzzytree.report.audit_states import result_text, state_text, state_word
 from fuzzytree.report.svg_regions import span_text
 from fuzzytree.report.text import aligned, counted, number
 
@@ -178,23 +170,6 @@ def _head(audit: Audit) -> Iterator[str]:
         yield f"  and {counted(len(sides) - _MOST_INPUTS, 'more variable')}"
 
 
-def result_text(result: Result) -> str:
-    """Return what another verb found, in words.
-
-    Example:
-        >>> from fuzzytree.auditing.records import Source
-        >>> result_text(Result("stability", Source("s.json", ""), 10, 1))
-        '1 of 10 criteria fails'
-    """
-    what, wrong = ("comparisons and bounds", "disagree")
-    if result.verb == "stability":
-        what, wrong = ("criteria", "fail")
-    if not result.wrong:
-        return f"none of {result.parts} {what} {wrong}s"
-    verb = f"{wrong}s" if result.wrong == 1 else wrong
-    return f"{result.wrong} of {result.parts} {what} {verb}"
-
-
 def _name(text: str) -> str:
     """Return a name as it fits into a line."""
     shown = text if len(text) <= _LONGEST_NAME else f"{text[: _LONGEST_NAME - 1]}…"
@@ -261,26 +236,6 @@ def _facts(answer: Answer) -> Iterator[tuple[str, str]]:
         yield "id", answer.id
     if answer.repeat:
         yield "again", answer.repeat
-
-
-def state_text(state: State) -> str:
-    """Return how an answer is known, in words.
-
-    Example:
-        >>> state_text(Bracket("the largest lead", 0.1, 0.2, "the budget is spent"))
-        'the largest lead lies between 0.1 and 0.2; the budget is spent'
-    """
-    match state:
-        case Proved(how=how):
-            return how
-        case Witness(claims=claims):
-            return "; ".join(map(claim_text, claims)) or "it happens here"
-        case Bracket(of=of, low=low, high=high, why=why):
-            return f"{of} lies between {number(low)} and {number(high)}; {why}"
-        case Sampled():
-            return sampled_text(state)
-        case Declined(code=code, reason=reason):
-            return f"{code}: {reason}"
 
 
 def _point_text(point: Sequence[Coordinate]) -> str:

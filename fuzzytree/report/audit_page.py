@@ -21,7 +21,7 @@ from fuzzytree.auditing.records import Answer, Audit
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.auditing.views import view
 from fuzzytree.proving.states import Declined
-from fuzzytree.report.audit import gathered, result_text
+from fuzzytree.report.audit import gathered
 from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
     anchors,
@@ -40,6 +40,7 @@ from fuzzytree.report.audit_rows import data_of, passing
 from fuzzytree.report.audit_states import (
     STATES,
     known_as,
+    result_text,
     state_badge,
     state_note,
     state_word,

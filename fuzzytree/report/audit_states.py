@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Severity
+from fuzzytree.auditing.records import Answer, Result, Severity
 from fuzzytree.proving.states import (
     Bracket,
     Claim,
@@ -239,3 +239,40 @@ def known_as(answers: Sequence[Answer]) -> dict[str, int]:
     for answer in answers:
         counts[state_word(answer.state)] += 1
     return counts
+
+
+def state_text(state: State) -> str:
+    """Return how an answer is known, in words.
+
+    Example:
+        >>> state_text(Bracket("the largest lead", 0.1, 0.2, "the budget is spent"))
+        'the largest lead lies between 0.1 and 0.2; the budget is spent'
+    """
+    match state:
+        case Proved(how=how):
+            return how
+        case Witness(claims=claims):
+            return "; ".join(map(claim_text, claims)) or "it happens here"
+        case Bracket(of=of, low=low, high=high, why=why):
+            return f"{of} lies between {number(low)} and {number(high)}; {why}"
+        case Sampled():
+            return sampled_text(state)
+        case Declined(code=code, reason=reason):
+            return f"{code}: {reason}"
+
+
+def result_text(result: Result) -> str:
+    """Return what another verb found, in words.
+
+    Example:
+        >>> from fuzzytree.auditing.records import Source
+        >>> result_text(Result("stability", Source("s.json", ""), 10, 1))
+        '1 of 10 criteria fails'
+    """
+    what, wrong = ("comparisons and bounds", "disagree")
+    if result.verb == "stability":
+        what, wrong = ("criteria", "fail")
+    if not result.wrong:
+        return f"none of {result.parts} {what} {wrong}s"
+    verb = f"{wrong}s" if result.wrong == 1 else wrong
+    return f"{result.wrong} of {result.parts} {what} {verb}"

@@ -9,8 +9,7 @@ from typing import Final
 from fuzzytree.auditing.difference_records import Change, Compared, Difference
 from fuzzytree.auditing.records import Answer, Place
 from fuzzytree.proving.states import Bracket, Coordinate, Witness
-from fuzzytree.report.audit import state_text
-from fuzzytree.report.audit_states import state_word
+from fuzzytree.report.audit_states import state_text, state_word
 from fuzzytree.report.svg_regions import span_text
 from fuzzytree.report.text import counted
 

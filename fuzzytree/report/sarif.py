@@ -12,8 +12,7 @@ import msgspec
 from fuzzytree.auditing.baselines import gone
 from fuzzytree.auditing.codes import CODES, Code
 from fuzzytree.auditing.records import Answer, Audit, Place, Severity
-from fuzzytree.report.audit import state_text
-from fuzzytree.report.audit_states import state_word
+from fuzzytree.report.audit_states import state_text, state_word
 
 SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 
