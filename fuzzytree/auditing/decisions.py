@@ -19,6 +19,7 @@ import numpy as np
 
 from fuzzytree.auditing.domains import inputs_of
 from fuzzytree.auditing.drafting import Evidence
+from fuzzytree.auditing.matching import have_same_classes
 from fuzzytree.auditing.records import Answer, Settings
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.auditing.support import drawn, share
@@ -152,9 +153,13 @@ def _alike(pair: Pair, clock: Clock) -> State:
     """Return whether both answer alike; the budget is kept even within a box."""
     try:
         with enforced(clock):
-            return alike(pair.old, pair.new, pair.domain, clock)
+            state = alike(pair.old, pair.new, pair.domain, clock)
     except OutOfTimeError:
-        return Bracket(OF, 0.0, 1.0, "the budget was spent within a box")
+        state = Bracket(OF, 0.0, 1.0, "the budget was spent within a box")
+    if isinstance(state, Bracket) and have_same_classes(pair.old, pair.new):
+        why = "each class has the same rules: answers differ only where classes tie"
+        return Bracket(OF, 0.0, 0.0, why)
+    return state
 
 
 def _same_everywhere(pair: Pair) -> Answer | None:

@@ -8,7 +8,7 @@ and another class; equal words, with curves that changed; some clauses in common
 from __future__ import annotations
 
 import itertools
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
@@ -119,6 +119,39 @@ class Said:
     def words(self, rule: Rule) -> Hashable:
         """Return what rules have in common that read the same."""
         return frozenset(map(words_of, rule.when)), self.then(rule)
+
+
+def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
+    """Return whether each class is as strong in both rule bases, at any input.
+
+    So it is where it has the same rules, in any order and any number of times; the two
+    can then differ only where two classes are equally strong.
+
+    Example:
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> turned = RuleBase(
+        ...     "b", rules.classes, rules.variables, rules.rules[::-1], rules.semantics
+        ... )
+        >>> have_same_classes(rules, turned)
+        True
+    """
+    one, other = old.semantics, new.semantics
+    if (one.conjunction, one.uncovered) != (other.conjunction, other.uncovered):
+        return False
+    curves = Curves()
+    asked: list[set[Hashable]] = []
+    for rules in (old, new):
+        said = Said(rules, curves)
+        known: set[Hashable] = set()
+        for rule in rules.rules:
+            counts = Counter(map(said.clause, rule.when))
+            if one.conjunction == "min":  # a clause that stands twice counts once
+                counts = Counter({*counts})
+            known.add((frozenset(counts.items()), rule.then))
+        asked.append(known)
+    return asked[0] == asked[1]
 
 
 def words_of(clause: Clause) -> NamedKey:

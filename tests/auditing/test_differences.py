@@ -153,6 +153,33 @@ def test_rules_in_another_order_break_where_a_tie_is_answered_otherwise() -> Non
     assert point_of(state.point) == {"x": Fraction(1, 2)}
 
 
+def test_rules_in_another_order_differ_only_where_classes_tie() -> None:
+    rises = Term("up", Points((0.0, 2.0), (0.0, 1.0)))  # met at 2/3, which is no double
+    falls = Term("down", Points((0.0, 1.0), (1.0, 0.0)))
+    variable = Variable("x", (rises, falls), "", 0.0, 1.0)
+    up, down = Rule((Clause("x", ("up",)),), "a"), Rule((Clause("x", ("down",)),), "b")
+    old = RuleBase("tie", ("a", "b"), (variable,), (up, down))
+    found = told(old, replace(old, rules=(down, up, up)))
+    assert found.verdict == "open"
+    state = found.answers[0].state
+    assert isinstance(state, Bracket)
+    assert (state.low, state.high) == (0.0, 0.0)
+    assert state.why == (
+        "each class has the same rules: answers differ only where classes tie"
+    )
+    assert found.answers[0].sentence == (
+        "no decision was seen to differ, and where both margins are larger than 0 "
+        "none does"
+    )
+    squared = Rule((*up.when, Clause("x", ("up",))), "a")
+    product = Semantics("product")
+    old, new = (
+        RuleBase("tie", ("a", "b"), (variable,), (one, down), product)
+        for one in (up, squared)
+    )
+    assert told(old, new).verdict == "changed"  # twice is no longer once
+
+
 def test_a_cut_that_moved_by_one_double_has_its_witness_exactly_there() -> None:
     def crisp(cut: float) -> RuleBase:
         whole = grip(cut)
