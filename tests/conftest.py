@@ -20,3 +20,10 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
         gc.collect()
         gc.freeze()
+
+
+@pytest.fixture(scope="module")
+def few_objects() -> None:
+    """Keep what tests before have made from the collection before a measurement."""
+    gc.collect()
+    gc.freeze()

@@ -32,6 +32,8 @@ from fuzzytree.runtimes.native import load
 from fuzzytree.timing.records import Machine
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets
 
+pytestmark = pytest.mark.usefixtures("few_objects")
+
 ROOT = Path(__file__).parent.parent
 GOLDEN = ROOT / "tests" / "golden" / "claims"
 STUDENT_1 = 12.706204736  # 97.5 % of Student's distribution of one degree of freedom

@@ -22,6 +22,8 @@ from fuzzytree.savings import report, stages, with_all_columns
 from fuzzytree.testing import random_tree
 from tests.test_pruning import ALL, FORCE, HARD, PATH, SOFT, base, force
 
+pytestmark = pytest.mark.usefixtures("few_objects")
+
 ROOT = Path(__file__).resolve().parent.parent
 OUTCOMES = ("native", "native mixed", "native float32", "best-first")
 

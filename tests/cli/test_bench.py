@@ -17,6 +17,8 @@ from fuzzytree.timing.records import Study
 from tests.cli.conftest import Call
 from tests.timing.studies import error, point, study, timing
 
+pytestmark = pytest.mark.usefixtures("few_objects")
+
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "bench"
 FAST = ("--rows", "8", "--threads", "1", "--budget", "1", "--only", "native")
 

@@ -15,6 +15,8 @@ from fuzzytree.rulebase import Band, Term, Variable
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 
+pytestmark = pytest.mark.usefixtures("few_objects")
+
 
 @pytest.fixture(autouse=True)
 def _here(folder: Path) -> None:

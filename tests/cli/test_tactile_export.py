@@ -16,6 +16,8 @@ from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.verbs import save
 from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
 
+pytestmark = pytest.mark.usefixtures("few_objects")
+
 SCHEMA = Path(__file__).resolve().parents[2] / "schemas" / "tactile-bench.schema.json"
 NONE = np.zeros(0, np.int64)
 SIZE = ["--sensor", "6x4", "--full", "100"]

@@ -21,6 +21,8 @@ from fuzzytree.timing.clock import (
 )
 from fuzzytree.timing.records import Timing
 
+pytestmark = pytest.mark.usefixtures("few_objects")
+
 MS = 1_000_000
 
 

@@ -31,6 +31,8 @@ from fuzzytree.timing.study import Plan, bench, faults, fitting, run_study
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
 
+pytestmark = pytest.mark.usefixtures("few_objects")
+
 ROOT = Path(__file__).resolve().parents[2]
 RULES = rules_from_tree(random_tree(3), "raw")
 SMALL = Plan(rows=(4,), threads=(1,), rounds=6, budget_s=10.0)
