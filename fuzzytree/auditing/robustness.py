@@ -5,24 +5,19 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-from fuzzytree.auditing.disagreement import narrowed_state
+from fuzzytree.auditing.deciders import Decider, decider_of
+from fuzzytree.auditing.nearby import narrowed_state
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.rows import OF_RANGES, Points, distance_measure, points_of
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.auditing.trees import too_many
 from fuzzytree.numerics.exact import outwards
-from fuzzytree.proving.clock import Clock
-from fuzzytree.proving.decisions import decision_at, other_decision
-from fuzzytree.proving.domain import Domain
-from fuzzytree.proving.ground import ground, narrowed, strengths_at
-from fuzzytree.proving.nearest import Nearest, nearest, nearest_box
-from fuzzytree.proving.polytopes import Polytope, Polytopes, polytope_of
-from fuzzytree.proving.regions import boxes, leaf_at, regions
+from fuzzytree.proving.nearest import Nearest
+from fuzzytree.proving.regions import regions
 from fuzzytree.proving.states import (
     Bracket,
-    Carrier,
     Claim,
     Declined,
     Proved,
@@ -31,9 +26,7 @@ from fuzzytree.proving.states import (
     coordinates,
 )
 from fuzzytree.proving.variables import contains, variable_value
-from fuzzytree.proving.witnesses import is_within
 from fuzzytree.proving.wording import answer_text, number_text, percent
-from fuzzytree.tree import FuzzyTree
 
 MOST_ROWS = 50
 """Rows whose radius is sought."""
@@ -42,97 +35,6 @@ SHOWN_ROWS = 5
 """Rows of the smallest radius that have an answer of their own."""
 
 _MOST_NAMED = 4  # inputs in a sentence
-
-
-class Decider(Protocol):
-    """A model that decides, asked exactly."""
-
-    of: Carrier
-
-    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
-        """Return the answer at a point, and what gave it."""
-        ...
-
-    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
-        """Return how far the nearest point with another answer is."""
-        ...
-
-
-class CrispDecider:
-    """A tree, by the regions of its leaves.
-
-    Args:
-        subject: The tree as it is audited.
-        tree: The tree itself.
-    """
-
-    of: Carrier = "tree"
-
-    def __init__(self, subject: Subject, tree: FuzzyTree) -> None:
-        self.tree, self.domain = tree, subject.domain
-        self.boxes: list[tuple[str, Domain]] = []
-        parts: list[Polytope] = []
-        variables = {variable.name: variable for variable in tree.variables}
-        for region in regions(tree):
-            for box in boxes(region, tree, subject.domain):
-                self.boxes.append((region.label, box))
-                parts.append(polytope_of(box, tree.inputs, variables))
-        self.is_plain = not any(variable.parts for variable in tree.variables)
-        self.polytopes = Polytopes(subject.domain, tree.inputs, parts)
-
-    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
-        """Return the class of the leaf that a point reaches, and the leaf."""
-        leaf = leaf_at(self.tree, point)
-        return self.tree.leaves[leaf - 1].label, f"leaf {leaf}"
-
-    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
-        """Return how far the nearest region of another class is."""
-        label, _ = self.decided(point)
-        chosen = [n for n, (other, _) in enumerate(self.boxes) if other != label]
-        if self.is_plain:
-            others = [self.boxes[number][1] for number in chosen]
-            return nearest_box(self.domain, point, others)
-        return self.polytopes.nearest(point, chosen, clock)
-
-
-class RuleDecider:
-    """Rules of which the strongest decides.
-
-    Args:
-        subject: The rules as they are audited.
-    """
-
-    of: Carrier = "rules"
-
-    def __init__(self, subject: Subject) -> None:
-        self.subject = subject
-        self.given = ground(subject.rules, subject.domain)
-
-    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
-        """Return the class of the first of the strongest rules, and the rule."""
-        strengths = strengths_at(self.given, point)
-        best = max(strengths)
-        if not best:
-            return self.subject.rules.semantics.uncovered, "no rule"
-        number = strengths.index(best) + 1
-        label = self.subject.rules.rules[number - 1].then
-        return label, self.subject.rule_name(number)
-
-    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
-        """Return how far the nearest point is where a rule of another class wins."""
-        label = decision_at(self.given, point)
-
-        def is_one(other: Mapping[str, Fraction]) -> bool:
-            decided = decision_at(self.given, other)
-            return decided != label and is_within(self.given, other)
-
-        return nearest(
-            self.subject.domain,
-            point,
-            lambda box: other_decision(narrowed(self.given, box), label, clock),
-            is_one,
-            clock,
-        )
 
 
 # --- a row
@@ -192,13 +94,6 @@ def _declined(subject: Subject) -> Declined | None:
     if not subject.is_whole:
         return Declined("FTD07", "rules are left out that may decide")
     return None if subject.tree is None else too_many(regions(subject.tree))
-
-
-def decider_of(subject: Subject) -> Decider:
-    """Return a model as it is asked: trees by regions, rules by strengths."""
-    if subject.tree is not None:
-        return CrispDecider(subject, subject.tree)
-    return RuleDecider(subject)
 
 
 def _point(subject: Subject, row: Mapping[str, float]) -> dict[str, Fraction]:
@@ -283,6 +178,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     points = points_of(subject, subject.rows)
     decider = decider_of(subject)
     asked: list[_Asked] = []
+    decider.look([point for _, point in points.at[:MOST_ROWS]])
     for number, point in points.at[:MOST_ROWS]:
         if subject.clock.is_over:
             break

@@ -49,7 +49,7 @@ class Around:
     """
 
     def __init__(self, rules: RuleBase, domain: Domain) -> None:
-        self.rules = rules
+        self.rules, self.inputs = rules, rules.inputs
         self.low, self.high = ends_of(rules, domain)
         self.width = self.high - self.low
         self.variables = {variable.name: variable for variable in rules.variables}
@@ -117,7 +117,7 @@ class Around:
         if variable.parts:
             first, last = self._combined(variable, low, high)
         else:
-            place = self.rules.inputs.index(variable.name)
+            place = self.inputs.index(variable.name)
             first, last = low[place], high[place]
         most = np.finfo(np.float64).max
         first = np.maximum(np.nextafter(first, -np.inf), -most)
@@ -130,10 +130,10 @@ class Around:
 
         The ends are doubles, so that its value there is known as well as at a row.
         """
-        weight = dict.fromkeys(self.rules.inputs, 0.0)
+        weight = dict.fromkeys(self.inputs, 0.0)
         for part in variable.parts:
             weight[part.input] += part.weight
-        names = self.rules.inputs
+        names = self.inputs
         rising = np.array([[weight[name] > 0.0] for name in names])
         down = axis_value(
             variable, dict(zip(names, np.where(rising, low, high), strict=True))
@@ -256,6 +256,17 @@ class Around:
         away[self.margins(points, label) >= 0.0] = np.inf
         nearest = int(away.argmin())
         return points[:, nearest], float(away[nearest])
+
+    def pairs(self, points: FloatArray, others: FloatArray) -> list[tuple[int, float]]:
+        """Return for each point the nearest of some others, and how far it is."""
+        if not others.shape[1]:
+            return [(0, np.inf)] * points.shape[1]
+        found: list[tuple[int, float]] = []
+        for column in points.T:
+            away = self._away(others, column[:, np.newaxis])
+            place = int(away.argmin())
+            found.append((place, float(away[place])))
+        return found
 
     def _away(self, points: FloatArray, centres: FloatArray) -> FloatArray:
         width = np.where(self.width > 0.0, self.width, np.inf)

@@ -125,7 +125,7 @@ class Polytopes:
             ('1/4', True)
         """
         at = [centre[name] for name in self.inputs]
-        bounds = self._bound.of(at)
+        bounds = self.bounds(centre)
         best: Nearest | None = None
         least = Fraction(1)
         clock = clock or Clock()
@@ -149,6 +149,10 @@ class Polytopes:
         if best is None:
             return Nearest(Fraction(1), is_none=True)
         return Nearest(least, best.high, best.point)
+
+    def bounds(self, centre: Mapping[str, Fraction]) -> list[float]:
+        """Return a radius within which each polytope is not, quickly."""
+        return self._bound.of([centre[name] for name in self.inputs])
 
     def _reached(
         self, place: int, at: Sequence[Fraction], enough: Fraction | None

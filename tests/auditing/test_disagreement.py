@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.disagreement import Both, answers
+from fuzzytree.auditing.deciders import Both
+from fuzzytree.auditing.disagreement import answers
 from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.numerics.exact import exact_answer

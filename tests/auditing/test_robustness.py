@@ -8,8 +8,9 @@ from fractions import Fraction
 
 import pytest
 
+from fuzzytree.auditing.deciders import decider_of
 from fuzzytree.auditing.records import Answer
-from fuzzytree.auditing.robustness import answers, decider_of, radius, row_answers
+from fuzzytree.auditing.robustness import answers, radius, row_answers
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.proving.clock import Clock
