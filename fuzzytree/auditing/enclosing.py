@@ -18,6 +18,7 @@ point is held against the curve's own value, enclosed by `fuzzytree.numerics
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Final, Literal, NamedTuple
@@ -76,6 +77,7 @@ class Enclosed(NamedTuple):
         return Enclosed(self.upper, self.lower, ("swapped", *self.key))
 
 
+@functools.lru_cache(maxsize=256)
 def enclosed(curve: Curve, of: Range | None) -> Enclosed | None:
     """Return two lines between which a curve is.
 

@@ -14,6 +14,7 @@ rounded degree of the condition by the weight, in one rounding more.)
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
@@ -44,7 +45,7 @@ Name = tuple[str, str]
 """A variable and one of its terms."""
 
 
-class Held(msgspec.Struct, frozen=True, eq=False):
+class Held(msgspec.Struct, frozen=True, eq=False, dict=True):
     """Rules from below and from above.
 
     Attributes:
@@ -68,20 +69,32 @@ class Held(msgspec.Struct, frozen=True, eq=False):
 
     def key(self, number: int) -> tuple[object, ...]:
         """Return what a rule asks: equal for rules that ask the same."""
-        shapes = shapes_of(self.lower.variables)
-        known = {name: one.key for name, one in self.terms.items()}
         asked = (
-            (
-                clause.variable,
-                clause.negated,
-                frozenset(
-                    known.get((clause.variable, term), (shapes[clause.variable, term],))
-                    for term in clause.terms
-                ),
-            )
-            for clause in self.lower.rules[number - 1].when
+            (one.variable, one.negated, frozenset(self._keys(one)))
+            for one in self.lower.rules[number - 1].when
         )
         return tuple(sorted(asked, key=repr))
+
+    def asked(self, clause: Clause) -> tuple[tuple[object, ...], float, float]:
+        """Return what a clause asks, and times which weights: the least, the most."""
+        weights, keys = set[float](), set[tuple[object, ...]]()
+        for key in self._keys(clause):
+            is_weighted = isinstance(key[0], float)
+            weights.add(float(str(key[0])) if is_weighted else 1.0)
+            keys.add(key[1:] if is_weighted else key)
+        what = clause.variable, clause.negated, frozenset(keys)
+        return what, min(weights), max(weights)
+
+    def _keys(self, clause: Clause) -> Iterator[tuple[object, ...]]:
+        """Yield what the terms of a clause are."""
+        for term in clause.terms:
+            name = clause.variable, term
+            known = self.terms.get(name)
+            yield (self._shapes[name],) if known is None else known.key
+
+    @functools.cached_property
+    def _shapes(self) -> Mapping[Name, Shape]:
+        return shapes_of(self.lower.variables)
 
     def certified(self, state: State) -> State:
         """Return what a state of the lower rules says of the true ones.

@@ -6,16 +6,16 @@ same in both, and everything is asked once.
 
 Where two rules share a clause, its degree v is one number for both. If one rule is
 nowhere weaker than the other with the upper degree u in both, it is so with v <= u too:
-`min(u, a) >= min(u, b)` makes `a >= min(u, b) >= min(v, b)`, and `u a >= u b` makes
-`a >= b` where u is above 0. So a shared clause is taken from above in both.
+`min(u, a) >= min(w u, b)` makes `a >= min(w u, b) >= min(w v, b)` for a weight w of at
+most 1, and `u a >= u b` makes `a >= b` where u is above 0. So a shared clause is taken
+from above in both.
 """
 
 from __future__ import annotations
 
 import functools
 import itertools
-from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
@@ -44,7 +44,7 @@ from fuzzytree.proving.meeting import Meeting, highest, meet
 from fuzzytree.proving.states import Bracket, Claim, Proved, State, Witness
 from fuzzytree.proving.variables import span
 from fuzzytree.proving.wins import wins
-from fuzzytree.rulebase import Clause, Points, RuleBase, Term, Variable, shapes_of
+from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Term, Variable, shapes_of
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
@@ -130,9 +130,9 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
         """
         below, above = self.lower.rules, self.upper.rules
         mine, theirs = below.rules[one - 1], above.rules[other - 1]
-        spare = Counter(theirs.when if shares else ())
+        known = [*theirs.when] if shares else []
         when = [
-            clause if mine.when.count(clause) <= spare[clause] else _renamed(clause)
+            clause if self._is_shared(clause, mine, known) else _renamed(clause)
             for clause in mine.when
         ]
         variables = (
@@ -145,6 +145,18 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
             rules=(replace(mine, when=tuple(when)), theirs),
         )
         return Compared(ground(rules, self.lower.domain))
+
+    def _is_shared(self, clause: Clause, rule: Rule, others: Sequence[Clause]) -> bool:
+        """Return whether other clauses ask what one of a rule does, perhaps for less.
+
+        Under the product they must do so as often: `v b` is not below `v v a`.
+        """
+        assert self.held is not None
+        if self.is_product:
+            return rule.when.count(clause) <= others.count(clause)
+        mine, weight, _ = self.held.asked(clause)
+        found = map(self.held.asked, others)
+        return any(theirs == mine and most <= weight for theirs, _, most in found)
 
     def distance(self, one: int, other: int, most: Fraction) -> Distance | None:
         """Return how far two rules are apart, None if more; see `factors.distance`.

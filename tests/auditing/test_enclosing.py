@@ -94,7 +94,7 @@ def test_a_curve_is_nowhere_beyond_its_lines_and_never_far_from_them(
 ) -> None:
     found = enclosed(curve, OF)
     assert found is not None
-    assert not beyond(curve, found, 8)
+    assert not beyond(curve, found, 4)
     assert 0 < gap(found, OF) <= 2 * HALF_GAP * (1 + 2**-19)
 
 
