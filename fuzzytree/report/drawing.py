@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from fuzzytree.inference.curves import curve_degree
+from fuzzytree.naming import printable
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.proving.domain import Domain
 from fuzzytree.report.markup import Attribute, Content, Markup, tag, trimmed
@@ -289,7 +290,7 @@ def cut(words: str, letters: float) -> str:
         >>> cut("above 1.75", 6)
         'above…'
     """
-    most = max(int(letters), 2)
+    words, most = printable(words), max(int(letters), 2)
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
 

@@ -23,6 +23,7 @@ from fuzzytree.report.drawing import (
     Scale,
     axes_of,
     curve_of,
+    cut,
     polyline,
     spread,
     thinned,
@@ -47,6 +48,10 @@ from tests.report.page_audits import rows_of, rule_base
 
 HUGE = 1.7e308
 ALWAYS = (Rule((), "k"),)
+
+
+def test_a_name_is_cut_by_what_is_drawn_of_it() -> None:
+    assert cut("a\u200d" * 9, 8) == r"a\u200d…"
 
 
 def axis(low: float | None = 0.0, high: float | None = 10.0) -> Axis:
