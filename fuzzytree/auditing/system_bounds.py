@@ -211,7 +211,7 @@ def most(
         next(each for each in system.outputs if each.name == output)
         for system in (old, new)
     )
-    known = entries(old, output), entries(new, output)
+    known = entries(old, output, domain), entries(new, output, domain)
     found = _moved(old, new, (one, other), known, domain)
     spans = [
         _span(system, each, asked, domain)

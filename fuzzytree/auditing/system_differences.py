@@ -113,6 +113,9 @@ def _variable_drafts(noun: str, old: _Variables, new: _Variables) -> Iterator[_D
                 continue
             shown = "cosmetic" if key == "unit" else "moves"
             text = f"the {key} of {name!r} is {_text(now)}, and was {_text(was)}"
+            if key == "clips":
+                text = f"values of {name!r} are {'now' if now else 'no longer'} held "
+                text += "in its range"
             yield shown, "unit" if key == "unit" else noun, text, here, there
         yield from _label_drafts(one, other, here, there)
     for name, (place, _) in theirs.items():

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from fuzzytree.auditing.matching import Curves
 from fuzzytree.casting import joined_outputs
 from fuzzytree.casting.shapes import shape_of
+from fuzzytree.proving.domain import Domain
 from fuzzytree.system import (
     And,
     Condition,
@@ -52,8 +53,16 @@ class Entry(NamedTuple):
     most: float
 
 
-def computed(system: FuzzySystem, output: str) -> Hashable:
+def computed(
+    system: FuzzySystem, output: str, domain: Domain | None = None
+) -> Hashable:
     """Return the operations and numbers that an output is computed by.
+
+    Args:
+        system: The system.
+        output: The name of one of its outputs.
+        domain: Where it is computed; anywhere unless given. A range that holds the
+            domain changes no value.
 
     Example:
         >>> from fuzzytree.testing import random_system
@@ -62,16 +71,19 @@ def computed(system: FuzzySystem, output: str) -> Hashable:
         >>> computed(one, name) == computed(other, name)
         False
     """
-    return _Read(system, None).output(output)
+    return _Read(system, None, domain).output(output)
 
 
-def meant(system: FuzzySystem, output: str, curves: Curves) -> Hashable | None:
+def meant(
+    system: FuzzySystem, output: str, curves: Curves, domain: Domain | None = None
+) -> Hashable | None:
     """Return the function of real numbers that an output is.
 
     Args:
         system: The system.
         output: The name of one of its outputs.
         curves: Numbers curves, equal ones for those of equal degrees.
+        domain: As for `computed`.
 
     Returns:
         None where the function jumps, so that rounding may change it by much.
@@ -84,12 +96,12 @@ def meant(system: FuzzySystem, output: str, curves: Curves) -> Hashable | None:
     is_smooth = method in ("centroid", "weighted average", "weighted sum")
     if not is_smooth or norms & _STEPPED or ways - {"general", "proportional"}:
         return None
-    return _Read(system, curves).output(output)
+    return _Read(system, curves, domain).output(output)
 
 
-def entries(system: FuzzySystem, output: str) -> tuple[Entry, ...]:
-    """Return what concludes an output, in the order of the rules."""
-    return tuple(_Read(system, None).entries(output))
+def entries(system: FuzzySystem, output: str, domain: Domain) -> tuple[Entry, ...]:
+    """Return what concludes an output on a domain, in the order of the rules."""
+    return tuple(_Read(system, None, domain).entries(output))
 
 
 class _Read:
@@ -98,10 +110,13 @@ class _Read:
     Args:
         system: The system.
         curves: Numbers curves; then operands whose order does not matter are sorted.
+        domain: Where values lie; anywhere if None.
     """
 
-    def __init__(self, system: FuzzySystem, curves: Curves | None) -> None:
-        self.system, self.curves = system, curves
+    def __init__(
+        self, system: FuzzySystem, curves: Curves | None, domain: Domain | None
+    ) -> None:
+        self.system, self.curves, self.domain = system, curves, domain
         self.outputs = {one.name: one for one in system.outputs}
         self.labels = {
             (one.name, label.name): label
@@ -121,11 +136,19 @@ class _Read:
         self.is_chained = not named.isdisjoint(self.outputs)
 
     def _source(self, one: SystemInput) -> Hashable:
-        held = (one.low, one.high) if one.clips else None
+        held = (one.low, one.high) if one.clips and not self._holds(one) else None
         parts = tuple(
             (part.weight, part.centre, self.sources[part.input]) for part in one.parts
         )
         return (parts or one.name, held)
+
+    def _holds(self, one: SystemInput) -> bool:
+        """Return whether the range of an input holds its part of the domain."""
+        side = self.domain.side(one.name) if self.domain and not one.parts else None
+        return side is not None and (
+            (one.low is None or one.low <= side.low)
+            and (one.high is None or side.high <= one.high)
+        )
 
     def output(self, name: str) -> Hashable:
         """Return the key of an output; of all where one depends on another."""

@@ -93,42 +93,61 @@ def number_answers(
         settings: How many points are drawn, and their seed.
         clock: How much time there is.
     """
-    if not pair.outputs:
-        return []
-    curves = Curves()
-    open_ = [
-        name
-        for name in pair.outputs
-        if computed(pair.old, name) != computed(pair.new, name)
-    ]
-    if not open_:
-        how = "both perform the same operations on the same numbers"
-        return [_proved(pair, _ALIKE, how)]
-    rounded: list[str] = []
-    for name in open_:
-        one, other = (meant(each, name, curves) for each in (pair.old, pair.new))
-        if one is not None and one == other:
-            rounded.append(name)
-    found = _Found(pair, [*open_], frozenset(rounded))
+    whole = [_how(pair, name) for name in pair.outputs]
+    if not whole or all(how is _SAME for how in whole):
+        return [_proved(pair, _ALIKE, _SAME.how)] if whole else []
+    hows = dict(zip(pair.outputs, whole, strict=True))
+    open_ = [name for name, how in hows.items() if how is not _SAME]
+    rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
+    found = _Found(pair, open_, rounded)
     answers = [*_sampled(found, rows, settings, clock)]
     if found.differing:
         answers = [*map(found.witness, found.differing), *answers]
-    elif len(rounded) == len(open_):
-        how = "both are one function of real numbers: equal curves in equal rules"
+    elif all(whole):
+        is_rounded = bool(rounded)
+        how = _ROUNDED.how if is_rounded else _HELD.how
+        sentence = f"{_ALIKE} everywhere on the domain"
+        sentence += ", but for rounding" if is_rounded else ""
         measures = (Measure("largest difference by rounding", found.rounding),)
-        whole = _proved(pair, f"{_ALIKE}, but for rounding", how)
-        return [msgspec.structs.replace(whole, measures=measures), *answers]
-    for name in pair.outputs:
-        if name not in open_:
-            how = "by the same operations on the same numbers"
-        elif name in rounded and name not in found.largest:
-            how = "as one function of real numbers, so that rounding may differ"
-        else:
-            continue
-        sentence = f"both systems compute {name!r} alike"
-        answers.append(Answer("FT801", name, sentence, Proved(how), is_finding=False))
-    answers += [found.bound(name) for name in open_ if name not in rounded]
+        whole_answer = _proved(pair, sentence, how)
+        if is_rounded:
+            whole_answer = msgspec.structs.replace(whole_answer, measures=measures)
+        return [whole_answer, *answers]
+    for name, known in hows.items():
+        if known is not None and name not in found.largest:
+            sentence = f"both systems compute {name!r} alike{known.where}"
+            state = Proved(known.how)
+            answers.append(Answer("FT801", name, sentence, state, is_finding=False))
+    answers += [found.bound(name) for name, how in hows.items() if how is None]
     return answers
+
+
+class _Alike(NamedTuple):
+    """How an output is known to be alike, and where."""
+
+    how: str
+    where: str
+
+
+_SAME = _Alike("both perform the same operations on the same numbers", "")
+_HELD = _Alike(_SAME.how, " everywhere on the domain")
+_ROUNDED = _Alike(
+    "both are one function of real numbers: equal curves in equal rules",
+    " everywhere on the domain, but for rounding",
+)
+
+
+def _how(pair: Pair, name: str) -> _Alike | None:
+    """Return how an output of both is known to be alike; None if it is not."""
+    old, new, domain = pair.old, pair.new, pair.domain
+    if computed(old, name) == computed(new, name):
+        return _SAME
+    if computed(old, name, domain) == computed(new, name, domain):
+        return _HELD
+    curves = Curves()
+    key = meant(old, name, curves, domain)
+    is_one = key is not None and key == meant(new, name, curves, domain)
+    return _ROUNDED if is_one else None
 
 
 def _proved(pair: Pair, sentence: str, how: str) -> Answer:
@@ -273,7 +292,7 @@ class _Found:
         found = self.largest[name]
         point = {key: Fraction(value) for key, value in found.row.items()}
         how = "as the reference computes it"
-        said = f"{name!r} is {found.now!r}, and was {found.was!r}"
+        said = f"{name!r} is {_shown(found.now)}, and was {_shown(found.was)}"
         measure = Measure("largest difference", found.gap)
         try:
             point = self._simple(name, point)
@@ -341,11 +360,22 @@ class _Found:
                 "FT801", f"bound of {name}", sentence, state, is_finding=False
             )
         high, why = outwards(known[0])[1], known[1]
-        low = 0.0 if seen is None or math.isinf(seen.gap) else min(seen.gap, high)
+        is_within = (
+            seen is not None
+            and math.isfinite(seen.gap)
+            and all(
+                side.low <= seen.row[side.variable] <= side.high
+                for side in self.pair.domain.sides
+                if side.variable in seen.row
+            )
+        )
+        low = min(seen.gap, high) if seen is not None and is_within else 0.0
         state = Bracket(of, low, high, why)
         sentence = f"{name!r} differs by at most {high:.6g} where both answer a number"
         return Answer("FT801", f"bound of {name}", sentence, state, is_finding=False)
 
 
-def _shown(number: Fraction | None) -> str:
-    return "no number" if number is None else f"{float(number)!r}"
+def _shown(number: Fraction | float | None) -> str:
+    if number is None or math.isnan(number):
+        return "no number"
+    return repr(float(number))

@@ -118,7 +118,9 @@ def test_rules_in_another_order_are_alike_but_for_rounding() -> None:
     found = told(tipper(), with_rules(tipper(), THREE, ONE, TWO))
     assert (found.verdict, found.ok) == ("equal", True)
     first = found.answers[0]
-    assert first.sentence == "both systems compute alike, but for rounding"
+    assert first.sentence == (
+        "both systems compute alike everywhere on the domain, but for rounding"
+    )
     assert first.measures[0].value < 1e-13
     assert not any(answer.is_finding for answer in found.answers)
 
@@ -134,6 +136,21 @@ def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
     assert told(old, new).answers[0].state == Proved(
         "both are one function of real numbers: equal curves in equal rules"
     )
+
+
+def test_a_range_that_holds_the_domain_moves_no_value() -> None:
+    food, service = tipper().inputs
+    held = tipper(inputs=(replace(food, clips=True), service))
+    found = told(tipper(), held)
+    assert (found.verdict, found.ok) == ("equal", True)
+    assert found.answers[0].sentence == (
+        "both systems compute alike everywhere on the domain"
+    )
+    assert [change.sentence for change in found.changes] == [
+        "values of 'food' are now held in its range"
+    ]
+    short = tipper(inputs=(replace(food, high=5.0, clips=True), service))
+    assert told(tipper(), short).verdict == "changed"
 
 
 def test_columns_that_one_alone_has_are_told_of() -> None:
@@ -327,8 +344,8 @@ def check_pair(seed: int, rows: int) -> None:
     new = altered(old, chance)
     name, curves = output.name, Curves()
     domain = domain_of(old)
-    is_same = computed(old, name) == computed(new, name)
-    keys = [meant(system, name, curves) for system in (old, new)]
+    is_same = computed(old, name, domain) == computed(new, name, domain)
+    keys = [meant(system, name, curves, domain) for system in (old, new)]
     is_meant = keys[0] is not None and keys[0] == keys[1]
     bound = most(old, new, name, domain)
     for _ in range(rows):
