@@ -24,7 +24,7 @@ from fuzzytree.rechecking.building import built, read_json
 from fuzzytree.rechecking.cases import Case
 from fuzzytree.rechecking.head import check_files, check_head
 from fuzzytree.rechecking.model_records import System
-from fuzzytree.rechecking.models import read_model
+from fuzzytree.rechecking.models import read_file
 from fuzzytree.rechecking.outcomes import MOST_BYTES, CannotRunError, DoesNotHoldError
 from fuzzytree.rechecking.report import Report
 
@@ -43,13 +43,14 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
         CannotRunError: If one of them cannot be read.
     """
     facts = read_json(audit, names[0])
-    found, whole = built(Audit, facts, names[0]), read_model(model, names[1])
+    found = built(Audit, facts, names[0])
+    whole, places = read_file(model, names[1])
     if isinstance(whole, System) and found.policy.decision == "strongest":
         text = "a system that stands for rules is not checked again; audit these"
         raise CannotRunError(f"{names[0]}: {text}")
     report = Report()
     try:
-        case = Case(found, whole)
+        case = Case(found, whole, places)
     except DoesNotHoldError as error:
         report.wrong.append(str(error))
         return report

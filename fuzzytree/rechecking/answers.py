@@ -18,6 +18,7 @@ from fuzzytree.rechecking.cases import Case
 from fuzzytree.rechecking.claims import check_point, check_spans, corners, holds
 from fuzzytree.rechecking.deciding import decide, shows
 from fuzzytree.rechecking.fixed import SEVERITIES
+from fuzzytree.rechecking.forms import is_as_told
 from fuzzytree.rechecking.meaning import value_of
 from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError, require
 from fuzzytree.rechecking.report import Report
@@ -48,7 +49,15 @@ def check_answer(case: Case, report: Report, answer: Answer, where: str) -> None
 def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     """Check what an answer names: rules, terms, measures, units, places."""
     expect = report.expect
-    expect(bool(answer.sentence and answer.subject), f"{where}: it says nothing")
+    try:
+        is_told = is_as_told(case, answer)
+    except IndexError:
+        is_told = False  # a rule that there is not
+    if is_told is None:
+        text = "sentences of a form that is not known here"
+        report.undecided["SENTENCE", text].append(answer.code)
+    expect(is_told is not False, f"{where}: its sentence says other than its facts")
+    report.counts["sentences held against facts"] += bool(is_told)
     count = len(case.rules.rules)
     for number in answer.rules:
         expect(1 <= number <= count, f"{where}: there is no rule {number}")
@@ -67,8 +76,13 @@ def _names(case: Case, report: Report, answer: Answer, where: str) -> None:
     expect(not (is_fact and answer.is_finding), f"{where}: it can be no finding")
     for place in answer.places:
         is_file = case.audit.file is not None and place.file == case.audit.file.name
-        is_one = is_file and place.line >= 1 and place.column >= 1
-        expect(is_one, f"{where}: a place that is not in the audited file")
+        expect(is_file, f"{where}: a place that is not in the audited file")
+    told = [(place.line, place.column) for place in answer.places]
+    try:
+        is_there = not case.has_places or told == case.placed(answer)
+    except LookupError:
+        is_there = not told
+    expect(is_there, f"{where}: its rules and terms stand elsewhere")
 
 
 def _measure(report: Report, measure: Measure, where: str) -> None:
@@ -95,7 +109,7 @@ def _state(case: Case, report: Report, answer: Answer) -> None:
     elif isinstance(state, Bracket):
         require(state.low <= state.high, "the ends of the bracket are swapped")
         is_far = answer.code == "FT102" and state.high < case.audit.settings.lead
-        may_be = is_far or answer.code in ("FT403", "FT203", "FT204", "FT601")
+        may_be = is_far or answer.code in ("FT401", "FT403", "FT203", "FT204", "FT601")
         require(may_be or not answer.is_finding, "what is open is no finding")
         if state.point or state.claims:
             check_point(case, report, state.point, state.claims)
@@ -121,7 +135,10 @@ def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None
         is_above = span.low is None or span.low <= x
         is_in = is_above and (span.high is None or x <= span.high)
         require(is_in, f"the witness lies outside its region in {span.variable!r}")
-    lasting = [c for c in state.claims if c.kind not in ("strength", "degree")]
+    passing = {"strength", "degree", "reaches"}
+    lasting = [claim for claim in state.claims if claim.kind not in passing]
+    if answer.code == "FT201":  # of the pair, and not of the weaker of the two
+        lasting = [claim for claim in state.claims if claim.rules == answer.rules]
     for other in corners(case, state.region, point):
         for claim in lasting:
             is_so = holds(case, claim, other)

@@ -33,8 +33,7 @@ def shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] | 
     for left, right, curves in stretches(both, line):
         inside = between(left, right)
         for root in (end for end in (left, right) if isinstance(end, Root)):
-            while root.high - root.low > FINE * (line.high - line.low):
-                root.halve()
+            root.narrow(FINE * (line.high - line.low))
             slack += root.high - root.low
         a = left.high if isinstance(left, Root) else left
         b = right.low if isinstance(right, Root) else right

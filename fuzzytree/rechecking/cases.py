@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from fuzzytree.rechecking.grid import Asked, Grid
 from fuzzytree.rechecking.meaning import Point, strengths
 from fuzzytree.rechecking.model_records import Model, Rules, System, Tree, Variable
 from fuzzytree.rechecking.outcomes import UndecidedError, require
+from fuzzytree.rechecking.places import Place, Places
 from fuzzytree.rechecking.polynomials import ONE, ZERO
 from fuzzytree.rechecking.trees import Steps, paths, rules_of
 from fuzzytree.rechecking.views import View
@@ -36,7 +37,11 @@ class Case:
         numbers: The numbers of the rules, from 1.
     """
 
-    def __init__(self, audit: Audit, model: Model | System) -> None:
+    def __init__(
+        self, audit: Audit, model: Model | System, places: Places | None = None
+    ) -> None:
+        self.places = places or Places({})
+        self.has_places = places is not None and any(a.places for a in audit.answers)
         self.view: View | None = None
         if isinstance(model, System):
             self.view = View(model, audit)
@@ -63,9 +68,25 @@ class Case:
             self.weights = [owner.weight for owner in self.view.owners]
             self.terms = self.view.labels
 
-    @cached_property
+    @property
     def grid(self) -> Grid:
-        """The rules in cells."""
+        """The rules in cells.
+
+        Raises:
+            UndecidedError: If these are too many, or a rule is not made of clauses.
+        """
+        if isinstance(self._grid, UndecidedError):
+            raise self._grid
+        return self._grid
+
+    @cached_property
+    def _grid(self) -> Grid | UndecidedError:
+        try:
+            return self._made()
+        except UndecidedError as error:  # known once, for every question
+            return error
+
+    def _made(self) -> Grid:
         when = zip(self.rules.rules, self.weights, strict=True)
         if not all(weight == 1 or rule.when for rule, weight in when):
             raise UndecidedError("a rule without clauses is not weighted here")
@@ -130,6 +151,26 @@ class Case:
         """Return the class of a rule."""
         return self.rules.rules[number - 1].then
 
+    @property
+    def default(self) -> str:
+        """How sentences call the answer where no rule fires."""
+        if self.view is not None:
+            return "what the outputs have by default"
+        label = self.rules.semantics.uncovered
+        return "no class" if label is None else repr(label)
+
+    def placed(self, answer: Answer) -> list[Place]:
+        """Return where the rules and terms of an answer stand, in that order."""
+        owners = self.view.owners if self.view else ()
+        numbers = [owners[n - 1].number if owners else n - 1 for n in answer.rules]
+        found = [self.places.rules[number] for number in numbers]
+        found += [self.places.terms[label] for label in answer.terms]
+        return [*dict.fromkeys(found)]
+
+    def name(self, number: int) -> str:
+        """Return what answers call a rule."""
+        return self.view.names[number - 1] if self.view else f"rule {number}"
+
     def asked(self, number: int) -> Asked:
         """Return what a rule asks of each axis."""
         return self.grid.of[number - 1]
@@ -150,11 +191,16 @@ class Case:
         owners = self.view.owners if self.view else ()
         return bool(owners) and owners[one - 1] is owners[other - 1]
 
-    def strengths(self, rules: Rules, point: Point) -> list[Between]:
-        """Return between which numbers the strength of each rule lies."""
+    def strengths(
+        self, rules: Rules, point: Point, numbers: Iterable[int]
+    ) -> dict[int, Between]:
+        """Return between which numbers the strengths of some rules lie."""
         if self.view is not None:
-            return self.view.strengths(point)
-        return [(one, one) for one in strengths(rules, point)]
+            return self.view.strengths(point, numbers)
+        known = [*dict.fromkeys(numbers)]
+        some = tuple(rules.rules[number - 1] for number in known)
+        found = strengths(rules._replace(rules=some), point)
+        return {n: (one, one) for n, one in zip(known, found, strict=True)}
 
     def fire(self, *numbers: int) -> bool:
         """Return whether each of some rules fires somewhere."""

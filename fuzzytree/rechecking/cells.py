@@ -91,8 +91,10 @@ class Levels:
         if isinstance(end, Fraction):
             return poly[0], poly[0]
         low, high = end.value(poly)
+        width = end.high - end.low
         while high - low > FINE:
-            end.halve()
+            width = min(width, end.high - end.low) / 2**16
+            end.narrow(width)
             low, high = end.value(poly)
         return low, high
 

@@ -120,16 +120,19 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
         return level is not None and low <= level <= high
     if not isinstance(model, Rules):
         raise DoesNotHoldError("a tree has no strengths")
-    every = case.strengths(model, point)
-    is_known = all(1 <= n <= len(every) for n in (*claim.rules, *claim.rivals))
+    numbers = [*claim.rules, *claim.rivals]
+    is_known = all(1 <= n <= len(model.rules) for n in numbers)
     require(is_known, "a claim of an unknown rule")
-    ours = [every[n - 1] for n in claim.rules]
-    rivals = [every[n - 1] for n in claim.rivals]
+    if claim.kind == "covered":
+        numbers = [*range(1, len(model.rules) + 1)]
+    every = case.strengths(model, point, numbers)
+    ours = [every[n] for n in claim.rules]
+    rivals = [every[n] for n in claim.rivals]
     require(bool(ours) or claim.kind == "covered", "a claim of no rule")
     if claim.kind == "strength":
         return level is not None and ours[0][0] <= level <= ours[0][1]
     if claim.kind == "covered":
-        return _certain(ZERO, max(every))
+        return _certain(ZERO, max(every.values()))
     least = min(low for low, _ in ours), min(high for _, high in ours)
     most = max(low for low, _ in ours), max(high for _, high in ours)
     top = max(rivals, default=(ZERO, ZERO))[0], max([h for _, h in rivals] or [ZERO])
@@ -142,7 +145,7 @@ def holds(case: Case, claim: Claim, point: Point) -> bool:
         raise DoesNotHoldError("a claim without its level")
     if claim.kind == "below":
         return most[1] == level == 0 or _certain(most, level)
-    return least[0] >= level or _certain(level, least)
+    return least[0] >= level or not _certain(least, level)
 
 
 def _certain(small: Between | Fraction, large: Between | Fraction) -> bool:

@@ -16,7 +16,10 @@ def heights(case: Case, answer: Answer) -> None:
     level = case.audit.settings.level
     low = {label: height for label, height in case.heights.items() if height < level}
     told = [one.terms[0] for one in case.coded("FT401") if one.terms]
+    told = [label for label in told if label in case.heights]
     require(told == list(low), "other terms are too low")
+    if any(label not in case.heights for label in answer.terms):
+        raise UndecidedError("the height of a curve that is no polynomial")
     for label in answer.terms:
         is_empty = answer.severity == "error"
         require(is_empty == (not low[label]), f"{label.term!r} is empty, or is not")

@@ -16,6 +16,7 @@ from fuzzytree.rechecking.outcomes import UndecidedError
 from fuzzytree.rechecking.polynomials import ONE, ZERO
 
 BITS, TERMS = 160, 48
+UNIT = 1 << BITS
 Between = tuple[Fraction, Fraction]
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751, 10**49)
@@ -40,18 +41,22 @@ def falling(x: Fraction) -> Between:
         >>> float(low) == float(high) == math.exp(-1)
         True
     """
+    if not x:
+        return ONE, ONE
     if x > BITS:
         return ZERO, Fraction(1, 2**BITS)
     halvings = math.ceil(x).bit_length() + 1
     part = x / 2**halvings  # at most 1/2
-    low, high = ONE, 1 + Fraction(2, 2**TERMS)
+    ends = part.numerator * UNIT // part.denominator, 0
+    ends = ends[0], ends[0] + 1
+    low, high = UNIT, UNIT + (UNIT >> (TERMS - 1)) + 1
     for place in range(TERMS, 0, -1):
-        low = down(1 + down(part) * low / place)
-        high = up(1 + up(part) * high / place)
-    low, high = 1 / high, 1 / low
+        low = UNIT + ends[0] * low // (place * UNIT)
+        high = UNIT - (-ends[1] * high // (place * UNIT))
+    low, high = UNIT * UNIT // high, -(-UNIT * UNIT // low)
     for _ in range(halvings):
-        low, high = down(low * low), up(high * high)
-    return low, high
+        low, high = low * low // UNIT, -(-high * high // UNIT)
+    return Fraction(low, UNIT), Fraction(high, UNIT)
 
 
 def logistic(low: Fraction, high: Fraction) -> Between:

@@ -17,10 +17,15 @@ Asked = tuple[int, ...]
 
 
 class Axis(NamedTuple):
-    """A variable: the numbers of the functions that rules ask, and its cells."""
+    """A variable: the numbers of the functions that rules ask, and its cells.
+
+    Of each cell `spans` has the rank of each function, the highest first, its lowest
+    and its highest band, and its bit.
+    """
 
     numbers: dict[tuple[Clause, Fraction], int]
     cells: list[Cell]
+    spans: list[list[tuple[int, int, int, int]]]
 
 
 class Grid:
@@ -52,8 +57,10 @@ class Grid:
                 }
                 numbers = {c: known[f] for c, f in zip(clauses, functions, strict=True)}
                 found = cells([*known], lines[variable.name], self.levels)
-                self.axes.append(Axis(numbers, found))
+                self.axes.append(Axis(numbers, found, []))
         self.levels.sort()
+        for axis in self.axes:
+            axis.spans.extend(map(self._spans, axis.cells))
         pairs = zip(rules.rules, weights, strict=True)
         self.of = [self.asked(rule.when, weight) for rule, weight in pairs]
         self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
@@ -78,6 +85,13 @@ class Grid:
                     bits[place] |= bit
         return (*bits, again)
 
+    def _spans(self, cell: Cell) -> list[tuple[int, int, int, int]]:
+        band, found = self.levels.band, list[tuple[int, int, int, int]]()
+        for number, rank in enumerate(cell.rank):
+            one, other = band[cell.left[number]], band[cell.right[number]]
+            found.append((rank, min(one, other), max(one, other), 1 << number))
+        return sorted(found, key=lambda span: -span[0])
+
     def _sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
         """Return per axis which sets of functions can be at a level or above.
 
@@ -92,21 +106,19 @@ class Grid:
 
     def _of_axis(self, axis: Axis, band: int, is_gap: bool) -> set[int]:
         found: set[int] = set()
-        of = self.levels.band
-        for cell in axis.cells:
-            base = 0
-            crossing: dict[int, int] = {}
-            for number, ends in enumerate(zip(cell.left, cell.right, strict=True)):
-                least, most = sorted((of[ends[0]], of[ends[1]]))
+        for cell in axis.spans:
+            base, crossing, last = 0, 0, -1
+            every: list[int] = []
+            for rank, least, most, bit in cell:
                 if least > band:
-                    base |= 1 << number
+                    base |= bit
                 elif most > band or (most == band and not is_gap):
-                    rank = cell.rank[number]
-                    crossing[rank] = crossing.get(rank, 0) | 1 << number
+                    if rank != last and crossing:
+                        every.append(crossing)
+                    crossing, last = crossing | bit, rank
             found.add(base)
-            for rank in sorted(crossing, reverse=True):
-                base |= crossing[rank]
-                found.add(base)
+            found.update(base | one for one in every)
+            found.add(base | crossing)
         return found
 
     def wins(self, mine: Asked, rivals: Sequence[Asked]) -> bool:

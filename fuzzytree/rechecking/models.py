@@ -11,6 +11,7 @@ from fuzzytree.rechecking.building import built
 from fuzzytree.rechecking.facts import keys_of, term_facts, variable_facts
 from fuzzytree.rechecking.model_records import Clause, Model, Rules, System, Tree
 from fuzzytree.rechecking.outcomes import CannotRunError
+from fuzzytree.rechecking.places import Places
 from fuzzytree.rechecking.systems import read_system
 from fuzzytree.rechecking.yaml import read_yaml
 
@@ -23,28 +24,39 @@ def read_model(content: bytes, name: str) -> Model | System:
     Raises:
         CannotRunError: If it is something else, or holds what is not known here.
     """
+    return read_file(content, name)[0]
+
+
+def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
+    """Return the model of a YAML file, and where its rules and terms stand.
+
+    Raises:
+        CannotRunError: If it is something else, or holds what is not known here.
+    """
     top = read_yaml(content, name)
     kind = top.get("kind") if isinstance(top, dict) else None
-    if kind not in ("rule base", "tree", "system"):
+    if not isinstance(top, dict) or kind not in ("rule base", "tree", "system"):
         text = f"{name}: rule bases, trees and systems are checked, not {kind!r}"
         raise CannotRunError(text)
+    found: Model | System
     try:
-        if kind == "system" and isinstance(top, dict):
-            return read_system(top, name)
-        if kind == "tree":
-            model = built(Tree, _tree_facts(top), name)
-            _check_numbers(model, name)
+        if kind == "system":
+            found = read_system(top, name)
+        elif kind == "tree":
+            found = built(Tree, _tree_facts(top), name)
         else:
-            model = built(Rules, _rule_facts(top), name)
-        _check_names(model, name)
+            found = built(Rules, _rule_facts(top), name)
+        if isinstance(found, Tree):
+            _check_numbers(found, name)
+        if not isinstance(found, System):
+            _check_names(found, name)
+        return found, Places(top)
     except CannotRunError as error:
         if str(error).startswith(name):
             raise
         raise CannotRunError(f"{name}: {error}") from error
     except (TypeError, AttributeError, KeyError, ValueError) as error:
         raise CannotRunError(f"{name}: not a {kind} that fuzzytree writes") from error
-    found: Model = model
-    return found
 
 
 def _rule_facts(found: Any) -> dict[str, Any]:

@@ -14,8 +14,6 @@ from fuzzytree.rechecking.polynomials import (
     common,
     derivative,
     quotient,
-    trimmed,
-    within,
 )
 
 
@@ -26,18 +24,60 @@ class Root:
         self.poly = poly
         self.low: Fraction = low
         self.high: Fraction = high
-        self.sign = at(poly, low) > 0
+        bottom = math.lcm(*(c.denominator for c in poly))
+        self.whole = [int(c * bottom) for c in reversed(poly)]
+        self.sign = self._sign(low) > 0
+
+    def _sign(self, x: Fraction) -> int:
+        """Return a number with the sign of the polynomial's value, in integers."""
+        total, power = 0, 1
+        for c in self.whole:
+            total = total * x.numerator + c * power
+            power *= x.denominator
+        return total
 
     def halve(self) -> None:
         """Make the interval half as wide."""
         middle = (self.low + self.high) / 2
-        value = at(self.poly, middle)
+        value = self._sign(middle)
         if value == 0:
             self.low = self.high = middle
         elif (value > 0) == self.sign:
             self.low = middle
         else:
             self.high = middle
+
+    def narrow(self, width: Fraction) -> None:
+        """Make the interval no wider than this, by a guess in doubles if it is one."""
+        if self.high - self.low > 256 * width:
+            self._guess(width / 4)
+        while self.high - self.low > width:
+            self.halve()
+
+    def _guess(self, away: Fraction) -> None:
+        try:
+            low, high = float(self.low), float(self.high)
+            near = [float(c) for c in reversed(self.poly)]
+        except OverflowError:
+            return
+        for _ in range(64):
+            middle, value = (low + high) / 2, 0.0
+            for c in near:
+                value = value * middle + c
+            if (value > 0) == self.sign:
+                low = middle
+            else:
+                high = middle
+        if not math.isfinite(low):
+            return
+        ends = Fraction(low) - away, Fraction(low) + away
+        while self.low < ends[0] and ends[1] < self.high:
+            signs = [self._sign(end) for end in ends]
+            if all(signs) and (signs[0] > 0) == self.sign != (signs[1] > 0):
+                self.low, self.high = ends
+                return
+            away *= 2**8
+            ends = Fraction(low) - away, Fraction(low) + away
 
     def value(self, poly: Poly) -> tuple[Fraction, Fraction]:
         """Return between which two numbers another polynomial's value here lies."""
@@ -94,9 +134,16 @@ def _changes(heights: Sequence[int]) -> int:
 
 def _bernstein(poly: Poly, low: Fraction, high: Fraction) -> list[int]:
     """Return the heights of the control points on an interval, times a number."""
-    moved, n = within(poly, trimmed((low, high - low))), len(poly) - 1
-    bottom = math.lcm(*(c.denominator for c in moved))
-    whole = [int(c * bottom) for c in moved] + [0] * (n + 1 - len(moved))
+    n, bottom = len(poly) - 1, math.lcm(*(c.denominator for c in poly))
+    q = math.lcm(low.denominator, high.denominator)
+    start, width = int(low * q), int((high - low) * q)
+    whole, power = [0] * (n + 1), 1
+    # Horner in t, with x = (start + width t) / q; every power of q is kept a factor
+    for place, c in enumerate(reversed(poly)):
+        for k in range(min(place, n), 0, -1):
+            whole[k] = whole[k] * start + whole[k - 1] * width
+        whole[0] = whole[0] * start + int(c * bottom) * power
+        power *= q
     # The k-th weight, binom(j, k) / binom(n, k), times n!
     return [
         sum(whole[k] * math.perm(j, k) * math.factorial(n - k) for k in range(j + 1))

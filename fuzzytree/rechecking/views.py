@@ -79,6 +79,7 @@ class View:
     Attributes:
         rules: A rule for each way.
         owners: Whose way each rule is.
+        ways: The numbers of the rules that are ways of each owner.
         names: What answers call each rule.
         silent: The names of the rules that never fire, as their text says.
         labels: The terms that are asked about.
@@ -103,11 +104,14 @@ class View:
             for way in self._ways_of(owner):
                 made.append(Rule(way, then, None))
                 self.owners.append(owner)
-        for owner in self.owners:
-            mine = [n for n, one in enumerate(self.owners) if one is owner]
-            place = 1 + len(self.names) - mine[0]
-            several = f"way {place} of {owner.name}"
-            self.names.append(several if len(mine) > 1 else owner.name)
+        self.ways = {
+            owner: [n for n, one in enumerate(self.owners, 1) if one is owner]
+            for owner in dict.fromkeys(self.owners)
+        }
+        for owner, ways in self.ways.items():
+            of_one = [owner.name]
+            several = [f"way {n} of {owner.name}" for n in range(1, len(ways) + 1)]
+            self.names += several if len(ways) > 1 else of_one
         self.labels = [
             Label(one.name, label.name)
             for one in system.inputs
@@ -124,6 +128,10 @@ class View:
             None,
             (),
         )
+
+        self.shapes = {
+            (v.name, t.name): t.shape for v in self.rules.variables for t in v.terms
+        }
 
     def _is_left_out(self, variable: str, term: str) -> bool:
         subject = f"term {term!r} of {variable!r}"
@@ -261,43 +269,38 @@ class View:
             place
         ].then
 
-    def strengths(self, point: Point) -> list[Between]:
-        """Return between which numbers the strength of each rule lies.
+    def strengths(self, point: Point, numbers: Iterable[int]) -> dict[int, Between]:
+        """Return between which numbers the strengths of some rules lie.
 
         Raises:
             DoesNotHoldError: If a rule's ways are not its own condition.
         """
         values = {v.name: value_of(v, point) for v in self.rules.variables}
-        shapes = {
-            (v.name, t.name): t.shape for v in self.rules.variables for t in v.terms
-        }
         known: dict[Clause, Between] = {}
-        for clause in dict.fromkeys(c for rule in self.rules.rules for c in rule.when):
-            every = [
-                bounds(shapes[clause.variable, term], values[clause.variable])
-                for term in clause.terms
-            ]
-            one = max(low for low, _ in every), max(high for _, high in every)
-            known[clause] = hedged("not", one) if clause.negated else one
-        join = "minimum" if self.conjunction == "min" else "product"
-        found: list[Between] = []
-        for owner, rule in zip(self.owners, self.rules.rules, strict=True):
-            one = (ONE, ONE)
-            for clause in rule.when:
-                one = _joined(join, one, known[clause])
-            found.append((one[0] * owner.weight, one[1] * owner.weight))
-        for owner in dict.fromkeys(self.owners):
-            mine = [n for n, one in enumerate(self.owners) if one is owner]
-            own = self.condition(owner.when, owner.block, values)
-            own = own[0] * owner.weight, own[1] * owner.weight
-            if mine and not self.rules.rules[mine[0]].when:
-                found[mine[0]] = own
+        found: dict[int, Between] = {}
+        for owner in dict.fromkeys(self.owners[number - 1] for number in numbers):
+            ways = self.ways[owner]
+            own = _times(owner.weight, self.condition(owner.when, owner.block, values))
+            if not self.rules.rules[ways[0] - 1].when:
+                found[ways[0]] = own  # of no clauses, or not of ways alone
                 continue
-            ways = [max(found[n][end] for n in mine) for end in (0, 1)]
-            is_one = ways[0] <= own[1] and own[0] <= ways[1]
-            if not is_one:
+            for number in ways:
+                one = (ONE, ONE)
+                for clause in self.rules.rules[number - 1].when:
+                    if clause not in known:
+                        known[clause] = self._degree(clause, values[clause.variable])
+                    join = "minimum" if self.conjunction == "min" else "product"
+                    one = _joined(join, one, known[clause])
+                found[number] = _times(owner.weight, one)
+            best = [max(found[number][end] for number in ways) for end in (0, 1)]
+            if own[1] < best[0] or best[1] < own[0]:
                 raise DoesNotHoldError(f"{owner.name} holds otherwise than its ways")
         return found
+
+    def _degree(self, clause: Clause, x: Fraction) -> Between:
+        every = [bounds(self.shapes[clause.variable, t], x) for t in clause.terms]
+        one = max(low for low, _ in every), max(high for _, high in every)
+        return hedged("not", one) if clause.negated else one
 
     def condition(
         self, condition: Condition | None, block: Block, values: Point
@@ -338,6 +341,10 @@ _NAMES: dict[str | None, Literal["min", "product"]] = {
     "minimum": "min",
     "product": "product",
 }
+
+
+def _times(weight: Fraction, one: Between) -> Between:
+    return weight * one[0], weight * one[1]
 
 
 def _joined(norm: str, one: Between, other: Between) -> Between:

@@ -26,6 +26,13 @@ _FORBIDDEN = re.compile(
 )
 
 
+class Items(list[Yaml]):
+    """A list with a line for each item, and the lines and columns of these."""
+
+    def __init__(self) -> None:
+        self.places: list[tuple[int, int]] = []
+
+
 class _Line(NamedTuple):
     number: int
     indent: int
@@ -113,11 +120,13 @@ class _Blocks:
         return line if line is not None and line.indent == indent else None
 
     def _list(self, indent: int, level: int) -> list[Yaml]:
-        items: list[Yaml] = []
+        items = Items()
         while line := self._next(indent):
             if not (line.text == "-" or line.text.startswith("- ")):
                 break
             rest = line.text[1:].lstrip(" ")
+            place = line.number, indent + len(line.text) - len(rest) + 1
+            items.places.append(place)
             if _KEY.match(rest) or rest.startswith("- ") or not rest:
                 inner = indent + len(line.text) - len(rest)
                 if not rest:

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from fuzzytree.auditing.audit import audit
-from fuzzytree.auditing.places import ModelFile
+from fuzzytree.auditing.places import model_file
 from fuzzytree.auditing.subject import Rows
 from fuzzytree.exporters import yaml
 from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
@@ -43,7 +43,7 @@ def audited(
 ) -> tuple[bytes, bytes]:
     """Return an audit and the file that it is of."""
     content = yaml.write(model).content
-    file = ModelFile("grip.yaml", content)
+    file = model_file("grip.yaml", content)
     repeat = "fuzzytree audit grip.yaml"
     options.setdefault("ignore", ["FT6"])
     found = audit(model, file=file, repeat=repeat, rows=rows, **options)

@@ -43,7 +43,6 @@ FREE = (
     r"settings\.(budget_s|seed|rows|epsilon|margin|lead|level|overlap)",
     r"domain\.sides\.(low|high|origin)",  # another domain, on which it all holds too
     r"unasked",  # the reason, in words
-    r"answers\.(sentence|subject|repeat|places(\..*)?)",
     r"answers\.severity",  # of what is no finding; of a finding one of two, for some
     r"answers\.state\.claims",  # one that the answer does not need is gone
     r"answers\.state\.(how|of|why|reason|low|high|hits|rows|confidence)",
@@ -60,9 +59,10 @@ def wrong_with(facts: Facts, content: bytes) -> list[str]:
     """Return what does not hold of an audit's facts."""
     text = json.dumps(facts, ensure_ascii=False).encode()
     try:
-        return recheck(text, content, ("audit.json", "grip.yaml")).wrong
+        found = recheck(text, content, ("audit.json", "grip.yaml"))
     except CannotRunError as error:
         return [str(error)]
+    return found.wrong + [why for state, why in found.undecided if state == "SENTENCE"]
 
 
 def ways(value: Any, way: Way = ()) -> Iterator[Way]:
@@ -255,6 +255,30 @@ def changed(**changes: Any) -> list[str]:
     facts = json.loads(audit_) | changes
     facts["digest"] = digest_of(facts)
     return wrong_with(facts, content)
+
+
+def test_each_sentence_of_a_real_audit_is_held_against_its_facts() -> None:
+    facts = json.loads(small()[0])
+    report = recheck(*small(), ("audit.json", "grip.yaml"))
+    assert report.counts["sentences held against facts"] == len(facts["answers"])
+
+
+def test_a_sentence_that_says_other_than_its_facts_is_told() -> None:
+    facts = json.loads(small()[0])
+    number, answer = next(
+        (n, one) for n, one in enumerate(facts["answers"], 1) if one["code"] == "FT102"
+    )
+    answer["sentence"] = "rule 1 leads by 0.75 at least somewhere"
+    where = f"answer {number} (FT102, rule 1)"
+    text = f"{where}: its sentence says other than its facts"
+    assert changed(answers=facts["answers"]) == [text]
+
+
+def test_a_sentence_in_new_words_is_not_checked_and_told_so() -> None:
+    answers = json.loads(small()[0])["answers"]
+    answers[0]["sentence"] = "all is well"
+    reason = "sentences of a form that is not known here"
+    assert changed(answers=answers) == [reason]
 
 
 def test_a_panel_that_was_edited_is_told() -> None:
