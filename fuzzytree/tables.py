@@ -49,6 +49,8 @@ _NUMBER = re.compile(
     re.IGNORECASE,
 )
 
+_NO_DELIMITER = '"\r\n\0'
+
 
 class Piece(msgspec.Struct, frozen=True, eq=False):
     """Some rows of a table, column by column, as they came.
@@ -513,6 +515,11 @@ def _csv_pieces(
         if not first.strip():
             raise TableError(f"{name} is empty: it needs a line with column names")
         mark = delimiter or _delimiter(first, name)
+        if len(mark) != 1 or mark in _NO_DELIMITER:
+            raise TableError(
+                f"{name}: a delimiter is one character such as ';', "
+                f"and not {mark[:20]!r}"
+            )
         lines = itertools.chain([first], cast("Iterable[str]", text))
         reader = csv.reader(lines, delimiter=mark, strict=True)
         columns = tuple(next(reader))

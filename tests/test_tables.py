@@ -475,3 +475,12 @@ def test_a_model_that_needs_no_column_answers_every_row(
     (batch,) = batches(_three_columns(kind, tmp_path), [])
     assert batch.values.shape == (0, 2)
     assert batch.extras == 3
+
+
+@pytest.mark.parametrize("mark", [";;", '"', "\n", "\\t"])
+def test_a_delimiter_that_is_none_is_refused(mark: str) -> None:
+    with pytest.raises(TableError) as caught:
+        read_table(io.StringIO("a;b\n1;x\n"), target="b", delimiter=mark)
+    assert str(caught.value) == (
+        f"the table: a delimiter is one character such as ';', and not {mark!r}"
+    )
