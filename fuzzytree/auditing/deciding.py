@@ -5,13 +5,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Final
+from functools import partial
+from typing import TYPE_CHECKING, Final
 
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.sides import Sides, sides_of
 from fuzzytree.auditing.subject import Subject
+from fuzzytree.auditing.turns import Turns
+from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.glimpses import Glimpses
 from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.leads import largest_lead
+from fuzzytree.proving.shared import may_tie
 from fuzzytree.proving.states import (
     Bracket,
     Declined,
@@ -21,11 +26,16 @@ from fuzzytree.proving.states import (
 )
 from fuzzytree.proving.ties import decides_by_order, tie
 from fuzzytree.proving.wins import wins
+from fuzzytree.proving.wording import counted
+
+if TYPE_CHECKING:
+    from fuzzytree.proving.ground import BoolArray
 
 MOST_SHOWN: Final = 20
 """The most ties that are told one by one."""
 
 _PART = 0.25  # of the time that is left, for one question
+_APART = Proved("they share no curve, and no constant")
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
@@ -40,9 +50,12 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if subject.policy.decision == "all":
         yield from _firing(subject, sides)
         return
-    yield from _winning(subject, given)
+    seen = Glimpses(given, subject.settings.seed)
+    won: dict[int, Witness] = {}
+    yield from _winning(subject, seen, won)
+    yield from _leading(subject, seen, won)
     ties = _Ties(subject, given)
-    yield from _needed(subject, given, ties)
+    yield from _needed(subject, seen, ties)
     yield from ties.answers()
 
 
@@ -80,23 +93,60 @@ def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
     )
 
 
-def _winning(subject: Subject, given: Ground) -> Iterator[Answer]:
-    """Answer whether each rule wins strictly, and whether it leads by enough."""
+def _winning(
+    subject: Subject, seen: Glimpses, won: dict[int, Witness]
+) -> Iterator[Answer]:
+    """Answer whether each rule wins strictly; those that were not seen to win first.
+
+    Args:
+        subject: The rules.
+        seen: What points show of them.
+        won: Is given where each rule wins.
+    """
+    given = seen.given
     count = len(subject.rules.rules)
-    for number in range(1, count + 1):
-        subject.clock.check()
+    turns = Turns(subject.clock, 0.5)
+    order = sorted(range(1, count + 1), key=seen.is_ahead)
+    for place, number in enumerate(order):
         name = subject.rule_name(number)
-        subject.clock.tell(f"does {name} win", number / count)
+        subject.clock.tell(f"does {name} win", place / count)
         rivals = _rivals(subject, number)
-        state = wins(given, number, rivals, subject.clock.share(_PART))
+        state = turns.ask(count - place, partial(wins, given, number, rivals))
+        if not isinstance(state, Proved | Witness):
+            state = seen.wins(number, rivals) or state
+        if isinstance(state, Witness):
+            won[number] = state
+        if state is None:
+            turns.left_out += 1
+            continue
         # A tree's own cuts tell this of its leaves: `fuzzytree.auditing.trees`.
         if subject.tree is None:
             yield _won(subject, given, number, state)
-        if isinstance(state, Witness):
-            yield _led(subject, given, number, rivals, state)
-        elif not isinstance(state, Proved):
+        if not isinstance(state, Proved | Witness):
             sentence = f"how far {name} leads is open, for it is open whether it wins"
             yield Answer("FT102", name, sentence, state, False, rules=(number,))
+    yield from turns.rest("FT101", "rule", "whether they ever win")
+
+
+def _leading(
+    subject: Subject, seen: Glimpses, won: dict[int, Witness]
+) -> Iterator[Answer]:
+    """Answer whether each rule that wins leads by enough."""
+    turns = Turns(subject.clock, 0.5)
+    for place, (number, state) in enumerate(sorted(won.items())):
+        name = subject.rule_name(number)
+        subject.clock.tell(f"how far does {name} lead", place / len(won))
+        rivals = _rivals(subject, number)
+        start = seen.wins(number, rivals) or state
+        found = turns.ask(
+            len(won) - place,
+            partial(_led, subject, seen.given, number, rivals, (state, start)),
+        )
+        if found is None:
+            turns.left_out += 1
+            continue
+        yield found
+    yield from turns.rest("FT102", "rule", "how far they lead")
 
 
 def _won(subject: Subject, given: Ground, number: int, state: State) -> Answer:
@@ -135,11 +185,18 @@ def _won(subject: Subject, given: Ground, number: int, state: State) -> Answer:
 
 
 def _led(
-    subject: Subject, given: Ground, number: int, rivals: tuple[int, ...], won: Witness
+    subject: Subject,
+    given: Ground,
+    number: int,
+    rivals: tuple[int, ...],
+    known: tuple[Witness, Witness],
+    clock: Clock,
 ) -> Answer:
+    """Return the answer for a rule of which two points are known at which it wins."""
     name = subject.rule_name(number)
+    won, start = known
     enough = Fraction(subject.settings.lead)
-    found = largest_lead(given, number, rivals, won, enough, subject.clock.share(_PART))
+    found = largest_lead(given, number, rivals, start, enough, clock)
     measures = (
         Measure("largest lead, at least", found.low),
         Measure("largest lead, at most", found.high),
@@ -174,20 +231,36 @@ class _Ties:
 
     def __init__(self, subject: Subject, given: Ground) -> None:
         self.subject, self.given = subject, given
+        self.turns = Turns(subject.clock, 0.9)
         self.known: dict[tuple[int, int], State] = {}
+        self.may: BoolArray | None = None
 
-    def of(self, one: int, other: int) -> State:
+    def of(self, one: int, other: int, left: int) -> State | None:
+        """Return whether two rules tie, None if the time does not suffice.
+
+        Args:
+            one: The number of a rule, from 1.
+            other: The number of another.
+            left: How many questions are left, this one too.
+        """
         pair = min(one, other), max(one, other)
-        if pair not in self.known:
-            self.subject.clock.check()
-            self.known[pair] = tie(self.given, *pair, self.subject.clock.share(_PART))
-        return self.known[pair]
+        if pair in self.known:
+            return self.known[pair]
+        if self.may is None:
+            self.may = self.turns.ask(1, lambda _: may_tie(self.given))
+        if self.may is not None and not self.may[one - 1, other - 1]:
+            return _APART
+        state = self.turns.ask(left, partial(tie, self.given, *pair))
+        if state is not None:
+            self.known[pair] = state
+        return state
 
     def answers(self) -> Iterator[Answer]:
         """Answer for pairs that tie one by one, for all others together."""
         rules = self.subject.rules.rules
         told = 0
         left_open: list[State] = []
+        unasked = 0
         pairs = [
             (one, other)
             for one, other in itertools.combinations(range(1, len(rules) + 1), 2)
@@ -195,7 +268,8 @@ class _Ties:
         ]
         for place, (one, other) in enumerate(pairs, 1):
             self.subject.clock.tell("which rules tie", place / len(pairs))
-            state = self.of(one, other)
+            state = self.of(one, other, len(pairs) - place + 1)
+            unasked += state is None
             if isinstance(state, Declined | Bracket):
                 left_open.append(state)
             if isinstance(state, Witness):
@@ -209,13 +283,16 @@ class _Ties:
             Measure("pairs", len(pairs)),
             Measure("pairs that tie", told),
             Measure("pairs told one by one", min(told, MOST_SHOWN)),
-            Measure("pairs left open", len(left_open)),
+            Measure("pairs left open", len(left_open) + unasked),
         )
         sentence = (
             f"of {len(pairs)} pairs of rules of different classes, {told} tie as the "
             "strongest on more than a surface"
         )
         state = left_open[0] if left_open else Proved(how)
+        if unasked:
+            sentence += f"; {counted(unasked, 'pair')} could not be asked"
+            state = Declined("FTD03", "the budget was spent")
         yield Answer(
             "FT202", "pairs of rules", sentence, state, False, measures=measures
         )
@@ -232,18 +309,22 @@ class _Ties:
         )  # fmt: skip
 
 
-def _needed(subject: Subject, given: Ground, ties: _Ties) -> Iterator[Answer]:
+def _needed(subject: Subject, seen: Glimpses, ties: _Ties) -> Iterator[Answer]:
     """Answer whether leaving out a rule changes a decision."""
-    rules = subject.rules.rules
-    count = len(rules)
+    count = len(subject.rules.rules)
+    if count == 1:
+        return
+    turns = Turns(subject.clock, 0.5)
     for number in range(1, count + 1):
-        subject.clock.check()
         name = subject.rule_name(number)
         subject.clock.tell(f"is {name} needed", number / count)
         others = tuple(n for n in range(1, count + 1) if n != number)
-        if not others:
-            return
-        state = wins(given, number, others, subject.clock.share(_PART))
+        state = seen.wins_alone(number, others) or turns.ask(
+            count - number + 1, partial(wins, seen.given, number, others)
+        )
+        if state is None:
+            turns.left_out += 1
+            continue
         if isinstance(state, Witness):
             sentence = f"{name} is somewhere stronger than every other rule"
             yield Answer("FT103", name, sentence, state, False, rules=(number,))
@@ -253,7 +334,11 @@ def _needed(subject: Subject, given: Ground, ties: _Ties) -> Iterator[Answer]:
             yield Answer("FT103", name, sentence, state, False, rules=(number,))
             continue
         later = [n for n in _rivals(subject, number) if n > number]
-        tied = [s for n in later if not isinstance(s := ties.of(number, n), Proved)]
+        known = [ties.of(number, n, len(later)) for n in later]
+        if None in known:
+            turns.left_out += 1
+            continue
+        tied = [one for one in known if one and not isinstance(one, Proved)]
         if tied:
             sentence = (
                 f"{name} is nowhere stronger than all others, and where it ties with "
@@ -267,3 +352,4 @@ def _needed(subject: Subject, given: Ground, ties: _Ties) -> Iterator[Answer]:
             + (", but where strengths only touch" if later else "")
         )
         yield Answer("FT103", name, sentence, state, True, "info", rules=(number,))
+    yield from turns.rest("FT103", "rule", "whether they are needed")

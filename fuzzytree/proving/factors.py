@@ -275,7 +275,7 @@ def is_single(laid: Laid, low: Fraction, high: Fraction) -> bool:
     zones = laid.cells.zones
     if low == zones[0][0] or high == zones[-1][1]:
         return False  # an end beside a place
-    places = laid.axis.found or ()
+    places = laid.axis.found
     met = [p for p in places if p.low <= high and p.high >= low]
     roots_of = {monic(p.of[0]) for p in met if p.of}
     return len(roots_of) == 1 and all(p.of and p.of[1].is_sure for p in met)

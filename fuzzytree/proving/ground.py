@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -49,7 +49,7 @@ class TooManyCellsError(MemoryError):
     """Curves cross so often that their cells are too many to be kept."""
 
 
-class Axis(msgspec.Struct, frozen=True, eq=False):
+class Axis(msgspec.Struct, frozen=True, eq=False, dict=True):
     """What the rules ask of one variable.
 
     Attributes:
@@ -57,13 +57,21 @@ class Axis(msgspec.Struct, frozen=True, eq=False):
         elements: The distinct curves; the first is that of a rule that asks nothing.
         asked: For each rule its clauses here, each as the elements of which it takes
             the largest; the rule takes the least of its clauses.
-        found: All places where something changes; None if they are too many.
     """
 
     variable: Variable
     elements: tuple[Element, ...]
     asked: tuple[tuple[tuple[int, ...], ...], ...]
-    found: tuple[Place, ...] | None
+
+    @functools.cached_property
+    def found(self) -> tuple[Place, ...]:
+        """All places where something changes."""
+        return _places(self.elements)
+
+    @functools.cached_property
+    def crossings(self) -> int:
+        """How often curves cross at least."""
+        return crossings(self.elements)
 
 
 class Laid(NamedTuple):
@@ -144,7 +152,6 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
             raise TooManyCellsError("its curves cross more often than can be kept")
         for axis, (low, high) in zip(self.axes, self.ends, strict=True):
             name = axis.variable.name
-            assert axis.found is not None  # seen above
             if name not in self._cut:  # who comes back after a spent budget goes on
                 self._cut[name] = cut(
                     axis.elements, axis.found, low, high, is_fine=self.is_fine
@@ -158,12 +165,20 @@ class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
     @functools.cached_property
     def is_kept(self) -> bool:
         """Whether all values of curves and rules in cells can be kept."""
-        size = 0
-        for axis in self.axes:
-            if axis.found is None:
-                return False
-            size += (len(axis.found) + 1) * (len(axis.elements) + len(axis.asked))
-        return size <= (MOST_FRACTIONS if self.is_fine else MOST_NUMBERS)
+        most = MOST_FRACTIONS if self.is_fine else MOST_NUMBERS
+
+        def is_within(counts: Iterator[int]) -> bool:
+            size = 0
+            for axis, count in zip(self.axes, counts, strict=False):
+                size += (count + 1) * (len(axis.elements) + len(axis.asked))
+                if size > most:  # the rest is not counted
+                    return False
+            return True
+
+        # Counting takes much less time than finding.
+        return is_within(axis.crossings for axis in self.axes) and is_within(
+            len(axis.found) for axis in self.axes
+        )
 
     @functools.cached_property
     def near_levels(self) -> tuple[list[float], list[float]]:
@@ -231,11 +246,7 @@ def _ends(
     return tuple(ends)
 
 
-@functools.lru_cache(maxsize=1 << 12)
-def _places(elements: tuple[Element, ...], rules: int) -> tuple[Place, ...] | None:
-    """Return the places of some curves, None if they are too many to be kept."""
-    most = MOST_NUMBERS // (len(elements) + rules)
-    return None if crossings(elements) > most else places(elements)
+_places = functools.lru_cache(maxsize=1 << 12)(places)
 
 
 @functools.lru_cache(maxsize=64)
@@ -250,7 +261,7 @@ def _axes(rules: RuleBase) -> tuple[Axis, ...]:
         is_last = variable is rules.variables[-1]
         if any(asked) or (is_last and not made):  # rules that ask nothing have one too
             of = tuple(elements)
-            made.append(Axis(variable, of, asked, _places(of, len(rules.rules))))
+            made.append(Axis(variable, of, asked))
     return tuple(made)
 
 

@@ -46,10 +46,11 @@ def largest_lead(
     others = tuple(sorted(rivals))
     best = point_of(won.point)
     low = _lead(given, best, rule, others)
-    found = leader(given, (rule,), others)
-    if is_within(given, found) and _lead(given, found, rule, others) > low:
-        best = plainer(given, found, (rule,), others)
-        low = _lead(given, best, rule, others)
+    if low < enough:
+        found = leader(given, (rule,), others)
+        if is_within(given, found) and _lead(given, found, rule, others) > low:
+            best = plainer(given, found, (rule,), others)
+            low = _lead(given, best, rule, others)
     name = f"the largest lead of rule {rule}"
     claims = (
         Claim("beats", rules=(rule,), rivals=others),

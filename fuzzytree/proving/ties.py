@@ -24,6 +24,7 @@ from fuzzytree.proving.ground import Ground, Laid, TooManyCellsError
 from fuzzytree.proving.linear import simple
 from fuzzytree.proving.parts import START, Stretch, part_of, stretch
 from fuzzytree.proving.products import tie_of_products
+from fuzzytree.proving.shared import is_constant
 from fuzzytree.proving.states import Declined, Proved, State, Witness
 from fuzzytree.proving.tied import Asked, checked
 from fuzzytree.proving.witnesses import point_with
@@ -266,7 +267,7 @@ def _held(contest: Contest, asked: Asked, rule: int) -> Iterator[tuple[_Pivot, i
         for column in np.flatnonzero(fits).tolist():
             element, cell = int(mine[column]), seen.cells[column]
             least, most = _ends(laid, element, cell)
-            if least == most:
+            if least == most and is_constant(laid, element, cell):
                 mask = sum(
                     1 << n for n in np.flatnonzero(is_behind[:, column]).tolist()
                 )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 from fuzzytree.auditing.deciding import answers
 from fuzzytree.auditing.records import Answer, Policy, Settings
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.states import Bracket, Proved, Witness
+from fuzzytree.proving.states import Bracket, Declined, Proved, Witness
 from fuzzytree.rulebase import (
     Clause,
     Points,
@@ -17,6 +19,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from tests.proving.bases import random_base, unit_domain, with_hidden_rule
 
 LOW = Term("low", Points((0.0, 1.0), (1.0, 0.0)))
 HIGH = Term("high", Points((0.0, 1.0), (0.0, 1.0)))
@@ -147,3 +150,30 @@ def test_where_all_rules_take_part_only_firing_is_asked() -> None:
     assert {one.code for one in given} == {"FT101"}
     (dead,) = [one for one in given if one.is_finding]
     assert dead.subject == "rule 4"
+
+
+def _subject(base: RuleBase, clock: Clock) -> Subject:
+    return Subject(
+        base, Policy("min", "strongest"), unit_domain(base), Settings(), clock
+    )
+
+
+def test_without_time_the_rules_that_points_show_to_win_are_told() -> None:
+    base = with_hidden_rule(random_base(0, 7, 4))
+    ticks = itertools.count()
+    clock = Clock(1.0, now=lambda: next(ticks) / 100.0)
+    found = [*answers(_subject(base, clock))]
+    won = [one for one in found if one.code == "FT101"]
+    assert [one.sentence for one in won if isinstance(one.state, Witness)]
+    (rest,) = [one for one in won if isinstance(one.state, Declined)]
+    assert rest.sentence.startswith("whether they ever win is not known of ")
+    assert not any(one.is_finding for one in found)
+
+
+def test_rules_that_points_do_not_show_to_win_are_asked_first() -> None:
+    base = with_hidden_rule(random_base(0, 7, 4))
+    first = next(
+        one for one in answers(_subject(base, Clock(30.0))) if one.code == "FT101"
+    )
+    assert first.rules == (len(base.rules),)
+    assert first.is_finding
