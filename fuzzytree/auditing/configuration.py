@@ -13,6 +13,9 @@ fail-on: error
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import PurePath
 from typing import Annotated, ClassVar, Final, Literal
 
 import msgspec
@@ -78,7 +81,7 @@ class Configuration(msgspec.Struct, frozen=True):
         ignore: Beginnings of codes that are left out.
         limits: The ends of variables, by name.
         settings: What is taken for small.
-        baseline: The path of a baseline.
+        baseline: The path of a baseline; in a file, from the folder of that file.
         fail_on: The least severity of a finding that fails.
     """
 
@@ -96,7 +99,11 @@ def read_configuration(path: PathLike) -> Configuration:
     Raises:
         ReadError: If it is none; it lists all mistakes with their places.
     """
-    return configuration(read_bounded(path, _MOST_BYTES), str(path))
+    found = configuration(read_bounded(path, _MOST_BYTES), str(path))
+    if found.baseline is None:
+        return found
+    beside = str(PurePath(path).parent / found.baseline)
+    return msgspec.structs.replace(found, baseline=beside)
 
 
 def configuration(content: bytes, name: str) -> Configuration:
@@ -115,6 +122,9 @@ def configuration(content: bytes, name: str) -> Configuration:
         raise report(name, found)
     assert isinstance(root, MappingNode)  # or it would not have been bound
     settings = _settings(bound.settings or SettingsOfFile(), root, found)
+    for position, fault in _wrong_limits(bound.limits):
+        node = find(root, ("limits", position))
+        found.append((node.line, node.column, fault))
     for key in ("select", "ignore"):
         for position, text in enumerate(getattr(bound, key)):
             try:
@@ -132,6 +142,20 @@ def configuration(content: bytes, name: str) -> Configuration:
         bound.baseline,
         bound.fail_on,
     )
+
+
+def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
+    """Yield the positions of limits that are none, and why."""
+    seen: set[str] = set()
+    for position, one in enumerate(limits):
+        if one.variable in seen:
+            yield position, f"{one.variable!r} has limits already"
+        seen.add(one.variable)
+        if not (math.isfinite(one.from_) and math.isfinite(one.to)):
+            yield position, f"limits must be finite, not {one.from_!r} to {one.to!r}"
+        elif one.from_ > one.to:
+            swapped = f"limits are swapped: {one.from_!r} to {one.to!r}"
+            yield position, f"{swapped}; the smaller one stands first"
 
 
 def _settings(given: SettingsOfFile, root: MappingNode, found: list[Found]) -> Settings:

@@ -64,6 +64,15 @@ def test_an_empty_mapping_changes_nothing() -> None:
             "x.yaml:1:21: epsilon must be above 0 and at most 1, not 2.0\n"
             "x.yaml:1:32: the budget must be above 0 and at most 1e9 seconds, not 0.0",
         ),
+        (
+            b"limits:\n"
+            b"- {variable: a, from: .inf, to: 1}\n"
+            b"- {variable: b, from: 2, to: 1}\n"
+            b"- {variable: a, from: 0, to: 1}\n",
+            "x.yaml:2:3: limits must be finite, not inf to 1.0\n"
+            "x.yaml:3:3: limits are swapped: 2.0 to 1.0; the smaller one stands first\n"
+            "x.yaml:4:3: 'a' has limits already",
+        ),
         (b"[1]", "x.yaml:1:1: a configuration must be a mapping, not a list"),
         (b"", "x.yaml:1:1: the file is empty"),
         (
@@ -76,7 +85,7 @@ def test_an_empty_mapping_changes_nothing() -> None:
             "x.yaml:2:4: aliases are not read; repeat the value",
         ),
     ],
-    ids=["keys", "number", "settings", "list", "empty", "aliases"],
+    ids=["keys", "number", "settings", "limits", "list", "empty", "aliases"],
 )
 def test_mistakes_are_told_with_their_places(content: bytes, message: str) -> None:
     with pytest.raises(ReadError) as caught:
@@ -94,6 +103,12 @@ def test_a_configuration_that_is_not_there_is_one_sentence(tmp_path: Path) -> No
     with pytest.raises(ReadError) as caught:
         read_configuration(path)
     assert str(caught.value) == f"{path}: cannot be read: no such file or directory"
+
+
+def test_a_baseline_lies_beside_the_file_that_names_it(tmp_path: Path) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text("baseline: known/b.json", "utf-8")
+    assert read_configuration(path).baseline == str(tmp_path / "known" / "b.json")
 
 
 # --- baselines
