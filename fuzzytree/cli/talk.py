@@ -142,7 +142,8 @@ def progress_bar(*, quiet: bool = False) -> Generator[Callable[[str, float], Non
             if time.monotonic() - begin < _PATIENCE_S:
                 return
             bars.append(_new_bar())
-        bars[0].update(bars[0].task_ids[0], description=text, completed=share)
+        shown = printable(text).replace("[", r"\[")  # what rich takes for a style
+        bars[0].update(bars[0].task_ids[0], description=shown, completed=share)
 
     try:
         yield tell

@@ -161,8 +161,8 @@ def test_a_bar_waits_half_a_second(
     monkeypatch.setattr("fuzzytree.cli.talk._PATIENCE_S", 0.0)
     monkeypatch.setenv("TERM", "xterm")
     with progress_bar() as tell:
-        tell("learning", 0.5)
-    assert "learning" in capsys.readouterr().err
+        tell("learning [/b]\x1b[2J", 0.5)
+    assert r"learning [/b]\x1b[2J" in capsys.readouterr().err
 
 
 def test_main_takes_the_words_of_the_process(
