@@ -373,8 +373,7 @@ def _rest_of_conflicts(
     never = f"{pairs} of rules of different {kind} never {reach} {level} together"
     parts = [never] if clean else []
     if touching:
-        touch = "touches" if touching == 1 else "touch"
-        parts.append(f"{touching} of them {touch} it, at irrational values only")
+        parts.append(f"{touching} of them at most touch it, at irrational values")
     if hidden:
         more = counted(hidden, "more pair")
         parts.append(f"{more} of rules may reach {level}: they conflict less")

@@ -46,6 +46,7 @@ _MOST_CHOICES = 1000  # of parts of axes that share inputs
 _HALVINGS = 12  # of what a level may be raised by
 _WEIGHTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.0, 1.0)
 _CLOSE = Fraction(1, 1000)  # how well a level is known under the product
+_CLOSER = 1e-9  # the same, where the level asked for is that near
 _NEARLY = Fraction(1, 2**30)  # of a level, by which a point may fall short of it
 
 
@@ -125,9 +126,12 @@ def meet(
     """
     if compared.is_product:
         found = _by_weights(compared, one, other, level)
-        if clock is None or found.level.high - found.level.low < _CLOSE:
+        if clock is not None and found.level.high - found.level.low >= _CLOSE:
+            found = _by_boxes(compared, (one, other), level, found, clock)
+        if isinstance(found.state, Witness) or found.level.high < level:
             return found
-        return _by_boxes(compared, (one, other), level, found, clock)
+        # No product exceeds the least of its factors.
+        return _never(compared.fine.ground, (one, other), found.level, level) or found
     band = int(_bands(compared, one - 1)[other - 1])
     bands = compared.ground.laid[1]
     if band >= len(bands.low):
@@ -154,8 +158,10 @@ def meet(
             return Meeting(Bounds(low, bounds.high), witness)
     if not joined and not given.is_fine:
         return meet(compared.fine, one, other, level, clock)
-    if not joined and not _may_be_hidden(given, rules, level):
-        return _never(given, rules, bounds, level)
+    known = given if given.is_fine else given.fine
+    never = _never(known, rules, bounds, level)
+    if never is not None:
+        return never
     high = bounds.high
     if joined and _is_never(given, rules, level, joined):
         high = min(high, level * (1 - _NEARLY))
@@ -180,20 +186,19 @@ def _may_be_hidden(given: Ground, rules: tuple[int, int], level: Fraction) -> bo
 
 def _never(
     given: Ground, rules: tuple[int, int], bounds: Bounds, level: Fraction
-) -> Meeting:
-    """Return that no fractions are a point at which rules reach a level.
+) -> Meeting | None:
+    """Return that no fractions are a point at which rules reach a level, if so.
 
     On some axis both reach it at irrational places alone, or come near it only.
     """
-    names: list[str] = []
-    is_touch = bounds.high >= level
-    for laid in given.laid[0]:
-        of = [rule - 1 for rule in rules]
-        if next(_parts(laid, of, level), None) is None:
-            names.append(repr(laid.axis.variable.name))
-            is_touch = is_touch and _touches(given, laid, of, level)
+    of = [rule - 1 for rule in rules]
+    short = [laid for laid in given.laid[0] if not any(_parts(laid, of, level))]
+    if not short or _may_be_hidden(given, rules, level):
+        return None
+    is_touch = all(_touches(given, laid, of, level) for laid in short)
     text = "is reached at irrational values alone" if is_touch else "is not reached"
-    how = f"{float(level)!r} {text}, by the values of {' and '.join(names)}"
+    names = " and ".join(repr(laid.axis.variable.name) for laid in short)
+    how = f"{float(level)!r} {text}, by the values of {names}"
     return Meeting(bounds, Proved(how), is_touch)
 
 
@@ -354,9 +359,12 @@ def _by_boxes(
 ) -> Meeting:
     """Return what is known of a meeting, made narrower by branch and bound."""
     given = compared.ground
-    tighter = highest_by_boxes(
-        given.rules, given.domain, *rules, clock, tolerance=float(_CLOSE)
-    )
+    for tolerance in (float(_CLOSE), _CLOSER):
+        tighter = highest_by_boxes(
+            given.rules, given.domain, *rules, clock, tolerance=tolerance
+        )
+        if not tighter.low < level <= tighter.high:
+            break  # it is known whether they reach the level
     low, high = known.level
     high = max(low, min(high, Fraction(tighter.high)))
     point = point_of(tighter.point)

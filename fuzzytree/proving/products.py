@@ -17,15 +17,17 @@ from fuzzytree.proving.bounding import wins_by_boxes
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import Ground
+from fuzzytree.proving.parts import Stretch
 from fuzzytree.proving.proportions import Box, Proportions
 from fuzzytree.proving.states import Declined, Proved, State, Witness, point_of
 from fuzzytree.proving.tied import Asked, checked
 from fuzzytree.proving.variables import Point, variable_value
-from fuzzytree.proving.witnesses import coupled
+from fuzzytree.proving.witnesses import coupled, point_with
 from fuzzytree.proving.wording import counted
 
 _MOST_BOXES: Final = 500  # of cells, in one question
 _SHARE: Final = 0.25  # of the time that is left, for one box
+_NEAR: Final = (3, 6, 12, 24, 48)  # halvings of the way from a point to the middle
 _TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
 
 
@@ -41,24 +43,24 @@ def tie_of_products(given: Ground, asked: Asked, clock: Clock) -> State:
         `Proved`: they nowhere are. `Witness`: here they are. `Bracket`: time, or a
         lead that is too small to tell, leaves it open. `Declined`: axes of one
         direction do, or places too near to each other.
+
+    Raises:
+        OutOfTimeError: If the clock is over.
+        TooManyCellsError: If the axes are too large.
     """
     search = _Search(Proportions(given), asked, clock)
-    every = [rule - 1 for rule in (*asked.ours, *asked.weak)]
-    pairs = [(every[0], other) for other in every[1:]]
-    if not all(search.of.are_free(*pair) for pair in pairs):
-        reason = "the inputs of its variables depend on each other"
-        return Declined("FTD04", reason)
-    if not all(search.of.is_told(*pair) for pair in pairs):
+    mine, *others = (rule - 1 for rule in (*asked.ours, *asked.weak))
+    if not all(search.of.is_told(mine, other) for other in others):
         search.of = Proportions(given.fine)
-    try:
-        found = search.found()
-    except OutOfTimeError:
-        return asked.open("the budget was spent")
+    found = search.found()
     if found is not None:
         return found
     if search.why:
         return asked.open(search.why)
-    if not all(search.of.is_told(*pair) for pair in pairs):
+    if not all(search.of.are_free(mine, other) for other in others):
+        reason = "the inputs of its variables depend on each other"
+        return Declined("FTD04", reason)
+    if not all(search.of.is_told(mine, other) for other in others):
         return Declined("FTD04", "two places of an axis are too near to tell")
     boxes = counted(len(search.seen), "box", "boxes")
     return Proved(f"{boxes} of cells visited in which they are one function")
@@ -131,10 +133,32 @@ class _Search:
             if isinstance(state, Proved) and is_outer:
                 return None
             if isinstance(state, Witness):
-                point = point_of(state.point)
-                if self._is_inside(box, point):
-                    return checked(self.of.ground, self.asked, point)
-        self.why = "no point is known where they lead, and none is excluded"
+                found = self._near(box, point_of(state.point))
+                if found is not None:
+                    return found
+        found = self._near(box, None)  # there may be no double in it
+        if found is None:
+            self.why = "no point is known where they lead, and none is excluded"
+        return found
+
+    def _near(self, box: Box, point: Point | None) -> Witness | None:
+        """Return a point of a box at which they tie, if one near another does."""
+        given = self.of.ground
+        ends = enumerate(self.of.ends(axis, run) for axis, run in enumerate(box))
+        wanted = {n: Stretch(*of, is_open=of[0] < of[1]) for n, of in ends}
+        middle = point_with(given, wanted)
+        tried = [] if point is None else [point]
+        if middle is not None:
+            start = point or middle
+            tried += [
+                {name: x + (middle[name] - x) / 2**bits for name, x in start.items()}
+                for bits in (_NEAR if point else (0,))
+            ]
+        for one in tried:
+            if self._is_inside(box, one):
+                found = checked(given, self.asked, one)
+                if found is not None:
+                    return found
         return None
 
     def _domain(self, box: Box, *, is_outer: bool) -> Domain | None:

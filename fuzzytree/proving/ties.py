@@ -107,9 +107,9 @@ def _asked(given: Ground, asked: Asked, clock: Clock) -> State:
         point = point_with(given, {})
         found = None if point is None else checked(given, asked, point)
         return found or Proved("no rule asks anything")
-    if given.rules.semantics.conjunction == "product":
-        return tie_of_products(given, asked, clock)
     try:
+        if given.rules.semantics.conjunction == "product":
+            return tie_of_products(given, asked, clock)
         return _searched(given, asked, clock)
     except OutOfTimeError:
         return asked.open("the budget was spent")
