@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.report.audit_page import page
-from tests.report.page_audits import EVIL, audit_of, rows_of, rule_base
+from tests.report.page_audits import EVIL, answers, audit_of, rows_of, rule_base
 
 pytestmark = pytest.mark.heavy
 
@@ -179,6 +180,21 @@ def test_the_page_works_by_keyboard(seen: Seen) -> None:
     assert seen.run(fold) is False
     press(keys.ENTER)
     assert seen.run(fold) is True
+
+
+def test_a_link_to_a_folded_finding_unfolds_it(browser: Any, tmp_path: Path) -> None:
+    gap = next(one for one in answers() if one.code == "FT301")
+    gaps = tuple(replace(gap, id=f"FT301-{k}", sentence=f"gap {k}") for k in range(5))
+    rules = rule_base()
+    place = tmp_path / "folded.html"
+    place.write_text(page(audit_of(rules, gaps), rules), "utf-8")
+    seen = Seen(browser, place)
+    fold = "return document.querySelector('#FT301-4 > details').open"
+    assert seen.run(fold) is False
+    seen.run("location.hash = 'FT301-4'")
+    seen.run("dispatchEvent(new HashChangeEvent('hashchange'))")
+    assert seen.run(fold) is True
+    assert seen.errors() == []
 
 
 def test_a_table_is_sorted_by_its_head(seen: Seen) -> None:

@@ -13,6 +13,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.report.sarif import sarif
 from fuzzytree.testing import random_tree
+from tests.cli.test_audit_surroundings import NAMES, hostile
 from tests.report.audits import every_state
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,6 +47,13 @@ def test_every_state_is_sarif_with_and_without_a_baseline(
 def test_an_audit_of_a_model_is_sarif(validate: Callable[[str], None]) -> None:
     found = ft.audit(random_tree(2), select=["FT1", "FT4", "FT5"])
     validate(sarif(found, {}))
+
+
+def test_hostile_names_are_sarif(validate: Callable[[str], None]) -> None:
+    for name in NAMES.values():
+        validate(
+            sarif(ft.audit(hostile(name), select=["FT1", "FT4"]), {"FT101-0": name})
+        )
 
 
 def test_the_schema_refuses_what_is_none(validate: Callable[[str], None]) -> None:
