@@ -25,7 +25,7 @@ def verdict(audit: Audit) -> Markup:
     """Return what was found, in words, and how it is known."""
     findings = gravest_first(audit.open_findings)
     states = known_as(audit.answers)
-    sign, said = _result(findings, states)
+    sign, said = _result(findings, states, is_complete=audit.is_complete)
     accepted = len(audit.findings) - len(findings)
     if accepted:
         said += f"; {counted(accepted, 'other')} {'is' if accepted == 1 else 'are'} "
@@ -49,7 +49,9 @@ def verdict(audit: Audit) -> Markup:
     )
 
 
-def _result(findings: Sequence[Answer], states: Mapping[str, int]) -> tuple[str, str]:
+def _result(
+    findings: Sequence[Answer], states: Mapping[str, int], *, is_complete: bool
+) -> tuple[str, str]:
     """Return a sign and a sentence: what was found, and what that is worth."""
     counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
     told = [counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]]
@@ -59,11 +61,12 @@ def _result(findings: Sequence[Answer], states: Mapping[str, int]) -> tuple[str,
         others = ", ".join(told[:-1])
         return worst, f"{others}{' and ' if others else ''}{told[-1]} {verb} found"
     whole, declined = sum(states.values()), states["DECLINED"]
-    if not declined:
-        return "calm", "Nothing was found"
-    if declined == whole:
+    if declined and declined == whole:
         return "declined", "Nothing was decided: every question was declined"
-    return "info", f"Nothing was found; {declined} of {whole} questions were declined"
+    said = "Nothing was found" if is_complete else "Nothing was found so far"
+    if declined:
+        said += f"; {declined} of {whole} questions were declined"
+    return "calm" if is_complete and not declined else "info", said
 
 
 def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | None:

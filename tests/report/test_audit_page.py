@@ -102,6 +102,14 @@ def test_an_audit_that_decided_nothing_does_not_look_calm() -> None:
     assert 'class="said calm"' not in content
 
 
+def test_an_audit_that_found_nothing_so_far_does_not_look_calm() -> None:
+    rules = rule_base()
+    clean = tuple(one for one in answers() if not one.is_finding)
+    content = page(audit_of(rules, clean[:1], is_complete=False), rules)
+    assert "Nothing was found so far" in content
+    assert 'class="said calm"' not in content
+
+
 def test_an_audit_that_was_cut_short_says_so_and_what_was_not_asked() -> None:
     unasked = ("FT501 complexity: not asked: the budget of 1 s is spent",)
     text = shown(is_complete=False, unasked=unasked).text
