@@ -9,6 +9,7 @@ An audit
     - `audit`: asks all families, one after another
     - `domains`, `views`, `conditions`: where a model is asked, and its rules as a rule
       base; conditions of fuzzy systems as clauses
+    - `turns`: many questions share what is left of the time
     - `places`: where rules stand in a file; ids that outlive their order
     - `results`: what other verbs found of the same model
     - `limits`: what an audit does not establish, and its digest

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -12,11 +13,12 @@ from msgspec.structs import replace
 from fuzzytree.auditing.records import Answer, Label, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.auditing.support import drawn
+from fuzzytree.auditing.turns import Turns
 from fuzzytree.numerics.oracle import decide
 from fuzzytree.proving.alike import alike
 from fuzzytree.proving.answers import answer_at
 from fuzzytree.proving.dominance import Compared
-from fuzzytree.proving.ground import Ground, ground
+from fuzzytree.proving.ground import Ground, ground, rule_strengths
 from fuzzytree.proving.states import (
     Bracket,
     Claim,
@@ -38,6 +40,7 @@ MOST_ROWS: Final = 4096
 MOST_SHOWN: Final = 100
 """The most clauses that matter which are told one by one."""
 
+_MOST_STRENGTHS = 1 << 24  # of all rules with and without each clause, at all rows
 _MOST_TRIED = 4  # rows that are evaluated in fractions for one clause
 
 
@@ -77,18 +80,22 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
     silent = [
         number for number in range(1, count + 1) if not compared.fires[number - 1]
     ]
-    needed = 0
+    needed, turns = 0, Turns(subject.clock, 0.9)
     for number, one in enumerate(every, count + 1):
         if one.rule in silent:
             continue
         subject.clock.check()
         subject.clock.tell("irrelevant clause", (number - count) / len(every))
-        state = _state(subject, compared, seen, one, number)
+        state = _state(subject, compared, seen, one, number, turns)
+        if state is None:
+            turns.left_out += 1
+            continue
         if isinstance(state, Witness):
             needed += 1
             if needed > MOST_SHOWN:
                 continue
         yield _answer(subject, one, state)
+    yield from turns.rest("FT107", "clause", "whether they are needed")
     for number in silent:
         name = subject.rule_name(number)
         yield Answer(
@@ -121,8 +128,14 @@ def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
 
 
 def _state(
-    subject: Subject, compared: Compared, seen: _Seen, one: _Dropped, number: int
-) -> State:
+    subject: Subject,
+    compared: Compared,
+    seen: _Seen,
+    one: _Dropped,
+    number: int,
+    turns: Turns,
+) -> State | None:
+    left = len(compared.ground.rules.rules) - number + 1
     if compared.never_weaker(one.rule, number) == "always":
         return Proved("the rule is as strong without it everywhere")
     by = _backed(subject, compared, one, number)
@@ -132,8 +145,8 @@ def _state(
     if found is not None:
         return found
     shorter = one.of(subject.rules)
-    clock = subject.clock.share(0.1)
-    state = alike(subject.rules, shorter, subject.domain, clock)
+    turn = partial(alike, subject.rules, shorter, subject.domain)
+    state = turns.ask(left, turn)
     if isinstance(state, Witness):
         point = point_of(state.point)
         return _witness(subject.rules, point)
@@ -173,8 +186,9 @@ class _Seen:
     def __init__(self, subject: Subject, given: Ground, both: RuleBase) -> None:
         self.rules, self.given = subject.rules, given
         self.count = len(subject.rules.rules)
+        most = min(MOST_ROWS, _MOST_STRENGTHS // len(both.rules))
         rows, seed = subject.settings.rows, subject.settings.seed
-        self.values = drawn(subject.rules, subject.domain, min(rows, MOST_ROWS), seed)
+        self.values = drawn(subject.rules, subject.domain, min(rows, most), seed)
         strengths = decide(both, self.values).strengths
         assert strengths is not None  # they were asked for
         self.strengths: FloatArray = strengths
@@ -184,31 +198,42 @@ class _Seen:
         )
         uncovered = subject.rules.semantics.uncovered
         self.uncovered = -1 if uncovered is None else numbers[uncovered]
-        self.labels = self._labels(self.strengths[: self.count])
+        whole = self.strengths[: self.count]
+        self.best, self.first = whole.max(axis=0), whole.argmax(axis=0)
+        found = self.classes[self.first]
+        self.labels = np.where(self.best > 0.0, found, self.uncovered)
+        self.known: dict[int, list[Fraction]] = {}
 
-    def _labels(self, strengths: FloatArray) -> IntArray:
-        found = self.classes[strengths.argmax(axis=0)]
-        return np.where(strengths.max(axis=0) > 0.0, found, self.uncovered)
+    def _point(self, row: int) -> dict[str, Fraction]:
+        values = map(Fraction, self.values[:, row].tolist())
+        return dict(zip(self.rules.inputs, values, strict=True))
+
+    def _label(self, strengths: Sequence[Fraction]) -> str | None:
+        best = max(strengths)
+        if not best:
+            return self.rules.semantics.uncovered
+        return self.rules.rules[strengths.index(best)].then
 
     def witness(self, one: _Dropped, number: int) -> Witness | None:
         """Return a row that is decided otherwise without a clause, if one is seen."""
-        strengths = self.strengths[: self.count].copy()
-        strengths[one.rule - 1] = self.strengths[number]
-        rows = np.flatnonzero(self._labels(strengths) != self.labels)
-        shorter = one.of(self.rules)
+        own, strengths = one.rule - 1, self.strengths[number]
+        # A rule only gains without a clause: it wins, or everything stays the same.
+        wins = (strengths > self.best) | ((strengths == self.best) & (own < self.first))
+        is_other = self.labels != self.classes[own]
+        rows = np.flatnonzero(wins & is_other & (strengths > 0.0))
         # The clearest first: those where the rule gains most.
-        gain = self.strengths[number, rows] - self.strengths[one.rule - 1, rows]
-        for row in rows[np.argsort(-gain, kind="stable")][:_MOST_TRIED]:
-            point = {
-                name: Fraction(float(value))
-                for name, value in zip(
-                    self.rules.inputs, self.values[:, row], strict=True
-                )
-            }
+        gain = strengths[rows] - self.strengths[own, rows]
+        for row in rows[np.argsort(-gain, kind="stable")][:_MOST_TRIED].tolist():
+            point = self._point(row)
             if not is_within(self.given, point):
                 continue
-            if answer_at(self.rules, point).label != answer_at(shorter, point).label:
-                return _witness(self.rules, point)
+            if row not in self.known:
+                self.known[row] = rule_strengths(self.rules, point)
+            exact = [*self.known[row]]
+            label = self._label(exact)
+            (exact[own],) = rule_strengths(self.rules, point, [one.shorter])
+            if self._label(exact) != label:
+                return Witness(coordinates(point), (Claim("decides", label=label),))
         return None
 
 

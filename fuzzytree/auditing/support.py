@@ -47,6 +47,8 @@ CONFIDENCE: Final = 0.95
 """Of every interval."""
 
 _STEP = 4096  # rows between two looks at the clock
+_MOST_DEGREES = 1 << 24  # of all clauses at points that are drawn
+_LEAST_ROWS = 1000  # that are drawn however many clauses there are
 
 
 def wilson(hits: int, rows: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
@@ -329,7 +331,9 @@ def _of_rows(subject: Subject, rows: Rows) -> Iterator[Answer]:
 def _of_domain(subject: Subject) -> Iterator[Answer]:
     """Yield which shares of the domain's volume are uncovered, weak, tied, close."""
     settings = subject.settings
-    points = drawn(subject.rules, subject.domain, settings.rows, settings.seed)
+    clauses = sum(len(rule.when) for rule in subject.rules.rules)
+    rows = min(settings.rows, max(_MOST_DEGREES // max(clauses, 1), _LEAST_ROWS))
+    points = drawn(subject.rules, subject.domain, rows, settings.seed)
     if not points.shape[1]:
         reason = "no drawn point lies within the sides of the combinations"
         text = f"shares of the domain are not known: {reason}"

@@ -15,6 +15,8 @@ from fuzzytree.auditing.ranges import (
 from fuzzytree.auditing.records import Answer, Label, Measure
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.curves import pieces
+from fuzzytree.proving.elements import Element
 from fuzzytree.proving.measures import Bounds, heights
 from fuzzytree.proving.states import Bracket, Proved
 from fuzzytree.proving.wording import counted, short
@@ -38,9 +40,12 @@ def _heights(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
     for of in whole:
         for term in of.variable.terms:
             subject.clock.check()
+            lines = held.get((of.variable.name, term.name))
+            if lines is None and _is_full(of, term):
+                clean += 1
+                continue
             made = of.line(term)
             ((height, at),) = heights(made)
-            lines = held.get((of.variable.name, term.name))
             if lines is not None:
                 upper = of.line(Term(term.name, lines.upper))
                 height = Bounds(height.low, heights(upper)[0][0].high)
@@ -60,6 +65,19 @@ def _heights(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
             is_finding=False,
             measures=(Measure("lowest height", float(lowest), str(lowest)),),
         )
+
+
+def _is_full(of: Range, term: Term) -> bool:
+    """Return whether a curve is 1 where one of its pieces ends, or the range does."""
+    curve = Element(term.shape)
+    ends = {of.low, of.high}
+    for piece in pieces(term.shape):
+        ends.update(end for end in (piece.low, piece.high) if end is not None)
+    return any(
+        curve.degree(end) == 1
+        for end in ends
+        if of.low <= end <= of.high and not (of.is_open and end == of.low)
+    )
 
 
 def _low_term(

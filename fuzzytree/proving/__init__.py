@@ -22,7 +22,7 @@ Curves, in fractions
 Points
     - `linear`: linear inequalities, decided in fractions
     - `witnesses`: from values of the axes to a point of the inputs
-    - `seeking`: points worth a look, by doubles
+    - `seeking`, `glimpses`: points worth a look, by doubles; what many show at once
     - `around`: what rules reach on many boxes at once, by doubles
     - `boxes`: the region around a witness
 
@@ -40,7 +40,7 @@ Rules under the product, and any other: boxes
 
 Questions, whatever the conjunction
     - `wins`, `leads`: is a rule ever strongest, and by how much
-    - `tied`, `ties`: are rules equally strong on a set with an interior
+    - `tied`, `shared`, `ties`: are rules equally strong on a set with an interior
     - `proportions`, `products`: where are they one function, under the product
     - `cover`: is there an input without a rule, or with weak ones only
     - `factors`, `dominance`: two rules compared axis by axis

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
 
     BoolArray = npt.NDArray[np.bool_]
+    ByteArray = npt.NDArray[np.int8]
 
 Verdict = Literal["always", "not", "open"]
 """It holds everywhere, it does not, or it is too near to tell."""
@@ -180,10 +181,10 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
         return found
 
     @functools.cached_property
-    def _known(self) -> dict[tuple[str, int], IntArray]:
+    def _known(self) -> dict[tuple[str, int], ByteArray]:
         return {}
 
-    def _weaker(self, weak: int) -> IntArray:
+    def _weaker(self, weak: int) -> ByteArray:
         """For each rule: 1 if it is somewhere weaker than one, 2 if unknown, else 0."""
         checkpoint()
         key = "weaker", weak
@@ -198,8 +199,8 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
                 least = np.minimum(least, np.where(start, side.at[:, 0], FAR))
             near = (least == rest[weak]) & ~self._is_sharp(least) & (found == 0)
             found = np.where(least < rest[weak], 1, np.where(near, 2, found))
-        self._known[key] = found
-        return found
+        self._known[key] = found.astype(np.int8)
+        return self._known[key]
 
     def _not_above(self, weak: int) -> BoolArray:
         """For each rule: whether it may be no stronger than one where that fires."""

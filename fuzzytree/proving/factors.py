@@ -39,6 +39,7 @@ from fuzzytree.rulebase import Clause, Shape, shapes_of
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
+    from fuzzytree.proving.ground import BoolArray
 
 Group = tuple[tuple[int, ...], bool]
 """A clause: its elements, and whether the least of them counts, not the largest."""
@@ -117,6 +118,27 @@ class Factored(msgspec.Struct, frozen=True, eq=False, dict=True):
             return low == high
         rank = self.laid[axis].cells.rank[cell]  # element 0 is 1 everywhere
         return bool(rank[low[0] if low else 0] <= rank[high[0] if high else 0])
+
+    def near(self, one: int, most: Fraction) -> BoolArray:
+        """Return which rules are not seen to be far from one, at places between cells.
+
+        Args:
+            one: The number of the rule, from 0.
+            most: How far is not far.
+        """
+        if (one, most) not in self._near:
+            checkpoint()
+            limit = float(most)
+            found: BoolArray = np.ones(len(self.ground.rules.rules), dtype=bool)
+            for low, high in self.at_zones:
+                is_far = (low[one] - high > limit) | (low - high[one] > limit)
+                found &= ~is_far.any(axis=1)
+            self._near[one, most] = found
+        return self._near[one, most]
+
+    @functools.cached_property
+    def _near(self) -> dict[tuple[int, Fraction], BoolArray]:
+        return {}
 
     def at_start(self, axis: int, rule: int) -> Fraction:
         """Return a rule's degree at the lower end of an axis."""
@@ -363,10 +385,8 @@ def distance(of: Factored, one: int, other: int, most: Fraction) -> Distance | N
         other: The number of another.
         most: More is not of interest.
     """
-    limit = float(most)
-    for low, high in of.at_zones:
-        if ((low[one] - high[other] > limit) | (low[other] - high[one] > limit)).any():
-            return None
+    if not of.near(one, most)[other]:
+        return None
     each, whole, found = Bounds(ZERO, ZERO), ZERO, (0, ZERO)
     for axis, laid in enumerate(of.laid):
         gap = Bounds(ZERO, ZERO)

@@ -28,7 +28,7 @@ from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.elements import ALWAYS, Element, Place, places
 from fuzzytree.proving.levels import Level, level_at, told_apart
 from fuzzytree.proving.variables import span, variable_value
-from fuzzytree.rulebase import Clause, RuleBase, Variable, shapes_of
+from fuzzytree.rulebase import Clause, Rule, RuleBase, Variable, shapes_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -412,12 +412,15 @@ def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]
     return rule_strengths(given.rules, point)
 
 
-def rule_strengths(rules: RuleBase, point: Mapping[str, Fraction]) -> list[Fraction]:
-    """Return every rule's exact strength, without a domain."""
+def rule_strengths(
+    rules: RuleBase, point: Mapping[str, Fraction], of: Sequence[Rule] | None = None
+) -> list[Fraction]:
+    """Return every rule's exact strength, or that of some rules, without a domain."""
     checkpoint()
+    every = rules.rules if of is None else of
     is_product = rules.semantics.conjunction == "product"
     shapes = shapes_of(rules.variables)
-    clauses = dict.fromkeys(c for rule in rules.rules for c in rule.when)
+    clauses = dict.fromkeys(c for rule in every for c in rule.when)
     asked = {clause.variable for clause in clauses}
     values = {
         v.name: variable_value(v, point) for v in rules.variables if v.name in asked
@@ -429,9 +432,8 @@ def rule_strengths(rules: RuleBase, point: Mapping[str, Fraction]) -> list[Fract
             exact_degree(shapes[clause.variable, t], value) for t in clause.terms
         )
         degrees[clause] = 1 - found if clause.negated else found
-    strengths: list[Fraction] = []
-    for rule in rules.rules:
-        each = [degrees[clause] for clause in rule.when]
-        whole = math.prod(each, start=Fraction(1))
-        strengths.append(whole if is_product else min(each, default=Fraction(1)))
-    return strengths
+    one = Fraction(1)
+    each = [[degrees[clause] for clause in rule.when] for rule in every]
+    if is_product:
+        return [math.prod(of_rule, start=one) for of_rule in each]
+    return [min(of_rule, default=one) for of_rule in each]
