@@ -202,7 +202,10 @@ def repeating(
         ("--budget", asked.budget),
         ("--row", asked.row),
     ):
-        words += [] if value is None else [name, str(value)]
+        if isinstance(value, float):
+            words += [name, repr(value).removesuffix(".0")]
+        elif value is not None:
+            words += [name, value]
     words += [] if asked.within == "model" else ["--within", asked.within]
     for name, values in (("--limits", asked.limits), ("--set", asked.settings)):
         words += [word for value in values for word in (name, value)]

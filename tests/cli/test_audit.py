@@ -184,7 +184,7 @@ def test_a_configuration_here_is_read_and_the_command_line_goes_before_it(
 def test_the_command_of_an_answer_has_the_options_that_matter(call: Call) -> None:
     options = (
         *("--data", "grasps.csv", "--target", "grip", "--within", "data"),
-        *("--budget", "30.0", "--set", "epsilon=0.2"),
+        *("--budget", "30", "--set", "epsilon=0.2"),
     )
     found = facts(call, *options, "--select", "FT101")
     words = found["answers"][0]["repeat"].split()
