@@ -15,7 +15,7 @@ from fuzzytree.auditing.rows import OF_RANGES, Points, distance_measure
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.numerics.oracle import decide
 from fuzzytree.proving.around import columns
-from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.nearest import NARROW, Nearest, nearest
 from fuzzytree.proving.states import (
     Bracket,
@@ -32,6 +32,7 @@ from fuzzytree.rulebase import RuleBase
 MOST_ROWS = 2000
 """Rows around which the nearest disagreement is sought."""
 
+_PART = 0.9  # of the time, to seek; what is found must still be told
 _HINTS = 16  # rows from which a point where both differ is sought by doubles
 _CROSSED = 8  # rows whose nearest cut is looked at
 
@@ -80,10 +81,10 @@ def nearest_difference(
             differ.append(point)
     search = _Search(both, alike[:MOST_ROWS], clock)
     if is_alike:
-        search.asked = len(alike)
+        search.settled = set(range(len(search.rows)))
     else:
         search.run([*differ, *known])
-    yield _nearest_answer(both, points, search, len(differ), len(alike))
+    yield _nearest_answer(points, search, len(differ), len(alike))
 
 
 def answer_of(rules: RuleBase, number: int) -> str | None:
@@ -102,9 +103,12 @@ class _Search:
 
     def __init__(self, both: Both, rows: Sequence[_Row], clock: Clock) -> None:
         self.both, self.rows, self.clock = both, rows, clock
-        self.asked = self.place = 0
+        self.end = clock.share(_PART)
+        self.settled: set[int] = set()
+        self.place = 0
         self.low: Fraction | None = None
         self.best: Nearest | None = None
+        self.claims: tuple[Claim, ...] = ()
         self.why = ""
         self.exact: dict[int, Fraction] = {}
 
@@ -119,8 +123,15 @@ class _Search:
         Args:
             seeds: Points at which both differ.
         """
-        if not self.rows:
-            return
+        try:
+            if self.rows:
+                self._run(seeds)
+        except OutOfTimeError:
+            self.why = self.why or "the budget was spent"
+        if self.best is not None and self.place not in self.settled:
+            self.low = Fraction(0)
+
+    def _run(self, seeds: Sequence[Mapping[str, Fraction]]) -> None:
         self._cross()
         hints = self._hints(seeds)
         far = (np.inf,)
@@ -129,39 +140,42 @@ class _Search:
             key=lambda place: (place != self.place, hints.get(place, far)[0]),
         )
         left = self._left(order)
-        while left and not self.clock.is_over:
+        while left and not self.end.is_over:
             place, row = left[0], self.rows[left[0]]
-            share = self.asked / len(self.rows)
+            share = len(self.settled) / len(self.rows)
             self.clock.tell(f"nearest disagreement to row {row.number}", share)
             found = nearest(
                 self.both.domain,
                 row.point,
-                lambda box: self.both.ask(box, self.clock),
+                lambda box: self.both.ask(box, self.end),
                 self.both.differ,
-                self.clock,
+                self.end,
                 within=None if self.best is None else self.best.high,
                 near=[hints[place][1]] if place in hints else (),
             )
             if found.is_none:  # and so for all of them: it was asked on the domain
-                self.asked, self.low = len(self.rows), None
+                self.settled, self.low = set(range(len(self.rows))), None
                 return
             before = self.best
             self._add(place, found)
             if found.why and not found.is_narrow:
                 self.why = self.why or f"around row {row.number}: {found.why}"
-            self.asked += 1
             left = left[1:] if self.best is before else self._left(left[1:])
         if left:
             self.why = self.why or "the budget was spent"
-        if self.place in left:
-            self.low = Fraction(0)
 
     def _add(self, place: int, found: Nearest) -> None:
         self._lower(found.low)
+        self.settled.add(place)
         if found.high is not None and found.point is not None:
             best = None if self.best is None else self.best.high
             if best is None or found.high < best:
-                self.best, self.place = found, place
+                self._keep(place, found)
+
+    def _keep(self, place: int, found: Nearest) -> None:
+        assert found.point is not None  # asked by the caller
+        self.claims = self.both.claims(found.point)
+        self.best, self.place = found, place
 
     def _lower(self, low: Fraction) -> None:
         self.low = low if self.low is None else min(self.low, low)
@@ -172,15 +186,15 @@ class _Search:
         for place in order[:_CROSSED]:
             row = self.rows[place]
             best = None if self.best is None else self.best.high
-            if self.clock.is_over or (best is not None and row.cut > best):
+            if self.end.is_over or (best is not None and row.cut > best):
                 return
-            found = self.both.crisp.nearest_other(row.point, self.clock)
+            found = self.both.crisp.nearest_other(row.point, self.end)
             if not found.why:
                 self.exact[place] = found.low
             if found.point is None or found.high is None:
                 continue
             if self.both.differ(found.point) and (best is None or found.high < best):
-                self.best, self.place = found, place
+                self._keep(place, found)
 
     def _hints(
         self, seeds: Sequence[Mapping[str, Fraction]]
@@ -216,27 +230,26 @@ class _Search:
         left: list[int] = []
         for place, row, is_clear in zip(places, rows, clear.tolist(), strict=True):
             if is_clear and max(self.exact.get(place, row.cut), row.cut) >= radius:
-                self.asked += 1
+                self.settled.add(place)
                 self._lower(radius)
             else:
                 left.append(place)
         return left
 
 
-def _nearest_answer(
-    both: Both, points: Points, search: _Search, differ: int, alike: int
-) -> Answer:
+def _nearest_answer(points: Points, search: _Search, differ: int, alike: int) -> Answer:
     measures = [Measure("rows that differ already", differ)]
-    measures.append(Measure("rows asked", search.asked))
+    measures.append(Measure("rows asked", len(search.settled)))
     before = f"of {points.text} {differ} differ already"
-    if not search.asked:
+    asked = len(search.settled)
+    if not asked:
         why = "no row of the domain is decided alike by both"
         if alike:
             why = "the budget was spent before the first row"
         declined = Declined("FTD03" if alike else "FTD06", why)
         text = f"{before}; the nearest disagreement to others is not sought"
         return Answer("FT203", "rows", text, declined, False, measures=tuple(measures))
-    some = f"{search.asked} of {alike}" if search.asked < alike else str(alike)
+    some = f"{asked} of {alike}" if asked < alike else str(alike)
     best, low = search.best, search.low or Fraction(0)
     if best is None or best.point is None or best.high is None:
         state = _no_nearest(search, low)
@@ -245,9 +258,8 @@ def _nearest_answer(
     measures.append(distance_measure("certified distance", low))
     measures.append(distance_measure("distance of the witness", best.high))
     measures.append(Measure("row", search.row))
-    claims = both.claims(best.point)
     state = narrowed_state(
-        "the distance of the nearest disagreement", low, best, claims, search.why
+        "the distance of the nearest disagreement", low, best, search.claims, search.why
     )
     return Answer(
         code="FT203",

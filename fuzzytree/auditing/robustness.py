@@ -34,6 +34,7 @@ MOST_ROWS = 50
 SHOWN_ROWS = 5
 """Rows of the smallest radius that have an answer of their own."""
 
+_PART = 0.9  # of the time, to seek; what is found must still be told
 _MOST_NAMED = 4  # inputs in a sentence
 
 
@@ -177,29 +178,30 @@ def answers(subject: Subject) -> Iterator[Answer]:
         return
     points = points_of(subject, subject.rows)
     decider = decider_of(subject)
+    clock = subject.clock.share(_PART)
     asked: list[_Asked] = []
     decider.look([point for _, point in points.at[:MOST_ROWS]])
     for number, point in points.at[:MOST_ROWS]:
-        if subject.clock.is_over:
+        if clock.is_over:
             break
         subject.clock.tell(f"radius of row {number}", len(asked) / len(points.at))
-        found = decider.nearest_other(point, subject.clock)
-        if subject.clock.is_over and not found.is_narrow:
+        found = decider.nearest_other(point, clock)
+        if clock.is_over and not found.is_narrow:
             break
-        asked.append(_Asked(number, point, found))
-    asked.sort(key=lambda one: (one.found.low, one.number))
-    yield _in_all(decider, points, asked)
-    for one in asked[:SHOWN_ROWS]:
-        yield _answer(decider, f"row {one.number}", one.point, one.found)
+        answer = _answer(decider, f"row {number}", point, found)
+        asked.append(_Asked(number, found.low, answer))
+    asked.sort(key=lambda one: (one.low, one.number))
+    yield _in_all(points, asked)
+    yield from (one.answer for one in asked[:SHOWN_ROWS])
 
 
 class _Asked(NamedTuple):
     number: int
-    point: dict[str, Fraction]
-    found: Nearest
+    low: Fraction
+    answer: Answer
 
 
-def _in_all(decider: Decider, points: Points, asked: Sequence[_Asked]) -> Answer:
+def _in_all(points: Points, asked: Sequence[_Asked]) -> Answer:
     """Return an answer about all rows together; `asked` is in order of their radius."""
     count = Measure("rows asked", len(asked))
     if not asked:
@@ -210,17 +212,16 @@ def _in_all(decider: Decider, points: Points, asked: Sequence[_Asked]) -> Answer
         )
         return Answer("FT204", "rows", NOT_SOUGHT, state, False, measures=(count,))
     first = asked[0]
-    least = first.found.low
+    least = first.low
     of_all = "" if len(asked) == len(points.at) else "with the smallest margins "
-    median = statistics.median_low([one.found.low for one in asked])
-    one = _answer(decider, f"row {first.number}", first.point, first.found)
+    median = statistics.median_low([one.low for one in asked])
     return Answer(
         code="FT204",
         subject="rows",
         sentence=f"of {points.text} {len(asked)} different ones {of_all}were asked: "
         f"each keeps its decision within at least {percent(least)} {OF_RANGES}, half "
         f"of them within {percent(median)}",
-        state=one.state,
+        state=first.answer.state,
         is_finding=False,
         measures=(
             count,

@@ -10,18 +10,19 @@ come up to the class anywhere on the box, by bounds of doubles, are not asked ab
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from msgspec.structs import replace
 
 from fuzzytree.proving.answers import answer_at
 from fuzzytree.proving.around import Around
 from fuzzytree.proving.branching import simplified
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.cover import uncovered
-from fuzzytree.proving.ground import Ground
+from fuzzytree.proving.ground import Ground, ground
 from fuzzytree.proving.seeking import drawn_in, ends_of, near_strengths
 from fuzzytree.proving.states import (
     Carrier,
@@ -102,6 +103,8 @@ def other_decision(
             return Witness(state.point, (claim,), state.region)
         if not isinstance(state, Proved):
             left_open = left_open or state
+            if clock.is_over:
+                break
     return left_open or Proved(f"{asked} questions about other decisions answered no")
 
 
@@ -136,15 +139,27 @@ class _Contest:
         Own rules that are below another one on all of the box are no rivals.
         """
         own = (np.flatnonzero(self.is_own & (self.high >= self.least)) + 1).tolist()
-        for number in self._others(is_tie=False):
-            yield wins(self.given, number, own, clock)
+        ahead, level = self._others(is_tie=False), self._others(is_tie=True)
+        # Of few rules axes have few places; the others matter only to what is bare.
+        kept = sorted({*own, *level})
+        given, number_of = self._among(kept)
+        mine = [number_of[number] for number in own]
+        for number in ahead:
+            yield wins(given, number_of[number], mine, clock)
         if self.may_be_bare:
             yield uncovered(self.given, clock)
-        for number in self._others(is_tie=True):
-            after = [rival for rival in own if rival > number]
+        for number in map(number_of.__getitem__, level):
+            after = [rival for rival in mine if rival > number]
             if after:
-                before = [rival for rival in own if rival < number]
-                yield decides_by_order(self.given, number, before, after, clock)
+                before = [rival for rival in mine if rival < number]
+                yield decides_by_order(given, number, before, after, clock)
+
+    def _among(self, kept: Sequence[int]) -> tuple[Ground, dict[int, int]]:
+        """Return the box with some rules only, and their numbers among these."""
+        rules = self.given.rules
+        few = replace(rules, rules=tuple(rules.rules[number - 1] for number in kept))
+        numbers = {number: place for place, number in enumerate(kept, 1)}
+        return ground(few, self.given.domain), numbers
 
     def _others(self, *, is_tie: bool) -> list[int]:
         """Return the numbers of other rules that may be as strong, or stronger."""
