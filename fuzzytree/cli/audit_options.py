@@ -202,10 +202,8 @@ def repeating(
         ("--budget", asked.budget),
         ("--row", asked.row),
     ):
-        if isinstance(value, float):
-            words += [name, repr(value).removesuffix(".0")]
-        elif value is not None:
-            words += [name, value]
+        said = value if isinstance(value, str) else repr(value).removesuffix(".0")
+        words += [] if value is None else [name, said]
     words += [] if asked.within == "model" else ["--within", asked.within]
     for name, values in (("--limits", asked.limits), ("--set", asked.settings)):
         words += [word for value in values for word in (name, value)]
