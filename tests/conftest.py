@@ -5,6 +5,16 @@ import os
 from collections.abc import Generator
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# Examples are the same in each run, and no clock judges: a busy machine is no fault.
+settings.register_profile(
+    "same",
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("same")
 
 # scikit-learn leaves checks of its estimators out without it.
 os.environ.setdefault("SCIPY_ARRAY_API", "1")
