@@ -14,6 +14,7 @@ from typing import NamedTuple
 from fuzzytree.auditing.matching import Curves
 from fuzzytree.casting import joined_outputs
 from fuzzytree.casting.shapes import shape_of
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.domain import Domain
 from fuzzytree.system import (
     And,
@@ -39,6 +40,9 @@ _STEPPED = {
 """Norms that jump: rounding may be all the difference."""
 
 
+_SMOOTH = ("centroid", "weighted average", "weighted sum")
+
+
 class Entry(NamedTuple):
     """What concludes an output: how strongly, and which of its terms.
 
@@ -53,50 +57,48 @@ class Entry(NamedTuple):
     most: float
 
 
-def computed(
-    system: FuzzySystem, output: str, domain: Domain | None = None
-) -> Hashable:
-    """Return the operations and numbers that an output is computed by.
+def computed(system: FuzzySystem, domain: Domain | None = None) -> dict[str, Hashable]:
+    """Return for each output the operations and numbers that it is computed by.
 
     Args:
         system: The system.
-        output: The name of one of its outputs.
         domain: Where it is computed; anywhere unless given. A range that holds the
             domain changes no value.
 
     Example:
         >>> from fuzzytree.testing import random_system
-        >>> one, other = random_system(2), random_system(3)
-        >>> name = one.outputs[0].name
-        >>> computed(one, name) == computed(other, name)
+        >>> one, other = computed(random_system(2)), computed(random_system(3))
+        >>> any(one[name] == other.get(name) for name in one)
         False
     """
-    return _Read(system, None, domain).output(output)
+    read = _Read(system, None, domain)
+    return {one.name: read.output(one.name) for one in system.outputs}
 
 
 def meant(
-    system: FuzzySystem, output: str, curves: Curves, domain: Domain | None = None
-) -> Hashable | None:
-    """Return the function of real numbers that an output is.
+    system: FuzzySystem, curves: Curves, domain: Domain | None = None
+) -> dict[str, Hashable]:
+    """Return for each output the function of real numbers that it is.
 
     Args:
         system: The system.
-        output: The name of one of its outputs.
         curves: Numbers curves, equal ones for those of equal degrees.
         domain: As for `computed`.
 
     Returns:
-        None where the function jumps, so that rounding may change it by much.
+        Nothing of those that jump, so that rounding may change them by much.
     """
-    found = next(one for one in system.outputs if one.name == output)
-    method = found.defuzzifier.method
     norms = {norm for b in system.blocks for norm in (b.conjunction, b.disjunction)}
-    norms |= {found.aggregation, *(block.implication for block in system.blocks)}
+    norms |= {block.implication for block in system.blocks}
     ways = {block.activation.method for block in system.blocks}
-    is_smooth = method in ("centroid", "weighted average", "weighted sum")
-    if not is_smooth or norms & _STEPPED or ways - {"general", "proportional"}:
-        return None
-    return _Read(system, curves, domain).output(output)
+    if norms & _STEPPED or ways - {"general", "proportional"}:
+        return {}
+    read = _Read(system, curves, domain)
+    return {
+        one.name: read.output(one.name)
+        for one in system.outputs
+        if one.aggregation not in _STEPPED and one.defuzzifier.method in _SMOOTH
+    }
 
 
 def entries(system: FuzzySystem, output: str, domain: Domain) -> tuple[Entry, ...]:
@@ -123,6 +125,7 @@ class _Read:
             for one in system.variables
             for label in one.labels
         }
+        self.known: dict[tuple[str, str], Hashable] = {}
         self.sources: dict[str, Hashable] = {}
         for one in system.inputs:
             self.sources[one.name] = self._source(one)
@@ -187,6 +190,13 @@ class _Read:
         ]
         return key, same.index(label.name)
 
+    def _term(self, variable: str, label: str) -> Hashable:
+        """Return a term of an input, or of an output that a rule asks."""
+        asked = self.labels[variable, label]
+        if variable in self.outputs:
+            return variable, self._concluded(self.outputs[variable], asked)
+        return self.sources[variable], self._curve(asked)
+
     def _curve(self, label: Label, *, is_number: bool = False) -> Hashable:
         curve = label.curve
         shape = None if is_number else shape_of(curve)
@@ -218,6 +228,7 @@ class _Read:
                 yield Entry((how, said_by), None, 1.0)
 
     def _rule(self, rule: SystemRule, block: RuleBlock) -> Hashable:
+        checkpoint()
         when = None if rule.when is None else self._condition(rule.when, block)
         return rule.weight, when
 
@@ -261,11 +272,10 @@ class _Read:
             case Is(variable=variable, label=label, hedges=hedges):
                 if label is None:
                     return "is", None, hedges
-                asked = self.labels[variable, label]
-                if variable in self.outputs:
-                    concluded = self._concluded(self.outputs[variable], asked)
-                    return "is", variable, concluded, hedges
-                return "is", self.sources[variable], self._curve(asked), hedges
+                place = variable, label
+                if place not in self.known:
+                    self.known[place] = self._term(*place)
+                return "is", self.known[place], hedges
             case Not(part=part):
                 return "not", self._condition(part, block)
             case And(parts=parts):

@@ -40,7 +40,7 @@ from fuzzytree.runtimes.systems import run_system
 from fuzzytree.system import FuzzySystem
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.contracts import FloatArray, SystemRun
 
 _PROBES = 2_000  # of each system
 _DRAWN = 4_000  # at most, for numbers take longer than decisions
@@ -71,16 +71,6 @@ class Pair(NamedTuple):
         names = {one.name for one in self.new.outputs}
         return tuple(one.name for one in self.old.outputs if one.name in names)
 
-    def numbers(self, values: FloatArray, outputs: Sequence[str]) -> list[FloatArray]:
-        """Return what both compute for some outputs, of shape (outputs, rows)."""
-        found: list[FloatArray] = []
-        for system in (self.old, self.new):
-            rows = values[[self.columns.index(name) for name in system.columns]]
-            known = [one.name for one in system.outputs]
-            every = run_system(system)(rows).outputs
-            found.append(every[[known.index(name) for name in outputs]])
-        return found
-
 
 def number_answers(
     pair: Pair, rows: Rows | None, settings: Settings, clock: Clock
@@ -93,31 +83,38 @@ def number_answers(
         settings: How many points are drawn, and their seed.
         clock: How much time there is.
     """
-    whole = [_how(pair, name) for name in pair.outputs]
-    if not whole or all(how is _SAME for how in whole):
-        return [_proved(pair, _ALIKE, _SAME.how)] if whole else []
-    hows = dict(zip(pair.outputs, whole, strict=True))
-    open_ = [name for name, how in hows.items() if how is not _SAME]
+    try:
+        with enforced(clock):
+            hows = _hows(pair)
+            open_ = [name for name, how in hows.items() if how is not _SAME]
+            if not open_:
+                return [_proved(pair, _ALIKE, _SAME.how)] if hows else []
+            runs = [run_system(system) for system in (pair.old, pair.new)]
+    except OutOfTimeError:
+        reason = "the budget was spent"
+        sentence = f"the numbers of the two were not compared: {reason}"
+        state = Declined("FTD03", reason)
+        return [Answer("FT801", "numbers", sentence, state, is_finding=False)]
     rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
-    found = _Found(pair, open_, rounded)
+    found = _Found(pair, open_, rounded, runs)
     answers = [*_sampled(found, rows, settings, clock)]
     if found.differing:
         answers = [*map(found.witness, found.differing), *answers]
-    elif all(whole):
+    elif None not in hows.values():
         is_rounded = bool(rounded)
         how = _ROUNDED.how if is_rounded else _HELD.how
         sentence = f"{_ALIKE} everywhere on the domain"
         sentence += ", but for rounding" if is_rounded else ""
         measures = (Measure("largest difference by rounding", found.rounding),)
-        whole_answer = _proved(pair, sentence, how)
+        whole = _proved(pair, sentence, how)
         if is_rounded:
-            whole_answer = msgspec.structs.replace(whole_answer, measures=measures)
-        return [whole_answer, *answers]
+            whole = msgspec.structs.replace(whole, measures=measures)
+        return [whole, *answers]
     for name, known in hows.items():
         if known is not None and name not in found.largest:
             sentence = f"both systems compute {name!r} alike{known.where}"
-            state = Proved(known.how)
-            answers.append(Answer("FT801", name, sentence, state, is_finding=False))
+            proof = Proved(known.how)
+            answers.append(Answer("FT801", name, sentence, proof, is_finding=False))
     answers += [found.bound(name) for name, how in hows.items() if how is None]
     return answers
 
@@ -137,17 +134,20 @@ _ROUNDED = _Alike(
 )
 
 
-def _how(pair: Pair, name: str) -> _Alike | None:
-    """Return how an output of both is known to be alike; None if it is not."""
-    old, new, domain = pair.old, pair.new, pair.domain
-    if computed(old, name) == computed(new, name):
-        return _SAME
-    if computed(old, name, domain) == computed(new, name, domain):
-        return _HELD
-    curves = Curves()
-    key = meant(old, name, curves, domain)
-    is_one = key is not None and key == meant(new, name, curves, domain)
-    return _ROUNDED if is_one else None
+def _hows(pair: Pair) -> dict[str, _Alike | None]:
+    """Return how each output of both is known to be alike; None if it is not."""
+    both, curves = (pair.old, pair.new), Curves()
+    keys = (
+        (_SAME, [computed(system) for system in both]),
+        (_HELD, [computed(system, pair.domain) for system in both]),
+        (_ROUNDED, [meant(system, curves, pair.domain) for system in both]),
+    )
+    return {
+        name: next(
+            (how for how, (a, b) in keys if name in a and a[name] == b.get(name)), None
+        )
+        for name in pair.outputs
+    }
 
 
 def _proved(pair: Pair, sentence: str, how: str) -> Answer:
@@ -241,12 +241,17 @@ class _Found:
         pair: The systems.
         outputs: The outputs that are compared.
         rounded: Those that are one function, so that rounding is no difference.
+        runs: What runs each system.
     """
 
     def __init__(
-        self, pair: Pair, outputs: Sequence[str], rounded: frozenset[str]
+        self,
+        pair: Pair,
+        outputs: Sequence[str],
+        rounded: frozenset[str],
+        runs: Sequence[SystemRun],
     ) -> None:
-        self.pair, self.outputs = pair, outputs
+        self.pair, self.outputs, self.runs = pair, outputs, runs
         self.is_rounded = np.array([name in rounded for name in outputs])
         self.largest: dict[str, _Largest] = {}
         self.rounding = 0.0
@@ -269,7 +274,7 @@ class _Found:
         return hits, seen
 
     def _add(self, values: FloatArray) -> int:
-        one, other = self.pair.numbers(values, self.outputs)
+        one, other = self._numbers(values)
         with np.errstate(invalid="ignore", over="ignore"):
             gap = np.abs(one - other)
             size = np.fmax(np.fmax(np.abs(one), np.abs(other)), 1.0)
@@ -286,6 +291,16 @@ class _Found:
                 was, now = float(one[place, row]), float(other[place, row])
                 self.largest[name] = _Largest(most_, was, now, dict(at))
         return int((gap > 0.0).any(axis=0).sum())
+
+    def _numbers(self, values: FloatArray) -> list[FloatArray]:
+        """Return what both compute, each of shape (outputs, rows)."""
+        found: list[FloatArray] = []
+        pair = self.pair
+        for system, run in zip((pair.old, pair.new), self.runs, strict=True):
+            rows = values[[pair.columns.index(name) for name in system.columns]]
+            known = [one.name for one in system.outputs]
+            found.append(run(rows).outputs[[known.index(n) for n in self.outputs]])
+        return found
 
     def witness(self, name: str) -> Answer:
         """Return where an output differs most, of what was seen."""

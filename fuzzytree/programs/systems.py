@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.programs.choosing import passes, positive, proportional, ranked
 from fuzzytree.programs.curves import curve_degree, is_unit, value_at
 from fuzzytree.programs.defuzzifying import defuzzified, sample_values, samples_of
@@ -232,6 +233,7 @@ class _Run:
         return place
 
     def _rule_degree(self, block: RuleBlock, rule: SystemRule) -> int:
+        checkpoint()
         make = self.make
         when = rule.when
         degree = make.constant(1.0) if when is None else self._degree(when, block)

@@ -7,12 +7,14 @@ are written into buffers that are used again as soon as nothing needs them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import heapq
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.programs.evaluate import Found, still_results
 from fuzzytree.programs.steps import Program, Step
 
@@ -224,6 +226,7 @@ def run_program(plan: Plan, values: FloatArray) -> FloatArray:
     found = np.empty((len(plan.results), count))
     with np.errstate(all="ignore"):
         for start in range(0, count, plan.rows):
+            checkpoint()
             part = values[:, start : start + plan.rows]
             out = found[:, start : start + plan.rows]
             _run_chunk(plan, np.ascontiguousarray(part), out)
@@ -287,19 +290,14 @@ def _shelf(
     kind: str, samples: int, places: Sequence[int], last: Mapping[int, int]
 ) -> _Shelf:
     free: list[int] = []
-    busy: dict[int, int] = {}  # buffer to the place of the last use
+    busy: list[tuple[int, int]] = []  # the place of the last use and the buffer, a heap
     taken: list[tuple[int, int]] = []
     for place in places:
-        for buffer in _ended(busy, place):
-            del busy[buffer]
-            free.append(buffer)
+        checkpoint()
+        while busy and busy[0][0] < place:
+            free.append(heapq.heappop(busy)[1])
         buffer = free.pop() if free else len(busy)
-        busy[buffer] = last[place]
+        heapq.heappush(busy, (last[place], buffer))
         taken.append((place, buffer))
     dtype = np.bool_ if kind == "truth" else np.float64
     return _Shelf(dtype, samples, tuple(taken), len(busy) + len(free))
-
-
-def _ended(busy: Mapping[int, int], place: int) -> Iterator[int]:
-    """Yield the buffers of which the last use is over before a step is run."""
-    yield from [buffer for buffer, end in busy.items() if end < place]

@@ -20,7 +20,7 @@ from fuzzytree.auditing.system_bounds import NotExactError, most, number_at
 from fuzzytree.auditing.system_meanings import computed, meant
 from fuzzytree.inference import infer
 from fuzzytree.proving.clock import Clock
-from fuzzytree.proving.states import Bracket, Proved, Witness, point_of
+from fuzzytree.proving.states import Bracket, Declined, Proved, Witness, point_of
 from fuzzytree.rulebase import Points
 from fuzzytree.system import (
     Activation,
@@ -132,7 +132,7 @@ def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
     other = replace(one, labels=(long, one.labels[1]))
     service = tipper().inputs[1]
     old, new = (tipper(inputs=(each, service)) for each in (one, other))
-    assert computed(old, "tip") != computed(new, "tip")
+    assert computed(old) != computed(new)
     assert told(old, new).answers[0].state == Proved(
         "both are one function of real numbers: equal curves in equal rules"
     )
@@ -166,7 +166,7 @@ def test_where_order_decides_it_is_no_rounding() -> None:
     first = RuleBlock((ONE, TWO, THREE), activation=Activation("highest"))
     highest = replace(tipper(), blocks=(first,))
     turned = with_rules(highest, THREE, ONE, TWO)
-    assert meant(highest, "tip", Curves()) is None
+    assert meant(highest, Curves()) == {}
     assert told(highest, turned).verdict == "changed"
 
 
@@ -256,13 +256,35 @@ def test_an_output_that_stays_is_proved_beside_one_that_differs() -> None:
 
 
 def test_the_budget_ends_the_comparison_of_numbers() -> None:
+    new, hour = tipper(numbers={"high": 25.5}), [0.0]
+
+    def now() -> float:
+        hour[0] += 0.001
+        return hour[0]
+
+    def tell(text: str, done: float) -> None:
+        if text == "comparing numbers" and done > 0.0:  # behind the probes
+            hour[0] = 999.0
+
+    found = told(tipper(), new, Clock(99.0, now=now, tell=tell))
+    (left,) = (a for a in found.answers if a.subject == "points")
+    assert left.sentence == "36 points were not looked at: the budget was spent"
+    assert left.state == Declined("FTD03", "the budget was spent")
+    assert found.verdict == "changed"
+    whole = told(tipper(), new, Clock(99.0, now=now))
+    assert all(a.subject != "points" for a in whole.answers)
+
+
+def test_a_budget_that_is_spent_before_anything_was_compared_is_told() -> None:
     now = iter(range(10**9))
-    clock = Clock(3.0, now=lambda: next(now))
-    found = told(tipper(), tipper(numbers={"high": 25.5}), clock)
-    left = [a for a in found.answers if a.subject == "points"]
-    assert [a.sentence.split(" ", 1)[1] for a in left] == [
-        "points were not looked at: the budget was spent"
-    ]
+    found = told(
+        tipper(), tipper(numbers={"low": 6.0}), Clock(3.0, now=lambda: next(now))
+    )
+    (answer,) = found.answers
+    assert answer.sentence == (
+        "the numbers of the two were not compared: the budget was spent"
+    )
+    assert found.verdict == "open"
 
 
 # --- no proof and no bound is wrong
@@ -344,8 +366,8 @@ def check_pair(seed: int, rows: int) -> None:
     new = altered(old, chance)
     name, curves = output.name, Curves()
     domain = domain_of(old)
-    is_same = computed(old, name, domain) == computed(new, name, domain)
-    keys = [meant(system, name, curves, domain) for system in (old, new)]
+    is_same = computed(old, domain)[name] == computed(new, domain)[name]
+    keys = [meant(system, curves, domain).get(name) for system in (old, new)]
     is_meant = keys[0] is not None and keys[0] == keys[1]
     bound = most(old, new, name, domain)
     for _ in range(rows):
