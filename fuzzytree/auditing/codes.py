@@ -172,7 +172,8 @@ _CODES = (
         "warning",
         "strongest",
         what="At the witness the tree decides for one class and its raw rules (those "
-        "over the fitted sets) for another, or for none.",
+        "over the fitted sets) for another, or for none. Given rows, the nearest such "
+        "point to any of them; places where strengths only touch are left aside.",
         why="Raw rules are easier to read, and people take them for the tree. They are "
         "another classifier.",
         example="Just below a cut the tree goes left, while the set of the right "
@@ -187,7 +188,8 @@ _CODES = (
         "strongest",
         what="How far a row is from the nearest point with another decision: the "
         "largest change of an input, in widths of its domain. Nothing nearer "
-        "decides otherwise.",
+        "decides otherwise; of rules, places where the strengths of two classes only "
+        "touch are left aside where that matters, and the sentence says so.",
         why="A row with a small radius is decided by noise.",
         example="fuzzytree audit grip.yaml --row force=2.1,slip=0 tells that at a "
         "distance of 0.02 widths, at force 2.0, the class is another.",

@@ -36,6 +36,10 @@ class Decider(Protocol):
         """Return the answer at a point, and what gave it."""
         ...
 
+    def leaves_out(self, label: str | None) -> bool:
+        """Return whether another answer may be where strengths only touch a class's."""
+        ...
+
     def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
         """Look at points together, before each is asked about."""
         ...
@@ -80,6 +84,11 @@ class CrispDecider:
         """Return the class of the leaf that a point reaches, and the leaf."""
         leaf = leaf_at(self.tree, point)
         return self.tree.leaves[leaf - 1].label, f"leaf {leaf}"
+
+    def leaves_out(self, label: str | None) -> bool:
+        """Return False: regions are exact, and have no strengths."""
+        del label
+        return False
 
     def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
         """Do nothing: regions are known."""
@@ -126,6 +135,15 @@ class RuleDecider:
         number = strengths.index(best) + 1
         label = self.subject.rules.rules[number - 1].then
         return label, self.subject.rule_name(number)
+
+    def leaves_out(self, label: str | None) -> bool:
+        """Return whether a rule of another class stands before one of a class's.
+
+        It wins where both are equally strong, and that is asked on sets with an
+        interior only.
+        """
+        order = [rule.then == label for rule in self.subject.rules.rules]
+        return any(order) and not all(order[: len(order) - order[::-1].index(True)])
 
     def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
         """Seek points near some others that are decided otherwise, by doubles."""

@@ -34,6 +34,9 @@ MOST_ROWS = 50
 SHOWN_ROWS = 5
 """Rows of the smallest radius that have an answer of their own."""
 
+ASIDE = ", places where strengths only touch aside"
+"""What a sentence adds where rules of other classes go first in a tie."""
+
 _PART = 0.9  # of the time, to seek; what is found must still be told
 _MOST_NAMED = 4  # inputs in a sentence
 
@@ -115,10 +118,11 @@ def _answer(
     decider: Decider, name: str, point: Mapping[str, Fraction], found: Nearest
 ) -> Answer:
     own, _ = decider.decided(point)
+    aside = ASIDE if decider.leaves_out(own) else ""
     what = f"the distance from {name} to another decision"
     if found.point is None or found.high is None:
         if found.is_none:
-            text = f"all of the domain is decided as {name}, {answer_text(own)}"
+            text = f"all of the domain is decided as {name}, {answer_text(own)}{aside}"
             state: State = Proved("other decisions asked on the whole domain")
         else:
             text = f"no decision other than {answer_text(own)} is known around {name}"
@@ -133,8 +137,8 @@ def _answer(
     if len(moved) > _MOST_NAMED:
         changed = f"{len(moved)} inputs move by no more than {percent(found.high)}"
     text = (
-        f"{name} stays {answer_text(own)} within {percent(found.low)} {OF_RANGES}; "
-        f"where {changed} it is {answer_text(other)}"
+        f"{name} stays {answer_text(own)} within {percent(found.low)} {OF_RANGES}"
+        f"{aside}; where {changed} it is {answer_text(other)}"
     )
     return Answer(
         code="FT204",
@@ -189,7 +193,8 @@ def answers(subject: Subject) -> Iterator[Answer]:
         if clock.is_over and not found.is_narrow:
             break
         answer = _answer(decider, f"row {number}", point, found)
-        asked.append(_Asked(number, found.low, answer))
+        is_aside = decider.leaves_out(decider.decided(point)[0])
+        asked.append(_Asked(number, found.low, answer, is_aside))
     asked.sort(key=lambda one: (one.low, one.number))
     yield _in_all(points, asked)
     yield from (one.answer for one in asked[:SHOWN_ROWS])
@@ -199,6 +204,7 @@ class _Asked(NamedTuple):
     number: int
     low: Fraction
     answer: Answer
+    is_aside: bool
 
 
 def _in_all(points: Points, asked: Sequence[_Asked]) -> Answer:
@@ -213,6 +219,7 @@ def _in_all(points: Points, asked: Sequence[_Asked]) -> Answer:
         return Answer("FT204", "rows", NOT_SOUGHT, state, False, measures=(count,))
     first = asked[0]
     least = first.low
+    aside = ASIDE if any(one.is_aside for one in asked) else ""
     of_all = "" if len(asked) == len(points.at) else "with the smallest margins "
     median = statistics.median_low([one.low for one in asked])
     return Answer(
@@ -220,7 +227,7 @@ def _in_all(points: Points, asked: Sequence[_Asked]) -> Answer:
         subject="rows",
         sentence=f"of {points.text} {len(asked)} different ones {of_all}were asked: "
         f"each keeps its decision within at least {percent(least)} {OF_RANGES}, half "
-        f"of them within {percent(median)}",
+        f"of them within {percent(median)}{aside}",
         state=first.answer.state,
         is_finding=False,
         measures=(

@@ -72,6 +72,18 @@ def test_the_radius_of_a_row_of_rules_is_found_by_their_strengths(
     assert found.state.claims[0].of == "rules"
 
 
+def test_places_where_strengths_only_touch_are_named_where_another_goes_first() -> None:
+    raw = subject_of(one_cut(0.25)).raw
+    assert raw is not None
+    subject = subject_of(raw, rows=[[0.75]])
+    whole, second = answers(subject)
+    assert ", places where strengths only touch aside; where 'x' is" in second.sentence
+    assert whole.sentence.endswith(", places where strengths only touch aside")
+    # The class of the first rule wins all ties, so there is nothing to leave out.
+    whole, first = answers(subject_of(raw, rows=[[0.1]]))
+    assert "touch" not in first.sentence + whole.sentence
+
+
 def test_a_row_is_told_its_decision_and_then_its_radius() -> None:
     first, second = row_answers(subject_of(one_cut()), {"x": 0.75})
     assert first.sentence == "the row is decided as 'b' by leaf 2"
