@@ -111,13 +111,18 @@ class Conditions:
             negated, hedges = not negated, hedges[1:]
         if hedges and hedges[0] == "any":
             return [*(_NEVER if negated else _ALWAYS)]
-        if hedges:
-            decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
+        if "any" in hedges:
+            decline("FTD07", f"the hedge {hedges[0]!r} of 'any' has no exact method")
         if asked.variable not in self.terms.plain:
             decline("FTD07", f"it asks the output {asked.variable!r}")
         if asked.label is None or not self.terms.knows(asked.variable, asked.label):
             name = f"{asked.label!r} of {asked.variable!r}"
             decline("FTD02", f"the curve of {name} has no exact method")
+        if hedges:
+            made = self.terms.hedged(asked.variable, asked.label, hedges)
+            if made is None:
+                decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
+            return [(Clause(asked.variable, (made,), negated),)]
         return [(Clause(asked.variable, (asked.label,), negated),)]
 
     def _one_clause(

@@ -50,7 +50,8 @@ _MORE = 1 + Fraction(1, 2**20)  # of a bound that was computed in doubles
 
 Side = Literal["lower", "upper"]
 Range = tuple[Fraction, Fraction]
-_Knot = tuple[float, Fraction]
+Knot = tuple[float, Fraction]
+"""A point of a line before it is rounded."""
 
 
 class Enclosed(NamedTuple):
@@ -111,9 +112,16 @@ def enclosed(curve: Curve, of: Range | None) -> Enclosed | None:
                 line = above if degree == 0 else below
                 line[place] = x, degree
     least = Fraction(0) if of is None else _least(curve, of)
-    lower = _laid([*_clipped(below, least, _is_below)], "lower", of)
-    upper = _laid([*_clipped(above, Fraction(1), _is_above)], "upper", of)
+    lower = laid([*clipped(below, least, "lower")], "lower", of)
+    upper = laid([*clipped(above, Fraction(1), "upper")], "upper", of)
     return Enclosed(lower, upper, (curve,))
+
+
+def pointed(shape: Shape, of: Range | None) -> Enclosed | None:
+    """Return a shape as points: itself if it is points, else lines around it."""
+    if isinstance(shape, Points):
+        return Enclosed(shape, shape, (shape,))
+    return enclosed(shape, of)
 
 
 def complement(found: Enclosed) -> Enclosed | None:
@@ -150,6 +158,7 @@ def _mapped(
     return Points(points.values, tuple(degrees))
 
 
+@functools.lru_cache(maxsize=256)
 def gap(found: Enclosed, of: Range) -> Fraction:
     """Return how far two lines are apart at most on a range."""
     low, high = of
@@ -224,44 +233,35 @@ def _least(curve: Curve, of: Range) -> Fraction:
 # --- lines
 
 
-def _is_below(one: Fraction, other: Fraction) -> bool:
-    return one < other
+def clipped(knots: Sequence[Knot], limit: Fraction, side: Side) -> Iterator[Knot]:
+    """Yield a line held at a limit; where it meets it, the limit lasts longer.
+
+    Args:
+        knots: The points of the line.
+        limit: What a lower line does not go below, an upper one not above.
+        side: Which of the two it is.
+    """
+    sign = 1 if side == "lower" else -1
+    previous: Knot | None = None
+    for x, degree in knots:
+        if previous is not None and previous[0] < x:
+            yield from _meeting(previous, (x, degree), limit, sign)
+        yield x, limit if (limit - degree) * sign > 0 else degree
+        previous = x, degree
 
 
-def _is_above(one: Fraction, other: Fraction) -> bool:
-    return one > other
-
-
-def _clipped(
-    knots: Sequence[_Knot],
-    limit: Fraction,
-    is_beyond: Callable[[Fraction, Fraction], bool],
-) -> Iterator[_Knot]:
-    """Yield a line held at a limit; where it meets it, the limit lasts longer."""
-    previous: _Knot | None = None
-    for knot in knots:
-        if previous is not None and previous[0] < knot[0]:
-            yield from _meeting(previous, knot, limit, is_beyond)
-        yield knot[0], limit if is_beyond(knot[1], limit) else knot[1]
-        previous = knot
-
-
-def _meeting(
-    one: _Knot,
-    other: _Knot,
-    limit: Fraction,
-    is_beyond: Callable[[Fraction, Fraction], bool],
-) -> Iterator[_Knot]:
+def _meeting(one: Knot, other: Knot, limit: Fraction, sign: int) -> Iterator[Knot]:
     (a, p), (b, q) = one, other
-    if is_beyond(p, limit) == is_beyond(q, limit):
+    is_beyond = (limit - p) * sign > 0
+    if is_beyond == ((limit - q) * sign > 0):
         return
     exact = Fraction(a) + (limit - p) / (q - p) * (Fraction(b) - Fraction(a))
     low, high = outwards(exact)
-    place = high if is_beyond(p, limit) else low
+    place = high if is_beyond else low
     yield min(max(place, a), b), limit
 
 
-def _laid(knots: Sequence[_Knot], side: Side, of: Range | None) -> Points:
+def laid(knots: Sequence[Knot], side: Side, of: Range | None) -> Points:
     """Return a line as points, with degrees rounded to its side; only on a range."""
     pick = 0 if side == "lower" else 1
     made = [(x, outwards(degree)[pick]) for x, degree in knots]

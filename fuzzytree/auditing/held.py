@@ -24,8 +24,8 @@ from fuzzytree.auditing.enclosing import (
     Enclosed,
     Range,
     complement,
-    enclosed,
     gap,
+    pointed,
     scaled,
 )
 from fuzzytree.numerics.exact import outwards
@@ -209,10 +209,7 @@ class _Made:
         known = self.terms.get((variable, term))
         if known is not None:
             return known
-        shape = self.plain[variable, term]
-        if isinstance(shape, Points):
-            return Enclosed(shape, shape, (shape,))
-        found = enclosed(shape, self.ranges[variable])
+        found = pointed(self.plain[variable, term], self.ranges[variable])
         if found is None:
             raise ValueError(f"the curve of {term!r} of {variable!r} has no points")
         return found

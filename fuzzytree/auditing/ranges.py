@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -51,9 +52,14 @@ def ranges(subject: Subject) -> tuple[Range, ...]:
 
 
 def whole_ranges(subject: Subject) -> tuple[Range, ...]:
-    """Return the same with all terms; of those that are held the lower line."""
+    """Return the same with all terms; of those that are held the lower line.
+
+    Terms that only the view has, such as `very high`, are left out.
+    """
     found: list[Range] = []
     for variable in subject.rules.variables:
+        if subject.held is not None:
+            variable = replace(variable, terms=tuple(_own_terms(subject, variable)))
         low, high = span(variable, subject.domain)
         if low > high:
             return ()
@@ -62,6 +68,15 @@ def whole_ranges(subject: Subject) -> tuple[Range, ...]:
             is_open = side is not None and side.is_open and low == side.low < high
             found.append(Range(variable, low, high, is_open))
     return tuple(found)
+
+
+def _own_terms(subject: Subject, variable: Variable) -> Iterator[Term]:
+    """Yield the terms of a variable that the system has."""
+    assert subject.system is not None  # nothing else is held
+    for one in subject.system.inputs:
+        if one.name == variable.name:
+            names = {label.name for label in one.labels}
+            yield from (term for term in variable.terms if term.name in names)
 
 
 def measure(name: str, value: Bounds, unit: str = "") -> Measure:

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.enclosing import Enclosed, Range, enclosed, gap, scaled
+from fuzzytree.auditing.enclosing import (
+    Enclosed,
+    Range,
+    enclosed,
+    gap,
+    pointed,
+    scaled,
+)
+from fuzzytree.auditing.hedging import hedged
 from fuzzytree.auditing.records import Answer, Label
 from fuzzytree.casting.shapes import shape_of
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import Declined
 from fuzzytree.proving.variables import span
 from fuzzytree.rulebase import Points, Shape, Term, Variable, shape_mistakes
-from fuzzytree.system import FuzzySystem, SystemInput, questions
+from fuzzytree.system import FuzzySystem, Hedge, SystemInput, questions
 from fuzzytree.system import Label as SystemLabel
 
 Name = tuple[str, str]
@@ -26,30 +34,57 @@ class Terms:
     Args:
         plain: Those with an exact shape, by variable and name.
         held: Those between two lines.
+        ranges: The values of each input, as far as they are known.
 
     Attributes:
         plain: As given.
-        held: As given, and those that conditions make of them.
+        held: As given.
+        made: Hedged terms that conditions ask, by variable and a name of their own.
     """
 
     def __init__(
         self,
         plain: Mapping[str, Mapping[str, Shape]],
         held: Mapping[Name, Enclosed] | None = None,
+        ranges: Mapping[str, Range | None] | None = None,
     ) -> None:
         self.plain = plain
-        self.held = {**(held or {})}
+        self.held = held or {}
+        self.ranges = ranges or {}
+        self.made: dict[Name, Enclosed] = {}
 
     def knows(self, variable: str, term: str) -> bool:
         """Return whether rules can ask a term."""
         return term in self.plain[variable] or (variable, term) in self.held
 
+    def hedged(self, variable: str, term: str, hedges: Sequence[Hedge]) -> str | None:
+        """Return the name of a hedged term, which rules can then ask.
+
+        Returns:
+            None if there are no lines between which it is.
+        """
+        found = self.held.get((variable, term))
+        if found is None:
+            found = pointed(self.plain[variable][term], self.ranges.get(variable))
+        for hedge in reversed(hedges):
+            found = found and hedged(found, hedge)
+        if found is None:
+            return None
+        name = " ".join((*hedges, term))
+        while (
+            self.knows(variable, name)
+            or self.made.get((variable, name), found) != found
+        ):
+            name += "'"
+        self.made[variable, name] = found
+        return name
+
     def variable(self, one: SystemInput) -> Variable:
         """Return an input as a variable; what is held is there as its lower line."""
         shapes = {**self.plain[one.name]}
-        shapes |= {
-            t: found.lower for (v, t), found in self.held.items() if v == one.name
-        }
+        for (variable, term), found in {**self.held, **self.made}.items():
+            if variable == one.name:
+                shapes[term] = found.lower
         terms = tuple(Term(name, shape) for name, shape in shapes.items())
         return Variable(one.name, terms, one.unit, one.low, one.high, one.parts)
 
@@ -98,7 +133,7 @@ def terms_of(
             asks = "1 rule asks" if count == 1 else f"{count} rules ask"
             told = _told(one, label, found, ranges[one.name])
             answers.append(_answer(one, label, told, f"{asks} for it"))
-    return Terms(plain, held), tuple(answers)
+    return Terms(plain, held, ranges), tuple(answers)
 
 
 def _shape(label: SystemLabel) -> Shape | None:

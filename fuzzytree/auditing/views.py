@@ -149,7 +149,7 @@ def _of_system(system: FuzzySystem, domain: Domain) -> View:
             tuple(taken.rules),
             Semantics(conjunction),
         )
-        both = held(rules, taken.weights, terms.held, ranges)
+        both = held(rules, taken.weights, {**terms.held, **terms.made}, ranges)
     return View(
         rules,
         Policy(conjunction, "all"),

@@ -26,6 +26,7 @@ from fuzzytree.rulebase import (
     RuleBase,
     Term,
     Variable,
+    sentence,
 )
 from fuzzytree.rulebase import Side as Flank
 from fuzzytree.system import (
@@ -37,6 +38,7 @@ from fuzzytree.system import (
     Defuzzifier,
     FuzzySystem,
     Gaussian,
+    Hedge,
     Is,
     Label,
     Not,
@@ -54,6 +56,7 @@ from tests.auditing.grids import told_rightly
 
 A, B = Is("a", "low"), Is("b", "low")
 A_HIGH, B_HIGH = Is("a", "high"), Is("b", "high")
+ROUNDING = 1e-12
 LOW, HIGH = Gaussian(0.0, 1.0), Gaussian(4.0, 1.0)
 Rules = tuple[tuple[Condition | None, str, float], ...]
 
@@ -185,6 +188,46 @@ def test_a_rule_without_weight_is_not_the_copy_of_a_weighted_one() -> None:
     assert found.startswith("rule 2 is subsumed by rule 1")
     (same,) = findings(system_of((rules[0], rules[0])), "FT106")
     assert "have the same antecedent" in same
+
+
+# --- hedges
+
+
+HEDGES: tuple[Hedge, ...] = (
+    *("very", "somewhat", "extremely", "seldom", "cubed", "very very", "plus"),
+    *("minus", "cube root"),
+)
+
+
+@pytest.mark.parametrize("curve", [Points((0.0, 1.0, 3.0), (0.0, 1.0, 0.2)), HIGH])
+def test_hedged_clauses_are_as_strong_as_those_of_the_system(curve: Curve) -> None:
+    asked = [Is("a", "low", (hedge,)) for hedge in HEDGES]
+    asked += [Is("a", "low", hedges) for hedges in (("not", "very"), ("very", "not"))]
+    rules = tuple((one, "big", weight) for one in asked for weight in (1.0, 0.5))
+    system = system_of(rules, low=curve)
+    found = view(system, domain_of(system))
+    assert found.held is not None
+    assert found.is_whole
+    assert len(found.numbers) == len(rules)
+    for row in rows(4):
+        right = infer(system, row).activations
+        low, high = (
+            exact_answer(one, row).strengths
+            for one in (found.held.lower, found.held.upper)
+        )
+        for below, true, above in zip(low, right, high, strict=True):
+            assert below - ROUNDING <= true <= above + ROUNDING
+            assert above - below < 0.1  # roots are steep at 0
+
+
+def test_hedged_terms_are_named_and_asked_but_are_no_terms_of_the_system() -> None:
+    rules: Rules = ((Is("a", "low", ("very",)), "soft", 1.0), (A, "soft", 1.0))
+    system = system_of(rules, **{"very low": FLAT})
+    seen = view(system, domain_of(system))
+    assert seen.rules is not None
+    assert sentence(seen.rules.rules[0]) == "IF a is very low' THEN power is soft"
+    assert findings(system, "FT104") == []  # what is below is not seen within lines
+    assert not any("very low'" in one.sentence for one in told(system, "FT401"))
 
 
 # --- each finding is planted in a system of curves between lines, and removed
