@@ -17,6 +17,7 @@ from fuzzytree.rechecking.model_records import Model, Rules, System, Tree, Varia
 from fuzzytree.rechecking.outcomes import UndecidedError, require
 from fuzzytree.rechecking.places import Place, Places
 from fuzzytree.rechecking.polynomials import ONE, ZERO
+from fuzzytree.rechecking.ties import Ties
 from fuzzytree.rechecking.trees import Steps, paths, rules_of
 from fuzzytree.rechecking.views import View
 
@@ -78,6 +79,13 @@ class Case:
         if isinstance(self._grid, UndecidedError):
             raise self._grid
         return self._grid
+
+    @cached_property
+    def ties(self) -> Ties:
+        """The pairs of rules that tie."""
+        if self.rules.semantics.conjunction != "min":
+            raise UndecidedError("ties under product are not decided again here")
+        return Ties(self.grid)
 
     @cached_property
     def _grid(self) -> Grid | UndecidedError:
@@ -218,6 +226,11 @@ class Case:
             return False
         text = "under product only one rule that hides another is seen here"
         raise UndecidedError(text)
+
+    def tie(self, one: int, other: int) -> bool:
+        """Return whether two rules tie as the strongest, on more than a surface."""
+        rivals = [self.asked(n) for n in self.numbers if n not in (one, other)]
+        return self.ties.tie(self.asked(one), self.asked(other), rivals)
 
     def never(self, is_so: bool, otherwise: str) -> None:
         """Refuse what was found although it should never happen, if inputs are free."""

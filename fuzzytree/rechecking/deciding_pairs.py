@@ -7,9 +7,11 @@ from fractions import Fraction
 from fuzzytree.rechecking.audit_records import Answer, Label, Witness, fraction
 from fuzzytree.rechecking.cases import Case, counted
 from fuzzytree.rechecking.claims import point_of
+from fuzzytree.rechecking.grid import Asked
 from fuzzytree.rechecking.meaning import answer_of
 from fuzzytree.rechecking.model_records import Clause
 from fuzzytree.rechecking.outcomes import UndecidedError, require
+from fuzzytree.rechecking.polynomials import ZERO
 
 
 def hidden(case: Case, answer: Answer) -> None:
@@ -90,8 +92,7 @@ def apart(case: Case, answer: Answer) -> None:
     if untold:
         raise UndecidedError("which pairs are not told is not known")
     for one, other in rest:
-        asked = zip(case.asked(one), case.asked(other), strict=True)
-        both = tuple(a | b for a, b in asked)
+        both = _union(case.asked(one), case.asked(other))
         if not grid.leaves(both, (), grid.gap(level, is_above=False)):
             continue
         is_met = level < 1 and grid.leaves(both, (), grid.gap(level, is_above=True))
@@ -108,9 +109,34 @@ def needless(case: Case, answer: Answer) -> None:
         require(not answer.is_finding, "it is of no clause of the rule")
         require(not case.fire(*answer.rules), "the rule fires somewhere")
         return
-    rest = case.grid.asked(_without(case, answer))
-    if case.beats(rest, [case.asked(answer.rules[0])]):
+    rest, number = case.grid.asked(_without(case, answer)), answer.rules[0]
+    if case.beats(rest, [case.asked(number)]):
+        _decides_alike(case, number, rest)
+
+
+def _decides_alike(case: Case, number: int, rest: Asked) -> None:
+    """Ask whether a rule that becomes stronger decides what was decided otherwise.
+
+    It does if it wins where a rule of another class was above all of its own class; or
+    where no rule fired; or it may if it ties with a later rule of another class.
+    """
+    grid, then = case.grid, case.then(number)
+    own = [case.asked(n) for n in case.numbers if case.then(n) == then]
+    others = [n for n in case.numbers if case.then(n) != then]
+    is_more = any(
+        case.beats(_union(rest, case.asked(n)), own)
+        or (n > number and case.ties.tie(rest, case.asked(n), own))
+        for n in others
+    )
+    if case.rules.semantics.uncovered != then:
+        is_more |= grid.leaves(rest, grid.of, grid.gap(ZERO, is_above=True))
+    if is_more:
         raise UndecidedError("the rule is stronger without it, if not in its answers")
+
+
+def _union(one: Asked, other: Asked) -> Asked:
+    """Return what two rules ask together."""
+    return tuple(a | b for a, b in zip(one, other, strict=True))
 
 
 def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:

@@ -53,8 +53,8 @@ def superfluous(case: Case, answer: Answer) -> None:
         is_between = any(n < other for n in later)
         if not is_between and not case.beats(mine, [case.asked(other)]):
             return
-    if later:
-        raise UndecidedError("that no tie is decided by its place is not asked here")
+    if any(case.tie(number, other) for other in later):
+        raise UndecidedError("it ties with a later rule, and its place may decide")
 
 
 def tied(case: Case, answer: Answer) -> None:
@@ -63,7 +63,14 @@ def tied(case: Case, answer: Answer) -> None:
     told = sum(bool(one.rules) for one in case.coded("FT202"))
     counted(answer, {"pairs": pairs, "pairs told one by one": told}, 2)
     require(not answer.is_finding, "that others do not tie is no finding")
-    raise UndecidedError("that the other pairs do not tie is not asked here")
+    known = {one.rules for one in case.coded("FT202") if one.rules}
+    total = next((m.value for m in answer.measures if m.name == "pairs that tie"), told)
+    if total != told:
+        raise UndecidedError("which pairs are not told is not known")
+    for pair in case.pairs(alike=False):
+        if pair not in known:
+            text = f"rules {pair[0]} and {pair[1]} tie as the strongest"
+            case.never(case.tie(*pair), text)
 
 
 def covered(case: Case, answer: Answer) -> None:

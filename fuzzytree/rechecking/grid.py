@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
@@ -16,16 +17,24 @@ Asked = tuple[int, ...]
 """What a rule asks of each axis, its functions as bits; and how many stand again."""
 
 
-class Axis(NamedTuple):
-    """A variable: the numbers of the functions that rules ask, and its cells.
+Span = list[tuple[int, int, int, int]]
+"""Of a cell the rank of each function, the highest first; its bands; its bit."""
 
-    Of each cell `spans` has the rank of each function, the highest first, its lowest
-    and its highest band, and its bit.
-    """
+
+class Cuts(NamedTuple):
+    """The bands of a cell's own levels, and the sets between two of them."""
+
+    bands: list[int]
+    known: dict[int, list[int]]
+
+
+class Axis(NamedTuple):
+    """A variable: the numbers of the functions that rules ask, and its cells."""
 
     numbers: dict[tuple[Clause, Fraction], int]
     cells: list[Cell]
-    spans: list[list[tuple[int, int, int, int]]]
+    spans: list[Span]
+    cuts: list[Cuts]
 
 
 class Grid:
@@ -57,10 +66,13 @@ class Grid:
                 }
                 numbers = {c: known[f] for c, f in zip(clauses, functions, strict=True)}
                 found = cells([*known], lines[variable.name], self.levels)
-                self.axes.append(Axis(numbers, found, []))
+                self.axes.append(Axis(numbers, found, [], []))
         self.levels.sort()
         for axis in self.axes:
             axis.spans.extend(map(self._spans, axis.cells))
+            for span in axis.spans:
+                bands = {band for _, least, most, _ in span for band in (least, most)}
+                axis.cuts.append(Cuts(sorted(bands), {}))
         pairs = zip(rules.rules, weights, strict=True)
         self.of = [self.asked(rule.when, weight) for rule, weight in pairs]
         self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
@@ -85,14 +97,14 @@ class Grid:
                     bits[place] |= bit
         return (*bits, again)
 
-    def _spans(self, cell: Cell) -> list[tuple[int, int, int, int]]:
+    def _spans(self, cell: Cell) -> Span:
         band, found = self.levels.band, list[tuple[int, int, int, int]]()
         for number, rank in enumerate(cell.rank):
             one, other = band[cell.left[number]], band[cell.right[number]]
             found.append((rank, min(one, other), max(one, other), 1 << number))
         return sorted(found, key=lambda span: -span[0])
 
-    def _sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
+    def sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
         """Return per axis which sets of functions can be at a level or above.
 
         The level is any between a band and the next one, or any within the band.
@@ -106,19 +118,15 @@ class Grid:
 
     def _of_axis(self, axis: Axis, band: int, is_gap: bool) -> set[int]:
         found: set[int] = set()
-        for cell in axis.spans:
-            base, crossing, last = 0, 0, -1
-            every: list[int] = []
-            for rank, least, most, bit in cell:
-                if least > band:
-                    base |= bit
-                elif most > band or (most == band and not is_gap):
-                    if rank != last and crossing:
-                        every.append(crossing)
-                    crossing, last = crossing | bit, rank
-            found.add(base)
-            found.update(base | one for one in every)
-            found.add(base | crossing)
+        for cell, cuts in zip(axis.spans, axis.cuts, strict=True):
+            if not is_gap:
+                found.update(_of_cell(cell, band, is_gap))
+                continue
+            # Between two levels of its own a cell has the same sets at every band.
+            place = bisect_right(cuts.bands, band)
+            if place not in cuts.known:
+                cuts.known[place] = _of_cell(cell, band, is_gap)
+            found.update(cuts.known[place])
         return found
 
     def wins(self, mine: Asked, rivals: Sequence[Asked]) -> bool:
@@ -152,10 +160,10 @@ class Grid:
         for is_vague in (False, True):
             every = [self._zeros(axis, is_vague=is_vague) for axis in self.axes]
             axes = [
-                {_bits(of[place] & zeros for of in rules) for zeros in sets}
+                {bits(of[place] & zeros for of in rules) for zeros in sets}
                 for place, sets in enumerate(every)
             ]
-            found.append(_reach(axes, len(rules)))
+            found.append(reach(axes, len(rules)))
         return found[0] if found[0] == found[1] else None
 
     def _zeros(self, axis: Axis, *, is_vague: bool) -> set[int]:
@@ -166,11 +174,11 @@ class Grid:
         found: set[int] = set()
         for cell in axis.cells:
             pairs = zip(cell.left, cell.right, strict=True)
-            found.add(_bits(ends == (zero, zero) for ends in pairs))
+            found.add(bits(ends == (zero, zero) for ends in pairs))
             right = [self.levels.band[end] == lowest for end in cell.right]
             if not is_vague and not is_sharp:
                 right = [end == zero for end in cell.right]
-            found.add(_bits(right))
+            found.add(bits(right))
         return found
 
     def gap(self, level: Fraction, *, is_above: bool) -> int:
@@ -206,13 +214,27 @@ class Grid:
     ) -> bool:
         """Return whether at a level a rule can be there and each rival below."""
         axes: list[set[int]] = []
-        for place, sets in enumerate(self._sets(band, is_gap=is_gap)):
+        for place, sets in enumerate(self.sets(band, is_gap=is_gap)):
             own = mine[place] if mine else 0
             met = [reached for reached in sets if reached & own == own]
             axes.append(
-                {_bits(of[place] & ~reached for of in rivals) for reached in met}
+                {bits(of[place] & ~reached for of in rivals) for reached in met}
             )
-        return _reach(axes, len(rivals))
+        return reach(axes, len(rivals))
+
+
+def _of_cell(cell: Span, band: int, is_gap: bool) -> list[int]:
+    """Return which functions can be at a level or above in parts of a cell."""
+    base, crossing, last = 0, 0, -1
+    every: list[int] = []
+    for rank, least, most, bit in cell:
+        if least > band:
+            base |= bit
+        elif most > band or (most == band and not is_gap):
+            if rank != last and crossing:
+                every.append(crossing)
+            crossing, last = crossing | bit, rank
+    return [base, *(base | one for one in every), base | crossing]
 
 
 def _functions(
@@ -225,12 +247,12 @@ def _functions(
     ]
 
 
-def _bits(flags: Iterable[int]) -> int:
+def bits(flags: Iterable[int]) -> int:
     """Return a number whose n-th bit tells whether the n-th flag is set."""
     return sum(1 << place for place, flag in enumerate(flags) if flag)
 
 
-def _reach(axes: Iterable[set[int]], count: int) -> bool:
+def reach(axes: Iterable[set[int]], count: int) -> bool:
     """Return whether a set of each axis, taken together, can hold all of `count`.
 
     Raises:

@@ -26,4 +26,6 @@ def models(seed: int) -> Iterator[RuleBase | FuzzyTree]:
 
 def read(model: RuleBase | FuzzyTree) -> model_records.Model:
     """Return a model as the re-checker reads it."""
-    return read_model(yaml.write(model).content, "model.yaml")
+    found = read_model(yaml.write(model).content, "model.yaml")
+    assert not isinstance(found, model_records.System)
+    return found
