@@ -31,6 +31,7 @@ Rules under the minimum: levels
     - `levels`: irrational levels that coincide
     - `contests`, `parts`: the options of each axis, and the values where one holds
     - `covering`: a choice on each axis that leaves all rivals below
+    - `choices`: values that axes which share inputs have together
     - `questions`: the search for a point at which a level parts rules from rivals
 
 Rules under the product, and any other: boxes
@@ -40,7 +41,8 @@ Rules under the product, and any other: boxes
 
 Questions, whatever the conjunction
     - `wins`, `leads`: is a rule ever strongest, and by how much
-    - `tied`, `shared`, `ties`: are rules equally strong on a set with an interior
+    - `tied`, `shared`, `pivots`, `ties`, `tied_inputs`: are rules equally strong on a
+      set with an interior
     - `proportions`, `products`: where are they one function, under the product
     - `cover`: is there an input without a rule, or with weak ones only
     - `factors`, `dominance`: two rules compared axis by axis

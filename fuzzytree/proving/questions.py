@@ -15,17 +15,18 @@ fractions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.boxes import region_around
+from fuzzytree.proving.choices import choices, parts_of, union
 from fuzzytree.proving.clock import Clock, OutOfTimeError
-from fuzzytree.proving.contests import Contest, Options, weakest
+from fuzzytree.proving.contests import Contest, weakest
 from fuzzytree.proving.covering import cover
 from fuzzytree.proving.ground import Ground, TooManyCellsError, strengths_at
-from fuzzytree.proving.parts import START, Stretch, stretch, widest
+from fuzzytree.proving.parts import START, Stretch, stretch
 from fuzzytree.proving.seeking import leader, plainer
 from fuzzytree.proving.states import (
     Bracket,
@@ -311,6 +312,13 @@ class _Search:
             todo += [((low, middle), depth + 1), ((middle, high), depth + 1)]
         return None
 
+    def _tell(self) -> None:
+        """Count a choice of inputs, and end the search where they are too many."""
+        self.clock.check()
+        self.choices += 1
+        if self.choices > _MOST_CHOICES:
+            raise OutOfTimeError
+
     def _choices(
         self,
         contest: Contest,
@@ -331,32 +339,23 @@ class _Search:
         joined = sorted({axis for group in self.groups for axis in group})
         free = [a for a in range(len(contest.options)) if a not in joined]
         families = [contest.options[axis].at_gap(band) for axis in free]
-        parts = [
-            [*_parts(contest, axis, band, levels, is_outer=is_outer)] for axis in joined
-        ]
-        reach = [_union(mask for family in families for mask in family)]
-        for of in reversed(parts):
-            reach.append(reach[-1] | _union(mask for _, mask in of))
-        reach.reverse()
-        todo: list[tuple[dict[int, Stretch], int]] = [({}, 0)]
-        while todo:
-            wanted, covered = todo.pop()
-            place = len(wanted)
-            if covered | reach[place] != contest.full:
-                continue
-            if place:
-                self.clock.check()
-                self.choices += 1
-                if self.choices > _MOST_CHOICES:
-                    raise OutOfTimeError
-                if point_with(contest.ground, wanted) is None:
-                    continue
-            if place < len(joined):
-                todo += [
-                    ({**wanted, joined[place]: part}, covered | mask)
-                    for part, mask in parts[place]
-                ]
-                continue
+        parts = {
+            axis: [
+                *parts_of(
+                    contest,
+                    contest.all_options[axis],
+                    axis,
+                    band,
+                    levels,
+                    is_outer=is_outer,
+                )
+            ]
+            for axis in joined
+        }
+        rest = union(mask for family in families for mask in family)
+        for wanted, covered in choices(
+            contest.ground, parts, contest.full, rest, {}, self._tell
+        ):
             left = contest.full & ~covered
             chosen = cover(families, left, self.clock)
             if chosen is None:
@@ -378,43 +377,3 @@ def _between(low: Fraction, high: Fraction) -> Fraction:
     middle = (low + high) / 2
     near = Fraction(float(middle))
     return near if low < near < high else middle
-
-
-def _union(masks: Iterable[int]) -> int:
-    found = 0
-    for mask in masks:
-        found |= mask
-    return found
-
-
-def _parts(
-    contest: Contest,
-    axis: int,
-    band: int,
-    levels: tuple[Fraction, Fraction],
-    *,
-    is_outer: bool,
-) -> Iterator[tuple[Stretch, int]]:
-    """Yield the stretches of an axis, each with the rivals left below there."""
-    options: Options = contest.all_options[axis]
-    laid = contest.ground.laid[0][axis]
-    for number in ((options.top > band) & (options.where >= START)).nonzero()[0]:
-        cell = int(options.where[number])
-        mine = weakest(laid, contest.ours, cell)
-        floors = options.floor[number]
-        rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
-        theirs = {
-            n: weakest(laid, [contest.rivals[n]], cell)
-            for n in range(len(floors))
-            if floors[n] <= band
-        }
-        # What is left below is nested: everything up to some element of the order.
-        for limit in sorted({-1, *(int(rank[e]) for e in theirs.values())}):
-            kept = {n: e for n, e in theirs.items() if int(rank[e]) <= limit}
-            below = set(kept.values())
-            if is_outer:
-                part = widest(laid, cell, levels, [mine], below)
-            else:
-                part = stretch(laid, cell, levels[0], [mine], below)
-            if part is not None:
-                yield part, sum(1 << n for n in kept)

@@ -224,3 +224,24 @@ def test_on_a_domain_of_one_value_rules_tie_along_the_other_inputs() -> None:
     assert isinstance(tie(ground(rules, point), 1, 2), Witness)
     assert isinstance(decides_by_order(ground(rules, point), 1, (), (2,)), Witness)
     assert isinstance(decides_by_order(ground(rules, point), 2, (1,), ()), Proved)
+
+
+def test_ties_on_axes_that_share_inputs_are_decided_where_inputs_have_the_values() -> (
+    None
+):
+    # x and mix = x + y - 1 / 2 share x, on [0, 1] each; the rules tie where x is below
+    # both: y is above 1 / 2 and x below 1 / 2, or so.
+    mix = Variable("mix", (UP, DOWN), parts=(Part("x", 1.0), Part("y", 1.0, 0.5)))
+    rules = RuleBase(
+        "mixed",
+        ("a", "b"),
+        (Variable("x", (UP,)), Variable("y", (UP,)), mix),
+        (
+            Rule((Clause("x", ("up",)), Clause("mix", ("up",))), "a"),
+            Rule((Clause("x", ("up",)), Clause("mix", ("down",))), "b"),
+        ),
+    )
+    found = tie(ground(rules, SQUARE), 1, 2)
+    assert isinstance(found, Witness)
+    low = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 0.25)))  # mix is below x
+    assert isinstance(tie(ground(rules, low), 1, 2), Proved)
