@@ -424,9 +424,10 @@ def test_a_recording_survives_the_death_of_its_program(place: Path, count: int) 
     found = read_recording(path)
     assert (found.damaged, found.counters.damaged) == (0, 0)
     assert len(found.frames) >= count
-    assert found.numbers.tolist() == list(range(3, 3 + len(found.frames)))
-    expected = sent[3 : 3 + len(found.frames)]
-    assert (found.frames == np.array(expected).reshape(-1, 4, 5)).all()
+    assert (found.frames == np.array(sent)[found.numbers]).all()
+    passed = np.diff(found.numbers, prepend=2)  # a busy computer drops some
+    assert (passed > 0).all()
+    assert (passed - 1).sum() <= found.counters.dropped
 
 
 def record_bytes() -> int:
