@@ -347,11 +347,17 @@ _CODES = (
         "FTD02",
         "declined: a curve without an exact method",
         "info",
-        what="A term's curve is no piecewise polynomial, such as a gaussian.",
-        why="Its degrees are no fractions, so nothing about them is decided exactly.",
+        what="A term's curve is no piecewise polynomial, such as a gaussian. It is "
+        "held between two lines of points, about 0.001 apart, and rules that ask it "
+        "are asked of both: what is proved or has a witness holds for the curve "
+        "itself, and what lies between the lines is a BRACKET. Its shape and its "
+        "overlaps are not asked. A formula has no such lines: what depends on it is "
+        "not decided.",
+        why="Its degrees are no fractions, so not every question has an exact answer.",
         example="gaussian: {mean: 20, deviation: 3}",
-        remedy="`fuzzytree convert --allow-loss` writes curves as points within a "
-        "tolerance that it states; audit that file.",
+        remedy="Nothing, where the answers suffice. `fuzzytree convert --allow-loss` "
+        "writes curves as points within a tolerance that it states; all is asked of "
+        "that file.",
     ),
     Code(
         "FTD03",
@@ -397,11 +403,13 @@ _CODES = (
         "FTD07",
         "declined: a condition without an exact method",
         "info",
-        what="A rule's condition asks what the exact method does not hold: a hedge "
-        "such as `very`, a formula, an output, or a weight where weights matter.",
+        what="A rule's condition asks what the exact method does not hold: an output, "
+        "or not what a product or an OR under products says.",
         why="The rule is left out of what is proved, and that is said.",
-        example="IF force is very high THEN power is low",
-        remedy="Write the hedged curve as a term of its own, as points.",
+        example="IF power is low AND force is high THEN brake is on, where power is "
+        "an output of the rules before",
+        remedy="Ask inputs alone, or audit the rules before and those behind as two "
+        "systems.",
     ),
     Code(
         "FTD08",

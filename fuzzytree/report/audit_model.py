@@ -246,6 +246,14 @@ def _notes(viewed: View) -> Iterator[Markup]:
         said = "These are the system's conditions as they are audited: one that says "
         yield tag("p", f"{said}'or' is asked as several rules", class_="caption")
     known = set(viewed.numbers)
+    weights = [
+        f"rule {k} by {rule.weight!r}"
+        for k, rule in enumerate(system.rules, 1)
+        if k in known and rule.weight != 1.0
+    ]
+    if weights:
+        said = "The strengths of these are multiplied by their weights: "
+        yield tag("p", said + ", ".join(weights[:MOST_RULES]), class_="caption")
     others = [
         joined([text(f"rule {k}: "), text(rule_text(rule))])
         for k, rule in enumerate(system.rules, 1)

@@ -222,7 +222,8 @@ def test_hedged_clauses_are_as_strong_as_those_of_the_system(curve: Curve) -> No
 
 def test_hedged_terms_are_named_and_asked_but_are_no_terms_of_the_system() -> None:
     rules: Rules = ((Is("a", "low", ("very",)), "soft", 1.0), (A, "soft", 1.0))
-    system = system_of(rules, **{"very low": FLAT})
+    others: dict[str, Curve] = {"very low": FLAT}
+    system = system_of(rules, norm="minimum", low=LOW, high=HIGH, **others)
     seen = view(system, domain_of(system))
     assert seen.rules is not None
     assert sentence(seen.rules.rules[0]) == "IF a is very low' THEN power is soft"

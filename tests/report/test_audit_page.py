@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from fuzzytree.agreement import Agreement, Comparison
 from fuzzytree.auditing.records import Answer, Measure
@@ -399,3 +400,19 @@ def test_a_page_of_many_findings_is_bounded() -> None:
     small = len(page(audit_of(rules, tuple(some * 100)), rules))
     large = len(page(audit_of(rules, tuple(some * 1000)), rules))
     assert large < small + 500_000 < 3_000_000
+
+
+def test_the_weights_of_a_systems_rules_are_told() -> None:
+    system = random_system(3)
+    blocks = [
+        replace(one, rules=tuple(replace(rule, weight=0.25) for rule in one.rules))
+        for one in system.blocks
+    ]
+    audit = audit_of(rule_base(), (), form="system")
+    told = "The strengths of these are multiplied by their weights: rule 1 by 0.25"
+    plain, weighted = (
+        Outline(page(audit, one)).text
+        for one in (system, replace(system, blocks=tuple(blocks)))
+    )
+    assert told in weighted
+    assert told not in plain
