@@ -136,6 +136,9 @@ def command(
         raise click.UsageError(
             "--target names a column of a table; give it with --data"
         )
+    output = None if output == "-" else output
+    if "-" in (page, write_baseline):
+        raise click.UsageError("`-` is stdout, where the findings go; name a file")
     read = [one for one in (model, data, config, *results) if one is not None]
     places = [one for one in (output, page, write_baseline) if one is not None]
     check_places(places, read)

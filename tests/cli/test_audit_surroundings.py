@@ -166,6 +166,18 @@ def test_a_place_that_is_none_is_one_sentence(
     assert {path: path.read_bytes() for path in Path().iterdir()} == before
 
 
+def test_a_dash_is_standard_output_for_the_findings_alone(call: Call) -> None:
+    plain = call("audit", "grip.yaml", *ASKED)
+    assert call("audit", "grip.yaml", *ASKED, "--output", "-") == plain
+    message = (
+        "`-` is stdout, where the findings go; name a file\n"
+        "  fuzzytree audit --help tells more\n"
+    )
+    for option in ("--page", "--write-baseline"):
+        assert call("audit", "grip.yaml", *ASKED, option, "-") == (2, "", message)
+    assert not Path("-").exists()
+
+
 @pytest.mark.parametrize("option", ["--output", "--page", "--write-baseline"])
 def test_a_full_disk_is_one_sentence_and_the_text_is_told(
     call: Call, option: str
