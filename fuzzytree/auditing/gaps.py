@@ -82,7 +82,11 @@ def _gaps(subject: Subject, given: Ground, first: Witness) -> Iterator[Answer]:
     found, is_all = _separate(subject, given, first)
     told = [_gap(subject, state) for state in found]
     if subject.rows is not None:
-        told = [*ranked(told, subject.rows, subject.domain, subject.rules.inputs)]
+        rules = subject.rules
+        found_near = ranked(
+            told, subject.rows, subject.domain, rules.inputs, rules.variables
+        )
+        told = [*found_near]
     yield from (
         replace(one, subject=f"gap {place}") for place, one in enumerate(told, 1)
     )

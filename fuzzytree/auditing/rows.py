@@ -13,9 +13,12 @@ from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.subject import Rows, Subject
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.numerics.oracle import decide
-from fuzzytree.proving.domain import Domain
+from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.polytopes import Polytope, Polytopes, polytope_of
 from fuzzytree.proving.states import Span, Witness, point_of
 from fuzzytree.proving.variables import contains
+from fuzzytree.proving.variables import span as ends_on
+from fuzzytree.rulebase import Variable
 
 OF_RANGES = "of each input's range"
 """The unit of distances: the largest difference of an input, in its range's width."""
@@ -92,7 +95,11 @@ def distance_measure(name: str, value: Fraction) -> Measure:
 
 
 def ranked(
-    gaps: Sequence[Answer], rows: Rows, domain: Domain, inputs: Sequence[str]
+    gaps: Sequence[Answer],
+    rows: Rows,
+    domain: Domain,
+    inputs: Sequence[str],
+    variables: Sequence[Variable] = (),
 ) -> tuple[Answer, ...]:
     """Return answers in order of how near they are to a row, with the distance.
 
@@ -104,6 +111,8 @@ def ranked(
         rows: The rows.
         domain: In whose widths distance is measured.
         inputs: The names of the rows' values.
+        variables: The combinations that regions may name; where one of another name
+            is met, the point of the witness counts.
 
     Example:
         >>> from fuzzytree.proving.domain import Side
@@ -118,7 +127,11 @@ def ranked(
     known: list[tuple[Fraction, int, Answer]] = []
     unknown: list[Answer] = []
     for place, gap in enumerate(gaps):
-        found = _nearest_row(_spans(gap, inputs), rows, domain, inputs)
+        part = _part(gap, domain, inputs, variables)
+        if part is None:
+            found = _nearest_row(_spans(gap, inputs), rows, domain, inputs)
+        else:
+            found = _nearest_to_part(part, rows, domain, inputs)
         if found is None:
             unknown.append(gap)
             continue
@@ -131,6 +144,50 @@ def ranked(
         known.append((away, place, msgspec.structs.replace(gap, measures=measures)))
     ordered = sorted(known, key=lambda one: one[:2])
     return (*(gap for _, _, gap in ordered), *unknown)
+
+
+def _part(
+    gap: Answer,
+    domain: Domain,
+    inputs: Sequence[str],
+    variables: Sequence[Variable],
+) -> Polytope | None:
+    """Return the region of a gap whose combinations are known; None of any other."""
+    combined = {one.name: one for one in variables if one.parts}
+    asked = {span.variable for span in gap.region}
+    if not asked & set(combined) or not asked <= {*combined, *inputs}:
+        return None
+    sides = {side.variable: side for side in domain.sides}
+    for one in gap.region:
+        name = one.variable
+        if name not in sides:
+            low, high = ends_on(combined[name], domain)
+            sides[name] = Side(name, outwards(low)[0], outwards(high)[1])
+        whole = sides[name]
+        low_end = whole.low if one.low is None else max(whole.low, one.low)
+        high_end = whole.high if one.high is None else min(whole.high, one.high)
+        sides[name] = Side(name, low_end, high_end)
+    return polytope_of(Domain(tuple(sides.values())), inputs, combined)
+
+
+def _nearest_to_part(
+    part: Polytope, rows: Rows, domain: Domain, inputs: Sequence[str]
+) -> tuple[Fraction, int] | None:
+    """Return how near a row is to a part of the inputs, at least, and which is it."""
+    asked = Polytopes(domain, inputs, [part])
+    near: list[tuple[float, int, dict[str, Fraction]]] = []
+    for row, values in enumerate(rows.values.T.tolist()):
+        if all(map(math.isfinite, values)):
+            point = dict(zip(inputs, map(Fraction, values), strict=True))
+            near.append((asked.bounds(point)[0], row, point))
+    best: tuple[Fraction, int] | None = None
+    for bound, row, point in sorted(near, key=lambda one: one[:2]):
+        if best is not None and bound > best[0]:
+            break
+        found = asked.nearest(point, [0])
+        if not found.is_none and (best is None or found.low < best[0]):
+            best = found.low, row + 1
+    return best
 
 
 def _spans(gap: Answer, inputs: Sequence[str]) -> tuple[Span, ...]:

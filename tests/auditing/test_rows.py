@@ -17,6 +17,7 @@ from fuzzytree.auditing.subject import Rows
 from fuzzytree.numerics.oracle import decide
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.states import Claim, Proved, Span, Witness, coordinates
+from fuzzytree.rulebase import Part, Variable
 from tests.auditing.small_trees import subject_of, two_cuts
 
 BOX = Domain((Side("x", 0.0, 4.0), Side("y", 0.0, 1.0)))
@@ -44,7 +45,20 @@ def test_a_gap_that_holds_a_row_is_at_distance_zero() -> None:
     assert told.measures[0].value == 0.0
 
 
-def test_a_gap_of_a_combination_is_measured_at_its_point() -> None:
+def test_a_gap_of_a_combination_is_as_far_as_its_inputs_must_move() -> None:
+    # From row 2, (1, 0.5), both move by r of their ranges: 1 + 4 r + 0.5 + r = 3.
+    of = Variable("sum", parts=(Part("x", 1.0), Part("y", 1.0)))
+    gap = _gap("sum", Span("sum", 3.0, None))
+    [told] = ranked([gap], ROWS, BOX, ["x", "y"], [of])
+    assert told.measures[0].exact == "3/10"
+    assert told.measures[1].value == 2
+    low, high = _gap("low", Span("sum", None, 1.0)), _gap("high", Span("sum", 2.0, 3.0))
+    first, second = ranked([high, low], ROWS, BOX, ["x", "y"], [of])
+    assert (first.subject, second.subject) == ("low", "high")
+    assert first.measures[0].value == 0.0
+
+
+def test_a_gap_of_an_unknown_combination_is_measured_at_its_point() -> None:
     point = coordinates({"x": Fraction(3), "y": Fraction(1, 2)})
     state = Witness(point, (Claim("below", rules=(1,), level="0"),))
     gap = Answer("FT301", "sum", "", state, True, region=(Span("sum", 3.0, 4.0),))
