@@ -185,6 +185,7 @@ def test_a_port_that_comes_back_goes_on_in_the_same_recording(
     assert len(read_recording("b.ftr").frames) == 110
 
 
+@pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_ctrl_c_ends_a_recording_well(
     call: Call, place: Path, resting: Device, number: signal.Signals

@@ -297,6 +297,7 @@ def test_ctrl_c_gives_the_terminal_back_and_is_a_normal_end(
 
 
 @pytest.mark.heavy
+@pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_a_signal_gives_the_terminal_back(
     call: Call, tmp_path: Path, name: str
