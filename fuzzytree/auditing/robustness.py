@@ -29,7 +29,10 @@ from fuzzytree.proving.variables import contains, variable_value
 from fuzzytree.proving.wording import answer_text, number_text, percent
 
 MOST_ROWS = 50
-"""Rows whose radius is sought."""
+"""Rows whose radius is sought by strengths."""
+
+MOST_ROWS_OF_TREE = 1000
+"""Rows whose radius is sought by regions, which is quick."""
 
 SHOWN_ROWS = 5
 """Rows of the smallest radius that have an answer of their own."""
@@ -184,11 +187,13 @@ def answers(subject: Subject) -> Iterator[Answer]:
     decider = decider_of(subject)
     clock = subject.clock.share(_PART)
     asked: list[_Asked] = []
-    decider.look([point for _, point in points.at[:MOST_ROWS]])
-    for number, point in points.at[:MOST_ROWS]:
+    most = MOST_ROWS if subject.tree is None else MOST_ROWS_OF_TREE
+    chosen = points.at[:most]
+    decider.look([point for _, point in chosen])
+    for number, point in chosen:
         if clock.is_over:
             break
-        subject.clock.tell(f"radius of row {number}", len(asked) / len(points.at))
+        subject.clock.tell(f"radius of row {number}", len(asked) / len(chosen))
         found = decider.nearest_other(point, clock)
         if clock.is_over and not found.is_narrow:
             break

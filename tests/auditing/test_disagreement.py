@@ -9,7 +9,9 @@ import pytest
 
 from fuzzytree.auditing.deciders import Both
 from fuzzytree.auditing.disagreement import answers
+from fuzzytree.auditing.nearby import nearest_difference
 from fuzzytree.auditing.records import Answer
+from fuzzytree.auditing.rows import points_of
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.proving.clock import Clock
@@ -79,6 +81,26 @@ def test_the_nearest_disagreement_to_a_row_is_bounded_on_both_sides() -> None:
     assert 0.0998 < _number(told, "certified distance, in ranges") <= 0.1
     assert 0.0999 < _number(told, "distance of the witness, in ranges") < 0.1002
     assert isinstance(told.state, Witness)
+
+
+@pytest.mark.parametrize("calls", [3, 8, 12, 20, 40])
+def test_a_budget_that_ends_certifies_no_more_than_was_asked(calls: int) -> None:
+    subject = subject_of(one_cut(0.25), rows=[[0.1], [0.6], [0.8]])
+    assert subject.tree is not None
+    assert subject.raw is not None
+    assert subject.rows is not None
+    both = Both(subject.tree, subject.raw, subject.domain, regions(subject.tree))
+    times = iter([0.0] * calls + [9.0] * 10_000)
+    clock = Clock(1.0, now=lambda: next(times))
+    [told] = nearest_difference(both, points_of(subject, subject.rows), clock)
+    asked = _number(told, "rows asked")
+    if not asked:
+        assert told.state == Declined(
+            "FTD03", "the budget was spent before the first row"
+        )
+        return
+    assert _number(told, "certified distance, in ranges") <= 0.1
+    assert isinstance(told.state, Witness if asked == 3 else (Bracket, Witness))
 
 
 def test_rows_around_which_nothing_differs_are_told_so() -> None:

@@ -111,6 +111,18 @@ def test_all_rows_are_told_of_together_and_the_nearest_by_name() -> None:
     assert _number(told[0], "row") == 2
 
 
+def test_all_rows_of_a_tree_are_asked_and_only_close_calls_of_rules() -> None:
+    rows = [[number / 100] for number in range(80)]
+    whole = next(answers(subject_of(one_cut(), rows=rows)))
+    assert _number(whole, "rows asked") == 80
+    assert "with the smallest margins" not in whole.sentence
+    raw = subject_of(one_cut()).raw
+    assert raw is not None
+    some = next(answers(subject_of(raw, rows=rows)))
+    assert _number(some, "rows asked") == 50
+    assert "50 different ones with the smallest margins were asked" in some.sentence
+
+
 def test_without_rows_it_is_declined() -> None:
     [told] = answers(subject_of(one_cut()))
     assert told.state == Declined("FTD06", "rows are needed (--data TABLE)")
