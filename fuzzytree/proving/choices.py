@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
+from fuzzytree.proving.clock import OutOfTimeError
 from fuzzytree.proving.contests import Contest, Options, weakest
 from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.parts import START, Stretch, stretch, widest
@@ -30,6 +31,17 @@ def union(masks: Iterable[int]) -> int:
     for mask in masks:
         found |= mask
     return found
+
+
+def at_most(calls: int) -> Callable[[], None]:
+    """Return what raises OutOfTimeError when it is called more often than that."""
+    left = iter(range(calls))
+
+    def tell() -> None:
+        if next(left, None) is None:
+            raise OutOfTimeError
+
+    return tell
 
 
 def choices(

@@ -9,7 +9,6 @@ the root of their product; what they do reach is tried.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -21,7 +20,8 @@ from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.bounding import highest_by_boxes
 from fuzzytree.proving.boxes import region_around
-from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.choices import Part, at_most, choices
+from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.curves import ONE, ZERO
 from fuzzytree.proving.dominance import FAR, Compared
 from fuzzytree.proving.ground import Ground, Laid, strengths_at
@@ -247,16 +247,24 @@ def _witness(
     joined: Collection[int],
 ) -> Witness | None:
     """Return a point at which both rules reach a level, if one is found."""
-    parts: dict[int, list[Stretch]] = {}
+    held: dict[int, Stretch] = {}
+    parts: dict[int, list[Part]] = {}
     for axis, laid in enumerate(given.laid[0]):
         of = [rule - 1 for rule in rules]
-        if any(laid.axis.asked[rule] for rule in of):
-            found = [*_parts(laid, of, goal)]
-            parts[axis] = found if axis in joined else found[:1]
-    for chosen in itertools.islice(itertools.product(*parts.values()), _MOST_CHOICES):
-        point = point_with(given, dict(zip(parts, chosen, strict=True)))
-        if point is not None and is_within(given, point):
-            return _checked(given, rules, point, level)
+        if axis in joined:
+            parts[axis] = [(part, 0) for part in _parts(laid, of, goal, is_run=True)]
+        elif any(laid.axis.asked[rule] for rule in of):
+            first = next(_parts(laid, of, goal), None)
+            if first is None:
+                return None
+            held[axis] = first
+    try:
+        for wanted, _ in choices(given, parts, 0, 0, held, at_most(_MOST_CHOICES)):
+            point = point_with(given, wanted)
+            if point is not None and is_within(given, point):
+                return _checked(given, rules, point, level)
+    except OutOfTimeError:
+        pass
     return None
 
 
@@ -264,7 +272,7 @@ def _is_never(
     given: Ground, rules: tuple[int, int], level: Fraction, joined: Collection[int]
 ) -> bool:
     """Return whether no inputs give axes that share them values that reach a level."""
-    parts: dict[int, list[Stretch]] = {}
+    parts: dict[int, list[Part]] = {}
     for axis in sorted(joined):
         laid = given.laid[0][axis]
         made: list[Stretch] = []
@@ -272,28 +280,39 @@ def _is_never(
             of = laid.of_start if cell == START else laid.of[:, cell]
             elements = {int(of[rule - 1]) for rule in rules}
             part = widest(laid, cell, (level, level), elements, ())
+            if part is not None and made and part.low <= made[-1].high:
+                part = Stretch(made.pop().low, part.high, is_open=False)
             if part is not None:
                 made.append(part)
-        parts[axis] = made
-    if math.prod(map(len, parts.values())) > _MOST_CHOICES:
+        parts[axis] = [(part, 0) for part in made]
+    try:
+        return not any(choices(given, parts, 0, 0, {}, at_most(_MOST_CHOICES)))
+    except OutOfTimeError:
         return False
-    return all(
-        point_with(given, dict(zip(parts, chosen, strict=True))) is None
-        for chosen in itertools.product(*parts.values())
-    )
 
 
-def _parts(laid: Laid, rules: Sequence[int], goal: Fraction) -> Iterator[Stretch]:
-    """Yield where both rules reach a level on an axis: stretches, widest first."""
+def _parts(
+    laid: Laid, rules: Sequence[int], goal: Fraction, *, is_run: bool = False
+) -> Iterator[Stretch]:
+    """Yield where both rules reach a level on an axis: stretches, widest first.
+
+    Those of neighbouring cells are one, if they shall be, where no cell is hidden
+    between: curves are continuous from below.
+    """
     found: list[Stretch] = []
+    between, is_vague = laid.cells.between, laid.cells.is_vague
     tops = np.maximum(laid.cells.right[1][:, :-1], laid.cells.left[1][:, 1:])
     every = np.arange(laid.of.shape[1])
     reach = np.minimum(*(tops[laid.of[rule], every] for rule in rules))
     for cell in np.flatnonzero(reach >= outwards(goal)[0]).tolist():
         elements = {int(laid.of[rule, cell]) for rule in rules}
         part = stretch(laid, cell, goal, elements, ())
-        if part is not None:
-            found.append(part)
+        if part is None:
+            continue
+        is_next = bool(found) and found[-1].high == between[cell - 1][1]
+        if is_run and is_next and part.low == between[cell][0] and not is_vague[cell]:
+            part = Stretch(found.pop().low, part.high)
+        found.append(part)
     found.sort(key=lambda part: part.low - part.high)
     yield from found
     zones = laid.cells.zones

@@ -116,7 +116,10 @@ def widest(
     zones = laid.cells.zones
     if cell == START:
         at = zones[0][0]
-        return Stretch(at, at, is_open=False)
+        fits = all(elements[one].degree(at) >= levels[0] for one in high_ones) and all(
+            elements[one].degree(at) < levels[1] for one in low_ones
+        )
+        return Stretch(at, at, is_open=False) if fits else None
     low, high = laid.cells.between[cell]
     ends = low, high
     first, last = zones[cell][0], zones[cell + 1][1]
