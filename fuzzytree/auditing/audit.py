@@ -158,6 +158,7 @@ def audit(
         limits=LIMITS,
         is_complete=not asked.cut,
         accepted=tuple(sorted(ids.intersection(accepted))),
+        numbers=() if _is_plain(viewed.numbers) else viewed.numbers,
     )
     # A count among doubles is a double from here on, as it is for who reads the file.
     found = msgspec.json.decode(msgspec.json.encode(found), type=Audit)
@@ -335,6 +336,11 @@ def _placed(
         places=places_of(answer, model, file, numbers),
         repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
     )
+
+
+def _is_plain(numbers: Sequence[int]) -> bool:
+    """Return whether the rules of a view are those of the model, one by one."""
+    return [*numbers] == [*range(1, len(numbers) + 1)]
 
 
 def _form(model: Document) -> str:

@@ -168,6 +168,8 @@ class Audit(Value, frozen=True):
         is_complete: Whether nothing was cut short.
         accepted: The ids of findings that the user's baseline accepts.
         results: What other verbs found of the same model, if that was given.
+        numbers: Of a fuzzy system the number in the file, over all blocks, of each rule
+            that answers and claims count; empty where the two are the same.
         digest: The SHA-256 of all else, as canonical JSON; see `digest_of`.
     """
 
@@ -187,6 +189,7 @@ class Audit(Value, frozen=True):
     is_complete: bool
     accepted: tuple[str, ...] = ()
     results: tuple[Result, ...] = ()
+    numbers: tuple[int, ...] = ()
     digest: str = ""
     format: Literal["fuzzytree-audit/1"] = FORMAT
 

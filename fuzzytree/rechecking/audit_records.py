@@ -167,6 +167,7 @@ class Audit(NamedTuple):
     is_complete: bool
     accepted: tuple[str, ...]
     results: tuple[Result, ...]
+    numbers: tuple[int, ...]
     digest: str
     format: Literal["fuzzytree-audit/1"]
 

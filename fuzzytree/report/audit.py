@@ -11,7 +11,12 @@ from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Severity
 from fuzzytree.naming import printable
 from fuzzytree.proving.states import Bracket, Coordinate, Declined, Witness
-from fuzzytree.report.audit_states import result_text, state_text, state_word
+from fuzzytree.report.audit_states import (
+    as_in_file,
+    result_text,
+    state_text,
+    state_word,
+)
 from fuzzytree.report.svg_regions import span_text
 from fuzzytree.report.text import aligned, counted, number
 
@@ -75,6 +80,7 @@ def audit_lines(
         is_coloured: Whether codes, severities and states have colours.
         is_whole: Whether every answer is told one by one.
     """
+    audit = as_in_file(audit)
     paint = _painted if is_coloured else _plain
     gravity = [*_GRAVE].index
     yield from _head(audit)

@@ -39,6 +39,7 @@ from fuzzytree.report.audit_pictures import Scene
 from fuzzytree.report.audit_rows import data_of, passing
 from fuzzytree.report.audit_states import (
     STATES,
+    as_in_file,
     known_as,
     result_text,
     state_badge,
@@ -111,6 +112,7 @@ def page(
         >>> "Nothing was found" in page(audit, tree)
         True
     """
+    audit = as_in_file(audit)
     sections = [*_sections(audit, model, rows, agreement, stability)]
     links = [tag("li", tag("a", title, href=f"#{name}")) for name, title, _ in sections]
     shown = [

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import msgspec
+
 from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Result, Severity
+from fuzzytree.auditing.records import Answer, Audit, Result, Severity
 from fuzzytree.proving.states import (
     Bracket,
     Claim,
@@ -239,6 +241,40 @@ def known_as(answers: Sequence[Answer]) -> dict[str, int]:
     for answer in answers:
         counts[state_word(answer.state)] += 1
     return counts
+
+
+def as_in_file(audit: Audit) -> Audit:
+    """Return an audit whose claims call rules by their numbers in the file.
+
+    Args:
+        audit: An audit; only that of a fuzzy system may number its rules otherwise.
+    """
+    if not audit.numbers:
+        return audit
+    answers = [
+        msgspec.structs.replace(
+            one,
+            state=msgspec.structs.replace(
+                one.state,
+                claims=tuple(
+                    _claim_in_file(claim, audit.numbers) for claim in one.state.claims
+                ),
+            ),
+        )
+        if isinstance(one.state, Witness | Bracket)
+        else one
+        for one in audit.answers
+    ]
+    return msgspec.structs.replace(audit, answers=tuple(answers))
+
+
+def _claim_in_file(claim: Claim, numbers: Sequence[int]) -> Claim:
+    """Return a claim by the numbers in the file; two ways of one rule are one."""
+    rules, rivals = (
+        tuple(dict.fromkeys(numbers[n - 1] for n in asked))
+        for asked in (claim.rules, claim.rivals)
+    )
+    return msgspec.structs.replace(claim, rules=rules, rivals=rivals)
 
 
 def state_text(state: State) -> str:

@@ -12,7 +12,7 @@ import msgspec
 from fuzzytree.auditing.baselines import gone
 from fuzzytree.auditing.codes import CODES, Code
 from fuzzytree.auditing.records import Answer, Audit, Place, Severity
-from fuzzytree.report.audit_states import state_text, state_word
+from fuzzytree.report.audit_states import as_in_file, state_text, state_word
 
 SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 
@@ -35,6 +35,7 @@ def sarif(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
         audit: The audit.
         baseline: What accepted findings say, by id.
     """
+    audit = as_in_file(audit)
     codes = [*CODES]
     results = [_result(one, audit, baseline, codes) for one in audit.findings]
     results += _absent(audit, baseline or {}, codes)

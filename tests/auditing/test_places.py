@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 import fuzzytree as ft
@@ -16,6 +18,7 @@ from fuzzytree.auditing.places import (
 from fuzzytree.auditing.records import Answer, Label, Place
 from fuzzytree.contracts import Document
 from fuzzytree.proving.states import Proved, Span
+from fuzzytree.report.audit import audit_lines
 from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.system import FuzzySystem
 from fuzzytree.testing import random_system, random_tree
@@ -186,3 +189,46 @@ def test_without_rules_and_terms_an_id_is_of_the_subject_and_the_region() -> Non
 
 def test_an_id_is_the_same_in_every_version() -> None:
     assert ids(base(), found("FT101", rules=(1,))) == ["FT101-5d4fb4a9"]
+
+
+# --- several ways of one rule
+
+WAYS = """\
+Engine: tip
+InputVariable: food
+  range: 0 10
+  term: bad Ramp 5 0
+  term: good Ramp 5 10
+InputVariable: service
+  range: 0 10
+  term: good Ramp 5 10
+OutputVariable: tip
+  defuzzifier: WeightedAverage TakagiSugeno
+  default: 0
+  term: little Constant 5
+  term: much Constant 25
+RuleBlock:
+  conjunction: Minimum
+  disjunction: Maximum
+  activation: General
+  rule: if food is good or service is good then tip is much
+  rule: if service is good then tip is little
+"""
+
+
+def test_both_ways_of_a_rule_stand_where_it_does_and_have_its_number(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "tip.fll"
+    path.write_text(WAYS)
+    audit = ft.audit(path, select=["FT201"])
+    assert audit.numbers == (1, 1, 2)
+    for answer in audit.answers:
+        lines = {17 + audit.numbers[number - 1] for number in answer.rules}
+        assert {place.line for place in answer.places} == lines
+    shown = "\n".join(audit_lines(audit, is_whole=True))
+    assert "rules 1, 2 reach 1/2" in shown
+    assert "rules 2, 3" not in shown
+    plain = WAYS.replace("food is good or service is good", "food is good")
+    path.write_text(plain)
+    assert ft.audit(path, select=["FT201"]).numbers == ()
