@@ -30,6 +30,7 @@ from fuzzytree.comparing import (
 )
 from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
 from fuzzytree.errors import FuzzyTreeError, LossError
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.lowering import forms, rules_from_tree
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide
@@ -183,6 +184,7 @@ def _runtimes(
         if not is_installed(runtime):
             yield f"{runtime.name} is not installed ({needed_by(runtime)})"
             continue
+        checkpoint()
         try:
             run = runtime.load(carrier.model)
         except LossError as error:
@@ -191,7 +193,9 @@ def _runtimes(
         step = _stride(carrier.model, rows) if runtime.is_slow else 1
         share = slice(None, None, step)
         some = rows.part(share)
+        checkpoint()
         found = Answers(title, carrier.model, run(some.values))
+        checkpoint()
         if runtime.name != "native":
             base = _base(runtime, carrier, bases, rows)
             yield _held(runtime, found, base.part(share), some)

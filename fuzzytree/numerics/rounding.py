@@ -36,6 +36,7 @@ from typing import TYPE_CHECKING, NamedTuple, assert_never
 import numpy as np
 
 from fuzzytree.contracts import Dtype
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.enclosures import U
 from fuzzytree.numerics.exact import exact_flank, outwards
 from fuzzytree.rulebase import (
@@ -143,6 +144,7 @@ def degree_bound(shape: Shape, dtype: Dtype) -> DegreeBound:
         >>> f"{bound.fixed:.1e}, and {bound.per_unit:.1g} for each unit of the value"
         '5.1e-07, and 0.5 for each unit of the value'
     """
+    checkpoint()
     kind = TYPES[dtype]
     match shape:
         case Band(low=low, high=high, left=left, right=right):

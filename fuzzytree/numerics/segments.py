@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.rulebase import Points
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def segments(shapes: Sequence[Points], axis: Real, degree: Real) -> Segments:
         >>> segments([Points((1.0, 3.0), (0.0, 1.0))], double, double).far.tolist()
         [0.0, 1.0, 1.0, 0.0]
     """
+    checkpoint()
     sizes = np.array([1 << len(shape.values).bit_length() for shape in shapes], int)
     first = np.cumsum(sizes) - sizes
     whole = int(sizes.sum())

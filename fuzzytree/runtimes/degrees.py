@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzytree.contracts import Dtype
+from fuzzytree.interrupts import checkpoint
 from fuzzytree.numerics.segments import segments
 from fuzzytree.rulebase import LR, Flank, Points, Shape, Side
 from fuzzytree.runtimes.polylines import counted, halved, join
@@ -149,6 +150,7 @@ def plan_blocks(
         members = list(group)
         size = max((BLOCK if kind < 4 else _LARGE_BLOCK) // rows, 1)
         for start in range(0, len(members), size):
+            checkpoint()
             part = members[start : start + size]
             lines = np.array([atom.line for atom in part], np.int64)
             blocks.append(Block(lines, _made(kind, part, numbers)))
