@@ -202,7 +202,7 @@ HEDGES: tuple[Hedge, ...] = (
 @pytest.mark.parametrize("curve", [Points((0.0, 1.0, 3.0), (0.0, 1.0, 0.2)), HIGH])
 def test_hedged_clauses_are_as_strong_as_those_of_the_system(curve: Curve) -> None:
     asked = [Is("a", "low", (hedge,)) for hedge in HEDGES]
-    asked += [Is("a", "low", hedges) for hedges in (("not", "very"), ("very", "not"))]
+    asked += [Is("a", "low", ("not", "very")), Is("a", "low", ("very", "not"))]
     rules = tuple((one, "big", weight) for one in asked for weight in (1.0, 0.5))
     system = system_of(rules, low=curve)
     found = view(system, domain_of(system))

@@ -27,7 +27,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.system import Is
+from fuzzytree.system import Is, SCurve
 from tests.auditing.test_views import A_LOW, block_of, system_of
 from tests.proving.bases import random_base
 
@@ -64,6 +64,7 @@ def subject_of(
         found.places,
         found.declined,
         found.is_whole,
+        found.held,
     )
 
 
@@ -271,12 +272,35 @@ def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> No
     assert whole["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
     assert whole["uncovered rows"].is_finding
     assert "tied rows" not in whole
-    part = system_of(block_of(A_LOW, Is("b", "low", ("very",))))
+    part = system_of(block_of(A_LOW, Is("power", "big")))
     found = asked(subject_of(part, Rows("pump", values)))
     assert "uncovered rows" not in found
     assert found["covered rows"].sentence == (
         "how many rows are covered is not known: rules are left out, and they may "
         "cover what the others do not"
+    )
+
+
+def test_of_a_curve_between_lines_counts_are_told_where_both_lines_agree() -> None:
+    system = system_of(block_of(A_LOW), low=SCurve(0.0, 4.0))
+    clear, near = (
+        np.array([[0.0, 3.0], [0.0, 0.0]]),
+        np.array([[0.01, 3.0], [0.0, 0.0]]),
+    )
+    found = asked(subject_of(system, Rows("pump", clear)))
+    assert found["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
+    assert found["uncovered rows"].sentence == "on 1 of 2 rows no rule fires"
+    found = asked(subject_of(system, Rows("pump", near)))
+    assert found["rule 1"].sentence == (
+        "on how many rows rule 1 fires is not decided: it fires on 1 of 2 at least, "
+        "and on 2 at most"
+    )
+    assert found["uncovered rows"].sentence == (
+        "how many rows are uncovered is not decided: there are 0 at least, and 1 at "
+        "most"
+    )
+    assert all(
+        isinstance(found[name].state, Declined) for name in ("rule 1", "uncovered rows")
     )
 
 
