@@ -9,6 +9,10 @@ An audit
     - `audit`: asks all families, one after another
     - `domains`, `views`, `conditions`: where a model is asked, and its rules as a rule
       base; conditions of fuzzy systems as clauses
+    - `system_terms`, `enclosing`, `hedging`: the terms of fuzzy systems; curves and
+      hedged ones between two lines of points
+    - `held`, `sides`: rules with such terms and with weights, from below and from
+      above; what is asked of which
     - `turns`: many questions share what is left of the time
     - `places`: where rules stand in a file; ids that outlive their order
     - `results`: what other verbs found of the same model

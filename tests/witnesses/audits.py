@@ -39,8 +39,9 @@ and about every FCL, FIS and FLL file that Debian's packages `fuzzylite` and
 `tests/witnesses/test_audits.py` compares it with what is found. The files are not ours
 and are not here; they are read where those packages put them.
 
-- *rules*: of the file. *asked*: those that the audit could take over exactly; see the
-  codes `FTD01` and following for the others.
+- *rules*: of the file. *asked*: those that the audit could take over; see the codes
+  `FTD01` and following for the others. Curves that are no polynomials are asked between
+  two lines about 0.001 apart: FTD02 counts them, and what is not asked of them.
 - *findings*: how often each code was found. `fuzzytree explain CODE` tells what it
   means. *declined*: how often each reason was given, for a rule or a term each.
 - Files of others are asked on the ranges that they declare. Carriers (FT6) and rows
