@@ -10,6 +10,7 @@ import numpy as np
 
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.proving.boxes import cell_of, zone_of
+from fuzzytree.proving.choices import Part, at_most, choices, union
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest
 from fuzzytree.proving.covering import cover, maximal
@@ -130,20 +131,20 @@ def uncovered(given: Ground, clock: Clock | None = None) -> State:
     ]
     cells = sum(map(len, sure))
     how = f"{cells} parts of {len(sure)} axes where rules are 0 visited"
+    point_of = _shared_point if coupled(given) else _bare_point
     try:
         if cover([maximal(m for m, _ in of) for of in sure], contest.full, clock):
-            point = _bare_point(given, sure, contest.full, clock)
+            point = point_of(given, sure, contest.full, clock)
             if point is not None:
                 return _bare_witness(given, point)
-            return Bracket(
-                "how many rules fire at least", 0.0, 1.0,
-                "the inputs of its variables depend on each other",
-            )  # fmt: skip
         vague = [
             [*of, *_maybe_bare(laid)]
             for of, laid in zip(sure, given.laid[0], strict=True)
         ]
-        if cover([maximal(m for m, _ in of) for of in vague], contest.full, clock):
+        if (
+            cover([maximal(m for m, _ in of) for of in vague], contest.full, clock)
+            and point_of(given, vague, contest.full, clock) is not None
+        ):
             why = "a curve may touch 0 where it is not known exactly"
             return Bracket("how many rules fire at least", 0.0, 1.0, why)
     except OutOfTimeError:
@@ -192,50 +193,70 @@ def _zero_at(laid: Laid, is_zero: object) -> list[bool]:
 def _bare_point(
     given: Ground, options: list[list[tuple[int, Stretch]]], full: int, clock: Clock
 ) -> Point | None:
-    """Return a point at which all rules are 0, if one is found."""
-    groups = coupled(given)
-    joined = {axis for group in groups for axis in group}
+    """Return a point at which all rules are 0, on free axes, if there is one."""
     # Open parts first: a point there has others around it.
     ways = [
-        sorted(of, key=lambda one: (not one[1].is_open, -one[0].bit_count()))
-        for of in options
+        _first_of_each(sorted(of, key=lambda one: not one[1].is_open)) for of in options
     ]
-    reach = [0] * (len(ways) + 1)
-    for place in range(len(ways) - 1, -1, -1):
-        reach[place] = reach[place + 1]
-        for mask, _ in ways[place]:
-            reach[place] |= mask
-    todo: list[tuple[dict[int, Stretch], int]] = [({}, 0)]
-    tried = 0
-    dead: set[tuple[int, int]] = set()
-    while todo:
-        wanted, covered = todo.pop()
-        place = len(wanted)
-        if covered | reach[place] != full or (not joined and (place, covered) in dead):
+    chosen = cover([maximal(of) for of in ways], full, clock)
+    if chosen is None:
+        return None
+    return point_with(given, {n: ways[n][mask] for n, mask in enumerate(chosen)})
+
+
+def _shared_point(
+    given: Ground, options: list[list[tuple[int, Stretch]]], full: int, clock: Clock
+) -> Point | None:
+    """Return a point at which all rules are 0, where axes share inputs, if any is."""
+    joined = sorted({axis for group in coupled(given) for axis in group})
+    parts = {axis: _joined(given.laid[0][axis], options[axis]) for axis in joined}
+    free = [axis for axis in range(len(options)) if axis not in parts]
+    ways = [_first_of_each(options[axis]) for axis in free]
+    families = [maximal(of) for of in ways]
+    rest = union(mask for of in ways for mask in of)
+    tell = at_most(_MOST_CHOICES)
+    for wanted, covered in choices(given, parts, full, rest, {}, tell):
+        chosen = cover(families, full & ~covered, clock)
+        if chosen is None:
             continue
-        dead.add((place, covered))
-        clock.check()
-        if place == len(ways) or (joined and place - 1 in joined):
-            point = point_with(given, wanted)
-            if place == len(ways) and point is not None:
-                return point
-            tried += 1
-            if point is None:
-                continue
-            if tried > _MOST_CHOICES:
-                return None
-        kept = ways[place] if joined else _first_of_each(ways[place])
-        for mask, part in reversed(kept):
-            todo.append(({**wanted, place: part}, covered | mask))
+        others = zip(free, ways, chosen, strict=True)
+        found = {axis: of[mask] for axis, of, mask in others}
+        point = point_with(given, wanted | found)
+        if point is not None:
+            return point
     return None
 
 
-def _first_of_each(ways: list[tuple[int, Stretch]]) -> list[tuple[int, Stretch]]:
-    """Return the first way to each mask, in order."""
+def _joined(laid: Laid, options: list[tuple[int, Stretch]]) -> list[Part]:
+    """Return parts of an axis, those of neighbouring cells as one; and all of it.
+
+    What is 0 in the cells on both sides of a place is 0 there.
+    """
+    count = len(laid.cells.between)
+    found: list[Part] = []
+    for cell, (mask, part) in enumerate(options[:count]):
+        if found and found[-1][1] == mask and not laid.cells.is_vague[cell]:
+            part = Stretch(found.pop()[0].low, part.high)
+        found.append((part, mask))
+    found += [
+        (part, mask)
+        for mask, part in options[count:]
+        if not any(
+            of.low < part.low and part.high < of.high and mask & ~bare == 0
+            for of, bare in found
+        )
+    ]
+    zones = laid.cells.zones
+    whole = Stretch(zones[0][0], zones[-1][1], is_open=False)
+    return [*(one for one in found if one[1]), (whole, 0)]
+
+
+def _first_of_each(ways: list[tuple[int, Stretch]]) -> dict[int, Stretch]:
+    """Return the first way to each mask."""
     kept: dict[int, Stretch] = {}
     for mask, part in ways:
         kept.setdefault(mask, part)
-    return list(kept.items())
+    return kept
 
 
 def _bare_witness(given: Ground, point: Point) -> State:
