@@ -195,7 +195,8 @@ def answers(subject: Subject) -> Iterator[Answer]:
             break
         subject.clock.tell(f"radius of row {number}", len(asked) / len(chosen))
         found = decider.nearest_other(point, clock)
-        if clock.is_over and not found.is_narrow:
+        is_worth_telling = found.is_narrow or (not asked and found.high is not None)
+        if clock.is_over and not is_worth_telling:
             break
         answer = _answer(decider, f"row {number}", point, found)
         is_aside = decider.leaves_out(decider.decided(point)[0])

@@ -143,10 +143,12 @@ class Around:
         )
         assert down.slack is not None  # of a combination
         assert up.slack is not None
-        with np.errstate(over="ignore"):
+        most = np.finfo(np.float64).max
+        with np.errstate(over="ignore", invalid="ignore"):
             first = np.nextafter(down.x - down.slack, -np.inf)
             last = np.nextafter(up.x + up.slack, np.inf)
-        return np.nan_to_num(first), np.nan_to_num(last)
+        first = np.where(np.isfinite(first), first, -most)
+        return first, np.where(np.isfinite(last), last, most)
 
     def is_clear(
         self, low: FloatArray, high: FloatArray, labels: Sequence[str | None]
@@ -231,7 +233,7 @@ class Around:
             radius = self._away(points, centres)
             is_met = (here < 0.0) & (radius < away)
             best[:, is_met], away[is_met] = points[:, is_met], radius[is_met]
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(all="ignore"):
                 slope = np.where(step != 0.0, (margins[:size] - here) / step, 0.0)
                 goal = here + (slope * (centres - points)).sum(axis=0)
                 reach = goal / (np.abs(slope) * self.width).sum(axis=0)

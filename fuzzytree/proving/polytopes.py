@@ -281,15 +281,19 @@ class _Bound:
         Every number is off by at most a rounding, a sum of n products by n more.
         """
         x = np.array([float(value) for value in at])
-        some = 8 * (len(x) + 4) * U
-        size = np.maximum(np.abs(self.low), np.abs(self.high)) + np.abs(x)
-        gap = np.maximum(self.low - x, x - self.high) - some * size
-        found = np.max(gap / self.width, axis=1, initial=0.0)
-        reach = np.abs(self.weights) @ np.where(self.width < np.inf, self.width, 0.0)
-        size = np.abs(self.weights) @ np.abs(x) + np.abs(self.goal)
-        lack = self.goal - self.weights @ x - some * size
-        is_short = (lack > 0.0) & (reach > 0.0)
-        radius = np.divide(lack, reach, out=np.zeros_like(lack), where=is_short)
-        np.maximum.at(found, self.owner, radius)
-        floor: FloatArray = np.maximum(found * (1.0 - some) - 2.0**-1000, 0.0)
-        return list(floor.tolist())
+        with np.errstate(all="ignore"):
+            some = 8 * (len(x) + 4) * U
+            size = np.maximum(np.abs(self.low), np.abs(self.high)) + np.abs(x)
+            gap = np.maximum(self.low - x, x - self.high) - some * size
+            found = np.max(gap / self.width, axis=1, initial=0.0)
+            reach = np.abs(self.weights) @ np.where(
+                self.width < np.inf, self.width, 0.0
+            )
+            size = np.abs(self.weights) @ np.abs(x) + np.abs(self.goal)
+            lack = self.goal - self.weights @ x - some * size
+            is_short = (lack > 0.0) & (reach > 0.0)
+            radius = np.divide(lack, reach, out=np.zeros_like(lack), where=is_short)
+            np.maximum.at(found, self.owner, radius)
+        floor = np.maximum(found * (1.0 - some) - 2.0**-1000, 0.0)
+        known: FloatArray = np.where(np.isfinite(floor), floor, 0.0)
+        return list(known.tolist())

@@ -100,7 +100,7 @@ def drawn_in(given: Ground, count: int, seed: int = 0) -> FloatArray | None:
     for variable, side in limited:
         here = axis_value(variable, dict(zip(names, start, strict=True))).x
         step = axis_value(variable, dict(zip(names, values, strict=True))).x - here
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(all="ignore"):
             most = np.where(step > 0.0, side.high - here, side.low - here) / step
         room = np.where(step != 0.0, np.clip(most, 0.0, room), room)
     share = room * chance.random(count) ** (1.0 / len(names))
