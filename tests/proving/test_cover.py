@@ -124,3 +124,19 @@ def test_what_is_0_between_two_places_is_told_of_a_point_between_them() -> None:
     found = uncovered(given)
     assert isinstance(found, Witness)
     assert not any(strengths_at(given, point_of(found.point)))
+
+
+@pytest.mark.parametrize("seed", [34])
+def test_gaps_on_axes_that_share_inputs_are_decided(seed: int) -> None:
+    rules = random_base(seed, 4, 2, kind="mixed", shared=0.5, odd=0.2, combinations=1)
+    given = ground(rules, unit_domain(rules))
+    found = uncovered(given)
+    if isinstance(found, Witness):
+        assert not any(strengths_at(given, point_of(found.point)))
+        return
+    assert isinstance(found, Proved)
+    steps = [Fraction(n, 12) for n in range(13)]
+    for x in steps:
+        for y in steps:
+            point = dict(zip(rules.inputs, (x, y), strict=True))
+            assert any(strengths_at(given, point))

@@ -15,7 +15,7 @@ from fuzzytree.proving.dominance import Compared
 from fuzzytree.proving.factors import distance, largest_ratio, quotient
 from fuzzytree.proving.ground import ground, strengths_at
 from fuzzytree.proving.meeting import highest, meet
-from fuzzytree.proving.states import Bracket, Proved, Witness
+from fuzzytree.proving.states import Bracket, Proved, Witness, point_of
 from fuzzytree.proving.wins import wins
 from fuzzytree.rulebase import (
     LR,
@@ -226,3 +226,22 @@ def test_a_rule_that_is_0_on_both_sides_of_an_irrational_place_never_fires() -> 
     )
     rules = RuleBase("r", ("a",), (variable,), tuple(Rule(when, "a") for when in whens))
     assert compared(rules).fires.tolist() == [False, True]
+
+
+@pytest.mark.parametrize("seed", [5, 18])
+def test_where_rules_on_shared_inputs_meet_is_decided(seed: int) -> None:
+    rules = random_base(seed, 4, 2, kind="mixed", shared=0.5, odd=0.2, combinations=1)
+    both = Compared(ground(rules, unit_domain(rules)))
+    level = Fraction(1, 2)
+    found = meet(both, 1, 3, level)
+    if isinstance(found.state, Witness):
+        strengths = strengths_at(both.ground, point_of(found.state.point))
+        assert min(strengths[0], strengths[2]) >= level
+        return
+    assert found.level.high < level or isinstance(found.state, Proved)
+    steps = [Fraction(n, 12) for n in range(13)]
+    for x in steps:
+        for y in steps:
+            point = dict(zip(rules.inputs, (x, y), strict=True))
+            strengths = strengths_at(both.ground, point)
+            assert min(strengths[0], strengths[2]) < level
