@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing import support
 from fuzzytree.auditing.domains import domain_of
 from fuzzytree.auditing.records import Answer, Settings
 from fuzzytree.auditing.subject import Rows, Subject
@@ -308,3 +309,13 @@ def test_a_spent_budget_stops_the_count() -> None:
     clock = Clock(1.0, now=iter([0.0, 2.0, 2.0]).__next__)
     with pytest.raises(OutOfTimeError):
         counted(replace(subject_of(RULES), clock=clock), FORCES)
+
+
+def test_of_a_model_of_many_clauses_fewer_points_are_drawn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(support, "_MOST_DEGREES", 1)
+    subject = subject_of(RULES, settings=Settings(rows=5000))
+    found = asked(subject)["uncovered points"]
+    assert isinstance(found.state, Sampled)
+    assert found.state.rows == 1000
