@@ -57,15 +57,20 @@ class Terms:
         """Return whether rules can ask a term."""
         return term in self.plain[variable] or (variable, term) in self.held
 
+    def pointed(self, variable: str, term: str) -> Enclosed | None:
+        """Return a term between lines of points, or as points; None if it has none."""
+        known = {**self.held, **self.made}.get((variable, term))
+        if known is not None:
+            return known
+        return pointed(self.plain[variable][term], self.ranges.get(variable))
+
     def hedged(self, variable: str, term: str, hedges: Sequence[Hedge]) -> str | None:
         """Return the name of a hedged term, which rules can then ask.
 
         Returns:
             None if there are no lines between which it is.
         """
-        found = self.held.get((variable, term))
-        if found is None:
-            found = pointed(self.plain[variable][term], self.ranges.get(variable))
+        found = self.pointed(variable, term)
         for hedge in reversed(hedges):
             found = found and hedged(found, hedge)
         if found is None:

@@ -24,6 +24,7 @@ from fuzzytree.auditing.conditions import (
     NORMS,
     Conditions,
     DecliningError,
+    Way,
     decline,
 )
 from fuzzytree.auditing.held import Held, held
@@ -239,6 +240,8 @@ class _Taken:
             if rule.weight != 1.0 and not self.terms.plain:
                 decline("FTD07", "there is no input that its weight could stand for")
             ways = Conditions(self.conjunction, self.terms, block).ways(rule.when)
+            if rule.weight != 1.0 and self.conjunction == "min":
+                self._check_weight(ways)
         except DecliningError as error:
             self.is_whole = False
             self.answers.append(_declined(error.code, name, error.reason))
@@ -250,6 +253,20 @@ class _Taken:
             self.weights.append(rule.weight)
             self.places.append(name if len(ways) == 1 else f"way {position} of {name}")
             self.numbers.append(number)
+
+    def _check_weight(self, ways: Iterable[Way]) -> None:
+        """Refuse a weight on a curve that has no points in its place.
+
+        Raises:
+            DecliningError: If there is one.
+        """
+        for clause in dict.fromkeys(clause for way in ways for clause in way):
+            for term in clause.terms:
+                if self.terms.pointed(clause.variable, term) is None:
+                    text = (
+                        f"{term!r} of {clause.variable!r} has no points to be weighted"
+                    )
+                    decline("FTD07", f"the curve of {text}")
 
     def _never(self, name: str, why: str) -> None:
         sentence = f"{name} never fires: {why}"

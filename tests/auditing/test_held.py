@@ -170,6 +170,18 @@ def test_a_weight_on_a_curve_of_polynomials_is_held_between_lines() -> None:
         assert low <= right / 2 <= high
 
 
+def test_a_weight_on_a_curve_without_points_is_declined() -> None:
+    narrow = Flank(5e-324, (0.5,), 2.0)
+    rules: Rules = ((A, "big", 0.5), (A, "big", 1.0))
+    system = system_of(rules, low=LR(1.0, narrow, narrow))
+    found = view(system, domain_of(system))
+    assert found.numbers == (2,)
+    assert [one.sentence for one in found.declined if one.code == "FTD07"] == [
+        "rule 1 is not taken over: the curve of 'low' of 'a' has no points to be "
+        "weighted"
+    ]
+
+
 def test_a_term_that_has_the_name_of_a_weighted_one_stays_itself() -> None:
     ramp, other = Points((0.0, 4.0), (0.0, 1.0)), Points((0.0, 4.0), (1.0, 0.0))
     rules: Rules = ((A, "big", 0.5), (Is("a", "low x 0.5"), "big", 1.0))
