@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from statistics import NormalDist
 
 from fuzzytree.rechecking.audit_records import (
@@ -14,9 +15,11 @@ from fuzzytree.rechecking.audit_records import (
     Witness,
     fraction,
 )
-from fuzzytree.rechecking.cases import Case
+from fuzzytree.rechecking.cases import NEAR, Case
 from fuzzytree.rechecking.claims import check_point, check_spans, corners, holds
 from fuzzytree.rechecking.deciding import decide, shows
+from fuzzytree.rechecking.deciding_pairs import highest
+from fuzzytree.rechecking.deciding_wins import lead
 from fuzzytree.rechecking.fixed import SEVERITIES
 from fuzzytree.rechecking.forms import is_as_told
 from fuzzytree.rechecking.meaning import value_of
@@ -107,13 +110,8 @@ def _state(case: Case, report: Report, answer: Answer) -> None:
         _witness(case, report, answer, state)
         report.counts["answers with a WITNESS, evaluated again"] += 1
     elif isinstance(state, Bracket):
-        require(state.low <= state.high, "the ends of the bracket are swapped")
-        is_far = answer.code == "FT102" and state.high < case.audit.settings.lead
-        may_be = is_far or answer.code in ("FT401", "FT403", "FT203", "FT204", "FT601")
-        require(may_be or not answer.is_finding, "what is open is no finding")
-        if state.point or state.claims:
-            check_point(case, report, state.point, state.claims)
-        raise UndecidedError("a bracket is not made again here")
+        _bracket(case, report, answer, state)
+        report.counts["answers BRACKET, decided again"] += 1
     elif isinstance(state, Sampled):
         _sample(state)
         raise UndecidedError("a sample is not drawn again here")
@@ -121,6 +119,28 @@ def _state(case: Case, report: Report, answer: Answer) -> None:
         is_reason = state.code.startswith("FTD") and state.code in SEVERITIES
         require(is_reason and bool(state.reason), "declined, and not for a reason")
         report.counts["answers DECLINED"] += 1
+
+
+def _bracket(case: Case, report: Report, answer: Answer, state: Bracket) -> None:
+    require(state.low <= state.high, "the ends of the bracket are swapped")
+    is_far = answer.code == "FT102" and state.high < case.audit.settings.lead
+    may_be = is_far or answer.code in ("FT401", "FT403", "FT203", "FT204", "FT601")
+    require(may_be or not answer.is_finding, "what is open is no finding")
+    told = {measure.name: measure.value for measure in answer.measures}
+    is_min = case.rules.semantics.conjunction == "min"
+    is_same = answer.code == "FT102" or (answer.code == "FT201" and is_min)
+    for name, end in told.items() if is_same else ():
+        wanted = state.high if name.endswith("at most") else state.low
+        is_one = math.isclose(end, wanted, abs_tol=float(NEAR))
+        require(is_one, f"the {name} is not the bracket's end")
+    if state.point or state.claims:
+        point = check_point(case, report, state.point, state.claims)
+        if answer.code == "FT102" and len(answer.rules) == 1:
+            is_reached = lead(case, answer.rules[0], point) >= Fraction(state.low)
+            require(is_reached, "the rule does not lead by so much there")
+    if answer.code != "FT201" or state.low:
+        raise UndecidedError("a bracket is not made again here")
+    highest(case, answer)
 
 
 def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from fuzzytree.rechecking.areas import height, shared
-from fuzzytree.rechecking.audit_records import Answer, Audit, Label
+from fuzzytree.rechecking.audit_records import Answer, Audit, Label, Measure, fraction
 from fuzzytree.rechecking.cells import Line
 from fuzzytree.rechecking.enclosing import Between
 from fuzzytree.rechecking.grid import Asked, Grid
@@ -20,6 +20,26 @@ from fuzzytree.rechecking.polynomials import ONE, ZERO
 from fuzzytree.rechecking.ties import Ties
 from fuzzytree.rechecking.trees import Steps, paths, rules_of
 from fuzzytree.rechecking.views import View
+
+NEAR = Fraction(1, 10**6)
+"""How far a highest common level that is told as one number may be above it."""
+
+LEVELS = (
+    *("highest common level", "highest common level at most"),
+    *("strength where it is least, at least", "strength where it is least, at most"),
+)
+"""The measures that are degrees which rules reach, or do not."""
+
+
+def level_of(measure: Measure) -> Fraction:
+    """Return the number of a measure."""
+    return Fraction(measure.value) if measure.exact is None else fraction(measure.exact)
+
+
+def end_of(measure: Measure) -> Fraction:
+    """Return the most that a measure can mean: one that is not exact is near."""
+    is_near = measure.name == "highest common level" and measure.exact is None
+    return level_of(measure) + (NEAR if is_near else 0)
 
 
 class Case:
@@ -100,9 +120,13 @@ class Case:
             raise UndecidedError("a rule without clauses is not weighted here")
         if self.view is not None and not self.view.is_plain:
             raise UndecidedError("a condition does not hold by its ways")
+        settings = self.audit.settings
         lines = {v.name: self.line(v) for v in self.rules.variables}
-        given = map(Fraction, (self.audit.settings.epsilon, self.audit.settings.level))
-        return Grid(self.rules, lines, given, self.weights)
+        levels = [Fraction(settings.epsilon), Fraction(settings.level)]
+        asked = (*self.coded("FT201"), *self.coded("FT301"))
+        told = (one for answer in asked for one in answer.measures)
+        levels += [end_of(m) for m in told if m.name in LEVELS and 0 <= m.value <= 1]
+        return Grid(self.rules, lines, levels, self.weights)
 
     @cached_property
     def paths(self) -> dict[int, Steps]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from fuzzytree.rechecking.audit_records import Answer, Label, Witness, fraction
-from fuzzytree.rechecking.cases import Case, counted
+from fuzzytree.rechecking.cases import LEVELS, NEAR, Case, counted, end_of
 from fuzzytree.rechecking.claims import point_of
 from fuzzytree.rechecking.grid import Asked
 from fuzzytree.rechecking.meaning import answer_of
@@ -39,7 +39,9 @@ def _not_told_to_hide(case: Case, answer: Answer) -> None:
     is_alike = answer.code == "FT104"
     pairs = [pair for pair in case.pairs(alike=is_alike) if case.fire(*pair)]
     silent = sum(not case.fire(number) for number in case.numbers)
-    counted(answer, {"pairs": len(pairs), "rules that never fire": silent}, 2)
+    counts = {"pairs": len(pairs), "pairs too near to tell": 0}
+    counts["rules that never fire"] = silent
+    counted(answer, counts, 3)
     told = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
     copies = {one.rules for one in case.coded("FT106") if _is_copy(one)}
     for first, second in pairs:
@@ -98,6 +100,31 @@ def apart(case: Case, answer: Answer) -> None:
         is_met = level < 1 and grid.leaves(both, (), grid.gap(level, is_above=True))
         case.never(is_met, f"rules {one} and {other} reach the level together")
         raise UndecidedError(f"rules {one} and {other} touch the level")
+
+
+def highest(case: Case, answer: Answer) -> None:
+    """Ask whether two rules reach a level together above the one that is told.
+
+    Raises:
+        UndecidedError: If that cannot be told here.
+    """
+    if case.rules.semantics.conjunction != "min":
+        raise UndecidedError("conflicts under product are not decided again here")
+    tops = [one for one in answer.measures if one.name in LEVELS]
+    require(len(tops) == 1 and len(answer.rules) == 2, "it tells no highest level")
+    top, grid = end_of(tops[0]), case.grid
+    both = _union(*map(case.asked, answer.rules))
+    require(0 <= top <= 1 + NEAR, "a level outside 0 to 1")
+    if 0 < top <= 1 and case.is_free and tops[0].exact is not None:
+        is_near = grid.leaves(both, (), grid.gap(top, is_above=False))
+        require(is_near, "both do not reach so high a level together")
+    if top >= 1:
+        return
+    band = grid.gap(top, is_above=True)
+    case.never(grid.leaves(both, (), band), "both reach a higher level together")
+    low, high = grid.levels.bands[band]
+    if low < high and grid.leaves(both, (), band, is_gap=False):
+        raise UndecidedError("two critical levels are too near to tell apart")
 
 
 def needless(case: Case, answer: Answer) -> None:
@@ -174,3 +201,5 @@ def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
     is_found = is_high and answer.is_finding
     require(is_found, "it is not claimed that both reach the level")
     case.differ(answer.rules)
+    if case.rules.semantics.conjunction == "min":
+        highest(case, answer)

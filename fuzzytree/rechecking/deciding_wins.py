@@ -5,10 +5,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 from fuzzytree.rechecking.audit_records import Answer, Witness, fraction
-from fuzzytree.rechecking.cases import Case, counted
+from fuzzytree.rechecking.cases import LEVELS, Case, counted, level_of
 from fuzzytree.rechecking.claims import point_of
 from fuzzytree.rechecking.deciding_leaves import dead_leaf
-from fuzzytree.rechecking.meaning import strengths
+from fuzzytree.rechecking.meaning import Point, strengths
 from fuzzytree.rechecking.model_records import Tree
 from fuzzytree.rechecking.outcomes import UndecidedError, require
 from fuzzytree.rechecking.polynomials import ZERO
@@ -87,6 +87,19 @@ def covered(case: Case, answer: Answer) -> None:
     below = grid.gap(Fraction(case.audit.settings.epsilon), is_above=False)
     is_gap = grid.leaves(None, grid.of, below)
     case.never(is_gap, "there are points at which every rule is below epsilon")
+    least_cover(case, answer)
+
+
+def least_cover(case: Case, answer: Answer) -> None:
+    """Ask whether the strength where it is least lies between those that are told."""
+    grid, told = case.grid, [level_of(m) for m in answer.measures if m.name in LEVELS]
+    require(len(told) == 2 and 0 <= told[0] <= told[1] <= 1, "no least strength")
+    if told[0] > 0:
+        is_less = grid.leaves(None, grid.of, grid.gap(told[0], is_above=False))
+        case.never(is_less, "somewhere every rule is weaker than is told")
+    if told[1] < 1 and case.is_free:
+        is_seen = grid.leaves(None, grid.of, grid.gap(told[1], is_above=True))
+        require(is_seen, "everywhere some rule is stronger than is told")
 
 
 def shows_win(case: Case, answer: Answer, state: Witness) -> None:
@@ -110,15 +123,20 @@ def shows_win(case: Case, answer: Answer, state: Witness) -> None:
     require(is_all, "it is not claimed that the rule beats all these others")
 
 
+def lead(case: Case, number: int, point: Point) -> Fraction:
+    """Return by how much a rule is above those of other classes at a point."""
+    every = strengths(case.rules, point)
+    then = case.then(number)
+    others = (every[n - 1] for n in case.numbers if case.then(n) != then)
+    return every[number - 1] - max(others, default=ZERO)
+
+
 def shows_lead(case: Case, answer: Answer, state: Witness) -> None:
     """Ask that the rule leads at the witness by as much as is told."""
     require(len(answer.rules) == 1 and not answer.is_finding, "it is of no rule")
-    every = strengths(case.rules, point_of(state.point))
-    then = case.then(answer.rules[0])
-    others = (every[n - 1] for n in case.numbers if case.then(n) != then)
-    lead = every[answer.rules[0] - 1] - max(others, default=ZERO)
+    found = lead(case, answer.rules[0], point_of(state.point))
     told = [m.value for m in answer.measures if m.name == "largest lead, at least"]
-    is_so = len(told) == 1 and lead >= Fraction(told[0]) >= case.audit.settings.lead
+    is_so = len(told) == 1 and found >= Fraction(told[0]) >= case.audit.settings.lead
     require(is_so, "the rule does not lead by so much there")
     shows_win(case, answer, state)
 
@@ -140,3 +158,5 @@ def shows_gap(case: Case, answer: Answer, state: Witness) -> None:
     met = [c for c in below if {*c.rules} == {*case.numbers}]
     is_low = any(fraction(claim.level or "1") <= level for claim in met)
     require(is_low and answer.is_finding, "it is not claimed that all rules are below")
+    if not is_gap and case.rules.semantics.conjunction == "min":
+        least_cover(case, answer)

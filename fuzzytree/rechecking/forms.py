@@ -37,6 +37,8 @@ FT101 P -info | leaves
   {live} of {rules} leaves are reached
 FT101 P +error | leaf {n1}
   leaf {n1} (rule {n1}) is never reached: {...}
+FT101 D -info | {...}
+  whether they ever {...} is not known of {_} <rule|rules>: {reason}
 FT102 W -info | {1} | largest lead, at least
   {1} leads by {largest lead, at least:.4g} at least somewhere
 FT102 B +warning | {1} | largest lead, at least; largest lead, at most
@@ -99,11 +101,11 @@ FT201 B -info | {1} and {2} | highest common level at most
   {highest common level at most:s} is reached by both
 FT201 P -info | pairs of rules | pairs that never do; pairs not told one by one
   {pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
-  {level:s} together
+  {level:s} together[; {...}]
 FT201 P +info | pairs of rules | pairs that never do; pairs not told one by one
   [{pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
-  {level:s} together; ]{pairs not told one by one:n more pair} of rules may reach
-  {level:s}: they conflict less
+  {level:s} together; [{...}; ]]{pairs not told one by one:n more pair} of rules may
+  reach {level:s}: they conflict less
 FT202 W +warning | {1} and {2}
   {1} and {2} are equally strong, and the strongest, on more than a surface: the order
   of the rules alone decides there

@@ -5,6 +5,12 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
+UNHELD = (
+    "the version, the table, how many rows and how long, how proofs were made, why "
+    "something is open or was not asked, the commands"
+)
+"""What of an audit is read and cannot be compared with anything."""
+
 
 class Report:
     """What a re-check found.
@@ -38,6 +44,7 @@ class Report:
         for (_, why), codes in self.undecided.items():
             size = f" ({len(codes)} answers)" if len(codes) > 1 else ""
             yield f"  {', '.join(dict.fromkeys(codes))}{size}: {why}"
+        yield f"held against nothing: {UNHELD}"
         yield from (f"DOES NOT HOLD: {text}" for text in self.wrong)
         many = len(self.wrong)
         what = f"{many} {'points do' if many != 1 else 'point does'} not hold"
