@@ -33,6 +33,7 @@ from fuzzytree.cli.talk import (
 )
 from fuzzytree.files import check_places, write_atomically
 from fuzzytree.naming import printable
+from fuzzytree.readers.lines import split_lines
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.configuration import FailOn
@@ -234,7 +235,9 @@ def _told(
 def _lines_of(material: Material) -> list[str]:
     """Return the lines of a model's file, for people."""
     content = material.file.content if material.file else b""
-    return content.decode("utf-8-sig", "replace").split("\n")
+    is_wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+    text = content.decode("utf-16" if is_wide else "utf-8-sig", "replace")
+    return split_lines(text)
 
 
 def _is_coloured() -> bool:

@@ -55,6 +55,23 @@ def test_a_finding_is_told_at_its_place_and_fails(call: Call) -> None:
     )
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_the_line_of_a_finding_is_shown_in_other_formats_too(
+    call: Call, end: str
+) -> None:
+    lines = [
+        *("Engine: tip", "InputVariable: food", "  range: 0 10"),
+        *("  term: good Ramp 5 10", "  term: odd Ramp 20 30"),
+        *("OutputVariable: tip", "  defuzzifier: WeightedAverage TakagiSugeno"),
+        *("  default: 0", "  term: much Constant 25", "RuleBlock: all"),
+        *("  activation: General", "  rule: if food is good then tip is much"),
+    ]
+    Path("tip.fll").write_bytes(end.join(lines).encode())
+    _, out, _ = call("audit", "tip.fll", "--select", "FT401")
+    assert "tip.fll:5:9: FT401 error: " in out
+    assert "  5 |   term: odd Ramp 20 30\n    |         ^" in out
+
+
 def test_an_input_on_which_nothing_depends_may_be_any_number(call: Call) -> None:
     high = Term("high", Band(low=2.0))
     inputs = (Variable("free"), Variable("force", (high,), low=0.0, high=5.0))
