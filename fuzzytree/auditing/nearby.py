@@ -85,6 +85,15 @@ def nearest_difference(
     else:
         search.run([*differ, *known])
     yield _nearest_answer(points, search, len(differ), len(alike))
+    if 0 < len(search.settled) < len(search.rows):
+        yield not_asked("FT203", len(search.rows) - len(search.settled))
+
+
+def not_asked(code: str, count: int) -> Answer:
+    """Return an answer that says how many rows the budget left out."""
+    declined = Declined("FTD03", "the budget was spent")
+    text = f"{count} more rows are not asked"
+    return Answer(code, "more rows", text, declined, False)
 
 
 def answer_of(rules: RuleBase, number: int) -> str | None:

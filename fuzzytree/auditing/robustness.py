@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.auditing.deciders import Decider, decider_of
-from fuzzytree.auditing.nearby import narrowed_state
+from fuzzytree.auditing.nearby import narrowed_state, not_asked
 from fuzzytree.auditing.records import Answer, Measure
 from fuzzytree.auditing.rows import OF_RANGES, Points, distance_measure, points_of
 from fuzzytree.auditing.subject import Subject
@@ -204,6 +204,8 @@ def answers(subject: Subject) -> Iterator[Answer]:
     asked.sort(key=lambda one: (one.low, one.number))
     yield _in_all(points, asked)
     yield from (one.answer for one in asked[:SHOWN_ROWS])
+    if 0 < len(asked) < len(chosen):
+        yield not_asked("FT204", len(chosen) - len(asked))
 
 
 class _Asked(NamedTuple):

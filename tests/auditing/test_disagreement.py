@@ -92,8 +92,11 @@ def test_a_budget_that_ends_certifies_no_more_than_was_asked(calls: int) -> None
     both = Both(subject.tree, subject.raw, subject.domain, regions(subject.tree))
     times = iter([0.0] * calls + [9.0] * 10_000)
     clock = Clock(1.0, now=lambda: next(times))
-    [told] = nearest_difference(both, points_of(subject, subject.rows), clock)
+    told, *more = nearest_difference(both, points_of(subject, subject.rows), clock)
     asked = _number(told, "rows asked")
+    assert [one.state for one in more] == (
+        [Declined("FTD03", "the budget was spent")] if 0 < asked < 3 else []
+    )
     if not asked:
         assert told.state == Declined(
             "FTD03", "the budget was spent before the first row"

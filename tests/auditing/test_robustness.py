@@ -134,6 +134,8 @@ def test_a_budget_that_ends_keeps_the_rows_that_were_asked() -> None:
     rows = [[number / 10] for number in range(1, 9)]
     told = [*answers(subject_of(one_cut(), rows=rows, clock=clock))]
     assert _number(told[0], "rows asked") == 2
+    assert told[-1].sentence == "6 more rows are not asked"
+    assert told[-1].state == Declined("FTD03", "the budget was spent")
 
 
 def _check(subject: Subject, row: Mapping[str, float], points: int, seed: int) -> None:
