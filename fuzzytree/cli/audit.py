@@ -33,7 +33,6 @@ from fuzzytree.cli.talk import (
 )
 from fuzzytree.files import check_places, write_atomically
 from fuzzytree.naming import printable
-from fuzzytree.readers.lines import split_lines
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.configuration import FailOn
@@ -234,6 +233,8 @@ def _told(
 
 def _lines_of(material: Material) -> list[str]:
     """Return the lines of a model's file, for people."""
+    from fuzzytree.readers.lines import split_lines
+
     content = material.file.content if material.file else b""
     is_wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
     text = content.decode("utf-16" if is_wide else "utf-8-sig", "replace")

@@ -115,7 +115,7 @@ def test_an_interrupt_ends_with_130(
 def _shell(command: str, folder: Path, **more: str) -> tuple[int, str, str]:
     done = subprocess.run(
         ["bash", "-c", command.replace("fuzzytree", f"{sys.executable} -m fuzzytree")],
-        cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT), **more},
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT), "LC_ALL": "C", **more},
         text=True, capture_output=True, check=False,
     )  # fmt: skip
     return done.returncode, done.stdout, done.stderr
