@@ -9,9 +9,10 @@ says what it could not. Exit 0: all holds; 1: something does not, and all of tha
 listed; 2: it could not be run.
 
 Read it in this order: the records (`audit_records`, `model_records`) and how files
-become them (`building`, `yaml`, `models`); what a model means (`polynomials`, `curves`,
-`meaning`, `trees`); how a "never" is decided again (`roots`, `cells`, `grid`, `areas`);
-the checks (`cases`, `head`, `answers`, `claims`, `deciding` and beyond, `report`).
+become them (`building`, `yaml`, `facts`, `models`, `conditions`, `systems`, `places`);
+what a model means (`polynomials`, `curves`, `enclosing`, `meaning`, `trees`, `views`);
+how a "never" is decided again (`roots`, `cells`, `grid`, `ties`, `areas`); the checks
+(`cases`, `head`, `answers`, `forms`, `claims`, `deciding` and beyond, `report`).
 """
 
 from __future__ import annotations

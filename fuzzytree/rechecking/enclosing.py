@@ -234,3 +234,32 @@ def hedged(hedge: str, one: Between) -> Between:
         return _opposite(one)
     low, high = (min(max(end, ZERO), ONE) for end in one)
     return _RISING[hedge](low)[0], _RISING[hedge](high)[1]
+
+
+Norm = Callable[[Fraction, Fraction], Fraction]
+NORMS: dict[str, Norm] = {
+    "minimum": min,
+    "product": lambda a, b: a * b,
+    "bounded difference": lambda a, b: max(a + b - 1, ZERO),
+    "drastic product": lambda a, b: min(a, b) if max(a, b) == 1 else ZERO,
+    "einstein product": lambda a, b: a * b / (2 - (a + b - a * b)),
+    "hamacher product": lambda a, b: a * b / (a + b - a * b) if a or b else ZERO,
+    "nilpotent minimum": lambda a, b: min(a, b) if a + b > 1 else ZERO,
+    "maximum": max,
+    "algebraic sum": lambda a, b: a + b - a * b,
+    "bounded sum": lambda a, b: min(a + b, ONE),
+    "drastic sum": lambda a, b: ONE if min(a, b) else max(a, b),
+    "einstein sum": lambda a, b: (a + b) / (1 + a * b),
+    "hamacher sum": lambda a, b: (
+        (a + b - 2 * a * b) / (1 - a * b) if a * b < 1 else ONE
+    ),
+    "nilpotent maximum": lambda a, b: max(a, b) if a + b < 1 else ONE,
+    "normalized sum": lambda a, b: (a + b) / max(a + b, ONE),
+    "sum": lambda a, b: a + b,
+}
+"""What joins two degrees; each rises with both."""
+
+
+def joined(norm: str, one: Between, other: Between) -> Between:
+    """Return what a norm makes of two degrees, each between two numbers."""
+    return NORMS[norm](one[0], other[0]), NORMS[norm](one[1], other[1])

@@ -12,6 +12,14 @@ UNHELD = (
 """What of an audit is read and cannot be compared with anything."""
 
 
+OTHERS = {
+    "SENTENCE": "sentences, not checked",
+    "ID": "ids of findings, not checked",
+    "FACT": "facts about the model, not checked",
+}
+"""What of an audit is not checked beside answers."""
+
+
 class Report:
     """What a re-check found.
 
@@ -35,7 +43,7 @@ class Report:
         """Yield the report, line by line."""
         counts = dict(sorted(self.counts.items()))
         for (state, _), codes in self.undecided.items():
-            name = f"answers {state}, not decided again"
+            name = OTHERS.get(state, f"answers {state}, not decided again")
             counts[name] = counts.get(name, 0) + len(codes)
         width = max(map(len, counts), default=0)
         yield from (f"{what:<{width}}  {number}" for what, number in counts.items())

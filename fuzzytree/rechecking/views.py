@@ -8,12 +8,12 @@ of their conclusions.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Literal, NamedTuple
 
 from fuzzytree.rechecking.audit_records import Audit, Declined, Label
-from fuzzytree.rechecking.enclosing import Between, bounds, hedged
+from fuzzytree.rechecking.enclosing import Between, bounds, hedged, joined
 from fuzzytree.rechecking.meaning import Point, value_of
 from fuzzytree.rechecking.model_records import (
     And,
@@ -34,33 +34,10 @@ from fuzzytree.rechecking.model_records import (
     Variable,
 )
 from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError, require
-from fuzzytree.rechecking.polynomials import ONE, ZERO
+from fuzzytree.rechecking.polynomials import ONE
 
 MOST_WAYS = 64
 Way = tuple[Clause, ...]
-Norm = Callable[[Fraction, Fraction], Fraction]
-
-NORMS: dict[str, Norm] = {
-    "minimum": min,
-    "product": lambda a, b: a * b,
-    "bounded difference": lambda a, b: max(a + b - 1, ZERO),
-    "drastic product": lambda a, b: min(a, b) if max(a, b) == 1 else ZERO,
-    "einstein product": lambda a, b: a * b / (2 - (a + b - a * b)),
-    "hamacher product": lambda a, b: a * b / (a + b - a * b) if a or b else ZERO,
-    "nilpotent minimum": lambda a, b: min(a, b) if a + b > 1 else ZERO,
-    "maximum": max,
-    "algebraic sum": lambda a, b: a + b - a * b,
-    "bounded sum": lambda a, b: min(a + b, ONE),
-    "drastic sum": lambda a, b: ONE if min(a, b) else max(a, b),
-    "einstein sum": lambda a, b: (a + b) / (1 + a * b),
-    "hamacher sum": lambda a, b: (
-        (a + b - 2 * a * b) / (1 - a * b) if a * b < 1 else ONE
-    ),
-    "nilpotent maximum": lambda a, b: max(a, b) if a + b < 1 else ONE,
-    "normalized sum": lambda a, b: (a + b) / max(a + b, ONE),
-    "sum": lambda a, b: a + b,
-}
-"""What joins two degrees; each rises with both."""
 
 
 class Owner(NamedTuple):
@@ -290,7 +267,7 @@ class View:
                     if clause not in known:
                         known[clause] = self._degree(clause, values[clause.variable])
                     join = "minimum" if self.conjunction == "min" else "product"
-                    one = _joined(join, one, known[clause])
+                    one = joined(join, one, known[clause])
                 found[number] = _times(owner.weight, one)
             best = [max(found[number][end] for number in ways) for end in (0, 1)]
             if own[1] < best[0] or best[1] < own[0]:
@@ -333,7 +310,7 @@ class View:
                 found = [self.condition(part, block, values) for part in parts]
                 whole_of = found[0]
                 for other in found[1:]:
-                    whole_of = _joined(norm or "", whole_of, other)
+                    whole_of = joined(norm or "", whole_of, other)
                 return whole_of
 
 
@@ -345,10 +322,6 @@ _NAMES: dict[str | None, Literal["min", "product"]] = {
 
 def _times(weight: Fraction, one: Between) -> Between:
     return weight * one[0], weight * one[1]
-
-
-def _joined(norm: str, one: Between, other: Between) -> Between:
-    return NORMS[norm](one[0], other[0]), NORMS[norm](one[1], other[1])
 
 
 def _conjunction(system: System) -> Literal["min", "product"]:

@@ -20,12 +20,12 @@ from fuzzytree.rechecking import CannotRunError, recheck
 from fuzzytree.rechecking.audit_records import Audit
 from fuzzytree.rechecking.building import built
 from fuzzytree.rechecking.conditions import HEDGES, read_condition
-from fuzzytree.rechecking.enclosing import bounds, hedged
+from fuzzytree.rechecking.enclosing import NORMS, bounds, hedged
 from fuzzytree.rechecking.fingerprints import digest_of, fingerprint
 from fuzzytree.rechecking.model_records import System
 from fuzzytree.rechecking.models import read_model
 from fuzzytree.rechecking.outcomes import UndecidedError
-from fuzzytree.rechecking.views import NORMS, View
+from fuzzytree.rechecking.views import View
 from fuzzytree.rulebase import fingerprint as our_fingerprint
 from fuzzytree.system import (
     And,
