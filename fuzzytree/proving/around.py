@@ -242,8 +242,7 @@ class Around:
             points = centres - np.sign(slope) * reach * self.width
             points = np.clip(points, self.low, self.high)
         for place in np.flatnonzero(np.isinf(away)).tolist():
-            found, radius = self._drawn(centres[:, [place]], label)
-            best[:, place], away[place] = found, radius
+            best[:, place], away[place] = self._drawn(centres[:, [place]], label)
         return best, away
 
     def _drawn(self, centre: FloatArray, label: str | None) -> tuple[FloatArray, float]:
