@@ -80,7 +80,9 @@ def test_a_comparison_ends_within_a_box_that_holds_no_clock(
 
     monkeypatch.setattr(decisions, "alike", endless)
     old = random_base(1, 3, 2)
-    new = msgspec.structs.replace(old, rules=(*old.rules, old.rules[-1]))
+    first, *_, last = old.rules
+    narrower = msgspec.structs.replace(last, when=(*last.when, first.when[0]))
+    new = msgspec.structs.replace(old, rules=(*old.rules, narrower))
     pair = decisions.Pair(old, new, old.inputs, unit_domain(old))
     (answer, *_), _ = decisions.decisions(pair, None, Settings(rows=10), Clock(0.05))
     assert isinstance(answer.state, Bracket)
