@@ -147,7 +147,6 @@ def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None
     point = check_point(case, report, state.point, state.claims)
     is_same = answer.region in ((), state.region)
     require(is_same, "the answer's region is not that of its witness")
-    shows(case, answer, state)
     require(bool(state.claims), "a witness of which nothing is claimed")
     check_spans(case, state.region)
     for span in state.region:
@@ -164,6 +163,7 @@ def _witness(case: Case, report: Report, answer: Answer, state: Witness) -> None
             is_so = holds(case, claim, other)
             require(is_so, f"{claim.kind} fails within the region")
         report.counts["points of regions"] += 1
+    shows(case, answer, state)
 
 
 def _sample(state: Sampled) -> None:
