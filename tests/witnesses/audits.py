@@ -46,8 +46,6 @@ and are not here; they are read where those packages put them.
   means. *declined*: how often each reason was given, for a rule or a term each.
 - Files of others are asked on the ranges that they declare. Carriers (FT6) and rows
   (FT7) are left out of them: [files of others](corpus.md) compares engines.
-- Of the tree with combined features the raw rules (FT203) and the nearest other
-  decisions (FT204) are left out as well: they take a minute.
 - A question that the budget would end is not on this page: every audit is complete.
 
 """
@@ -65,12 +63,12 @@ class Case(NamedTuple):
 
 def wines() -> Iterator[Case]:
     """Yield the audits of trees that are learnt from the wines, with their rows."""
-    for name, tree, left_out in (
-        ("plain", learn(WINE, target="cultivar", mode="paper"), ("FT6",)),
-        ("combined", learn(WINE, target="cultivar"), ("FT6", "FT203", "FT204")),
+    for name, tree in (
+        ("plain", learn(WINE, target="cultivar", mode="paper")),
+        ("combined", learn(WINE, target="cultivar")),
     ):
         rows = audited_rows(WINE, tree, target="cultivar")
-        found = audit(tree, rows=rows, settings=SETTINGS, ignore=left_out)
+        found = audit(tree, rows=rows, settings=SETTINGS, ignore=LEFT_OUT[:1])
         count = len(tree.leaves)
         yield Case(f"wine, {name} features", "tree", count, count, found)
 
