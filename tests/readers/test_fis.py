@@ -352,10 +352,10 @@ def test_all_mistakes_are_told_at_once() -> None:
     ids=range(10),
 )
 def test_hostile_files_end_in_a_sentence_within_two_seconds(content: bytes) -> None:
-    start = time.monotonic()
+    start = time.process_time()
     with pytest.raises(ReadError) as caught:
         reading(content, "x.fis")
-    assert time.monotonic() - start < 2.0
+    assert time.process_time() - start < 2.0
     assert len(str(caught.value)) < 40_000
 
 
@@ -380,8 +380,8 @@ def test_thousands_of_terms_of_one_name_are_read_quickly() -> None:
     many = "".join(f"MF{k}='a':'trimf',[0 1 2]\n" for k in range(1, 20_001))
     start, _, rest = SUGENO.partition("MF1='slow'")
     text = start.replace("NumMFs=1\n", "") + many + rest.partition("\n")[2]
-    began = time.monotonic()
+    began = time.process_time()
     assert len(read(text).inputs[1].labels) == 20_000
-    assert time.monotonic() - began < 5.0
+    assert time.process_time() - began < 5.0
     with pytest.raises(ReadError, match="lines are more than the 60,000 that are read"):
         read(text + "1 1, 1 (1) : 1\n" * 60_000)

@@ -484,10 +484,10 @@ def test_what_is_no_text_file_is_told_in_one_sentence(
 )
 def test_hostile_lines_end_soon_in_a_message(line: str) -> None:
     text = "InputVariable: a\nterm: low Ramp 0 1\nOutputVariable: b\nterm: c Ramp 0 1\n"
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(ReadError) as error:
         read(f"{text}defuzzifier: Centroid\nRuleBlock:\n{line}".encode(), "x.fll")
-    assert time.perf_counter() - started < 5.0
+    assert time.process_time() - started < 5.0
     assert len(str(error.value)) < 100_000
 
 

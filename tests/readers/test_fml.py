@@ -279,10 +279,10 @@ def bomb(levels: int) -> str:
     ids=range(12),
 )
 def test_hostile_files_end_in_a_sentence_within_two_seconds(content: bytes) -> None:
-    start = time.monotonic()
+    start = time.process_time()
     with pytest.raises(ReadError) as caught:
         reading(content, "x.xml")
-    assert time.monotonic() - start < 2.0
+    assert time.process_time() - start < 2.0
     assert len(str(caught.value)) < 10_000
 
 

@@ -104,13 +104,13 @@ def test_a_file_beyond_a_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
     ids=lambda content: content[:8].decode(),
 )
 def test_a_hostile_file_is_refused_in_seconds(content: bytes) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     try:
         _, found = compose(content, "x.yaml")
     except ReadError:
         found = [(1, 1, "refused")]
     assert found
-    assert time.perf_counter() - start < 10
+    assert time.process_time() - start < 10
 
 
 def test_nodes_are_the_same_without_libyaml(monkeypatch: pytest.MonkeyPatch) -> None:

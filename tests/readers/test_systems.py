@@ -235,9 +235,9 @@ def hostile() -> dict[str, str]:
 
 @pytest.mark.parametrize("name", hostile())
 def test_a_hostile_system_ends_in_an_error_in_bounded_time(name: str) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     text = error_of(hostile()[name])
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0
     assert len(text.splitlines()) <= 101
     assert len(text) < 200_000
     assert all(line.startswith("x.yaml:") for line in text.splitlines())

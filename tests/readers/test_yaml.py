@@ -132,11 +132,11 @@ def test_a_damaged_file_gives_a_read_error_or_a_model_in_bounded_time(
     ]
     for _ in range(150):
         content = mutated(chance, chance.choice(texts))
-        start = time.perf_counter()
+        start = time.process_time()
         model = model_or_none(content)
         if model is not None:
             assert read(write(model).content, "x.yaml") == model
-        assert time.perf_counter() - start < 5
+        assert time.process_time() - start < 5
 
 
 def test_lines_are_swapped_without_an_error_of_another_kind() -> None:
@@ -174,9 +174,9 @@ def test_thousands_of_mistakes_are_listed_in_part_and_at_once() -> None:
     text = RULES.replace("rules:\n", f"{variables}rules:\n{wrong}").replace(
         "columns: [sepal length, sepal width, petal length, petal width]\n", ""
     )
-    start = time.perf_counter()
+    start = time.process_time()
     message = error_of(text).splitlines()
-    assert time.perf_counter() - start < 10
+    assert time.process_time() - start < 10
     assert len(message) == 101
     assert message[0].startswith("x.yaml:6033:8: rule 1: 'petal length is lowish 0'")
     assert message[-1] == "x.yaml: and 11900 more mistakes"
@@ -192,9 +192,9 @@ def test_sentences_of_traps_are_read_in_bounded_time(longest: int) -> None:
         + f"- {{if: [a is {'a or ' * 10_000}a], then: setosa}}\n" * 20
         + f"- {{if: [{'a is ' * 100}{'a or ' * 1000}a], then: setosa}}\n" * 20,
     ).replace("columns", "# columns")
-    start = time.perf_counter()
+    start = time.process_time()
     assert error_of(text).startswith("x.yaml:")
-    assert time.perf_counter() - start < 10
+    assert time.process_time() - start < 10
 
 
 def test_a_name_has_a_longest_length() -> None:
@@ -209,7 +209,7 @@ def test_ten_thousand_rules_are_read_in_seconds() -> None:
     many = RuleBase(
         "many", rules.classes, rules.variables, rules.rules * 20, rules.semantics
     )
-    start = time.perf_counter()
+    start = time.process_time()
     content = write(many).content
     assert read(content, "x.yaml") == many
-    assert time.perf_counter() - start < 30
+    assert time.process_time() - start < 30
