@@ -32,7 +32,9 @@ Families, each with `answers(subject)`
       used, ill shaped, hard to tell apart
     - `complexity`: counts, and the index of Nauck
     - `trees`: what each leaf decides
-    - `disagreement`, with `rows`: where a tree and its raw rules part
+    - `deciders`: models that decide, and how far another decision is
+    - `disagreement`, with `rows` and `nearby`: where a tree and its raw rules part, and
+      how near to rows
     - `robustness`: how far a row is from another decision
     - `support`: what rows say; shares of the domain
     - `carriers`, with `conventions`: do all forms and runtimes answer alike

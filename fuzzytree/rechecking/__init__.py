@@ -12,7 +12,9 @@ Read it in this order: the records (`audit_records`, `model_records`) and how fi
 become them (`building`, `yaml`, `facts`, `models`, `conditions`, `systems`, `places`);
 what a model means (`polynomials`, `curves`, `enclosing`, `meaning`, `trees`, `views`);
 how a "never" is decided again (`roots`, `cells`, `grid`, `ties`, `areas`); the checks
-(`cases`, `head`, `answers`, `forms`, `claims`, `deciding` and beyond, `report`).
+(`cases`, `head` with `fixed` and `fingerprints`, `answers`, `forms`, `claims`,
+`deciding` with `deciding_wins`, `deciding_pairs`, `deciding_terms`, `deciding_leaves`);
+how they end (`outcomes`, `report`).
 """
 
 from __future__ import annotations

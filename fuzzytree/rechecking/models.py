@@ -1,4 +1,4 @@
-"""A model from its file: a rule base or a tree."""
+"""A model from its file: a rule base, a tree or a fuzzy system."""
 
 from __future__ import annotations
 
@@ -16,15 +16,6 @@ from fuzzytree.rechecking.systems import read_system
 from fuzzytree.rechecking.yaml import read_yaml
 
 _HEAD = "format, kind, name, classes, semantics"
-
-
-def read_model(content: bytes, name: str) -> Model | System:
-    """Return the rule base, tree or fuzzy system of a YAML file.
-
-    Raises:
-        CannotRunError: If it is something else, or holds what is not known here.
-    """
-    return read_file(content, name)[0]
 
 
 def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:

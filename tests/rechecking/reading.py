@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import yaml
 from fuzzytree.rechecking import model_records
-from fuzzytree.rechecking.models import read_model
+from fuzzytree.rechecking.models import read_file
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.testing import exporter_models
 from fuzzytree.tree import FuzzyTree
@@ -26,6 +26,6 @@ def models(seed: int) -> Iterator[RuleBase | FuzzyTree]:
 
 def read(model: RuleBase | FuzzyTree) -> model_records.Model:
     """Return a model as the re-checker reads it."""
-    found = read_model(yaml.write(model).content, "model.yaml")
+    found, _ = read_file(yaml.write(model).content, "model.yaml")
     assert not isinstance(found, model_records.System)
     return found

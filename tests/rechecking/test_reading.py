@@ -22,7 +22,7 @@ from fuzzytree.rechecking import (
 )
 from fuzzytree.rechecking.building import read_json
 from fuzzytree.rechecking.fingerprints import compact
-from fuzzytree.rechecking.models import read_model
+from fuzzytree.rechecking.models import read_file
 from fuzzytree.rechecking.trees import rules_of
 from fuzzytree.rechecking.yaml import read_yaml
 from fuzzytree.rulebase import RuleBase, fingerprint
@@ -111,7 +111,7 @@ def test_damaged_files_end_in_one_error() -> None:
             place = chance.randrange(len(damaged))
             damaged[place : place + chance.randint(0, 2)] = chance.randbytes(1)
         try:
-            read_model(bytes(damaged), "x.yaml")
+            read_file(bytes(damaged), "x.yaml")
         except CannotRunError as error:
             refused.append(str(error))
     assert len(refused) > 50

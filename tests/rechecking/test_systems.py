@@ -23,7 +23,7 @@ from fuzzytree.rechecking.conditions import HEDGES, read_condition
 from fuzzytree.rechecking.enclosing import NORMS, bounds, hedged
 from fuzzytree.rechecking.fingerprints import digest_of, fingerprint
 from fuzzytree.rechecking.model_records import System
-from fuzzytree.rechecking.models import read_model
+from fuzzytree.rechecking.models import read_file
 from fuzzytree.rechecking.outcomes import UndecidedError
 from fuzzytree.rechecking.views import View
 from fuzzytree.rulebase import fingerprint as our_fingerprint
@@ -57,7 +57,7 @@ def systems(seeds: range) -> list[FuzzySystem]:
 
 def read(system: FuzzySystem) -> System:
     """Return a system as the re-checker reads it."""
-    found = read_model(yaml.write(system).content, "system.yaml")
+    found, _ = read_file(yaml.write(system).content, "system.yaml")
     assert isinstance(found, System)
     return found
 
@@ -176,7 +176,7 @@ def test_the_audit_of_a_system_holds() -> None:
 
 def test_the_ways_of_a_rule_are_numbered_as_the_audit_numbers_them() -> None:
     facts, content = audited(SMALL)
-    whole = read_model(content, "m.yaml")
+    whole, _ = read_file(content, "m.yaml")
     assert isinstance(whole, System)
     view = View(whole, built(Audit, json.loads(facts), "a.json"))
     assert view.names[:4] == [
