@@ -26,17 +26,21 @@ _COUNTS: Mapping[str, tuple[int, int]] = {
 
 
 def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[str]:
-    """Return the codes that are asked; reasons for declining unless they are ignored.
+    """Return the codes that are asked, and all reasons for declining.
+
+    What is left out of every question is told whatever is chosen: without that the
+    other answers seem to be about more than they are.
 
     Args:
         select: Beginnings of codes, such as `FT1`; all codes if none.
         ignore: Beginnings of codes that are left out.
 
     Raises:
-        ValueError: If one is the beginning of no code, or nothing is left to ask.
+        ValueError: If one is the beginning of no code, a reason for declining is to be
+            left out, or nothing is left to ask.
 
     Example:
-        >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103", "FTD"]))
+        >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103"]))[:5]
         ['FT101', 'FT104', 'FT105', 'FT106', 'FT107']
     """
     for text in (*select, *ignore):
@@ -44,11 +48,17 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
             raise ValueError(
                 f"no code begins with {text!r}; {name_choice(text, [*CODES])}"
             )
-    taken = (*select, "FTD") if select else ("FT",)
+    for text in ignore:
+        if text.startswith("FTD"):
+            raise ValueError(
+                f"{text} cannot be left out: it tells what was not asked, and why"
+            )
+    taken = tuple(select) or ("FT",)
     found = {
         code
         for code in CODES
-        if code.startswith(taken) and not (ignore and code.startswith(tuple(ignore)))
+        if code.startswith("FTD")
+        or (code.startswith(taken) and not code.startswith(tuple(ignore)))
     }
     if all(code.startswith("FTD") for code in found):
         raise ValueError("select and ignore leave no code of which anything is asked")

@@ -14,13 +14,23 @@ def test_all_codes_are_asked_unless_some_are_chosen() -> None:
 
 
 def test_ignoring_goes_before_selecting() -> None:
-    chosen = chosen_codes(["FT4", "FT301"], ["FT402", "FTD"])
-    assert chosen == {"FT401", "FT403", "FT404", "FT301"}
+    chosen = chosen_codes(["FT4", "FT301"], ["FT402"])
+    asked = {code for code in chosen if not code.startswith("FTD")}
+    assert asked == {"FT401", "FT403", "FT404", "FT301"}
 
 
 def test_reasons_for_declining_are_told_whatever_is_selected() -> None:
     declined = {code for code in CODES if code.startswith("FTD")}
     assert chosen_codes(["FT501"]) == {"FT501", *declined}
+    assert chosen_codes(["FT5"], ["FT4"]) == {"FT501", *declined}
+
+
+@pytest.mark.parametrize("text", ["FTD", "FTD04"])
+def test_reasons_for_declining_cannot_be_left_out(text: str) -> None:
+    with pytest.raises(ValueError, match=r".") as caught:
+        chosen_codes([], [text])
+    why = "it tells what was not asked, and why"
+    assert str(caught.value) == f"{text} cannot be left out: {why}"
 
 
 @pytest.mark.parametrize("text", ["", "FT9", "x", "FT1011"])
