@@ -29,14 +29,17 @@ def test_an_audit_that_holds_is_told_with_what_was_checked(
 ) -> None:
     code, out, err = call("recheck", "audit.json", "grip.yaml")
     assert (code, err) == (0, "")
-    assert out.splitlines() == [
+    *counts, nothing, verdict = out.splitlines()
+    assert counts == [
         "answers PROVED, decided again            1",
         "answers with a WITNESS, evaluated again  3",
         "claims evaluated again                   3",
         "facts about the audit                    12",
         "points of regions                        39",
-        "the audit holds as far as it was checked again",
+        "sentences held against facts             4",
     ]
+    assert nothing.startswith("held against nothing: the version, the table, ")
+    assert verdict == "the audit holds as far as it was checked again"
 
 
 def test_an_audit_whose_panel_was_cut_fails(
