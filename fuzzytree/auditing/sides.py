@@ -253,12 +253,13 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
         found = meet(self.from_below, one, other, level, clock)
         if self.held is None or not self.is_held(one, other):
             return found
-        most = meet(self.from_above, one, other, level, clock).level.high
+        above = meet(self.from_above, one, other, level, clock)
+        most = above.level.high
         if isinstance(found.state, Witness):
             state = self.held.certified(found.state)
             return Meeting(Bounds(found.level.low, max(most, found.level.low)), state)
-        if most < level:
-            return Meeting(Bounds(Fraction(0), most), found.state)
+        if most < level or isinstance(above.state, Proved):
+            return Meeting(Bounds(Fraction(0), most), above.state, above.is_touch)
         # What is reached nearly is told, with its point.
         easier = max(level - 4 * Fraction(self.held.gap), Fraction(0))
         near = meet(self.from_below, one, other, easier, clock)

@@ -162,14 +162,15 @@ def meet(
     never = _never(known, rules, bounds, level)
     if never is not None:
         return never
-    high = bounds.high
     if joined and _is_never(given, rules, level, joined):
-        high = min(high, level * (1 - _NEARLY))
+        # They may come as near to it as one likes.
+        how = f"{float(level)!r} is reached by no values that inputs have together"
+        return Meeting(Bounds(ZERO, min(bounds.high, level)), Proved(how))
     why = "where they meet is known nearly, and no point there reaches the level"
     if joined:
         why = "the inputs of their variables depend on each other"
-    most = outwards(high)[1]
-    return Meeting(Bounds(ZERO, high), Bracket(name, 0.0, most, why))
+    most = outwards(bounds.high)[1]
+    return Meeting(Bounds(ZERO, bounds.high), Bracket(name, 0.0, most, why))
 
 
 def _may_be_hidden(given: Ground, rules: tuple[int, int], level: Fraction) -> bool:

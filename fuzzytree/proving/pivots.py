@@ -93,8 +93,13 @@ def ends_of(laid: Laid, element: int, cell: int) -> tuple[int, int]:
     return int(laid.least[element, cell]), int(laid.most[element, cell])
 
 
-def levels_of(contest: Contest, least: int, most: int) -> list[int]:
-    """Return bands from which on, up to the next one, nothing changes."""
+def levels_of(contest: Contest, least: int, most: int, *, is_each: bool) -> list[int]:
+    """Return bands from which on, up to the next one, nothing changes.
+
+    Where axes share inputs every level matters: at another one other values are free.
+    """
+    if is_each:
+        return [*range(least, most)] or [least]
     inner = {band for band in contest.inner_events if least < band < most}
     return sorted({least, *inner})
 
@@ -164,26 +169,41 @@ def _limits(asked: Asked) -> IntArray:
 
 
 def flat_family(
-    contest: Contest, asked: Asked, axis: int, band: int
+    contest: Contest, asked: Asked, axis: int, band: int, *, is_within: bool = False
 ) -> tuple[int, ...]:
-    """Return what does not exceed a sharp level where ours reach it.
+    """Return what does not exceed a level where ours reach it.
 
     Rivals are left strictly below it, or stay at it as curves that are constant.
+
+    Args:
+        contest: Our rules and their rivals.
+        asked: Which of these must be weaker.
+        axis: The axis.
+        band: The band of the level, which is sharp.
+        is_within: Of a band that is not: what may hold somewhere in it, never too
+            little.
     """
     options, laid = contest.all_inner[axis], contest.ground.laid[0][axis]
     masks: list[int] = []
-    for number in np.flatnonzero(options.where >= START).tolist():
-        cell = int(options.where[number])
-        one = weakest(laid, contest.ours, cell)
-        if options.top[number] > band or (
-            options.top[number] == band
-            and (cell == START or int(laid.least[one, cell]) == band)
+    limit = band + 1 if is_within else band  # below which rivals are left
+    least = -np.iinfo(np.int64).max if is_within else START
+    for number in np.flatnonzero(options.where >= least).tolist():
+        cell, top = int(options.where[number]), int(options.top[number])
+        if top > band or (
+            top == band and (is_within or _least(contest, laid, cell) == band)
         ):
-            behind = options.floor[number] < band
+            behind = options.floor[number] < limit
             for place in range(len(asked.strict), len(behind)):
-                behind[place] |= stays(contest, laid, cell, place, band)
+                behind[place] |= cell >= START and stays(
+                    contest, laid, cell, place, band
+                )
             masks.append(sum(1 << n for n in np.flatnonzero(behind).tolist()))
     return maximal(masks)
+
+
+def _least(contest: Contest, laid: Laid, cell: int) -> int:
+    """Return the band of the least value of our weakest rule in a cell."""
+    return ends_of(laid, weakest(laid, contest.ours, cell), cell)[0]
 
 
 def stays(contest: Contest, laid: Laid, cell: int, rival: int, band: int) -> bool:

@@ -122,15 +122,15 @@ def _searched(given: Ground, asked: Asked, clock: Clock) -> State:
         if is_flat and not bands.is_sharp[least]:
             clock.check()
             vague = [
-                options.at_band(least)
-                for axis, options in enumerate(contest.inner_options)
+                flat_family(contest, asked, axis, least, is_within=True)
+                for axis in range(len(floors))
                 if axis not in held
             ]
             if cover([*masks, *vague], contest.full, clock) is None:
                 continue
             # What may be there is looked for as at a level that is known exactly.
             is_vague = True
-        tried = [least] if is_flat else levels_of(contest, least, most)
+        tried = [least] if is_flat else levels_of(contest, least, most, is_each=is_each)
         for band in tried:
             clock.check()
             levels += 1

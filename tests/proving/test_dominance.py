@@ -22,6 +22,7 @@ from fuzzytree.rulebase import (
     Band,
     Clause,
     Flank,
+    Part,
     Points,
     Rule,
     RuleBase,
@@ -245,3 +246,21 @@ def test_where_rules_on_shared_inputs_meet_is_decided(seed: int) -> None:
             point = dict(zip(rules.inputs, (x, y), strict=True))
             strengths = strengths_at(both.ground, point)
             assert min(strengths[0], strengths[2]) < level
+
+
+def test_rules_that_come_as_near_to_a_level_as_one_likes_do_not_reach_it() -> None:
+    falls = Term("falls", Points((0.0, 2.0), (0.5, 0.25)))
+    mixed = Variable("mixed", (falls,), parts=(Part("x", -1.0, 1.0), Part("y", 1.0)))
+    rules = RuleBase(
+        "near",
+        ("a", "b"),
+        (Variable("x"), Variable("y", (falls,)), mixed),
+        (
+            Rule((Clause("y", ("falls",)),), "a"),
+            Rule((Clause("mixed", ("falls",)),), "b"),
+        ),
+    )
+    box = Domain((Side("x", 0.0, 2.0), Side("y", 0.0, 4.0, is_open=True)))
+    found = meet(Compared(ground(rules, box)), 1, 2, Fraction(1, 2))
+    assert isinstance(found.state, Proved)
+    assert found.level.high == Fraction(1, 2)  # nothing below it bounds them

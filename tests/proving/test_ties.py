@@ -245,3 +245,50 @@ def test_ties_on_axes_that_share_inputs_are_decided_where_inputs_have_the_values
     assert isinstance(found, Witness)
     low = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 0.25)))  # mix is below x
     assert isinstance(tie(ground(rules, low), 1, 2), Proved)
+
+
+def test_rivals_that_stay_at_a_level_are_seen_where_levels_are_near() -> None:
+    level = Term("level", Points((0.5,), (0.5,)))
+    rise = Term("rise", Points((2.0, 3.5), (0.5, 0.75)))
+    dip = Term("dip", Points((1.0, 2.0, 3.0), (1.0, 0.25, 0.5)))
+    never = Term("never", Points((0.0, 1.5, 2.0), (0.0, 0.0, 0.75)))
+    on_x, on_y = Clause("x", ("level",)), Clause("y", ("rise",))
+    rules = RuleBase(
+        "flat",
+        ("a", "b", "c"),
+        (Variable("x", (never, level)), Variable("y", (rise, dip))),
+        (
+            Rule((on_x, on_y), "a"),
+            Rule((on_x,), "b"),
+            Rule((on_y,), "c"),
+            Rule((Clause("y", ("dip",)),), "c"),
+            Rule((Clause("x", ("level",), negated=True),), "a"),
+        ),
+    )
+    box = Domain((Side("x", 0.0, 2.0), Side("y", 0.25, 3.75)))
+    found = decides_by_order(ground(rules, box), 1, (), (2, 3, 4))
+    assert isinstance(found, Witness)  # all but the dip are 1/2 where y is up to 2
+
+
+def test_a_tie_between_any_two_levels_is_seen_where_axes_share_inputs() -> None:
+    # Rules 1 and 2 are (1 - x / 2) / 2, which exceeds rule 3 from 1/4 to 1/2 alone.
+    falls = Term("falls", Points((-1.0, 1.0), (0.0, 0.5)))
+    dent = Term("dent", Points((0.0, 0.5, 0.75, 1.0), (1.0, 0.75, 0.0, 1.0)))
+    bump = Term("bump", Points((1.0, 1.5, 2.0), (0.0, 0.25, 0.0)))
+    most = Term("most", Points((0.0,), (1.0,)))
+    mixed = Variable("mixed", (falls,), parts=(Part("x", -1.0, 1.0),))
+    one = Clause("mixed", ("falls",))
+    rules = RuleBase(
+        "mixed",
+        ("a", "b", "c"),
+        (Variable("x", (dent, bump, most)), mixed),
+        (
+            Rule((one,), "a"),
+            Rule((one, Clause("x", ("most",))), "b"),
+            Rule((Clause("x", ("dent",)),), "c"),
+            Rule((Clause("x", ("bump",)),), "c"),
+        ),
+    )
+    found = tie(ground(rules, Domain((Side("x", 0.0, 2.0),))), 1, 2)
+    assert isinstance(found, Witness)
+    assert Fraction(1, 2) < point_of(found.point)["x"] < 1
