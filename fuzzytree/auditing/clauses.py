@@ -20,7 +20,6 @@ from fuzzytree.proving.answers import answer_at
 from fuzzytree.proving.dominance import Compared
 from fuzzytree.proving.ground import Ground, ground, rule_strengths
 from fuzzytree.proving.states import (
-    Bracket,
     Claim,
     Proved,
     State,
@@ -248,7 +247,7 @@ def _answer(subject: Subject, one: _Dropped, state: State) -> Answer:
             f"{name} needs {text}: without it {before} becomes {one.shorter.then!r} "
             "at some input"
         )
-    elif isinstance(state, Bracket):
+    elif not isinstance(state, Proved):
         sentence = f"whether {name} needs {text} is open"
     return Answer(
         "FT107",

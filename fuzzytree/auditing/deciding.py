@@ -126,6 +126,8 @@ def _winning(
             sentence = f"how far {name} leads is open, for it is open whether it wins"
             yield Answer("FT102", name, sentence, state, False, rules=(number,))
     yield from turns.rest("FT101", "rule", "whether they ever win")
+    # Only of a rule that is known to win is it asked how far it leads.
+    yield from turns.rest("FT102", "rule", "how far they lead")
 
 
 def _leading(

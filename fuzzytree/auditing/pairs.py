@@ -330,7 +330,7 @@ def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
     first, second = (subject.rule_name(number) for number in pair)
     one, other = (_then(subject, number) for number in pair)
     low, high = found.level
-    reached = "nearly 1" if low < 1 and short(low) == "1" else short(low)
+    reached = level_reached(found)
     level, most = "highest common level", "highest common level at most"
     if isinstance(found.state, Witness):
         region = found.state.region
@@ -361,6 +361,19 @@ def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
         region=region,
         measures=tuple(measures),
     )
+
+
+def level_reached(found: Meeting) -> str:
+    """Return the level that two rules both reach, as their sentence says it.
+
+    A point in fractions may fall a little short of a level that is irrational.
+    """
+    low = found.level.low
+    if not isinstance(found.state, Witness):
+        return short(low)
+    shown = [Fraction(one.level or 0) for one in found.state.claims]
+    is_short = max(shown, default=low) < low or (low < 1 and short(low) == "1")
+    return f"{'nearly ' if is_short else ''}{short(low)}"
 
 
 def _rest_of_conflicts(

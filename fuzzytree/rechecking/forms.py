@@ -48,6 +48,8 @@ FT102 B -warning | {1} | largest lead, at least; largest lead, at most
   {largest lead, at most:.3g} is excluded
 FT102 BD -info | {1}
   how far {1} leads is open, for it is open whether it wins
+FT102 D -info | {...}
+  how far they lead is not known of {_} <rule|rules>: {reason}
 FT103 W -info | {1}
   {1} is somewhere stronger than every other rule
 FT103 WBD -info | {1}
@@ -83,6 +85,9 @@ FT106 P +info | {1} and {2} | largest distance; place of it
   {then2}[; degrees differ by at most {largest distance:s}, at {...} = {place of it:s}]
 FT106 P -info | pairs of rules | pairs
   no [other ]two rules have nearly the same antecedent, among {pairs:n pair}
+FT106 D -info | pairs of rules | pairs
+  no [other ]two rules are shown to have nearly the same antecedent, among
+  {pairs:n pair}: {reason}
 FT107 W -info | {1}, {clause}
   {1} needs {clause}: without it {...} becomes {then1} at some input
 FT107 P +info | {1}, {clause}
@@ -94,7 +99,7 @@ FT107 P -info | {1}
 FT107 P -info | clauses | clauses
   {clauses:d} more <clause matters: it decides|clauses matter: each decides> some input
 FT201 W +info | {1} and {2} | highest common level; * at least; * at most
-  {1} and {2} conflict: both reach <{_}|nearly 1> at one input, and say {then1} and
+  {1} and {2} conflict: both reach [nearly ]{_} at one input, and say {then1} and
   {then2}
 FT201 B -info | {1} and {2} | highest common level at most
   {1} and {2} may conflict, on {then1} and {then2}: no more than

@@ -167,6 +167,11 @@ def test_without_time_the_rules_that_points_show_to_win_are_told() -> None:
     assert [one.sentence for one in won if isinstance(one.state, Witness)]
     (rest,) = [one for one in won if isinstance(one.state, Declined)]
     assert rest.sentence.startswith("whether they ever win is not known of ")
+    of = rest.subject
+    leads = f"how far they lead is not known of {of.removesuffix(' left open')}"
+    open_leads = [one for one in found if (one.code, one.subject) == ("FT102", of)]
+    assert open_leads[0].sentence == f"{leads}: the budget was spent"
+    assert isinstance(open_leads[0].state, Declined)
     assert not any(one.is_finding for one in found)
 
 

@@ -8,10 +8,20 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.audit import audit
+from fuzzytree.auditing.pairs import level_reached
 from fuzzytree.auditing.records import Answer, Settings
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.proving.answers import answer_at
-from fuzzytree.proving.states import Bracket, Declined, Proved, Witness, point_of
+from fuzzytree.proving.measures import Bounds
+from fuzzytree.proving.meeting import Meeting
+from fuzzytree.proving.states import (
+    Bracket,
+    Claim,
+    Declined,
+    Proved,
+    Witness,
+    point_of,
+)
 from fuzzytree.rulebase import (
     Band,
     Clause,
@@ -266,6 +276,15 @@ def test_a_conflict_is_told_with_its_highest_level_and_a_region() -> None:
     assert [one.variable for one in first.region] == ["force", "slip"]
     for span in first.region:
         assert (span.low, span.high) == pytest.approx((3.0, 4.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(("claimed", "text"), [("1/2", "0.5"), ("1/3", "nearly 0.5")])
+def test_a_point_that_falls_short_of_the_highest_level_nearly_reaches_it(
+    claimed: str, text: str
+) -> None:
+    claims = (Claim("reaches", rules=(1, 2), level=claimed),)
+    half = Bounds(Fraction(1, 2), Fraction(1, 2))
+    assert level_reached(Meeting(half, Witness((), claims))) == text
 
 
 @pytest.mark.parametrize(
