@@ -30,7 +30,7 @@ def built(kind: Any, value: Any, where: str) -> Any:
         name, kinds = TAGS[kind]
         rest = dict(value) if isinstance(value, dict) else {}
         tag = rest.pop(name, None)
-        if tag in kinds:
+        if isinstance(tag, str) and tag in kinds:
             return built(kinds[tag], rest, where)
     origin, choices = get_origin(kind), get_args(kind)
     if origin is types.UnionType and type(None) in choices:
@@ -44,7 +44,8 @@ def built(kind: Any, value: Any, where: str) -> Any:
     if names and isinstance(value, dict):
         wrong = sorted(value.keys() ^ set(names))
         if wrong:
-            raise CannotRunError(f"{where}: missing or unknown: {', '.join(wrong)}")
+            shown = ", ".join(one if one.isidentifier() else repr(one) for one in wrong)
+            raise CannotRunError(f"{where}: missing or unknown: {shown:.200}")
         hints = _hints(kind)
         return kind(*(built(hints[n], value[n], f"{where}, {n}") for n in names))
     is_real = isinstance(value, int | float) and not isinstance(value, bool)

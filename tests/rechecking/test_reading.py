@@ -20,7 +20,7 @@ from fuzzytree.rechecking import (
     fixed,
     model_records,
 )
-from fuzzytree.rechecking.building import read_json
+from fuzzytree.rechecking.building import built, read_json
 from fuzzytree.rechecking.fingerprints import compact
 from fuzzytree.rechecking.models import read_file
 from fuzzytree.rechecking.trees import rules_of
@@ -98,6 +98,22 @@ def test_the_records_of_an_audit_are_ours() -> None:
 def test_yaml_that_is_not_of_its_subset_is_refused(text: str, sentence: str) -> None:
     with pytest.raises(CannotRunError) as caught:
         read_yaml(text.encode(), "x.yaml")
+    assert str(caught.value) == sentence
+
+
+@pytest.mark.parametrize(
+    ("facts", "sentence"),
+    [
+        ({"state": []}, "it: it cannot be {'state': []}"),
+        ({"state": {}}, "it: it cannot be {'state': {}}"),
+        ({"state": "PROVED", "a\nb": 1}, "it: missing or unknown: 'a\\nb', how"),
+    ],
+)
+def test_a_state_that_is_none_is_one_sentence(
+    facts: dict[str, object], sentence: str
+) -> None:
+    with pytest.raises(CannotRunError) as caught:
+        built(audit_records.State, facts, "it")
     assert str(caught.value) == sentence
 
 
