@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from fuzzytree.proving.clock import OutOfTimeError
 from fuzzytree.proving.contests import Contest, Options, weakest
-from fuzzytree.proving.ground import Ground
+from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.parts import START, Stretch, stretch, widest
 from fuzzytree.proving.witnesses import point_with
 
@@ -110,19 +110,42 @@ def parts_of(
         cell = int(options.where[number])
         mine = weakest(laid, contest.ours, cell)
         floors = options.floor[number]
-        rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
         theirs = {
             n: weakest(laid, [contest.rivals[n]], cell)
             for n in range(len(floors))
             if floors[n] <= band
         }
-        # What is left below is nested: everything up to some element of the order.
-        for limit in sorted({-1, *(int(rank[e]) for e in theirs.values())}):
-            kept = {n: e for n, e in theirs.items() if int(rank[e]) <= limit}
-            below = set(kept.values())
-            if is_outer:
-                part = widest(laid, cell, levels, [mine], below)
-            else:
-                part = stretch(laid, cell, levels[0], [mine], below)
-            if part is not None:
-                yield part, union(1 << n for n in kept)
+        yield from nested(laid, cell, levels, mine, theirs, is_outer=is_outer)
+
+
+def nested(
+    laid: Laid,
+    cell: int,
+    levels: tuple[Fraction, Fraction],
+    mine: int,
+    theirs: Mapping[int, int],
+    *,
+    is_outer: bool,
+) -> Iterator[Part]:
+    """Yield stretches of a cell, each with the rivals left below there.
+
+    What is left below is nested: everything up to some element of the order.
+
+    Args:
+        laid: The axis.
+        cell: The cell.
+        levels: As for `parts_of`.
+        mine: The element that is the rule's degree.
+        theirs: That of each rival that may be left below.
+        is_outer: As for `parts_of`.
+    """
+    rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
+    for limit in sorted({-1, *(int(rank[e]) for e in theirs.values())}):
+        kept = {n: e for n, e in theirs.items() if int(rank[e]) <= limit}
+        below = set(kept.values())
+        if is_outer:
+            part = widest(laid, cell, levels, [mine], below)
+        else:
+            part = stretch(laid, cell, levels[0], [mine], below)
+        if part is not None:
+            yield part, union(1 << n for n in kept)

@@ -272,9 +272,8 @@ def told_apart(
         spans = parted(known) if len(known) == len(levels) else None
         if spans is None:
             continue
-        for span in set(
-            spans
-        ):  # all bounds of equal ones hold, and none leaves the band
+        # All bounds of equal ones hold, and none leaves the band.
+        for span in set(spans):
             equal = [n for n, own in zip(numbers, spans, strict=True) if own == span]
             least, most = max(span[0], *low[equal]), min(span[1], *high[equal])
             low[equal], high[equal] = least, most

@@ -15,16 +15,14 @@ import numpy as np
 from fuzzytree.proving.contests import Contest, weakest
 from fuzzytree.proving.covering import maximal
 from fuzzytree.proving.ground import Laid
-from fuzzytree.proving.parts import START, Stretch, stretch
+from fuzzytree.proving.linear import simple
+from fuzzytree.proving.parts import START, Stretch, part_of, stretch
 from fuzzytree.proving.shared import is_constant
 from fuzzytree.proving.tied import Asked
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from fuzzytree.contracts import IntArray
-
-    BoolArray = npt.NDArray[np.bool_]
+    from fuzzytree.proving.ground import BoolArray
 
 
 class Pivot(NamedTuple):
@@ -84,6 +82,19 @@ def whole(laid: Laid, cell: int) -> Stretch:
     if cell == START:
         return Stretch(*laid.cells.zones[0], is_open=False)
     return Stretch(*laid.cells.between[cell])
+
+
+def value_of(
+    laid: Laid, pivot: Pivot, levels: tuple[Fraction, Fraction]
+) -> Fraction | None:
+    """Return a value of a pivot's axis at which its level is well between two."""
+    low, high, _ = whole(laid, pivot.cell)
+    ends, room = (low, high), (levels[1] - levels[0]) / 4
+    element = laid.axis.elements[pivot.element]
+    for level, is_high in ((levels[0] + room, True), (levels[1] - room, False)):
+        part = part_of(element, ends, level, is_high=is_high, bits=64)
+        low, high = max(low, part.low), min(high, part.high)
+    return simple(low, high) if low < high else None
 
 
 def ends_of(laid: Laid, element: int, cell: int) -> tuple[int, int]:

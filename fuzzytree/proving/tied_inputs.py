@@ -6,13 +6,19 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.proving.choices import Part, choices, parts_of, union
+from fuzzytree.proving.choices import Part, choices, nested, parts_of, union
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest, weakest
 from fuzzytree.proving.covering import cover
-from fuzzytree.proving.linear import simple
-from fuzzytree.proving.parts import START, Stretch, part_of, stretch, widest
-from fuzzytree.proving.pivots import Pivot, flat_family, part_at, stays, whole
+from fuzzytree.proving.parts import START, Stretch, widest
+from fuzzytree.proving.pivots import (
+    Pivot,
+    flat_family,
+    part_at,
+    stays,
+    value_of,
+    whole,
+)
 from fuzzytree.proving.seeking import leader
 from fuzzytree.proving.states import Witness
 from fuzzytree.proving.tied import Asked, checked
@@ -157,16 +163,8 @@ class Sharing:
         if is_outer:
             part = widest(laid, pivot.cell, levels, [pivot.element], [pivot.element])
             return None if part is None else {pivot.axis: part}
-        low, high, _ = whole(laid, pivot.cell)
-        ends, room = (low, high), (levels[1] - levels[0]) / 4
-        element = laid.axis.elements[pivot.element]
-        for level, is_high in ((levels[0] + room, True), (levels[1] - room, False)):
-            part = part_of(element, ends, level, is_high=is_high, bits=64)
-            low, high = max(low, part.low), min(high, part.high)
-        if not low < high:
-            return None
-        at = simple(low, high)
-        return {pivot.axis: Stretch(at, at, is_open=False)}
+        at = value_of(laid, pivot, levels)
+        return None if at is None else {pivot.axis: Stretch(at, at, is_open=False)}
 
     def _parts(
         self,
@@ -198,14 +196,6 @@ class Sharing:
                 for n in range(len(contest.rivals))
                 if n not in equal and options.floor[number, n] < band
             }
-            rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
-            for limit in sorted({-1, *(int(rank[one]) for one in below.values())}):
-                kept = {n: one for n, one in below.items() if int(rank[one]) <= limit}
-                low = set(kept.values())
-                part = (
-                    widest(laid, cell, levels, [mine], low)
-                    if is_outer
-                    else stretch(laid, cell, levels[0], [mine], low)
-                )
-                if part is not None:
-                    yield part, union(1 << n for n in (*kept, *equal))
+            held = union(1 << n for n in equal)
+            found = nested(laid, cell, levels, mine, below, is_outer=is_outer)
+            yield from ((part, mask | held) for part, mask in found)

@@ -12,13 +12,14 @@ one level on different axes too; there are two pivots then.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from fractions import Fraction
 
 from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest
 from fuzzytree.proving.covering import cover
 from fuzzytree.proving.ground import Ground, TooManyCellsError
 from fuzzytree.proving.linear import simple
-from fuzzytree.proving.parts import Stretch, part_of
+from fuzzytree.proving.parts import Stretch
 from fuzzytree.proving.pivots import (
     Pivot,
     crossed,
@@ -27,6 +28,7 @@ from fuzzytree.proving.pivots import (
     levels_of,
     part_at,
     pivots,
+    value_of,
     whole,
 )
 from fuzzytree.proving.products import tie_of_products
@@ -175,19 +177,14 @@ def _witness(
     """Return a point at which ours tie, if one is found."""
     given = contest.ground
     laid = given.laid[0][pivot.axis]
-    low, high, _ = whole(laid, pivot.cell)
-    ends = low, high
-    element = laid.axis.elements[pivot.element]
-    if not is_flat:
-        first, last = contest.bands.high[band], contest.bands.low_after(band)
-        room = (last - first) / 4
-        for level, is_high in ((first + room, True), (last - room, False)):
-            part = part_of(element, ends, level, is_high=is_high, bits=64)
-            low, high = max(low, part.low), min(high, part.high)
-        if not low < high:
-            return None
-    at = simple(low, high)
-    level = element.degree(at)
+    if is_flat:
+        at: Fraction | None = simple(*whole(laid, pivot.cell)[:2])
+    else:
+        levels = contest.bands.high[band], contest.bands.low_after(band)
+        at = value_of(laid, pivot, levels)
+    if at is None:
+        return None
+    level = laid.axis.elements[pivot.element].degree(at)
     wanted = {pivot.axis: Stretch(at, at, is_open=False)}
     left = contest.full
     for held in pivot.all:
