@@ -259,7 +259,10 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
             state = self.held.certified(found.state)
             return Meeting(Bounds(found.level.low, max(most, found.level.low)), state)
         if most < level or isinstance(above.state, Proved):
-            return Meeting(Bounds(Fraction(0), most), above.state, above.is_touch)
+            state = above.state
+            if isinstance(state, Bracket):  # its point is one of the upper rules
+                state = replace(state, low=0.0, point=(), claims=())
+            return Meeting(Bounds(Fraction(0), most), state, above.is_touch)
         # What is reached nearly is told, with its point.
         easier = max(level - 4 * Fraction(self.held.gap), Fraction(0))
         near = meet(self.from_below, one, other, easier, clock)

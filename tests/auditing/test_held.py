@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import random
 from collections.abc import Iterator
 from fractions import Fraction
@@ -14,9 +15,12 @@ from fuzzytree.auditing.audit import audit
 from fuzzytree.auditing.domains import domain_of
 from fuzzytree.auditing.held import held
 from fuzzytree.auditing.records import Answer, Settings
+from fuzzytree.auditing.sides import Sides
 from fuzzytree.auditing.views import view
 from fuzzytree.inference import infer
 from fuzzytree.numerics.exact import exact_answer
+from fuzzytree.proving.clock import Clock
+from fuzzytree.proving.ground import ground
 from fuzzytree.proving.states import Bracket, Witness
 from fuzzytree.rulebase import (
     LR,
@@ -390,3 +394,27 @@ def test_what_is_told_of_many_drawn_systems_holds_on_a_grid(norm: TNorm) -> None
         found = audit(system, select=["FT1", "FT2", "FT3"])
         checked += told_rightly(system, found, view(system, found.domain), 25)
     assert checked > 100
+
+
+@pytest.mark.parametrize("norm", ["minimum", "product"])
+def test_where_rules_do_not_meet_nothing_is_claimed_of_the_upper_ones(
+    norm: TNorm,
+) -> None:
+    system = system_of(((A, "x", 1.0), (A_HIGH, "y", 0.5)), norm=norm)
+    seen = view(system, domain_of(system))
+    assert seen.held is not None
+    lower, upper = (
+        ground(one, seen.domain) for one in (seen.held.lower, seen.held.upper)
+    )
+    found = Sides(lower, upper, seen.held).meet(1, 2, Fraction(1, 2), Clock())
+    assert found.level.high < Fraction(1, 2)
+    assert isinstance(found.state, Bracket)
+    assert not found.state.point
+    assert found.state.low <= max(meeting_on_a_line()) <= found.state.high
+
+
+def meeting_on_a_line() -> Iterator[float]:
+    """Yield the smaller of the two degrees in steps."""
+    for step in range(401):
+        x = step / 100.0
+        yield min(math.exp(-(x**2) / 2.0), 0.5 * math.exp(-((x - 4.0) ** 2) / 2.0))
