@@ -14,6 +14,7 @@ from typing import Final, Literal
 from msgspec.structs import replace
 
 from fuzzytree.casting import (
+    FACTS,
     as_system,
     cast_losses,
     cast_remarks,
@@ -29,7 +30,7 @@ from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.losses import refusal
 from fuzzytree.naming import Names, changes_text
 from fuzzytree.readers.engines import fuzzylite_losses
-from fuzzytree.readers.fis import DEFAULTS, DIALECT, FACTS, places, reading
+from fuzzytree.readers.fis import DEFAULTS, DIALECT, places, reading
 from fuzzytree.readers.fis_words import (
     DIALECTS,
     METHODS,

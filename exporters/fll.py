@@ -15,6 +15,7 @@ import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.casting import (
+    FACTS,
     Scores,
     as_system,
     cast_losses,
@@ -34,7 +35,7 @@ from fuzzytree.exporters.fll_terms import (
 )
 from fuzzytree.losses import refusal
 from fuzzytree.naming import Names, changes_text
-from fuzzytree.readers.fll import FACTS, places, read
+from fuzzytree.readers.fll import places, read
 from fuzzytree.readers.fll_meaning import differences
 from fuzzytree.readers.fll_rules import RULE_WORDS
 from fuzzytree.readers.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS

@@ -15,6 +15,7 @@ from xml.sax.saxutils import escape, quoteattr
 from msgspec.structs import replace
 
 from fuzzytree.casting import (
+    FACTS,
     as_system,
     cast_losses,
     cast_remarks,
@@ -29,7 +30,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
 from fuzzytree.losses import refusal
 from fuzzytree.naming import DIGITS, LETTERS, Names, changes_text
-from fuzzytree.readers.fml import FACTS, places, reading
+from fuzzytree.readers.fml import places, reading
 from fuzzytree.readers.fml_words import FAR, METHODS, NAMESPACE, SNORMS, TNORMS, USUAL
 from fuzzytree.rulebase import Points, RuleBase
 from fuzzytree.system import (

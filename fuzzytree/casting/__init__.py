@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fuzzytree.casting.facts import as_rules, facts_of
+from fuzzytree.casting.facts import FACTS, as_rules, as_written, facts_of
 from fuzzytree.casting.joining import joined_outputs
 from fuzzytree.casting.points import check_tolerance, pointed
 from fuzzytree.casting.scores import (
@@ -16,10 +16,12 @@ from fuzzytree.casting.scores import (
 )
 
 __all__ = [
+    "FACTS",
     "Always",
     "Scores",
     "as_rules",
     "as_system",
+    "as_written",
     "cast_losses",
     "cast_remarks",
     "check_tolerance",

@@ -9,7 +9,8 @@ the rules of the file say.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
 
 import msgspec
 from msgspec.structs import replace
@@ -41,6 +42,9 @@ from fuzzytree.system import (
 )
 
 _UNSAFE = {character: f"\\u{ord(character):04x}" for character in "*/<>&#%'`$\x7f"}
+
+FACTS: Final = "rules of fuzzytree: "
+"""What a comment with facts begins with, in formats whose comments are text."""
 
 _MOST = 4 * 2**20  # bytes of facts
 
@@ -177,6 +181,30 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
     is_winner = found.scores == "winner"
     given, wanted = (_plain(one, has_default=is_winner) for one in (system, expected))
     return rules if given == wanted else None
+
+
+def as_written(
+    system: FuzzySystem, comments: Iterable[str]
+) -> tuple[RuleBase | FuzzySystem, str | None]:
+    """Return the rule base that a file was made of, and its facts, or the system.
+
+    Args:
+        system: The system of the file.
+        comments: Its comments; the first that begins with `FACTS` counts.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0))
+        >>> as_written(as_system(rules), [FACTS + facts_of(rules)])[0] == rules
+        True
+    """
+    every = (comment.strip() for comment in comments)
+    facts = next(
+        (one.removeprefix(FACTS) for one in every if one.startswith(FACTS)), None
+    )
+    rules = None if facts is None else as_rules(system, facts)
+    return (system, None) if rules is None else (rules, facts)
 
 
 def numbers_of(facts: str) -> tuple[int, ...]:

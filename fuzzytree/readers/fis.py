@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from fuzzytree.casting import as_rules
-from fuzzytree.contracts import Document, Locate, Loss, Reading
+from fuzzytree.casting import as_written
+from fuzzytree.contracts import Locate, Loss, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.naming import numbered
 from fuzzytree.readers import fis_text as text
@@ -38,7 +38,6 @@ from fuzzytree.system import (
     TNorm,
 )
 
-FACTS: Final = "rules of fuzzytree: "
 DIALECT: Final = "dialect: "
 
 _SYSTEM_KEYS: Final = (
@@ -133,21 +132,9 @@ def _read(
     parts = _system(page, name, meant, notes)
     if notes.found or parts is None:
         raise report(name, notes.found)
-    model, facts = _as_written(parts.system, page.comments)
+    model, facts = as_written(parts.system, page.comments)
     reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
     return reading, parts, facts
-
-
-def _as_written(
-    system: FuzzySystem, comments: Sequence[str]
-) -> tuple[Document, str | None]:
-    """Return the rule base that a file was made of, and its facts, or the system."""
-    for comment in comments:
-        if comment.startswith(FACTS):
-            facts = comment.removeprefix(FACTS)
-            rules = as_rules(system, facts)
-            return (system, None) if rules is None else (rules, facts)
-    return system, None
 
 
 def _dialect(page: text.Page, notes: Notes) -> Dialect:

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
-from fuzzytree.casting import as_rules
-from fuzzytree.contracts import Document, Locate, Reading
+from fuzzytree.casting import as_written
+from fuzzytree.contracts import Locate, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers.fll_meaning import as_meant, differences, without_disabled
 from fuzzytree.readers.fll_variables import (
@@ -25,9 +25,6 @@ from fuzzytree.readers.lines import decoded
 from fuzzytree.readers.nodes import MOST_SHOWN, report
 from fuzzytree.readers.spots import Group, Spots
 from fuzzytree.system import FuzzySystem, SystemInput
-
-FACTS: Final = "rules of fuzzytree: "
-"""How a comment begins that says which rule base a file was made of."""
 
 
 def read(content: bytes, name: str) -> Reading:
@@ -82,14 +79,9 @@ def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
         parts = _system(page.sections, PurePath(name).stem, notes)
     if notes.found or parts is None:
         raise report(name, notes.found)
-    rules, facts = None, None
-    for comment in page.comments:
-        if comment.startswith(FACTS):
-            facts = comment.removeprefix(FACTS)
-            rules = as_rules(parts.system, facts)
-    model: Document = rules or parts.system
+    model, facts = as_written(parts.system, page.comments)
     reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
-    return reading, parts, facts if rules else None
+    return reading, parts, facts
 
 
 def _system(sections: Sequence[Section], stem: str, notes: Notes) -> _Parts | None:

@@ -11,8 +11,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple, TypeVar
 
-from fuzzytree.casting import as_rules
-from fuzzytree.contracts import Document, Locate, Reading
+from fuzzytree.casting import as_written
+from fuzzytree.contracts import Locate, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.naming import numbered
 from fuzzytree.readers import fml_words as words
@@ -33,8 +33,6 @@ from fuzzytree.system import (
     SystemInput,
     SystemOutput,
 )
-
-FACTS: Final = "rules of fuzzytree: "
 
 _T = TypeVar("_T")
 
@@ -118,21 +116,9 @@ def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
     parts = None if notes.found else _system(root, name, notes)
     if notes.found or parts is None:
         raise report(name, notes.found)
-    model, facts = _as_written(parts.system, document.comments)
+    model, facts = as_written(parts.system, document.comments)
     reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
     return reading, parts, facts
-
-
-def _as_written(
-    system: FuzzySystem, comments: Sequence[str]
-) -> tuple[Document, str | None]:
-    """Return the rule base that a file was made of, and its facts, or the system."""
-    for comment in comments:
-        if comment.strip().startswith(FACTS):
-            facts = comment.strip().removeprefix(FACTS)
-            rules = as_rules(system, facts)
-            return (system, None) if rules is None else (rules, facts)
-    return system, None
 
 
 def _system(root: Element, name: str, notes: Notes) -> _Parts | None:

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from fuzzytree.anonymous import anonymous
-from fuzzytree.casting import Scores, as_system, pointed
+from fuzzytree.casting import FACTS, Scores, as_system, pointed
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
 from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.readers.fll import FACTS, read
+from fuzzytree.readers.fll import read
 from fuzzytree.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
 from fuzzytree.system import (
     Activation,
