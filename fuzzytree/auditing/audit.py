@@ -331,6 +331,8 @@ def _placed(
 ) -> Answer:
     """Return an answer with its places and the command that finds it again."""
     numbers = [viewed.numbers[number - 1] for number in answer.rules]
+    if not numbers and answer.subject in viewed.left_out:
+        numbers = [viewed.left_out[answer.subject]]
     return msgspec.structs.replace(
         answer,
         places=places_of(answer, model, file, numbers),

@@ -389,7 +389,7 @@ def _rest_of_conflicts(
         parts.append(f"{touching} of them at most touch it, at irrational values")
     if hidden:
         more = counted(hidden, "more pair")
-        parts.append(f"{more} of rules may reach {level}: they conflict less")
+        parts.append(f"{more} of rules may reach {level}, not told one by one")
     means = "products" if compared.is_product else "minima"
     return Answer(
         "FT201",

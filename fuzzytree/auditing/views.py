@@ -15,7 +15,7 @@ their curves and numbers, is not part of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import msgspec
 
@@ -71,6 +71,7 @@ class View(msgspec.Struct, frozen=True, eq=False):
             are simply numbered.
         numbers: The number in the model of each rule, from 1, over all blocks.
         declined: What was left out, and why; and rules that can never fire.
+        left_out: The number in the model of each rule that is named there.
         is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
             the view fires another one may.
         held: The rules from below and from above; None if they are plain.
@@ -87,6 +88,7 @@ class View(msgspec.Struct, frozen=True, eq=False):
     declined: tuple[Answer, ...] = ()
     is_whole: bool = True
     held: Held | None = None
+    left_out: Mapping[str, int] = {}
 
 
 def view(model: Document, domain: Domain) -> View:
@@ -159,6 +161,7 @@ def _of_system(system: FuzzySystem, domain: Domain) -> View:
         places=tuple(taken.places),
         numbers=tuple(taken.numbers),
         declined=tuple(taken.answers),
+        left_out=taken.left_out,
         is_whole=taken.is_whole,
         held=both,
     )
@@ -221,6 +224,7 @@ class _Taken:
         self.weights: list[float] = []
         self.places: list[str] = []
         self.numbers: list[int] = []
+        self.left_out: dict[str, int] = {}
         self.is_whole = True
 
     def note_activation(self, position: int, block: RuleBlock) -> None:
@@ -231,6 +235,12 @@ class _Taken:
 
     def take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
         """Take over a rule, or note why not."""
+        taken = len(self.rules)
+        self._take(name, number, rule, block)
+        if len(self.rules) == taken:
+            self.left_out[name] = number
+
+    def _take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
         if rule.weight == 0.0:
             self._never(name, "its weight is 0")
             return

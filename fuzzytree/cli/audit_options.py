@@ -81,7 +81,7 @@ _OPTIONS = (
         "--budget",
         type=float,
         metavar="SECONDS",
-        help="Begin nothing new after these; 60.",
+        help="End the work within these; 60.",
     ),
     click.option(
         "--set",

@@ -195,6 +195,8 @@ class Case:
         """Return where the rules and terms of an answer stand, in that order."""
         owners = self.view.owners if self.view else ()
         numbers = [owners[n - 1].number if owners else n - 1 for n in answer.rules]
+        if self.view and not numbers:
+            numbers = self.view.absent(answer.subject)
         found = [self.places.rules[number] for number in numbers]
         found += [self.places.terms[label] for label in answer.terms]
         return [*dict.fromkeys(found)]

@@ -110,7 +110,7 @@ FT201 P -info | pairs of rules | pairs that never do; pairs not told one by one
 FT201 P +info | pairs of rules | pairs that never do; pairs not told one by one
   [{pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
   {level:s} together; [{...}; ]]{pairs not told one by one:n more pair} of rules may
-  reach {level:s}: they conflict less
+  reach {level:s}, not told one by one
 FT202 W +warning | {1} and {2}
   {1} and {2} are equally strong, and the strongest, on more than a surface: the order
   of the rules alone decides there

@@ -231,6 +231,12 @@ class View:
                     pass
         return found
 
+    def absent(self, name: str) -> list[int]:
+        """Return the number, from 0, of a rule of which no way is taken over."""
+        if any(owner.name == name for owner in self.owners):
+            return []
+        return [one.number for one, _ in _owners(self.system) if one.name == name]
+
     def may_conflict(self, one: int, other: int) -> bool:
         """Return whether two rules say different things of one output."""
         told = [

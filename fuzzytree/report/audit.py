@@ -389,8 +389,12 @@ def _asked_text(audit: Audit) -> str:
         word: sum(isinstance(one.state, kind) for one in audit.answers)
         for word, kind in kinds.items()
     }
+    declined = [o.state.code for o in audit.answers if isinstance(o.state, Declined)]
     if counts["declined"] == len(audit.answers):
-        return f"{asked}, and every one declined: nothing is known"
+        return (
+            f"{asked}, and every one declined: nothing is known; "
+            f"`fuzzytree explain {declined[0]}` tells what to do"
+        )
     told = [f"{count} {word}" for word, count in counts.items() if count]
     if not told:
         return f"{asked} and answered"

@@ -329,7 +329,9 @@ def test_many_conflicts_are_told_up_to_a_number_and_counted() -> None:
     rules = base(*(("force is low", ("soft", "hard")[n % 2]) for n in range(12)))
     *found, rest = asked(rules, "FT201")
     assert (len(found), rest.is_finding) == (20, True)
-    assert rest.sentence == ("16 more pairs of rules may reach 0.5: they conflict less")
+    assert rest.sentence == (
+        "16 more pairs of rules may reach 0.5, not told one by one"
+    )
 
 
 def test_pairs_that_cross_at_the_level_itself_conflict() -> None:

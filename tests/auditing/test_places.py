@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
+from fuzzytree.auditing.audit import audit
 from fuzzytree.auditing.places import (
     ModelFile,
     model_file,
@@ -17,6 +18,7 @@ from fuzzytree.auditing.places import (
 )
 from fuzzytree.auditing.records import Answer, Label, Place
 from fuzzytree.contracts import Document
+from fuzzytree.converting import format_of, read_content
 from fuzzytree.proving.states import Proved, Span
 from fuzzytree.report.audit import audit_lines
 from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
@@ -232,3 +234,40 @@ def test_both_ways_of_a_rule_stand_where_it_does_and_have_its_number(
     plain = WAYS.replace("food is good or service is good", "food is good")
     path.write_text(plain)
     assert ft.audit(path, select=["FT201"]).numbers == ()
+
+
+def test_a_rule_that_is_left_out_has_its_line() -> None:
+    text = b"""FUNCTION_BLOCK brake
+VAR_INPUT speed : REAL; END_VAR
+VAR_OUTPUT force : REAL; END_VAR
+FUZZIFY speed
+  RANGE := (0 .. 100);
+  TERM low := (0, 1) (60, 0);
+  TERM high := (40, 0) (100, 1);
+END_FUZZIFY
+DEFUZZIFY force
+  RANGE := (0 .. 1);
+  TERM soft := (0, 1) (0.5, 0);
+  TERM hard := (0.5, 0) (1, 1);
+  METHOD : COG;
+END_DEFUZZIFY
+RULEBLOCK rules
+  AND : MIN; ACT : MIN; ACCU : MAX;
+  RULE 1 : IF speed IS high THEN force IS hard;
+  RULE 2 : IF speed IS low THEN force IS soft WITH 0;
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+    model = read_content(text, format_of("brake.fcl"), name="brake.fcl").model
+    assert isinstance(model, FuzzySystem)
+    for file, place in [
+        (model_file("brake.fcl", text), Place("brake.fcl", 18, 3)),
+        (written(model), None),
+    ]:
+        found = audit(model, select=["FT101"], file=file)
+        dead = next(one for one in found.answers if one.is_finding)
+        assert dead.sentence == "rule 2 never fires: its weight is 0"
+        assert len(dead.places) == 1
+        assert place is None or dead.places == (place,)
+        if place is None:
+            assert text_at(file, dead.places[0]).startswith("if: speed is low")

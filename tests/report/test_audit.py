@@ -189,7 +189,8 @@ def test_the_verdict_counts_and_says_what_next() -> None:
     assert verdict_text(bare) == "nothing found; nothing in this model to ask it of"
     none = replace(calm, answers=calm.answers[:1])
     assert verdict_text(none) == (
-        "nothing found; 1 question asked, and every one declined: nothing is known"
+        "nothing found; 1 question asked, and every one declined: nothing is known; "
+        "`fuzzytree explain FTD02` tells what to do"
     )
     bracket = replace(audit.answers[2], is_finding=False)
     unsure = replace(calm, answers=(bracket, *calm.answers))
