@@ -10,7 +10,7 @@ difference, boxes prove that there is none on the domain, or find it, or leave a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -39,6 +39,7 @@ from fuzzytree.proving.states import (
     Witness,
     point_of,
 )
+from fuzzytree.proving.witnesses import simplified
 from fuzzytree.proving.wording import answer_text
 from fuzzytree.pruning import proof_faults, unguarded
 from fuzzytree.rulebase import Rule, RuleBase, Variable
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
 _PROBES = 4_000  # of each model
 _SEGMENTS = 64  # between points of different decisions, halved down to doubles
 _HALVINGS = 70
-_DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 _MOST_TOLD = 24  # pairs of classes with a witness each
 _POINTS = 0.5  # of the budget is for single points, the rest for proofs
 _PORTION = 64  # rows between two looks at the clock, at first
@@ -253,19 +253,12 @@ def _simple(
     pair: Pair, labels: tuple[str | None, str | None], point: dict[str, Fraction]
 ) -> dict[str, Fraction]:
     """Return a point of few digits at which both models answer the same as here."""
-    best = dict(point)
-    for name, value in point.items():
-        side = pair.domain.side(name)
-        for digits in _DIGITS if side else ():
-            near = float(f"{float(value):.{digits}g}")
-            if side is None or not side.low <= near <= side.high:
-                continue
-            tried = {**best, name: Fraction(near)}
-            models = (pair.old, pair.new)
-            if tuple(answer_at(model, tried).label for model in models) == labels:
-                best = tried
-                break
-    return best
+
+    def holds(tried: Mapping[str, Fraction]) -> bool:
+        both = (answer_at(model, tried).label for model in (pair.old, pair.new))
+        return tuple(both) == labels
+
+    return simplified(point, pair.domain, holds)
 
 
 def _answered(one: Answered) -> str:

@@ -52,6 +52,8 @@ Side = Literal["lower", "upper"]
 Range = tuple[Fraction, Fraction]
 Knot = tuple[float, Fraction]
 """A point of a line before it is rounded."""
+Name = tuple[str, str]
+"""A variable and one of its terms."""
 
 
 class Enclosed(NamedTuple):

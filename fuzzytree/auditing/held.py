@@ -22,7 +22,9 @@ import msgspec
 
 from fuzzytree.auditing.enclosing import (
     Enclosed,
+    Name,
     Range,
+    Side,
     complement,
     gap,
     pointed,
@@ -40,9 +42,6 @@ from fuzzytree.rulebase import (
     Variable,
     shapes_of,
 )
-
-Name = tuple[str, str]
-"""A variable and one of its terms."""
 
 
 class Held(msgspec.Struct, frozen=True, eq=False, dict=True):
@@ -233,7 +232,7 @@ class _Made:
         self.terms[variable, text] = one
         return text
 
-    def variables(self, side: str) -> tuple[Variable, ...]:
+    def variables(self, side: Side) -> tuple[Variable, ...]:
         """Return the variables with all terms, from below or from above."""
         found: list[Variable] = []
         for variable in self.rules.variables:

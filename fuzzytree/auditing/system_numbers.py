@@ -36,6 +36,7 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
+from fuzzytree.proving.witnesses import simplified
 from fuzzytree.runtimes.systems import run_system
 from fuzzytree.system import FuzzySystem
 
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
 _PROBES = 2_000  # of each system
 _DRAWN = 4_000  # at most, for numbers take longer than decisions
 _ROUNDING = 1e-9  # relative; what one function of real numbers may differ by
-_DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 _MOST_SHOWN = 0.9  # of the largest difference, at a witness of fewer digits
 _ALIKE = "both systems compute alike"
 
@@ -342,19 +342,10 @@ class _Found:
 
     def _simple(self, name: str, point: Mapping[str, Fraction]) -> dict[str, Fraction]:
         """Return a point of few digits where an output differs nearly as much."""
-        best = dict(point)
-        least = self._apart(name, best) * _MOST_SHOWN
-        for column, value in point.items():
-            side = self.pair.domain.side(column)
-            for digits in _DIGITS if side else ():
-                near = float(f"{float(value):.{digits}g}")
-                if side is None or not side.low <= near <= side.high:
-                    continue
-                tried = {**best, column: Fraction(near)}
-                if self._apart(name, tried) >= least:
-                    best = tried
-                    break
-        return best
+        least = self._apart(name, point) * _MOST_SHOWN
+        return simplified(
+            point, self.pair.domain, lambda tried: self._apart(name, tried) >= least
+        )
 
     def _apart(self, name: str, point: Mapping[str, Fraction]) -> float:
         was, now = self._exact(name, point)

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from fuzzytree.auditing.enclosing import (
     Enclosed,
+    Name,
     Range,
     enclosed,
     gap,
@@ -23,9 +24,6 @@ from fuzzytree.proving.variables import span
 from fuzzytree.rulebase import Points, Shape, Term, Variable, shape_mistakes
 from fuzzytree.system import FuzzySystem, Hedge, SystemInput, questions
 from fuzzytree.system import Label as SystemLabel
-
-Name = tuple[str, str]
-"""A variable and one of its terms."""
 
 
 class Terms:

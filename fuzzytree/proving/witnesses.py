@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
+from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.ground import Ground
 from fuzzytree.proving.linear import Row, feasible, simple
 from fuzzytree.proving.parts import Stretch
 from fuzzytree.proving.variables import Point, contains, linear_form
+
+_DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 
 
 def coupled(given: Ground) -> tuple[tuple[int, ...], ...]:
@@ -119,3 +122,35 @@ def _ends(row: Row, weight: Fraction) -> tuple[Fraction | None, Fraction | None]
 def is_within(given: Ground, point: Mapping[str, Fraction]) -> bool:
     """Return whether a point of the inputs lies in the domain."""
     return contains(given.domain, given.rules.variables, point)
+
+
+def simplified(
+    point: Mapping[str, Fraction],
+    domain: Domain,
+    holds: Callable[[Mapping[str, Fraction]], bool],
+) -> dict[str, Fraction]:
+    """Return a point of fewer digits near another one.
+
+    Args:
+        point: The point; what has no side in the domain stays.
+        domain: Where the point stays.
+        holds: Whether a point will do.
+
+    Example:
+        >>> from fuzzytree.proving.domain import Domain, Side
+        >>> box = Domain((Side("x", 0.0, 1.0),))
+        >>> simplified({"x": Fraction(1, 3)}, box, lambda at: 3 * at["x"] < 1)
+        {'x': Fraction(5944751508129055, 18014398509481984)}
+    """
+    best = dict(point)
+    for name, value in point.items():
+        side = domain.side(name)
+        for digits in _DIGITS if side else ():
+            near = float(f"{float(value):.{digits}g}")
+            if side is None or not side.low <= near <= side.high:
+                continue
+            tried = {**best, name: Fraction(near)}
+            if holds(tried):
+                best = tried
+                break
+    return best
