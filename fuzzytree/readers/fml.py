@@ -28,6 +28,7 @@ from fuzzytree.system import (
     FuzzySystem,
     Label,
     Linear,
+    RuleBlock,
     SCurve,
     Singleton,
     SystemInput,
@@ -69,25 +70,46 @@ def places(content: bytes, name: str) -> Locate:
 
 
 class _Parts(NamedTuple):
-    """A system, and what its parts were made of: each rule with its rule base."""
+    """The parts of a system, each with what it was made of.
 
-    system: FuzzySystem
-    inputs: Sequence[Element]
-    outputs: Sequence[Element]
+    Attributes:
+        inputs: The inputs.
+        outputs: The outputs.
+        blocks: The blocks.
+        rules: What each rule of them was made of, and its rule base.
+        variables: What the variables call their terms.
+    """
+
+    inputs: Sequence[tuple[Element, SystemInput]]
+    outputs: Sequence[tuple[Element, SystemOutput]]
+    blocks: tuple[RuleBlock, ...]
     rules: Sequence[tuple[Element, Element]]
     variables: Variables
+
+    def system(self, title: str) -> FuzzySystem:
+        """Return the system.
+
+        Raises:
+            InvalidModelError: With everything that is wrong with it.
+        """
+        inputs = tuple(one for _, one in self.inputs)
+        return FuzzySystem(
+            title, inputs, tuple(one for _, one in self.outputs), self.blocks
+        )
 
     def spots(self) -> Spots:
         """Return where its parts stand."""
         waiting = iter(self.rules)
         blocks: list[Group] = []
-        for block in self.system.blocks:
+        for block in self.blocks:
             rules = [next(waiting) for _ in block.rules]
             places = tuple(_place(rule) for _, rule in rules)
             blocks.append(Group(_place(rules[0][0]) if rules else (1, 1), places))
-        inputs = map(self._group, self.inputs, self.system.inputs)
-        outputs = map(self._group, self.outputs, self.system.outputs)
-        return Spots(tuple(inputs), tuple(outputs), tuple(blocks))
+        return Spots(
+            tuple(self._group(*one) for one in self.inputs),
+            tuple(self._group(*one) for one in self.outputs),
+            tuple(blocks),
+        )
 
     def _group(self, element: Element, variable: SystemInput | SystemOutput) -> Group:
         names = self.variables.labels[variable.name]
@@ -113,15 +135,21 @@ def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
             f"the namespace is {given} and not {words.NAMESPACE!r}; read as if it was"
         )
         notes.remarks.append(what)
-    parts = None if notes.found else _system(root, name, notes)
+    parts = None if notes.found else _parts(root, notes)
     if notes.found or parts is None:
         raise report(name, notes.found)
-    model, facts = as_written(parts.system, document.comments)
+    title = root.attributes.get("name", "") or name.rpartition(".")[0] or "system"
+    try:
+        system = parts.system(title)
+    except InvalidModelError as error:
+        raise report(name, list(parts.spots().placed(error.mistakes))) from error
+    model, facts = as_written(system, document.comments)
     reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
     return reading, parts, facts
 
 
-def _system(root: Element, name: str, notes: Notes) -> _Parts | None:
+def _parts(root: Element, notes: Notes) -> _Parts | None:
+    """Return the parts of the system; None where something is wrong, which is noted."""
     bases = root.all("knowledgeBase")
     if len(bases) != 1:
         has = f"has {len(bases)} <knowledgeBase>" if bases else "has no <knowledgeBase>"
@@ -156,14 +184,12 @@ def _system(root: Element, name: str, notes: Notes) -> _Parts | None:
     blocks = blocks_of(rule_bases, variables, notes)
     if notes.found:
         return None
-    title = root.attributes.get("name", "") or name.rpartition(".")[0] or "system"
     rules = [(base, child) for base in rule_bases for child in base.children]
-    try:
-        system = FuzzySystem(title, found_inputs, found_outputs, blocks)
-    except InvalidModelError as error:
-        notes.found.extend((1, 1, sentence) for _, sentence in error.mistakes)
-        return None
-    return _Parts(system, inputs, outputs, rules, variables)
+    pairs = (
+        zip(inputs, found_inputs, strict=True),
+        zip(outputs, found_outputs, strict=True),
+    )
+    return _Parts([*pairs[0]], [*pairs[1]], blocks, rules, variables)
 
 
 def _is_output(element: Element) -> bool:

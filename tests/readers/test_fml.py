@@ -228,6 +228,7 @@ MISTAKES = [
     (('<or><t', '<or t-conorm="ESUM"><t'), "9:9: it is joined by ESUM, and the rule"),
     (("<knowledgeBase>", "<knowledgeBase><anYaDataCloud/>"), "3:18: <anYaDataCloud>"),
     (("<term>small<", "<term>bad<"), "29:44: 'tip' has no term 'bad'"),
+    (('domainleft="0"', 'domainleft="20"'), "4:5: the range of 'food' starts at 20.0"),
     (("</tskThen>", "<x/></tskThe>"), "30:13: no well-formed XML: mismatched tag"),
 ]  # fmt: skip
 
