@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Answer, Audit, Severity
 from fuzzytree.naming import printable
+from fuzzytree.proving.states import Declined
 from fuzzytree.report.audit_states import state_word
 
 _COMMANDS: Mapping[Severity, str] = {
@@ -21,7 +22,7 @@ _IN_PROPERTIES = {**_IN_TEXT, ":": "%3A", ",": "%2C"}
 def annotation_lines(audit: Audit) -> Iterator[str]:
     """Yield a workflow command for each finding that no baseline accepts.
 
-    A last one tells that an audit is not complete.
+    A last one tells that an audit is not complete, or that it knows nothing.
     """
     for answer in audit.open_findings:
         yield _annotation(answer, audit)
@@ -29,6 +30,10 @@ def annotation_lines(audit: Audit) -> Iterator[str]:
         cut = [text for text in audit.unasked if ": cut short" in text]
         cut += [text for text in audit.unasked if ": not asked: " in text]
         yield f"::notice title=audit not complete::{_escaped('; '.join(cut), _IN_TEXT)}"
+    declined = [one for one in audit.answers if isinstance(one.state, Declined)]
+    if declined and len(declined) == len(audit.answers):
+        said = _escaped(declined[0].sentence, _IN_TEXT)
+        yield f"::notice title=audit declined::nothing is known: first, {said}"
 
 
 def _annotation(answer: Answer, audit: Audit) -> str:

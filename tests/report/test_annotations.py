@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from fuzzytree.proving.states import Declined
 from fuzzytree.report.annotations import annotation_lines
 from tests.report.audits import every_state
 
@@ -35,3 +36,11 @@ def test_an_audit_of_no_file_names_none() -> None:
     lines = [*annotation_lines(replace(audit, answers=audit.answers[1:2]))]
     assert len(lines) == 1
     assert lines[0].startswith("::warning title=FT202 ambiguity::rules 1 and 2 are")
+
+
+def test_an_audit_that_knows_nothing_says_so() -> None:
+    audit = every_state()
+    declined = [one for one in audit.answers if isinstance(one.state, Declined)]
+    silent = replace(audit, answers=tuple(declined), is_complete=True)
+    said = f"nothing is known: first, {declined[0].sentence}"
+    assert [*annotation_lines(silent)] == [f"::notice title=audit declined::{said}"]
