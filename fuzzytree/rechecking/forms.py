@@ -123,6 +123,19 @@ FT203 BD -info | leaf {n1}
   whether the raw rules decide otherwise in leaf {n1} is left open
 FT203 P -info | leaves
   in {_} of {rules} leaves the raw rules decide as the tree does
+FT203 WB -info | rows | rows that differ already; rows asked; * in ranges; row
+  of {rows of the audit:d} rows[ ({_} incomplete or outside the domain)]
+  {rows that differ already:d} differ already; around {rows asked:d}[ of {_}] others the
+  nearest disagreement is {distance of the witness, in ranges:p} of each input's range
+  from row {row:d}
+FT204 WB -info | rows | rows asked; * certified radius, in ranges; row
+  of {rows of the audit:d} rows[ ({_} incomplete or outside the domain)] {rows asked:d}
+  different ones [with the smallest margins ]were asked: each keeps its decision within
+  at least {smallest certified radius, in ranges:p} of each input's range, half of them
+  within {median certified radius, in ranges:p}[, {...}]
+FT204 WB -info | row[ {_}] | * in ranges
+  [the ]{subject} stays {...} within {certified radius, in ranges:p} of each input's
+  range[, {...}]; where {...} it is {...}
 FT204 D -info | row
   the nearest other decision is not sought
 FT204 D -info | rows | rows asked
@@ -205,8 +218,8 @@ FTD D -info | {subject}
 finding (+) or of none (-); the subject; the measures. Then the sentence.
 
 `{_}` stands for any number and `{...}` for any words; all else in braces is a fact. A
-format `s` shows four digits, `n pair` a count with its noun. `[...]` may be missing,
-`<a|b>` is one of the two, `*` in a measure any words.
+format `s` shows four digits, `p` a share in percent, `n pair` a count with its noun.
+`[...]` may be missing, `<a|b>` is one of the two, `*` in a measure any words.
 """
 
 
@@ -256,6 +269,8 @@ class _Shown:
             return self.value
         if spec == "s":
             return f"{self.value:.4g}"
+        if spec == "p":
+            return f"{100.0 * self.value:.3g} %"
         if spec[:2] == "n ":
             noun = spec[2:] if self.value == 1 else f"{spec[2:]}s"
             return f"{self.value:.0f} {noun}"
@@ -295,6 +310,7 @@ def _facts(case: Case, answer: Answer) -> dict[str, _Shown]:
         "level": settings.level,
         "overlap": settings.overlap,
         "subject": answer.subject,
+        "rows of the audit": case.audit.rows,
         "rules": len(case.numbers),
         "live": len(case.numbers)
         - sum(one.is_finding for one in case.coded("FT101") if one.rules),

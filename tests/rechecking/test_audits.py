@@ -342,3 +342,24 @@ def test_an_answer_that_names_three_rules_for_two_is_told() -> None:
 def test_the_audit_with_rows_that_are_no_table_holds() -> None:
     rows = Rows("an array", np.array([[0.5, 1.5, 3.5]]))
     assert wrong_of(rules_of((Clause("x", ("up",)),)), rows=rows) == []
+
+
+def test_distances_in_sentences_about_rows_are_held_against_their_measures() -> None:
+    tree = random_tree(4, leaves=4)
+    values = np.random.default_rng(1).uniform(-1.0, 1.0, (len(tree.inputs), 6))
+    options: Facts = {"rows": Rows("an array", values), "domain": unit(tree)}
+    text, content = audited(tree, select=["FT203", "FT204"], **options)
+    assert wrong_with(json.loads(text), content) == []
+    edited_of = set[str]()
+    for number, answer in enumerate(json.loads(text)["answers"]):
+        sentence = answer["sentence"]
+        if " of each input's range" not in sentence:
+            continue
+        facts = json.loads(text)
+        other = sentence.replace(" % of each", "1 % of each", 1)
+        facts["answers"][number]["sentence"] = other
+        facts["digest"] = digest_of(facts)
+        (wrong,) = wrong_with(facts, content)
+        assert wrong.endswith("its sentence says other than its facts")
+        edited_of.add(answer["code"])
+    assert edited_of >= {"FT204"}
