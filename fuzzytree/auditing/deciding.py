@@ -44,7 +44,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     Where every rule that fires takes part in the answer, it is asked whether it fires.
     """
     sides = sides_of(subject)
-    given = sides.ground
+    given = sides.lower
     if given.is_empty:
         return
     if subject.policy.decision == "all":

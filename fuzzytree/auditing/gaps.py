@@ -38,7 +38,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         yield Answer("FT301", "cover", sentence, Declined("FTD07", reason), False)
         return
     sides = sides_of(subject)
-    if sides.ground.is_empty:
+    if sides.lower.is_empty:
         return
     bare = sides.uncovered(subject.clock.share(_PART))
     if isinstance(bare, Witness):

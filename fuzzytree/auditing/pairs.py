@@ -33,7 +33,7 @@ Pair = tuple[int, int]
 def answers(subject: Subject) -> Iterator[Answer]:
     """Answer what is to be said of pairs of rules, and of single clauses."""
     compared = sides_of(subject)
-    if compared.ground.is_empty:
+    if compared.lower.is_empty:
         return
     copies = [*_copies(subject, compared)]
     same = {pair for pair, found in copies if not found.each.high}
@@ -146,9 +146,9 @@ def _masked(subject: Subject, compared: Sides, same: set[Pair]) -> Iterator[Answ
 
 
 def _how(compared: Sides) -> str:
-    cells = sum(len(laid.cells.rank) for laid in compared.ground.laid[0])
+    cells = sum(len(laid.cells.rank) for laid in compared.lower.laid[0])
     means = "ratios of degrees" if compared.is_product else "orders of degrees"
-    axes = len(compared.ground.axes)
+    axes = len(compared.lower.axes)
     return f"{means} in {cells} cells on {counted(axes, 'axis', 'axes')} were compared"
 
 
@@ -170,7 +170,7 @@ def _rest_of_strengths(
     rest = "no rule" if not found else "no other rule"
     state: State = Proved(_how(compared))
     sentence = f"{rest} is {word}, among {among}"
-    shared = coupled(compared.ground)
+    shared = coupled(compared.lower)
     if shared:
         reason = "the inputs of variables depend on each other"
         sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
@@ -224,7 +224,7 @@ def _copied(
             text = f"and different conclusions: {one!r} and {other!r}"
         measures: tuple[Measure, ...] = (measure("largest distance", found.each),)
         if not is_exact:
-            variable = compared.ground.axes[found.axis].variable
+            variable = compared.lower.axes[found.axis].variable
             text += (
                 f"; degrees differ by at most {short(found.each.high)}, "
                 f"at {variable.name!r} = {short(found.at)}"

@@ -72,11 +72,6 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
         """Return whether one of some rules is not known exactly."""
         return self.held is not None and not self.held.rules.isdisjoint(numbers)
 
-    @property
-    def ground(self) -> Ground:
-        """The rules from below."""
-        return self.lower
-
     @functools.cached_property
     def from_below(self) -> Compared:
         """The lower rules, to be compared."""
