@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
-from fuzzytree.proving.clock import OutOfTimeError
+from fuzzytree.proving.clock import Clock, OutOfTimeError
 from fuzzytree.proving.contests import Contest, Options, weakest
 from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.parts import START, Stretch, stretch, widest
@@ -33,11 +33,13 @@ def union(masks: Iterable[int]) -> int:
     return found
 
 
-def at_most(calls: int) -> Callable[[], None]:
-    """Return what raises OutOfTimeError when it is called more often than that."""
+def at_most(calls: int, clock: Clock | None = None) -> Callable[[], None]:
+    """Return what raises OutOfTimeError when called too often, or too late."""
     left = iter(range(calls))
 
     def tell() -> None:
+        if clock is not None:
+            clock.check()
         if next(left, None) is None:
             raise OutOfTimeError
 

@@ -214,7 +214,7 @@ def _shared_point(
     ways = [_first_of_each(options[axis]) for axis in free]
     families = [maximal(of) for of in ways]
     rest = union(mask for of in ways for mask in of)
-    tell = at_most(_MOST_CHOICES)
+    tell = at_most(_MOST_CHOICES, clock)
     for wanted, covered in choices(given, parts, full, rest, {}, tell):
         chosen = cover(families, full & ~covered, clock)
         if chosen is None:

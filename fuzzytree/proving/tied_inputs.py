@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.proving.choices import Part, choices, nested, parts_of, union
-from fuzzytree.proving.clock import Clock, OutOfTimeError
+from fuzzytree.proving.choices import Part, at_most, choices, nested, parts_of, union
+from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.contests import Contest, weakest
 from fuzzytree.proving.covering import cover
 from fuzzytree.proving.parts import START, Stretch, widest
@@ -44,7 +44,7 @@ class Sharing:
         self.contest, self.asked, self.clock = contest, asked, clock
         given = contest.ground
         self.joined = sorted({axis for group in coupled(given) for axis in group})
-        self.count = 0
+        self.tell = at_most(_MOST_CHOICES, clock)
 
     def leader(self) -> Witness | None:
         """Return a point at which a single rule leads, if floats lead to one."""
@@ -93,12 +93,6 @@ class Sharing:
             todo += [((low, middle), depth + 1), ((middle, high), depth + 1)]
         return None, is_open
 
-    def _tell(self) -> None:
-        self.clock.check()
-        self.count += 1
-        if self.count > _MOST_CHOICES:
-            raise OutOfTimeError
-
     def _fitting(
         self,
         pivot: Pivot,
@@ -135,7 +129,7 @@ class Sharing:
         ]
         rest = union(mask for family in families for mask in family)
         given = contest.ground
-        for wanted, covered in choices(given, parts, goal, rest, held, self._tell):
+        for wanted, covered in choices(given, parts, goal, rest, held, self.tell):
             left = goal & ~covered
             chosen = cover(families, left, self.clock)
             if chosen is None:
