@@ -134,9 +134,8 @@ def _answer(
     other, _ = decider.decided(found.point)
     claim = Claim("decides", of=decider.of, label=other)
     moved = [axis for axis, value in found.point.items() if value != point[axis]]
-    changed = " and ".join(
-        f"{axis!r} is {_moved(found.point[axis], point[axis])}" for axis in moved
-    )
+    told = _told(decider, point, found.point, moved)
+    changed = " and ".join(f"{axis!r} is {told[axis]}" for axis in moved)
     if len(moved) > _MOST_NAMED:
         changed = f"{len(moved)} inputs move by no more than {percent(found.high)}"
     text = (
@@ -154,6 +153,22 @@ def _answer(
             distance_measure("distance of the witness", found.high),
         ),
     )
+
+
+def _told(
+    decider: Decider,
+    row: Mapping[str, Fraction],
+    point: Mapping[str, Fraction],
+    moved: Sequence[str],
+) -> Mapping[str, str]:
+    """Return the values of a point in the fewest digits that are decided like it."""
+    other, _ = decider.decided(point)
+    for digits in range(6, 18) if len(moved) <= _MOST_NAMED else ():
+        told = {axis: f"{float(point[axis]):.{digits}g}" for axis in moved}
+        near = {axis: Fraction(text) for axis, text in told.items()}
+        if decider.decided({**point, **near})[0] == other:
+            return told
+    return {axis: _moved(point[axis], row[axis]) for axis in moved}
 
 
 def _moved(value: Fraction, own: Fraction) -> str:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
+import fuzzytree as ft
 from fuzzytree.auditing.deciders import decider_of
 from fuzzytree.auditing.records import Answer
 from fuzzytree.auditing.robustness import answers, radius, row_answers
@@ -16,7 +18,7 @@ from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.nearest import distance
 from fuzzytree.proving.states import Declined, Proved, Witness, point_of
-from fuzzytree.rulebase import Conjunction
+from fuzzytree.rulebase import Conjunction, RuleBase
 from fuzzytree.testing import random_tree
 from tests.auditing.small_trees import one_cut, subject_of, two_cuts
 from tests.proving.bases import random_base
@@ -37,6 +39,19 @@ def test_the_radius_of_a_row_of_a_tree_is_the_distance_to_its_cut() -> None:
     )
     assert isinstance(found.state, Witness)
     assert found.state.claims[0].label == "b"
+
+
+def test_the_point_that_is_told_is_decided_as_the_sentence_says() -> None:
+    grip = Path(__file__).parents[2] / "examples" / "grip.yaml"
+    rules = ft.read(grip).model
+    assert isinstance(rules, RuleBase)
+    subject = subject_of(rules, limits={"force": (0.0, 10.0), "slip": (0.0, 2.0)})
+    found = radius(subject, {"force": 4.9, "slip": 0.3})
+    assert found.sentence.endswith("; where 'force' is 5.000001 it is 'soft'")
+    decided = decider_of(subject).decided
+    slip = Fraction(0.3)
+    assert decided({"force": Fraction("5.000001"), "slip": slip})[0] == "soft"
+    assert decided({"force": Fraction(5), "slip": slip})[0] == "open"
 
 
 def test_a_cut_moved_away_makes_the_radius_larger() -> None:
