@@ -12,7 +12,8 @@ def keys_of(found: Any, needed: str, allowed: str = "") -> dict[str, Any]:
     must, may = set(needed.split(", ")), set(allowed.split(", "))
     wrong = must - found.keys() | found.keys() - must - may
     if wrong - {""}:
-        raise CannotRunError(f"missing or unknown keys: {', '.join(sorted(wrong))}")
+        shown = ", ".join(sorted(wrong))
+        raise CannotRunError(f"missing or unknown keys: {shown:.200}")
     return dict(found)
 
 

@@ -27,7 +27,7 @@ def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
     top = read_yaml(content, name)
     kind = top.get("kind") if isinstance(top, dict) else None
     if not isinstance(top, dict) or kind not in ("rule base", "tree", "system"):
-        text = f"{name}: rule bases, trees and systems are checked, not {kind!r}"
+        text = f"{name}: rule bases, trees and systems are checked, not {kind!r:.60}"
         raise CannotRunError(text)
     found: Model | System
     try:

@@ -75,7 +75,7 @@ class _Blocks:
                 self.lines.append(_Line(number, indent, kept.strip(" ")))
 
     def error(self, number: int, what: str) -> CannotRunError:
-        return CannotRunError(f"{self.name}:{number}: {what}")
+        return CannotRunError(f"{self.name}:{number}: {what:.200}")
 
     def _without_comment(self, line: str, number: int) -> str:
         """Cut a comment off: a `#` at the start or behind a blank, not in quotes."""

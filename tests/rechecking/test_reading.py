@@ -117,6 +117,15 @@ def test_a_state_that_is_none_is_one_sentence(
     assert str(caught.value) == sentence
 
 
+@pytest.mark.parametrize(
+    "text", ["kind: [{0}]", "{0}: 1\n{0}: 2", "kind: tree\n{0}: 1", "a: [1] {0}"]
+)
+def test_a_long_name_does_not_make_a_long_sentence(text: str) -> None:
+    with pytest.raises(CannotRunError) as caught:
+        read_file(text.format("x" * 5000).encode(), "x.yaml")
+    assert 20 < len(str(caught.value)) < 300
+
+
 def test_damaged_files_end_in_one_error() -> None:
     content = yaml.write(random_tree(2, leaves=6)).content
     chance = random.Random(0)
