@@ -24,7 +24,13 @@ def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
     Raises:
         CannotRunError: If it is something else, or holds what is not known here.
     """
-    top = read_yaml(content, name)
+    try:
+        top = read_yaml(content, name)
+    except CannotRunError as error:
+        if name.lower().endswith((".yaml", ".yml")):
+            raise
+        text = "only YAML is read here: convert it (fuzzytree convert), and audit that"
+        raise CannotRunError(f"{error}; {text}") from error
     kind = top.get("kind") if isinstance(top, dict) else None
     if not isinstance(top, dict) or kind not in ("rule base", "tree", "system"):
         text = f"{name}: rule bases, trees and systems are checked, not {kind!r:.60}"

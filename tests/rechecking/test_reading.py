@@ -158,3 +158,12 @@ def test_json_that_is_none_is_refused(text: str, sentence: str) -> None:
     with pytest.raises(CannotRunError) as caught:
         read_json(text.encode(), "x.json")
     assert str(caught.value).startswith(sentence)
+
+
+def test_a_file_of_another_format_is_told_to_be_converted() -> None:
+    with pytest.raises(CannotRunError) as refused:
+        read_file(b"FUNCTION_BLOCK brake\n", "brake.fcl")
+    assert str(refused.value) == (
+        "brake.fcl:1: no key and no list: 'FUNCTION_BLOCK brake'; only YAML is read "
+        "here: convert it (fuzzytree convert), and audit that"
+    )
