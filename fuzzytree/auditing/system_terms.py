@@ -133,7 +133,8 @@ def terms_of(
             if found is not None:
                 held[one.name, label.name] = found
             count = asking[one.name, label.name]
-            asks = "1 rule asks" if count == 1 else f"{count} rules ask"
+            few = {0: "no rule asks", 1: "1 rule asks"}
+            asks = few.get(count, f"{count} rules ask")
             told = _told(one, label, found, ranges[one.name])
             answers.append(_answer(one, label, told, f"{asks} for it"))
     return Terms(plain, held, ranges), tuple(answers)
