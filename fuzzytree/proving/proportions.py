@@ -143,7 +143,7 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
         for axis, laid in enumerate(self.laid):
             if self.is_shared(axis, one, other):
                 continue
-            direction = self._direction(axis)
+            direction = direction_of(self.ground, axis)
             if direction and not laid.cells.between:
                 return False  # one value of a combination makes inputs depend
             if direction in found:
@@ -151,19 +151,6 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
             if direction:
                 found.append(direction)
         return True
-
-    def _direction(self, axis: int) -> tuple[tuple[int, Fraction], ...]:
-        """Return the weights of the inputs that vary, as multiples of the first."""
-        given = self.ground
-        number = {name: place for place, name in enumerate(given.rules.inputs)}
-        weights, _ = linear_form(given.axes[axis].variable, number)
-        sides = [given.domain.side(name) for name in given.rules.inputs]
-        kept = [
-            (place, weight)
-            for place, weight in sorted(weights.items())
-            if (side := sides[place]) is not None and side.low < side.high
-        ]
-        return tuple((place, weight / kept[0][1]) for place, weight in kept)
 
     @functools.cached_property
     def _forms(self) -> dict[tuple[int, int, int], _Form]:
@@ -221,3 +208,23 @@ class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
 
 def _cells(run: Run) -> range:
     return range(run.first, run.last + 1)
+
+
+def direction_of(given: Ground, axis: int) -> tuple[tuple[int, Fraction], ...]:
+    """Return the weights of an axis's inputs that vary, as multiples of the first."""
+    number = {name: place for place, name in enumerate(given.rules.inputs)}
+    weights, _ = linear_form(given.axes[axis].variable, number)
+    sides = [given.domain.side(name) for name in given.rules.inputs]
+    kept = [
+        (place, weight)
+        for place, weight in sorted(weights.items())
+        if (side := sides[place]) is not None and side.low < side.high
+    ]
+    return tuple((place, weight / kept[0][1]) for place, weight in kept)
+
+
+def have_one_direction(given: Ground) -> bool:
+    """Return whether curves of two axes can be one function of the inputs."""
+    known = [direction_of(given, axis) for axis in range(len(given.axes))]
+    found = [one for one in known if one]
+    return len(set(found)) < len(found)

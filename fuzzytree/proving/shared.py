@@ -18,6 +18,7 @@ from fuzzytree.interrupts import checkpoint
 from fuzzytree.proving.ground import Ground, Laid
 from fuzzytree.proving.measures import local
 from fuzzytree.proving.parts import START
+from fuzzytree.proving.proportions import have_one_direction
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import IntArray
@@ -32,7 +33,8 @@ def may_tie(given: Ground) -> BoolArray:
 
     Returns:
         Shape (rules, rules), symmetric. All are true under the product, where cells
-        are too many to be kept, and where an axis is a single value.
+        are too many to be kept, where an axis is a single value, and where two axes
+        have one direction.
 
     Example:
         >>> from fuzzytree.lowering import rules_from_tree
@@ -50,7 +52,7 @@ def may_tie(given: Ground) -> BoolArray:
     if is_product or given.is_empty or not given.is_kept or not given.axes:
         return every
     laid, bands = given.laid
-    if any(not len(one.cells.rank) for one in laid):
+    if any(not len(one.cells.rank) for one in laid) or have_one_direction(given):
         return every
     flat = [_flat(one, bands.is_sharp) for one in laid]
     found = _constants(laid, flat, bands.is_sharp)

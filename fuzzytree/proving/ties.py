@@ -32,6 +32,7 @@ from fuzzytree.proving.pivots import (
     whole,
 )
 from fuzzytree.proving.products import tie_of_products
+from fuzzytree.proving.proportions import have_one_direction
 from fuzzytree.proving.states import Declined, Proved, State, Witness
 from fuzzytree.proving.tied import Asked, checked
 from fuzzytree.proving.tied_inputs import Sharing
@@ -159,7 +160,7 @@ def _searched(given: Ground, asked: Asked, clock: Clock) -> State:
         return _searched(given.fine, asked, clock)
     if is_vague:
         return asked.open("two critical levels are too near to tell")
-    if is_open:
+    if is_open or have_one_direction(given):
         reason = "the inputs of its variables depend on each other"
         return Declined("FTD04", reason)
     return Proved(f"{len(held_by)} cells where they share a curve, {levels} levels")

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from fuzzytree.numerics.oracle import TIE, decide
 from fuzzytree.proving.domain import Domain, Side
 from fuzzytree.proving.ground import ground, strengths_at
+from fuzzytree.proving.shared import may_tie
 from fuzzytree.proving.states import Declined, Proved, Witness, point_of
 from fuzzytree.proving.ties import decides_by_order, tie
 from fuzzytree.rulebase import (
@@ -292,3 +293,25 @@ def test_a_tie_between_any_two_levels_is_seen_where_axes_share_inputs() -> None:
     found = tie(ground(rules, Domain((Side("x", 0.0, 2.0),))), 1, 2)
     assert isinstance(found, Witness)
     assert Fraction(1, 2) < point_of(found.point)["x"] < 1
+
+
+def test_curves_on_axes_of_one_direction_may_be_one_function_of_the_inputs() -> None:
+    twice = Variable(
+        "twice",
+        (Term("late", Points((0.0, 2.0), (0.0, 1.0))),),
+        parts=(Part("x", 2.0),),
+    )
+    rules = RuleBase(
+        "parallel",
+        ("a", "b"),
+        (Variable("x", (UP,)), twice),
+        (
+            Rule((Clause("x", ("up",)),), "a"),
+            Rule((Clause("twice", ("late",)),), "b"),
+        ),
+    )
+    given = ground(rules, Domain((Side("x", 0.0, 1.0),)))
+    found = tie(given, 1, 2)
+    assert isinstance(found, Declined)  # both are x
+    assert found.code == "FTD04"
+    assert may_tie(given).all()
