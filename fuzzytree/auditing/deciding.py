@@ -8,7 +8,7 @@ from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from fuzzytree.auditing.records import Answer, Measure
+from fuzzytree.auditing.records import Answer, Measure, Severity
 from fuzzytree.auditing.sides import Sides, sides_of
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.auditing.turns import Turns
@@ -183,7 +183,11 @@ def _won(subject: Subject, given: Ground, number: int, state: State) -> Answer:
         f"{name} never wins: wherever it fires, a rule of another class is at least "
         "as strong"
     )
-    return Answer("FT101", name, sentence, state, True, "error", rules=(number,))
+    severity: Severity = "error"
+    if not isinstance(order, Proved):
+        sentence += "; whether it decides by its place in the list is open"
+        severity = "warning"
+    return Answer("FT101", name, sentence, state, True, severity, rules=(number,))
 
 
 def _led(

@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
+from fuzzytree.interrupts import checkpoint
+
 ZERO, ONE = Fraction(0), Fraction(1)
 
 _MOST_DIGITS = 17  # every double is told from its neighbours by so many
@@ -200,6 +202,7 @@ class _Tableau:
     def repair(self) -> int | None:
         """Bring every sum within its bounds; return one for which it is impossible."""
         while True:
+            checkpoint()
             broken = next((one for one in sorted(self.sums) if self._gap(one)), None)
             if broken is None:
                 return None
@@ -234,6 +237,7 @@ class _Tableau:
     def raise_slack(self) -> Fraction:
         """Make the slack as large as possible, from a point that satisfies all."""
         while True:
+            checkpoint()
             if self.slack not in self.sums:
                 moving, sign = self.slack, 1
             else:

@@ -27,6 +27,9 @@ FT101 P +error | {1}
 FT101 W +warning | {1}
   {1} decides by its place in the list alone: where it is strongest, a rule of another
   class further down is exactly as strong
+FT101 P +warning | {1}
+  {1} never wins: wherever it fires, a rule of another class is at least as strong;
+  whether it decides by its place in the list is open
 FT101 P +error | {subject}
   {subject} never fires: {...}
 FT101 BD -info | {1}

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 
+from fuzzytree.auditing.deciding import _won as won
 from fuzzytree.auditing.deciding import answers
 from fuzzytree.auditing.records import Answer, Policy, Settings
 from fuzzytree.auditing.subject import Subject
 from fuzzytree.proving.clock import Clock
 from fuzzytree.proving.domain import Domain, Side
+from fuzzytree.proving.ground import ground
 from fuzzytree.proving.states import Bracket, Declined, Proved, Witness
 from fuzzytree.rulebase import (
     Clause,
@@ -155,6 +157,21 @@ def test_where_all_rules_take_part_only_firing_is_asked() -> None:
 def _subject(base: RuleBase, clock: Clock) -> Subject:
     return Subject(
         base, Policy("min", "strongest"), unit_domain(base), Settings(), clock
+    )
+
+
+def test_where_a_place_in_the_list_may_decide_a_rule_is_no_error() -> None:
+    base = _base(("low high", "a"), ("low high", "b"), ("high low", "c"))
+    for clock, says in (
+        (Clock(9.0), "rule 1 decides by its place in the list alone: "),
+        (Clock(1.0, now=itertools.count().__next__), "rule 1 never wins: "),
+    ):
+        given = ground(base, unit_domain(base))
+        found = won(_subject(base, clock), given, 1, Proved("never above rule 2"))
+        assert found.sentence.startswith(says)
+        assert (found.is_finding, found.severity) == (True, "warning")
+    assert found.sentence.endswith(
+        "whether it decides by its place in the list is open"
     )
 
 
