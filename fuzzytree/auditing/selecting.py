@@ -51,7 +51,7 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
     for text in ignore:
         if text.startswith("FTD"):
             raise ValueError(
-                f"{text} cannot be left out: it tells what was not asked, and why"
+                f"the code {text!r} cannot be left out: it tells what was not asked"
             )
     taken = tuple(select) or ("FT",)
     found = {
