@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib
-import importlib.metadata
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -13,6 +12,7 @@ from typing import Final, NamedTuple, cast
 
 import msgspec
 
+from fuzzytree.agreement import version
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.domains import domain_of, inputs_of
 from fuzzytree.auditing.limits import LIMITS, digest_of
@@ -143,7 +143,7 @@ def audit(
     )
     ids = {one.id for one in answers if one.is_finding}
     found = Audit(
-        version=_version(),
+        version=version(),
         model=model.name,
         form=_form(model),
         fingerprint=fingerprint(model),
@@ -353,10 +353,3 @@ def _form(model: Document) -> str:
             return f"{kind} rules" if kind else "rules"
         case _:
             return "system"
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version("fuzzytree-toolkit")
-    except importlib.metadata.PackageNotFoundError:
-        return "uninstalled"

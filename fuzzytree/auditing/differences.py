@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from fuzzytree.agreement import version
 from fuzzytree.auditing.audit import source_of
 from fuzzytree.auditing.decisions import Pair, all_inputs, decisions, union
 from fuzzytree.auditing.difference_records import Change, Compared, Difference
@@ -170,7 +170,7 @@ def difference(
         for model, file in zip(both, files, strict=True)
     )
     return Difference(
-        importlib.metadata.version("fuzzytree-toolkit"),
+        version(),
         one,
         other,
         data,

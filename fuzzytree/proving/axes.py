@@ -178,7 +178,7 @@ def _ranks(
     Where a curve meets 0 is a place, so it is 0 in all of a cell or nowhere in it.
     """
     ends = [(a[1], b[0]) for a, b in itertools.pairwise(zones)]
-    points = [_between(a, b) for a, b in ends]
+    points = [between(a, b) for a, b in ends]
     near = np.array([float(point) for point in points])
     # A point that is no double may be on the other side of a place than the nearest.
     is_double = np.array(
@@ -217,7 +217,7 @@ def _zeros_at(
     return is_zero
 
 
-def _between(low: Fraction, high: Fraction) -> Fraction:
+def between(low: Fraction, high: Fraction) -> Fraction:
     """Return a point between two others, a double if there is one."""
     middle = (low + high) / 2
     near = Fraction(float(middle))

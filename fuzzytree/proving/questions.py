@@ -20,6 +20,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from fuzzytree.numerics.exact import outwards
+from fuzzytree.proving.axes import between
 from fuzzytree.proving.boxes import region_around
 from fuzzytree.proving.choices import choices, parts_of, union
 from fuzzytree.proving.clock import Clock, OutOfTimeError
@@ -215,7 +216,7 @@ class _Search:
         levels: tuple[Fraction, Fraction],
         chosen: Sequence[int],
     ) -> Witness | None:
-        level = _between(*levels)
+        level = between(*levels)
         wanted: dict[int, Stretch] = {}
         left = contest.full
         # Axes that leave many rivals below come first: few axes then matter.
@@ -370,10 +371,3 @@ class _Search:
             whole = {axis: part for axis, part in found.items() if part is not None}
             if len(whole) == len(found):
                 yield wanted | whole
-
-
-def _between(low: Fraction, high: Fraction) -> Fraction:
-    """Return a level between two, a double if there is one."""
-    middle = (low + high) / 2
-    near = Fraction(float(middle))
-    return near if low < near < high else middle
