@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from fuzzytree.answers import Answers
     from fuzzytree.errors import FuzzyTreeError
     from fuzzytree.estimator import FuzzyTreeClassifier
-    from fuzzytree.lowering import rules_from_tree
     from fuzzytree.outputs import Outputs
     from fuzzytree.readers.sklearn import from_sklearn
     from fuzzytree.rulebase import RuleBase
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
         learn,
         load,
         read,
+        rules_from_tree,
         run,
         save,
         stability,
@@ -85,7 +85,7 @@ _HOMES = {
     "learn": "fuzzytree.verbs",
     "load": "fuzzytree.verbs",
     "read": "fuzzytree.verbs",
-    "rules_from_tree": "fuzzytree.lowering",
+    "rules_from_tree": "fuzzytree.verbs",
     "run": "fuzzytree.verbs",
     "save": "fuzzytree.verbs",
     "stability": "fuzzytree.verbs",

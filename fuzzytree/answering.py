@@ -11,8 +11,16 @@ import msgspec
 import numpy as np
 
 from fuzzytree.answers import Answers, answers_of, joined
-from fuzzytree.contracts import Document, Model, Run, Runtime, SystemOutcome
-from fuzzytree.converting import CALLED, carrier_of, load
+from fuzzytree.contracts import (
+    Document,
+    Fitted,
+    Model,
+    ModelSource,
+    Run,
+    Runtime,
+    SystemOutcome,
+)
+from fuzzytree.converting import CALLED, as_model, carrier_of
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.files import read_bounded
 from fuzzytree.outputs import Outputs, joined_outputs
@@ -25,7 +33,7 @@ from fuzzytree.tables import Batch, batches
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
 
-Carried = Document | OnnxModel | bytes | str | os.PathLike[str]
+Carried = ModelSource | OnnxModel | bytes
 """A model, an ONNX file opened or as bytes, or the path of a file of either."""
 
 _BLOCK = 1 << 16  # rows answered at a time
@@ -49,9 +57,11 @@ def opened(source: Carried, *, allow_loss: bool = False) -> Document | OnnxModel
         case str() | os.PathLike():
             if Path(source).suffix.lower() == ".onnx":
                 return open_onnx(read_bounded(source), os.fspath(source))
-            return load(source, allow_loss=allow_loss)
-        case _:
+            return as_model(source, allow_loss=allow_loss)
+        case OnnxModel():
             return source
+        case _:
+            return as_model(source)
 
 
 @overload
@@ -68,7 +78,7 @@ def run(
 
 @overload
 def run(
-    model: Model,
+    model: Model | Fitted,
     table: object,
     *,
     runtime: str | None = None,

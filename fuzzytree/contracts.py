@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -23,6 +24,18 @@ Model = FuzzyTree | RuleBase
 
 Document = FuzzyTree | RuleBase | FuzzySystem
 """What a file can hold."""
+
+
+class Fitted(Protocol):
+    """A fitted classifier that can say which tree it predicts with."""
+
+    def __fuzzytree__(self) -> FuzzyTree:
+        """Return the tree, or raise what scikit-learn raises where none is fitted."""
+        ...
+
+
+ModelSource = Document | Fitted | str | os.PathLike[str]
+"""What public functions take as a model; `fuzzytree.converting.as_model` reads it."""
 
 Carrier = Literal["tree", "rules", "system"]
 Dtype = Literal["float64", "mixed", "float32"]

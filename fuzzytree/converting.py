@@ -17,6 +17,7 @@ from fuzzytree.contracts import (
     Format,
     Loss,
     Model,
+    ModelSource,
     Reading,
     Written,
 )
@@ -28,6 +29,7 @@ from fuzzytree.losses import loss_text
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.options import Option, check_options
 from fuzzytree.probing import probes
+from fuzzytree.readers.sklearn import from_sklearn
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase
 from fuzzytree.system import FuzzySystem
@@ -188,6 +190,46 @@ def load_content(content: bytes, name: str, *, allow_loss: bool = False) -> Docu
     """
     found = read_content(content, format_of(name), name=name)
     return _whole(found, name, allow_loss=allow_loss)
+
+
+def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
+    """Return the model of whatever a public function was called with.
+
+    Args:
+        source: A tree, a rule base or a fuzzy system; a fitted `FuzzyTreeClassifier`
+            or `DecisionTreeClassifier`; a system of scikit-fuzzy or simpful; or the
+            path of a file.
+        allow_loss: As in `load`.
+
+    Raises:
+        TypeError: If it is something else.
+        NotFittedError: If it is a classifier that is not fitted.
+        ReadError: If a file cannot be read, or an object of another library holds what
+            no model can.
+        LossError: As `load`.
+    """
+    if isinstance(source, FuzzyTree | RuleBase | FuzzySystem):
+        return source
+    if isinstance(source, str | os.PathLike):
+        return load(source, allow_loss=allow_loss)
+    if hasattr(source, "__fuzzytree__") and not isinstance(source, type):
+        return source.__fuzzytree__()
+    for parent in type(source).__mro__:
+        reader = _OBJECT_READERS.get((parent.__module__, parent.__name__))
+        if reader is not None:
+            return reader(source)
+    raise TypeError(
+        "a model is a FuzzyTree, a RuleBase, a FuzzySystem, a fitted "
+        "FuzzyTreeClassifier or DecisionTreeClassifier, a ControlSystem of "
+        "scikit-fuzzy, a FuzzySystem of simpful, or the path of a file, and not "
+        f"a value of type {type(source).__name__}"
+    )
+
+
+_OBJECT_READERS: dict[tuple[str, str], Callable[[object], Document]] = {
+    ("sklearn.tree._classes", "DecisionTreeClassifier"): from_sklearn,
+}
+"""The module and name of a class of another library, and what reads its objects."""
 
 
 def _whole(found: Reading, name: str, *, allow_loss: bool) -> Document:
@@ -371,12 +413,16 @@ def _refuse_remaking(
 
 
 def export(
-    model: Document, to: str = "yaml", *, allow_loss: bool = False, **options: Option
+    model: ModelSource,
+    to: str = "yaml",
+    *,
+    allow_loss: bool = False,
+    **options: Option,
 ) -> Written:
     """Write a model in a format, as bytes.
 
     Args:
-        model: A tree, a rule base or a fuzzy system.
+        model: A tree, a rule base or a fuzzy system; see `as_model`.
         to: The name of a format, or a suffix such as `.onnx`.
         allow_loss: Whether to write what the format cannot hold as near as it can.
         options: The writer's own options, such as `dtype` for onnx.
@@ -389,6 +435,7 @@ def export(
         MissingExtraError: If a package is missing; the message names the extra.
         ValueError: If there is no such format or option.
     """
+    model = as_model(model, allow_loss=allow_loss)
     form = find_format(to)
     carrier = carrier_of(model)
     if carrier not in form.carries:
@@ -509,7 +556,7 @@ def _exact(model: Document, origin: str) -> Certificate | None:
 
 
 def convert(
-    source: str | os.PathLike[str] | Document | Reading,
+    source: ModelSource | Reading,
     to: str,
     *,
     format: str | None = None,
@@ -522,7 +569,7 @@ def convert(
     """Bring a model from one format to another, and prove what arrived.
 
     Args:
-        source: The path of a file, a model, or what was read.
+        source: The path of a file, a model as in `as_model`, or what was read.
         to: The name of a format, or a suffix such as `.fll`.
         format: Of the file; the one of its suffix unless given.
         allow_loss: Whether to read and write what has no place as near as it can.
@@ -554,7 +601,7 @@ def convert(
         name = os.fspath(source)
         read_as = (find_format(format) if format else format_of(source)).name
     else:
-        found = Reading(source)
+        found = Reading(as_model(source))
     name = name or found.model.name
     if found.losses and not allow_loss:
         raise LossError(losses_text(found.losses, name))

@@ -220,6 +220,15 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         shares[winner, rows] = highest
         return np.ascontiguousarray(shares.T)
 
+    def __fuzzytree__(self) -> FuzzyTree:
+        """Return the tree, so that every function of fuzzytree takes the classifier.
+
+        Raises:
+            NotFittedError: If the classifier is not fitted.
+        """
+        check_is_fitted(self, "tree_")
+        return self.tree_
+
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what is prepared from the tree."""
         state: Any = super().__getstate__()

@@ -12,12 +12,16 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
+from fuzzytree import lowering
 from fuzzytree.agreement import Agreement
 from fuzzytree.answering import Answering, Carried, answering, opened, run
 from fuzzytree.casting import as_rules, as_system
-from fuzzytree.contracts import Document, Dtype, Model, Written
+from fuzzytree.contracts import Document, Dtype, Model, ModelSource, Written
 from fuzzytree.converting import (
+    CALLED,
     Conversion,
+    as_model,
+    carrier_of,
     convert,
     deciding,
     export,
@@ -31,7 +35,7 @@ from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import read_bounded, reason, write_atomically
 from fuzzytree.options import Option
-from fuzzytree.rulebase import RuleBase, name_choice
+from fuzzytree.rulebase import Conjunction, Kind, RuleBase, name_choice
 from fuzzytree.runtimes import chosen_runtimes
 from fuzzytree.runtimes.onnxruntime import OnnxModel
 from fuzzytree.system import FuzzySystem
@@ -72,6 +76,7 @@ __all__ = [
     "opened",
     "read",
     "rows_of",
+    "rules_from_tree",
     "run",
     "save",
     "stability",
@@ -215,8 +220,38 @@ def _name_of(table: object) -> str:
     return "tree"
 
 
+def rules_from_tree(
+    tree: ModelSource,
+    kind: Kind = "relative",
+    *,
+    conjunction: Conjunction | None = None,
+) -> RuleBase:
+    """Turn each path of a tree into a rule, in the order of the leaves.
+
+    Args:
+        tree: A tree, a fitted classifier, or the path of a file that holds a tree.
+        kind: `relative` for rules that equal the tree on every input; `raw` for the
+            paper's rules, whose terms are the fitted sets as they are.
+        conjunction: The AND of the rules; the tree's own unless given.
+
+    Returns:
+        A rule base whose rule k is leaf k, with the variables that the nodes use.
+
+    Raises:
+        TypeError: If it is no tree.
+        InvalidModelError: If `kind` is `raw` and the tree carries no sets.
+    """
+    found = as_model(tree)
+    if not isinstance(found, FuzzyTree):
+        raise TypeError(
+            f"rules_from_tree takes a tree, and {found.name} is a "
+            f"{CALLED[carrier_of(found)]}"
+        )
+    return lowering.rules_from_tree(found, kind, conjunction=conjunction)
+
+
 def save(
-    model: Document,
+    model: ModelSource,
     path: str | os.PathLike[str],
     *,
     to: str | None = None,
@@ -298,7 +333,7 @@ def _rows(
 
 
 def check(
-    model: Document | str | os.PathLike[str],
+    model: ModelSource,
     *others: Carried,
     data: object = None,
     columns: Sequence[str] | None = None,
@@ -333,7 +368,7 @@ def check(
         >>> check(random_tree(1), runtimes=["native"], limit=100).ok
         True
     """
-    first = _loaded(model, allow_loss=allow_loss)
+    first = as_model(model, allow_loss=allow_loss)
     titles = [
         names[k] if k < len(names) else _title(other, k)
         for k, other in enumerate(others)
@@ -394,7 +429,7 @@ def _as_deciding(model: Document | OnnxModel, title: str) -> Model | OnnxModel:
 
 
 def certify(
-    model: Model | str | os.PathLike[str],
+    model: ModelSource,
     dtype: Dtype = "float64",
     *,
     data: object = None,
@@ -429,7 +464,7 @@ def certify(
 
 
 def bench(
-    model: Model | str | os.PathLike[str],
+    model: ModelSource,
     *,
     data: object = None,
     columns: Sequence[str] | None = None,
@@ -491,16 +526,8 @@ def bench(
     )
 
 
-def _model_of(model: Document | str | os.PathLike[str], verb: str) -> Model:
-    return deciding(_loaded(model), verb)
-
-
-def _loaded(
-    model: Document | str | os.PathLike[str], *, allow_loss: bool = False
-) -> Document:
-    if isinstance(model, str | os.PathLike):
-        return load(model, allow_loss=allow_loss)
-    return model
+def _model_of(model: ModelSource, verb: str) -> Model:
+    return deciding(as_model(model), verb)
 
 
 def _data_name(data: object) -> str:
@@ -510,7 +537,7 @@ def _data_name(data: object) -> str:
 
 
 def audit(
-    model: Document | str | os.PathLike[str] | Material,
+    model: ModelSource | Material,
     *,
     data: object = None,
     target: str | None = None,
@@ -615,7 +642,7 @@ def audit(
 
 
 def material(
-    model: Document | str | os.PathLike[str],
+    model: ModelSource,
     *,
     data: object = None,
     target: str | None = None,
@@ -649,6 +676,8 @@ def material(
     if isinstance(model, str | os.PathLike):
         file = model_file(os.fspath(model), _bytes_of(model))
         model = load_content(file.content, file.name, allow_loss=allow_loss)
+    else:
+        model = as_model(model)
     given = read_results(results, model)
     name = os.fspath(data) if isinstance(data, str | os.PathLike) else None
     if name is not None and stat.S_ISFIFO(_mode(name)):
@@ -756,8 +785,8 @@ def audited_rows(
 
 
 def diff(
-    old: Document | str | os.PathLike[str],
-    new: Document | str | os.PathLike[str],
+    old: ModelSource,
+    new: ModelSource,
     *,
     data: object = None,
     columns: Sequence[str] | None = None,
@@ -817,7 +846,7 @@ def diff(
             models.append(load_content(file.content, file.name, allow_loss=allow_loss))
         else:
             files.append(None)
-            models.append(model)
+            models.append(as_model(model))
     first, second = models
     titles = [f.name if f else m.name for f, m in zip(files, models, strict=True)]
     refuse_strangers(first, second, (titles[0], titles[1]))
@@ -845,7 +874,7 @@ def diff(
 
 
 def stability(
-    model: Model | str | os.PathLike[str],
+    model: ModelSource,
     *,
     data: object = None,
     columns: Sequence[str] | None = None,

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -11,6 +14,9 @@ import pandas as pd
 import polars as pl
 import pyarrow as pa
 import pytest
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.tree import DecisionTreeClassifier
 
 import fuzzytree as ft
 from fuzzytree import answering
@@ -58,6 +64,76 @@ def test_the_lines_of_the_readme_run(
     onnx = ft.export(rules, "onnx").content
     found = ft.check(tree, rules, onnx, data=table, runtimes=["native"], limit=500)
     found.raise_if_not_ok()
+
+
+FITTED = ft.FuzzyTreeClassifier().fit(FEW, KINDS)
+VERBS: dict[str, Callable[[Any], object]] = {
+    "audit": lambda model: ft.audit(model, select=["FT501"]).model,
+    "bench": lambda model: (
+        ft.bench(model, rows=[9], only=["native"], budget_s=1).fingerprint
+    ),
+    "certify": lambda model: ft.certify(model).sentence,
+    "check": lambda model: (
+        ft.check(FITTED.tree_, model, runtimes=["native"], limit=99).comparisons
+    ),
+    "check first": lambda model: (
+        ft.check(model, runtimes=["native"], limit=99).comparisons
+    ),
+    "convert": lambda model: ft.convert(model, "fcl", allow_loss=True).written,
+    "diff": lambda model: ft.diff(model, model).verdict,
+    "export": lambda model: ft.export(model, "onnx").content,
+    "rules_from_tree": ft.rules_from_tree,
+    "run": lambda model: ft.run(model, FEW).classes,
+    "save": lambda model: ft.save(model, os.devnull, to="yaml").content,
+    "stability": lambda model: ft.stability(model, runtimes=["native"], only=["N3"]).ok,
+}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_takes_a_fitted_classifier_as_its_tree(verb: str) -> None:
+    assert VERBS[verb](FITTED) == VERBS[verb](FITTED.tree_)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_refuses_a_classifier_that_is_not_fitted(verb: str) -> None:
+    with pytest.raises(NotFittedError) as caught:
+        VERBS[verb](clone(FITTED))
+    assert str(caught.value) == (
+        "This FuzzyTreeClassifier instance is not fitted yet. Call 'fit' with "
+        "appropriate arguments before using this estimator."
+    )
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_refuses_what_is_no_model_with_one_sentence(verb: str) -> None:
+    with pytest.raises(TypeError) as caught:
+        VERBS[verb]([FITTED])
+    assert str(caught.value) == (
+        "a model is a FuzzyTree, a RuleBase, a FuzzySystem, a fitted "
+        "FuzzyTreeClassifier or DecisionTreeClassifier, a ControlSystem of "
+        "scikit-fuzzy, a FuzzySystem of simpful, or the path of a file, and not "
+        "a value of type list"
+    )
+
+
+def test_a_verb_takes_a_fitted_decision_tree_of_scikit_learn() -> None:
+    grown = DecisionTreeClassifier().fit(FEW, KINDS)
+    assert ft.run(grown, FEW).classes == KINDS
+    assert ft.export(grown) == ft.export(ft.from_sklearn(grown))
+
+
+def test_export_takes_the_path_of_a_file(tmp_path: Path) -> None:
+    ft.save(TREE, tmp_path / "tree.yaml")
+    assert ft.export(tmp_path / "tree.yaml", "onnx") == ft.export(TREE, "onnx")
+
+
+def test_rules_are_refused_where_a_tree_is_needed() -> None:
+    rules = ft.rules_from_tree(TREE)
+    with pytest.raises(TypeError) as caught:
+        ft.rules_from_tree(rules)
+    assert str(caught.value) == (
+        f"rules_from_tree takes a tree, and {rules.name} is a rule base"
+    )
 
 
 def test_learn_offers_every_setting_with_its_default() -> None:
