@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shlex
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -224,7 +225,9 @@ def carry(
         say(f"remark   {remark}", quiet=quiet)
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
-    after = _next(source, output, form, has_loss=bool(found.losses))
+    after = next_check((source, read_as), (output, form.name))
+    if after and found.losses:
+        after += " --allow-loss"
     if carrier_of(model) == "system" != carrier_of(found.model):
         after = ""  # numbers are not compared with classes
     shows = " (shows what the losses change)" if written.losses else ""
@@ -295,9 +298,21 @@ def _certificate_facts(found: Certificate | None) -> dict[str, object] | None:
     return {"sentence": found.sentence, **msgspec.structs.asdict(found)}
 
 
-def _next(source: str, output: str, form: Format, *, has_loss: bool) -> str:
-    """Return the command that one might run after this one."""
-    if "-" in (source, output) or (form.read is None and form.name != "onnx"):
-        return ""
-    words = ["fuzzytree", "check", source, output]
-    return shlex.join([*words, "--allow-loss"] if has_loss else words)
+def next_check(*files: tuple[str, str], more: Sequence[str] = ()) -> str:
+    """Return the command that checks a model and what is made of it.
+
+    It is empty if `check` cannot read one of them, for then the command would fail.
+
+    Args:
+        files: Each with the name of its format; the first holds the model.
+        more: What the command says behind the files.
+    """
+    from fuzzytree.exporters import find_format
+
+    for number, (path, form) in enumerate(files):
+        found = find_format(form)
+        is_readable = found.read is not None or (number > 0 and form == "onnx")
+        suffix = Path(path).suffix.lower()
+        if path == "-" or not is_readable or suffix not in found.suffixes:
+            return ""
+    return shlex.join(["fuzzytree", "check", *(path for path, _ in files), *more])

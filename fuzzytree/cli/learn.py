@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-import shlex
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -18,6 +17,7 @@ from fuzzytree.cli.carriers import (
     terms_option,
     wanted_format,
 )
+from fuzzytree.cli.convert import next_check
 from fuzzytree.cli.talk import (
     answer_bytes,
     answer_json,
@@ -29,8 +29,8 @@ from fuzzytree.cli.talk import (
     table_source,
     wrong_options,
 )
-from fuzzytree.contracts import Carrier
-from fuzzytree.files import check_place, write_atomically
+from fuzzytree.contracts import Carrier, Document, Format
+from fuzzytree.files import check_place, read_bounded, write_atomically
 from fuzzytree.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
@@ -145,6 +145,9 @@ def command(
 ) -> None:
     """Learn a fuzzy tree from TABLE and write it to FILE.
 
+    Beside a program or a graph, which no verb reads as a model, the model itself is
+    written as YAML, unless a file of that name is there already.
+
     TABLE is CSV or Parquet, or `-` for standard input. The accuracy that is told is
     that of trees learnt without the rows that they are tested on.
     """
@@ -155,6 +158,7 @@ def command(
     form = wanted_format(output, None)
     if output != "-":
         check_place(output)
+        check_place(_model_file(output, form))
     settings, units_of = _settings(chosen), dict(_pairs("--unit", units))
     found = read_table(
         table_source(table),
@@ -187,11 +191,43 @@ def command(
         answer_bytes(content)
         return
     write_atomically(output, content)
-    data = [] if table == "-" else ["--data", table]
-    after = shlex.join(["fuzzytree", "check", output, *data])
-    tell_rows(("wrote", output, f"next: {after}"))
+    rest = [] if table == "-" else ["--data", table]
+    rest += ["--delimiter", delimiter] if rest and delimiter else []
+    tell_rows(*_written_rows(model, output, form, rest))
     if as_json:
         answer_json(_facts(found, learnt, tested, output))
+
+
+def _model_file(output: str, form: Format) -> str:
+    """Return the file that holds the model: a YAML file beside what is not read."""
+    return output if form.read else str(Path(output).with_suffix(".yaml"))
+
+
+def _written_rows(
+    model: Document, output: str, form: Format, rest: Sequence[str]
+) -> Iterator[tuple[str, str, str]]:
+    """Yield lines about the files and the next step; write the model if it has none.
+
+    Args:
+        model: What was written.
+        output: The file that it was written to.
+        form: The format of that file.
+        rest: What the next step says behind the files.
+    """
+    from fuzzytree.verbs import export
+
+    files = [(_model_file(output, form), "yaml"), (output, form.name)]
+    if form.read:
+        yield "wrote", output, f"next: {next_check(files[1], more=rest)}"
+        return
+    yield "wrote", output, ""
+    beside, content = files[0][0], export(model, "yaml").content
+    if Path(beside).exists() and read_bounded(beside) != content:
+        yield "kept", beside, "it is there already, and holds another model"
+        return
+    write_atomically(beside, content)
+    after = next_check(*files, more=rest) or next_check(files[0], more=rest)
+    yield "wrote", beside, f"the model; next: {after}"
 
 
 def _settings(chosen: Mapping[str, object]) -> Settings:

@@ -73,6 +73,7 @@ def command(
     from pathlib import Path
 
     from fuzzytree import savings, verbs
+    from fuzzytree.cli.convert import next_check
     from fuzzytree.converting import deciding
     from fuzzytree.exporters import find_format
     from fuzzytree.pruning import pruned
@@ -106,12 +107,12 @@ def command(
         return 1
     if output is not None:
         verbs.save(found.model, output)
-        say_rows(("wrote", output, _next(model, output, found.is_same)), quiet=quiet)
+        after = f"not for all rows the answers of {model}"
+        if found.is_same:
+            files = [
+                (one, find_format(Path(one).suffix).name) for one in (model, output)
+            ]
+            check = next_check(*files)
+            after = f"next: {check}" if check else ""
+        say_rows(("wrote", output, after), quiet=quiet)
     return 0
-
-
-def _next(model: str, output: str, is_same: bool) -> str:
-    import shlex
-
-    check = shlex.join(["fuzzytree", "check", model, output])
-    return f"next: {check}" if is_same else f"not for all rows the answers of {model}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 import sys
 import threading
 import time
@@ -254,7 +255,7 @@ def _tell(
         ),
         ("counted", ", ".join(f"{name} {count}" for name, count in facts), ""),
         ("at risk", f"{risk} at most, if the power had failed", ""),
-        ("next", f"fuzzytree tactile replay {output}", ""),
+        ("next", shlex.join(["fuzzytree", "tactile", "replay", output]), ""),
         quiet=quiet,
     )
 
