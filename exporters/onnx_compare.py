@@ -1,35 +1,57 @@
 """Is a shipped file the one that would be written now?
 
 A graph that equals a fresh one to the last bit is the same function on every input:
-no row has to be run to know it.
+no row has to be run to know it. What a file says of itself only chooses the options of
+the fresh graph, among those that `write` knows; the two are always compared.
 """
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections import Counter
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
 from fuzzytree.contracts import Model
+from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write
 from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
+from fuzzytree.rulebase import fingerprint
 from fuzzytree.system import FuzzySystem
 
 if TYPE_CHECKING:
     import onnx
 
+_VERSION = "fuzzytree.version"
+_FINGERPRINT = "fuzzytree.fingerprint"
+_NUMBERED = (
+    ("node", "node"),
+    ("initializer", "constant"),
+    ("input", "input"),
+    ("output", "output"),
+)
+_SHOWN = 4  # numbers of a constant
+_LONGEST = 60  # characters of a text
 
-def graph_difference(content: bytes, model: Model | FuzzySystem) -> str | None:
-    """Return how a file's graph differs from a fresh one; None if they are equal.
 
-    The fresh graph is written with the options that the file itself states. Metadata
-    and texts are not compared.
+class Differences(NamedTuple):
+    """How a file differs from a freshly written one, in sentences.
+
+    Attributes:
+        graph: Operators, constants, wiring and texts.
+        metadata: What the file states about itself; its version may be any.
+    """
+
+    graph: tuple[str, ...]
+    metadata: tuple[str, ...]
+
+
+def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
+    """Return how a file differs from one that is written of a model now.
 
     Args:
         content: An ONNX file that fuzzytree wrote (`open_onnx` accepts it).
-        model: The model that it should hold.
-
-    Raises:
-        ValueError: If the file states an option that this version does not know.
+        model: The model that it should contain.
     """
     import onnx
 
@@ -38,40 +60,146 @@ def graph_difference(content: bytes, model: Model | FuzzySystem) -> str | None:
     versions = {entry.domain: entry.version for entry in found.opset_import}
     columns = json.loads(facts["columns"])
     needed = model.columns if isinstance(model, FuzzySystem) else model.inputs
-    fresh = write(
-        model,
-        allow_loss=True,
-        dtype=facts["dtype"],
-        opset=versions.get("", 0),
-        ir=found.ir_version,
-        signature="needed" if columns == list(needed) else "all",
-        outputs=json.loads(facts["outputs"]),
-        readable=DOMAIN in versions,
-        plain=facts["carrier"] == "tree" and TREES not in versions,
-        verify=False,
-    )
-    return proto_difference(onnx.load_model_from_string(fresh.content), found)
+    try:
+        fresh = write(
+            model,
+            allow_loss=True,
+            dtype=facts["dtype"],
+            opset=versions.get("", 0),
+            ir=found.ir_version,
+            signature="needed" if columns == list(needed) else "all",
+            outputs=json.loads(facts["outputs"]),
+            readable=DOMAIN in versions,
+            plain=facts["carrier"] == "tree" and TREES not in versions,
+            verify=False,
+        )
+    except (ValueError, LossError) as error:  # it states what is not written now
+        stated, right = facts["fingerprint"], fingerprint(model)
+        faults = [] if stated == right else [_stated(_FINGERPRINT, stated, right)]
+        return Differences((str(error),), tuple(faults))
+    return proto_differences(onnx.load_model_from_string(fresh.content), found)
 
 
-def proto_difference(fresh: onnx.ModelProto, found: onnx.ModelProto) -> str | None:
-    """Return how a file differs from a fresh one, metadata and texts left out."""
-    for what, one, two in (
-        ("node", fresh.graph.node, found.graph.node),
-        ("constant", fresh.graph.initializer, found.graph.initializer),
-        ("input", fresh.graph.input, found.graph.input),
-        ("output", fresh.graph.output, found.graph.output),
-        ("function", fresh.functions, found.functions),
-        ("operator set", fresh.opset_import, found.opset_import),
-    ):
+def proto_differences(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Differences:
+    """Return how a file differs from a fresh one in graph and metadata."""
+    return Differences(tuple(_graph(fresh, found)), tuple(_metadata(fresh, found)))
+
+
+def _graph(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
+    faults = [*_operators(fresh, found), *_constants(fresh, found)]
+    faults += _parts(fresh, found, ("graph", "metadata_props", "producer_version"))
+    lists = tuple(field for field, _ in _NUMBERED)
+    faults += _parts(fresh.graph, found.graph, lists)
+    yield from faults
+    for field, what in () if faults else _NUMBERED:
+        one, two = getattr(fresh.graph, field), getattr(found.graph, field)
         if len(one) != len(two):
-            return f"{len(two)} {what}s where {len(one)} are right"
-        for number, (right, entry) in enumerate(zip(one, two, strict=True), 1):
+            yield f"{len(two)} {what}s where {len(one)} are right"
+        for number, (right, entry) in enumerate(zip(one, two, strict=False), 1):
             if _bytes(right) != _bytes(entry):
                 name = getattr(entry, "name", "") or str(number)
-                return f"{what} {name} differs from the one that would be written"
-    return None
+                yield f"{what} {name!r} differs from the one that would be written"
+                break
 
 
-def _bytes(message: onnx.NodeProto) -> bytes:
+def _operators(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
+    """Yield the operators that do not occur as often as in a fresh graph.
+
+    Those that occur more often are listed with the results of the nodes that are new.
+    """
+    right, stated = _nodes(fresh), _nodes(found)
+    for name in sorted(right.keys() | stated.keys()):
+        one, two = right.get(name, []), stated.get(name, [])
+        if len(one) == len(two):
+            continue
+        text = f"operator {name!r}: {len(two)} nodes where {len(one)} are right"
+        known = {_bytes(node) for node in one}
+        new = [node for node in two if _bytes(node) not in known]
+        shown = ", ".join(repr(", ".join(node.output)) for node in new[:_SHOWN])
+        yield f"{text}; new: {shown}" if len(two) > len(one) else text
+
+
+def _nodes(proto: onnx.ModelProto) -> dict[str, list[onnx.NodeProto]]:
+    """Return the nodes of each operator, those of functions too."""
+    nodes: dict[str, list[onnx.NodeProto]] = {}
+    for body in (proto.graph.node, *(function.node for function in proto.functions)):
+        for node in body:
+            name = f"{node.domain}.{node.op_type}" if node.domain else node.op_type
+            nodes.setdefault(name, []).append(node)
+    return nodes
+
+
+def _constants(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
+    """Yield the constants whose numbers no constant of a fresh graph has left over."""
+    from onnx import numpy_helper
+
+    left = Counter(_bytes(_unnamed(one)) for one in fresh.graph.initializer)
+    for tensor in found.graph.initializer:
+        key = _bytes(_unnamed(tensor))
+        left[key] -= 1
+        if left[key] < 0:
+            try:
+                numbers = numpy_helper.to_array(tensor).reshape(-1)
+            except (ValueError, TypeError) as error:
+                yield f"constant {tensor.name!r} cannot be decoded: {error}"
+                continue
+            texts = [_short(one) for one in numbers[:_SHOWN].tolist()]
+            texts += ["..."] if len(numbers) > _SHOWN else []
+            yield f"constant {tensor.name!r} is not the model's: {', '.join(texts)}"
+
+
+def _unnamed(tensor: onnx.TensorProto) -> onnx.TensorProto:
+    import onnx
+
+    copy = onnx.TensorProto()
+    copy.CopyFrom(tensor)
+    copy.ClearField("name")
+    return copy
+
+
+def _parts(
+    fresh: onnx.ModelProto | onnx.GraphProto,
+    found: onnx.ModelProto | onnx.GraphProto,
+    without: tuple[str, ...],
+) -> Iterator[str]:
+    """Yield the fields that differ, of those without which a graph could lie."""
+    for field in fresh.DESCRIPTOR.fields:
+        if field.name not in without:
+            one, two = getattr(fresh, field.name), getattr(found, field.name)
+            if one != two:
+                yield f"its {field.name} differs from the one that would be written"
+
+
+def _metadata(fresh: onnx.ModelProto, found: onnx.ModelProto) -> Iterator[str]:
+    right = {entry.key: entry.value for entry in fresh.metadata_props}
+    stated: dict[str, str] = {}
+    for entry in found.metadata_props:
+        if entry.key in stated:
+            yield f"it states {entry.key!r} twice"
+        stated[entry.key] = entry.value
+    for key in dict.fromkeys([_FINGERPRINT, *right, *stated]):
+        if key == _VERSION or stated.get(key) == right.get(key):
+            continue
+        if key not in right:
+            yield f"it states {key!r}, which is not written"
+        elif key not in stated:
+            yield f"it does not state {key!r}"
+        else:
+            yield _stated(key, stated[key], right[key])
+
+
+def _stated(key: str, stated: str, right: str) -> str:
+    if key == _FINGERPRINT:
+        return f"it states fingerprint {stated[:12]}..., and {right[:12]}... is right"
+    name = key.removeprefix("fuzzytree.")
+    return f"it states {name} {_short(stated)}, and {_short(right)} is right"
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def _bytes(message: onnx.NodeProto | onnx.TensorProto) -> bytes:
     content: bytes = message.SerializeToString(deterministic=True)
     return content

@@ -9,7 +9,8 @@ import msgspec
 from fuzzytree.errors import DisagreementError
 
 Basis = Literal["file", "proof", "all cells", "rows", "calls"]
-Verdict = Literal["agrees", "DISAGREES", "differs by design"]
+Verdict = Literal["agrees", "rows only", "DISAGREES", "differs by design"]
+"""`rows only`: the rows agree, and the content is not what this version writes."""
 
 
 def version() -> str:
@@ -124,6 +125,7 @@ class Agreement(msgspec.Struct, frozen=True):
         cells: The number of cells of the tree, or None for a rule base.
         probes: How many of the rows are probes; the others are data.
         certificates: What each number type that was run can change, and did.
+        rows_only: Whether the verdict `rows only` is accepted.
     """
 
     FORMAT: ClassVar[str] = "fuzzytree-check/1"
@@ -136,11 +138,19 @@ class Agreement(msgspec.Struct, frozen=True):
     cells: int | None = None
     probes: int = 0
     certificates: tuple[Certified, ...] = ()
+    rows_only: bool = False
 
     @property
     def ok(self) -> bool:
-        """Whether nothing disagrees."""
-        return not self._wrong()
+        """Whether nothing disagrees, and content agrees unless rows are enough."""
+        return not self.wrong
+
+    @property
+    def wrong(self) -> tuple[Comparison | Certified, ...]:
+        """What makes `ok` false."""
+        bad = ("DISAGREES",) if self.rows_only else ("DISAGREES", "rows only")
+        every = (*self.comparisons, *self.certificates)
+        return tuple(one for one in every if one.verdict in bad)
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""
@@ -150,16 +160,15 @@ class Agreement(msgspec.Struct, frozen=True):
 
     def raise_if_not_ok(self) -> None:
         """Raise DisagreementError, naming what disagrees, unless all agrees."""
-        wrong = self._wrong()
-        if wrong:
-            lines = [f"{one.carrier} disagrees with {_against(one)}" for one in wrong]
-            lines += [f"  {text}" for one in wrong for text in one.detail[:1]]
+        if self.wrong:
+            lines = [*map(_fault, self.wrong)]
+            lines += [f"  {text}" for one in self.wrong for text in one.detail[:1]]
             raise DisagreementError("\n".join(lines))
 
-    def _wrong(self) -> list[Comparison | Certified]:
-        found: list[Comparison | Certified] = [*self.comparisons, *self.certificates]
-        return [one for one in found if one.verdict == "DISAGREES"]
 
-
-def _against(one: Comparison | Certified) -> str:
-    return "exact arithmetic" if isinstance(one, Certified) else one.against
+def _fault(one: Comparison | Certified) -> str:
+    if isinstance(one, Certified):
+        return f"{one.carrier} disagrees with exact arithmetic"
+    if one.verdict == "rows only":
+        return f"{one.carrier} is not {one.against}; its rows agree"
+    return f"{one.carrier} disagrees with {one.against}"

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree import cells
-from fuzzytree.agreement import Agreement, Basis, Certified, Comparison, Count
+from fuzzytree.agreement import Agreement, Certified, Comparison, Count
 from fuzzytree.comparing import (
     Answers,
     BoolArray,
@@ -25,6 +25,8 @@ from fuzzytree.comparing import (
     compare_exact,
     compare_excused,
     compare_within,
+    counted,
+    judged,
     labels,
     probed,
 )
@@ -84,6 +86,7 @@ def check(
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     limit: int = 20_000,
+    rows_only: bool = False,
 ) -> Agreement:
     """Hold every carrier of a model against the model itself.
 
@@ -95,6 +98,7 @@ def check(
         names: What to call each of the others; `file 1`, `file 2` unless given.
         runtimes: The names of the runtimes to run; all that are installed if None.
         limit: The most probes.
+        rows_only: Whether files whose rows agree are accepted with other content.
 
     Returns:
         What was compared, on what, and with which result.
@@ -124,6 +128,7 @@ def check(
         cells.cell_count(model) if isinstance(model, FuzzyTree) else None,
         rows.probes,
         tuple(certificates),
+        rows_only,
     )
 
 
@@ -143,7 +148,7 @@ def _equivalence(
     path, relative, *raw = carriers
     faults = tuple(cells.node_faults(tree))
     points = sum(map(len, map(cells.node_points, tree.nodes)))
-    yield _counted("proof", relative.title, path.title, points, faults)
+    yield counted("proof", relative.title, path.title, points, faults)
     size = cells.grid_size(tree)
     if size <= GRID_LIMIT:
         yield _all_cells(tree, relative.title, path.title, size)
@@ -168,7 +173,7 @@ def _all_cells(tree: FuzzyTree, carrier: str, against: str, size: int) -> Compar
             values = zip(free.inputs, points[:, row].tolist(), strict=True)
             where = ", ".join(f"{name} {value!r}" for name, value in values)
             faults.append(f"{where}: leaf {path.rule[row]}, rule {fired.rule[row]}")
-    return _counted("all cells", carrier, against, size, tuple(faults))
+    return counted("all cells", carrier, against, size, tuple(faults))
 
 
 def _runtimes(
@@ -287,7 +292,7 @@ def _calls(title: str, run: Run, rows: Rows) -> Comparison:
         faults.append("no rows do not give empty answers")
     if not _refuses(run, np.zeros((width + 1, 3))):
         faults.append(f"{width + 1} inputs are accepted where {width} are right")
-    return _counted("calls", title, "itself", sample.shape[1] + 3, tuple(faults))
+    return counted("calls", title, "itself", sample.shape[1] + 3, tuple(faults))
 
 
 def _refuses(run: Run, values: FloatArray) -> bool:
@@ -319,23 +324,48 @@ def _shipped(
 def _shipped_model(
     title: str, other: Model, model: Model, rows: Rows
 ) -> Iterator[Finding]:
+    if isinstance(other, FuzzyTree) and isinstance(model, RuleBase):
+        other = _as_rules(other, model) or other
     expected = _counterpart(other, model)
-    if expected is not None:
-        yield _content(title, other, expected)
-    if other.inputs != model.inputs:
-        fault = f"its inputs are {', '.join(other.inputs)}"
-        yield _counted("file", title, "the model's inputs", 1, (fault,))
-        return
+    for what, one, two in (
+        ("inputs", other.inputs, model.inputs),
+        ("classes", sorted(other.classes), sorted(model.classes)),
+    ):
+        if one != two:
+            if expected is not None:
+                yield _content(title, other, expected, [])
+            fault = f"its {what} are {', '.join(one)}"
+            yield counted("file", title, f"the model's {what}", 1, (fault,))
+            return
     found = _native(title, other, rows)
-    base = _native("the model", model if expected is None else expected, rows)
-    is_like = type(base.model) is type(other) and other.classes == model.classes
-    if is_like:
-        yield compare_bits(found, base, rows)
-    elif set(other.classes) == set(model.classes):
-        yield compare_answers(found, base, rows)
+    if expected is None:
+        answers = compare_answers(found, _native("the model", model, rows), rows)
+        yield judged(title, "the model", (_no_counterpart(other, model),), [answers])
+        yield answers
+        return
+    base = _native("the model", expected, rows)
+    is_like = other.classes == model.classes
+    answers = (compare_bits if is_like else compare_answers)(found, base, rows)
+    yield _content(title, other, expected, [answers])
+    yield answers
 
 
-def _content(title: str, other: Model, expected: Model) -> Comparison:
+def _as_rules(tree: FuzzyTree, model: RuleBase) -> RuleBase | None:
+    """Return the rules of a tree that a model made from it should equal."""
+    if model.kind is None or (model.kind == "raw" and not tree.sets):
+        return None
+    return rules_from_tree(tree, model.kind, conjunction=model.semantics.conjunction)
+
+
+def _no_counterpart(other: Model | OnnxModel, model: Model) -> str:
+    if isinstance(model, FuzzyTree):
+        return "raw rules cannot be made of a tree without fitted sets"
+    return "it is a tree, and no tree can be made of rules"
+
+
+def _content(
+    title: str, other: Model, expected: Model, rows: Sequence[Comparison]
+) -> Comparison:
     """Compare the content of a file with what it should be: whole, or pruned.
 
     What `fuzzytree needs` writes is made once more, then held against the model by
@@ -350,8 +380,8 @@ def _content(title: str, other: Model, expected: Model) -> Comparison:
             served = "rules"
             if isinstance(expected, FuzzyTree):
                 served = " and ".join(_SERVICES[use] for use in uses)
-            return _counted("proof", title, f"the model's {served}", 1, faults)
-    return _counted("file", title, "the model", 1, (fault,) if fault else ())
+            return counted("proof", title, f"the model's {served}", 1, faults)
+    return judged(title, "the model", (fault,) if fault else (), rows)
 
 
 def _shipped_onnx(
@@ -360,28 +390,30 @@ def _shipped_onnx(
     """Compare an ONNX file: what it says of itself, its graph, and its answers."""
     if other.run_system is not None:
         fault = "it answers the numbers of a fuzzy system, and the model a class"
-        yield _counted("file", title, "the model's facts", 1, (fault,))
+        yield counted("file", title, "the model's facts", 1, (fault,))
         return
     if other.inputs != model.inputs or other.classes != model.classes:
         fault = (
             f"it decides for {', '.join(other.classes)} "
             f"from {', '.join(other.inputs)}, which are not the model's"
         )
-        yield _counted("file", title, "the model's facts", 1, (fault,))
+        yield counted("file", title, "the model's facts", 1, (fault,))
         return
+    from fuzzytree.exporters.onnx_compare import Differences, differences
+
     expected = _onnx_counterpart(other, model)
     if expected is None:
-        yield f"{title}: a tree cannot be made from rules; its classes are compared"
+        apart = Differences((_no_counterpart(other, model),), ())
     else:
-        right, stated = fingerprint(expected), other.fingerprint
-        fault = f"it states fingerprint {stated[:12]}..., and {right[:12]}... is right"
-        faults = () if stated == right else (fault,)
-        yield _counted("file", title, "the model's fingerprint", 1, faults)
-        yield from _onnx_graph(title, other, expected)
+        apart = differences(other.content, expected)
+        yield counted("file", title, "the model's metadata", 1, apart.metadata)
     try:
-        yield from _onnx_rows(title, other, expected, model, rows)
+        found = [*_onnx_rows(title, other, expected, model, rows)]
     except LossError as error:  # the file loads, but onnxruntime cannot run it
-        yield _counted("rows", title, "the model", len(rows.numbers), (str(error),))
+        faults = (str(error),)
+        found = [counted("rows", title, "the model", len(rows.numbers), faults)]
+    yield judged(title, "a freshly written graph", apart.graph, found)
+    yield from found
 
 
 def _onnx_counterpart(other: OnnxModel, model: Model) -> Model | None:
@@ -393,25 +425,9 @@ def _onnx_counterpart(other: OnnxModel, model: Model) -> Model | None:
     return rules_from_tree(model, kind, conjunction=other.semantics.conjunction)
 
 
-def _onnx_graph(title: str, other: OnnxModel, expected: Model) -> Iterator[Finding]:
-    """Compare the graph with the one that would be written now: a proof if equal."""
-    from fuzzytree.exporters.onnx import version
-    from fuzzytree.exporters.onnx_compare import graph_difference
-
-    try:
-        fault = graph_difference(other.content, expected)
-    except ValueError as error:  # it states what this version does not write
-        fault = str(error)
-    if fault is None or other.version == version():
-        faults = () if fault is None else (fault,)
-        yield _counted("file", title, "a freshly written graph", 1, faults)
-    else:
-        yield f"{title}: another version, {other.version}, wrote it, so only rows tell"
-
-
 def _onnx_rows(
     title: str, other: OnnxModel, expected: Model | None, model: Model, rows: Rows
-) -> Iterator[Finding]:
+) -> Iterator[Comparison]:
     """Compare a file's answers with the native ones, then its labels."""
     held = expected or model
     is_rules = isinstance(held, RuleBase)
@@ -458,7 +474,7 @@ def _onnx_labels(
         for row, (found, label) in enumerate(zip(told, right, strict=True))
         if found != label and not excused[row]
     ]
-    return _counted("rows", title, "the model's classes", len(right), faults)
+    return counted("rows", title, "the model's classes", len(right), faults)
 
 
 def _counterpart(other: Model, model: Model) -> Model | None:
@@ -505,20 +521,6 @@ def _differ(path: tuple[str, ...], expected: object, found: object) -> str | Non
     if expected == found:
         return None
     return f"{where}: {found!r} where {expected!r} is right"
-
-
-def _counted(
-    basis: Basis, carrier: str, against: str, rows: int, faults: Sequence[str]
-) -> Comparison:
-    return Comparison(
-        carrier,
-        against,
-        basis,
-        rows,
-        "DISAGREES" if faults else "agrees",
-        differing=len(faults),
-        detail=tuple(faults[:5]),
-    )
 
 
 def _count(carrier: Answers) -> Count:

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.agreement import Agreement, Basis, Comparison, Count
+from fuzzytree.agreement import Agreement, Comparison, Count
 from fuzzytree.checking import first_difference
-from fuzzytree.comparing import Rows
+from fuzzytree.comparing import Rows, counted, judged
 from fuzzytree.contracts import Runtime, SystemOutcome, SystemRun
 from fuzzytree.errors import FuzzyTreeError, LossError
+from fuzzytree.likeness import is_alike
 from fuzzytree.probing import system_probes
 from fuzzytree.programs.bounds import ORIGIN, error_bounds
 from fuzzytree.programs.systems import from_system
@@ -67,6 +68,7 @@ def check_system(
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     limit: int = 2_000,
+    rows_only: bool = False,
 ) -> Agreement:
     """Hold every carrier of a fuzzy system against the system itself.
 
@@ -79,6 +81,7 @@ def check_system(
         names: What to call each of the others; `file 1`, `file 2` unless given.
         runtimes: The names of the runtimes to run; all that are installed if None.
         limit: The most probes.
+        rows_only: Whether files whose rows agree are accepted with other content.
 
     Returns:
         What was compared, on what, and with which result. A row `flips` where its
@@ -111,6 +114,7 @@ def check_system(
         tuple(dict.fromkeys(one for one in findings if isinstance(one, str))),
         None,
         rows.probes,
+        rows_only=rows_only,
     )
 
 
@@ -335,7 +339,7 @@ def _calls(title: str, run: SystemRun, rows: Rows, subject: _Subject) -> Compari
         faults.append(f"{width + 1} inputs are accepted where {width} are right")
     except (ValueError, FuzzyTreeError):
         pass
-    return _counted("calls", title, "itself", sample.shape[1] + 3, faults)
+    return counted("calls", title, "itself", sample.shape[1] + 3, faults)
 
 
 def _shipped(
@@ -356,23 +360,34 @@ def _shipped(
             f"it computes {', '.join(other.names) or 'a class'} from "
             f"{', '.join(other.inputs)}, which are not the system's"
         )
-        yield _counted("file", title, "the system's facts", 1, (fault,))
+        yield counted("file", title, "the system's facts", 1, (fault,))
         return
-    stated, right_print = other.fingerprint, fingerprint(system)
-    fault = f"it states fingerprint {stated[:12]}..., {right_print[:12]}... is right"
-    faults = () if stated == right_print else (fault,)
-    yield _counted("file", title, "the system's fingerprint", 1, faults)
-    yield from _graph(title, other, system)
+    from fuzzytree.exporters.onnx_compare import differences
+
+    apart = differences(other.content, system)
+    yield counted("file", title, "the system's metadata", 1, apart.metadata)
     rows = subject.rows
     try:
         found = other.run_system(rows.values)
     except LossError as error:  # the file loads, but onnxruntime cannot run it
-        yield _counted("rows", title, "native", len(rows.numbers), (str(error),))
+        faults = (str(error),)
+        answers = [counted("rows", title, "native", len(rows.numbers), faults)]
+        yield judged(title, "a freshly written graph", apart.graph, answers)
+        yield from answers
         return
     right = subject.native
     if "status" not in other.outputs:
         found, right = (_without_status(one) for one in (found, right))
-    yield from _compared(title, "native", found, right, subject, rows)
+    results = [*_compared(title, "native", found, right, subject, rows)]
+    yield _content(title, "a freshly written graph", apart.graph, results)
+    yield from results
+
+
+def _content(
+    title: str, against: str, faults: Sequence[str], results: Sequence[Finding]
+) -> Comparison:
+    rows = [one for one in results if isinstance(one, Comparison)]
+    return judged(title, against, faults, rows)
 
 
 def _without_status(outcome: SystemOutcome) -> SystemOutcome:
@@ -383,59 +398,32 @@ def _without_status(outcome: SystemOutcome) -> SystemOutcome:
     )
 
 
-def _graph(title: str, other: OnnxModel, system: FuzzySystem) -> Iterator[Finding]:
-    """Compare the graph with the one that would be written now: a proof if equal."""
-    from fuzzytree.exporters.onnx import version
-    from fuzzytree.exporters.onnx_compare import graph_difference
-
-    try:
-        fault = graph_difference(other.content, system)
-    except (ValueError, LossError) as error:  # it states what is not written now
-        fault = str(error)
-    if fault is None or other.version == version():
-        faults = () if fault is None else (fault,)
-        yield _counted("file", title, "a freshly written graph", 1, faults)
-    else:
-        yield f"{title}: another version, {other.version}, wrote it, so only rows tell"
-
-
 def _shipped_system(
     title: str, other: FuzzySystem, subject: _Subject
 ) -> Iterator[Finding]:
-    """Compare content; where it differs, only rows tell. Names are taken in order."""
+    """Compare content, names apart, then rows. Names are taken in order."""
     system = subject.system
     fault = first_difference(system, other)
     if fault is None:
-        yield _counted("file", title, "the system", 1, ())
+        yield counted("file", title, "the system", 1, ())
         return
-    yield Comparison(
-        title, "the system", "file", 1, "differs by design", 1, detail=(fault,)
-    )
     counts = [(len(one.columns), len(one.outputs)) for one in (system, other)]
     if counts[0] != counts[1]:
         fault = (
             f"it computes {counts[1][1]} outputs from {counts[1][0]} inputs, and the "
             f"system {counts[0][1]} from {counts[0][0]}"
         )
-        yield _counted("file", title, "the system's inputs and outputs", 1, (fault,))
+        yield counted("file", title, "the system's inputs and outputs", 1, (fault,))
         return
-    is_alike = len(other.rules) == len(system.rules)
-    found = run_system(other, activations=is_alike)(subject.rows.values)
-    yield from _compared(title, "native", found, subject.native, subject, subject.rows)
-
-
-def _counted(
-    basis: Basis, carrier: str, against: str, rows: int, faults: Sequence[str]
-) -> Comparison:
-    return Comparison(
-        carrier,
-        against,
-        basis,
-        rows,
-        "DISAGREES" if faults else "agrees",
-        differing=len(faults),
-        detail=tuple(faults[:_TOLD]),
-    )
+    has_all = len(other.rules) == len(system.rules)
+    found = run_system(other, activations=has_all)(subject.rows.values)
+    rows = subject.rows
+    results = [*_compared(title, "native", found, subject.native, subject, rows)]
+    if is_alike(system, other):
+        yield counted("file", title, "the system but for names", 1, ())
+    else:
+        yield _content(title, "the system", (fault,), results)
+    yield from results
 
 
 def _count(carrier: str, outcome: SystemOutcome) -> Count:

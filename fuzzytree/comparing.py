@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.agreement import Certified, Comparison, Verdict
+from fuzzytree.agreement import Basis, Certified, Comparison, Verdict
 from fuzzytree.contracts import Dtype, Model, Outcome
 from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
 from fuzzytree.numerics.oracle import Decided, strength_errors
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 BoolArray = npt.NDArray[np.bool_]
 
 _TOLD = 5  # differing rows told for each comparison
+_LISTED = 20  # differences in the content of a file
 
 
 class Rows(msgspec.Struct, frozen=True):
@@ -89,6 +90,47 @@ class Answers(msgspec.Struct, frozen=True):
     def part(self, rows: slice | IntArray) -> Answers:
         """Return some of the answers."""
         return Answers(self.title, self.model, self.outcome.part(rows))
+
+
+def counted(
+    basis: Basis, carrier: str, against: str, rows: int, faults: Sequence[str]
+) -> Comparison:
+    """Return a comparison that disagrees in as many rows as there are faults."""
+    return Comparison(
+        carrier,
+        against,
+        basis,
+        rows,
+        "DISAGREES" if faults else "agrees",
+        differing=len(faults),
+        detail=tuple(faults[:_TOLD]),
+    )
+
+
+def judged(
+    name: str, against: str, faults: Sequence[str], rows: Sequence[Comparison]
+) -> Comparison:
+    """Compare the content of a file, in the light of what its rows gave.
+
+    Args:
+        name: What to call the file.
+        against: What its content should equal.
+        faults: How it differs.
+        rows: The comparisons of the file's rows.
+    """
+    more = [f"and {len(faults) - _LISTED} more"] if len(faults) > _LISTED else []
+    verdict: Verdict = "DISAGREES" if faults else "agrees"
+    if faults and rows and all(one.verdict == "agrees" for one in rows):
+        verdict = "rows only"
+    return Comparison(
+        name,
+        against,
+        "file",
+        1,
+        verdict,
+        differing=len(faults),
+        detail=(*faults[:_LISTED], *more),
+    )
 
 
 def compare_bits(found: Answers, expected: Answers, rows: Rows) -> Comparison:

@@ -341,6 +341,7 @@ def check(
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
     limit: int | None = None,
+    rows_only: bool = False,
     allow_loss: bool = False,
 ) -> Agreement:
     """Compare a model with everything that is made of it, in every runtime.
@@ -355,6 +356,8 @@ def check(
         names: What to call each of the others; its path unless given.
         runtimes: The names of the runtimes; all that are installed unless given.
         limit: The most probes; 20,000 unless given, and 2,000 for a system.
+        rows_only: Whether files whose rows agree are accepted with other content: a
+            graph that this version would not write, or a system with other numbers.
         allow_loss: As in `load`, for every file.
 
     Raises:
@@ -385,6 +388,7 @@ def check(
             names=titles,
             runtimes=runtimes,
             limit=limit or 2_000,
+            rows_only=rows_only,
         )
     from fuzzytree import checking
 
@@ -395,6 +399,7 @@ def check(
         names=titles,
         runtimes=runtimes,
         limit=limit or 20_000,
+        rows_only=rows_only,
     )
 
 

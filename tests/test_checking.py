@@ -12,7 +12,7 @@ from fuzzytree.agreement import Agreement
 from fuzzytree.checking import check, first_difference
 from fuzzytree.errors import DisagreementError
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Band, Flank, RuleBase
+from fuzzytree.rulebase import Band, Flank, Kind, RuleBase
 from fuzzytree.runtimes import all_runtimes, is_installed
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree
@@ -181,6 +181,49 @@ def test_a_fault_in_a_rule_file_is_found_in_content_and_in_answers(
 def test_the_rules_of_the_tree_itself_agree_as_a_file() -> None:
     found = check(TREE, rules_from_tree(TREE), limit=300, runtimes=["native"])
     assert by(found, "file 1") == ["agrees", "agrees"]
+
+
+def test_rules_that_say_to_be_raw_are_not_believed() -> None:
+    tree = replace(
+        TREE,
+        sets=(),
+        nodes=tuple(
+            replace(n, branches=tuple(replace(b, sets=()) for b in n.branches))
+            for n in TREE.nodes
+        ),
+    )
+    rules = replace(rules_from_tree(tree), kind="raw")
+    found = check(tree, rules, limit=300, runtimes=["native"])
+    assert by(found, "file 1") == ["rows only", "agrees"]
+    assert not found.ok
+    assert check(tree, rules, limit=300, runtimes=["native"], rows_only=True).ok
+
+
+@pytest.mark.parametrize("kind", ["relative", "raw"])
+def test_a_tree_is_compared_with_rules_by_the_rules_made_from_it(kind: Kind) -> None:
+    rules = rules_from_tree(TREE, kind)
+    found = check(rules, TREE, limit=300, runtimes=["native"])
+    assert by(found, "file 1") == ["agrees", "agrees"]
+    first, *rest = TREE.leaves
+    other = next(c for c in TREE.classes if c != first.label)
+    faulty = replace(TREE, leaves=(replace(first, label=other), *rest))
+    assert not check(rules, faulty, limit=300, runtimes=["native"]).ok
+
+
+def test_a_tree_of_other_classes_does_not_agree_with_rules() -> None:
+    classes = {c: f"{c}!" for c in TREE.classes}
+    leaves = tuple(replace(x, label=classes[x.label]) for x in TREE.leaves)
+    semantics = TREE.semantics
+    missing = classes[semantics.missing] if semantics.missing else None
+    other = replace(
+        TREE,
+        classes=tuple(classes.values()),
+        leaves=leaves,
+        semantics=replace(semantics, missing=missing),
+    )
+    rules = replace(rules_from_tree(TREE), kind=None)
+    found = check(rules, other, limit=300, runtimes=["native"])
+    assert by(found, "file 1") == ["DISAGREES"]
 
 
 def test_a_swapped_leaf_in_a_tree_file_is_found() -> None:

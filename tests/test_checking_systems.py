@@ -87,18 +87,34 @@ def test_files_with_the_system_agree() -> None:
     assert found.ok
     told = [(c.carrier, c.against) for c in found.comparisons if c.carrier == "b.onnx"]
     assert told == [
-        ("b.onnx", "the system's fingerprint"),
+        ("b.onnx", "the system's metadata"),
         ("b.onnx", "a freshly written graph"),
         ("b.onnx", "native"),
     ]
 
 
-def test_a_file_with_other_names_agrees_by_its_rows() -> None:
+def test_a_file_with_other_names_agrees() -> None:
     found = check_system(washer(), washer(output="t"), limit=50)
     assert found.ok
-    one = about(found, "file 1", "file")
-    assert one.verdict == "differs by design"
-    assert one.detail == ("outputs 1, name: 't' where 'time' is right",)
+    told = [(c.against, c.basis) for c in found.comparisons if c.carrier == "file 1"]
+    assert told == [("the system but for names", "file"), ("native", "rows")]
+
+
+def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
+    system = washer()
+    (dirt,) = system.inputs
+    key = Label("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
+    (block,) = system.blocks
+    rules = (*block.rules, SystemRule(Is("dirt", "key"), block.rules[0].then))
+    other = replace(
+        system,
+        inputs=(replace(dirt, labels=(*dirt.labels, key)),),
+        blocks=(replace(block, rules=rules),),
+    )
+    found = check_system(system, other, limit=50)
+    assert about(found, "file 1", "file").verdict == "rows only"
+    assert not found.ok
+    assert check_system(system, other, limit=50, rows_only=True).ok
 
 
 def test_a_file_with_another_number_is_found_in_its_rows() -> None:
@@ -129,9 +145,7 @@ def test_a_wrong_fingerprint_and_a_wrong_graph_are_found() -> None:
     other = opened(washer(61.0))
     found = check_system(washer(), other, limit=20)
     wrong = [c.against for c in found.comparisons if c.verdict == "DISAGREES"]
-    assert wrong == ["the system's fingerprint", "a freshly written graph", "native"]
-    old = check_system(washer(), replace(opened(washer(61.0)), version="0"), limit=20)
-    assert "file 1: another version, 0, wrote it, so only rows tell" in old.skipped
+    assert wrong == ["the system's metadata", "a freshly written graph", "native"]
 
 
 def test_a_file_without_status_is_compared_by_its_numbers() -> None:

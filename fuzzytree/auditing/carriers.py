@@ -120,7 +120,7 @@ def told(subject: Subject, found: Agreement, values: FloatArray) -> Iterator[Ans
     """
     clean: dict[Basis, list[Comparison]] = {}
     for one in found.comparisons:
-        if one.verdict == "DISAGREES":
+        if one.verdict in ("DISAGREES", "rows only"):
             yield _disagreement(subject, one, values)
         elif one.verdict == "agrees":  # raw rules differ from a tree by design: FT203
             basis = "proof" if one.basis in ("file", "all cells") else one.basis

@@ -13,6 +13,7 @@ from fuzzytree.cli.talk import (
     delimiter_option,
     json_option,
     quiet_option,
+    rows_only_option,
     runtimes_option,
     say,
     table_source,
@@ -32,6 +33,7 @@ from fuzzytree.cli.talk import (
 )
 @click.option("--rows", "is_full", is_flag=True, help="Tell rows that may differ, too.")
 @delimiter_option
+@rows_only_option
 @allow_loss_option
 @json_option
 @quiet_option
@@ -43,6 +45,7 @@ def command(
     limit: int | None,
     is_full: bool,
     delimiter: str | None,
+    rows_only: bool,
     allow_loss: bool,
     as_json: bool,
     quiet: bool,
@@ -63,6 +66,7 @@ def command(
             delimiter=delimiter,
             runtimes=runtimes or None,
             limit=limit,
+            rows_only=rows_only,
             allow_loss=allow_loss,
         )
     if as_json:

@@ -37,6 +37,12 @@ allow_loss_option = click.option(
     help="Read what a model cannot hold as near as it can.",
 )
 
+rows_only_option = click.option(
+    "--rows-only",
+    is_flag=True,
+    help="Accept a file whose rows agree though its content is not as written now.",
+)
+
 data_option = click.option(
     "--data", metavar="TABLE", help="Rows of your own, beside the probes."
 )

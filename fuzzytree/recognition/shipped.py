@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
 from fuzzytree.agreement import Agreement, Comparison
+from fuzzytree.comparing import counted, judged
 from fuzzytree.contracts import Model
 from fuzzytree.errors import InvalidModelError, ReadError
-from fuzzytree.exporters.onnx import version
 from fuzzytree.exporters.onnx_frames import Output, write_frames
 from fuzzytree.recognition.recogniser import check_inputs
 from fuzzytree.recognition.runners import PLAIN, as_sent
@@ -26,6 +26,7 @@ from fuzzytree.tree import FuzzyTree
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from fuzzytree.exporters.onnx_compare import Differences
     from fuzzytree.exporters.onnx_session import Bare
 
 _TOLD = 3
@@ -92,7 +93,13 @@ def frames_file(content: bytes, name: str) -> FramesFile:
 
 
 def check_shipped(
-    model: Model, files: Mapping[str, bytes], frames: Cells | None = None
+    model: Model,
+    files: Mapping[str, bytes],
+    frames: Cells | None = None,
+    *,
+    sensor: Sensor | None = None,
+    reject: float = 0.0,
+    rows_only: bool = False,
 ) -> Agreement:
     """Hold ONNX files of frames against a model, by what they say and by their answers.
 
@@ -100,6 +107,9 @@ def check_shipped(
         model: A tree or a rule base whose inputs are names of features.
         files: The files by name; each may be of a sensor of its own.
         frames: Shape (frames, rows, columns); beside the aimed ones.
+        sensor: The one that each file must state; any if None.
+        reject: The reject that each file must state.
+        rows_only: Whether files whose answers agree are accepted with another graph.
 
     Raises:
         ReadError: If a file is no graph of frames, or does not run.
@@ -120,7 +130,11 @@ def check_shipped(
     probes = 0
     for name, content in files.items():
         known = frames_file(content, name)
-        comparisons.append(_fingerprints(model, known, name))
+        if sensor is None:
+            skipped.append(
+                f"{name}: its sensor, which is {_sensor_text(known.sensor)}; "
+                "name the right one with --sensor or --board"
+            )
         if known.features != model.inputs or known.classes != model.classes:
             comparisons.append(_strangers(known, name))
             continue
@@ -132,39 +146,51 @@ def check_shipped(
         if len(asked) < len(rows):
             skipped.append(f"{name}: {len(rows) - len(asked)} frames, to save time")
         probes += len(aimed)
-        graph = _fresh(model, known, content, name)
-        if graph.detail and known.version != version():
-            text = f"another version, {known.version}, wrote it, so only frames tell"
-            skipped.append(f"{name}: {text}")
-        else:
-            comparisons.append(graph)
-        comparisons.append(_answers(model, known, loaded(content, name), asked, name))
+        stated = _misstated(known, sensor, reject)
+        graph, metadata = _differences(model, known, content)
+        answers = _answers(model, known, loaded(content, name), asked, name)
+        comparisons += [
+            counted("file", name, "the model's metadata", 1, (*metadata, *stated)),
+            judged(name, "a freshly written graph", graph, [answers]),
+            answers,
+        ]
     return Agreement(
         model.name,
         fingerprint(model),
         tuple(comparisons),
         skipped=tuple(skipped),
         probes=probes,
+        rows_only=rows_only,
     )
 
 
-def _fingerprints(model: Model, known: FramesFile, name: str) -> Comparison:
-    is_same = known.fingerprint == fingerprint(model)
-    told = () if is_same else (f"it was written of another model, {known.name!r}",)
-    return _of_file(name, "the model's fingerprint", told)
+def _misstated(
+    known: FramesFile, sensor: Sensor | None, reject: float
+) -> Iterator[str]:
+    if sensor is not None and known.sensor != sensor:
+        yield f"its sensor is {_sensor_text(known.sensor)}, not {_sensor_text(sensor)}"
+    if known.reject != reject:
+        yield f"its reject is {known.reject!r}, not {reject!r}"
+
+
+def _sensor_text(sensor: Sensor) -> str:
+    text = f"{sensor.rows} x {sensor.columns} cells up to {sensor.full}"
+    text += f", threshold {sensor.threshold}"
+    extras = (("baseline", sensor.baseline), ("masked cells", sensor.masked))
+    return text + "".join(f", with {name}" for name, value in extras if value)
 
 
 def _strangers(known: FramesFile, name: str) -> Comparison:
     asked, classes = ", ".join(known.features), ", ".join(known.classes)
     told = f"it asks for {asked}, and knows {classes}"
-    return _of_file(name, "the model's features and classes", (told,))
+    return counted("file", name, "the model's features and classes", 1, (told,))
 
 
-def _fresh(model: Model, known: FramesFile, content: bytes, name: str) -> Comparison:
+def _differences(model: Model, known: FramesFile, content: bytes) -> Differences:
     """Compare the file with the one that the model gives now."""
     import onnx
 
-    from fuzzytree.exporters.onnx_compare import proto_difference
+    from fuzzytree.exporters.onnx_compare import Differences, proto_differences
     from fuzzytree.exporters.onnx_graph import TREES
 
     proto = onnx.load_model_from_string(content)
@@ -181,22 +207,8 @@ def _fresh(model: Model, known: FramesFile, content: bytes, name: str) -> Compar
             verify=False,
         ).content
     except ValueError as error:
-        return _of_file(name, "a freshly written graph", (str(error),))
-    apart = proto_difference(onnx.load_model_from_string(fresh), proto)
-    told = () if apart is None else (apart,)
-    return _of_file(name, "a freshly written graph", told)
-
-
-def _of_file(name: str, against: str, told: tuple[str, ...]) -> Comparison:
-    return Comparison(
-        name,
-        against,
-        "file",
-        1,
-        "DISAGREES" if told else "agrees",
-        differing=len(told),
-        detail=told,
-    )
+        return Differences((str(error),), ())
+    return proto_differences(onnx.load_model_from_string(fresh), proto)
 
 
 def _answers(

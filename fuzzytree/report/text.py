@@ -304,7 +304,8 @@ def agreement_lines(found: Agreement, *, is_full: bool = False) -> Iterator[str]
             "another memory order and with a wrong width: none fails"
         )
     for comparison in shown:
-        if comparison.detail and (is_full or comparison.verdict == "DISAGREES"):
+        is_wrong = comparison.verdict in ("DISAGREES", "rows only")
+        if comparison.detail and (is_full or is_wrong):
             yield f"{comparison.carrier} against {comparison.against}:"
             yield from (f"  {line}" for line in comparison.detail)
     for count in found.counts:
@@ -340,6 +341,10 @@ def verdict_text(found: Agreement) -> str:
     said = f"{count}, and none disagrees"
     if wrong:
         said = f"{wrong} of {count} {'disagrees' if wrong == 1 else 'disagree'}"
+    rows_only = sum(one.verdict == "rows only" for one in found.comparisons)
+    if rows_only:
+        said += f"; in {counted(rows_only, 'file')} only the rows agree"
+        said += "" if found.rows_only else ", which --rows-only accepts"
     if broken:
         verb = "does" if broken == 1 else "do"
         said += f"; {counted(broken, 'bound')} {verb} not hold"
@@ -356,7 +361,9 @@ def _basis_text(found: Agreement) -> str:
 
 def _comparison_row(one: Comparison) -> tuple[str, ...]:
     verdict: str = one.verdict
-    if one.differing:
+    if verdict == "rows only":
+        verdict += f", {counted(one.differing, 'difference')}"
+    elif one.differing:
         verdict += f" in {one.differing}"
     if one.flips and not one.differing:
         verdict += f", {counted(one.flips, 'class', 'classes')} differ as allowed"

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+import onnx
 import pytest
+from onnx import numpy_helper
 
 import fuzzytree as ft
 from fuzzytree.agreement import Agreement, Certified, Comparison
@@ -138,3 +141,31 @@ def test_certificates_stand_behind_all_the_rest() -> None:
         "tree in mixed disagrees with exact arithmetic\n"
         "  probe 1: force 2.0: exactly soft"
     )
+
+
+def test_a_graph_that_is_not_written_now_ends_with_1_unless_accepted(
+    call: Call,
+) -> None:
+    proto = onnx.load("grip.onnx")
+    proto.graph.initializer.append(numpy_helper.from_array(np.array(13.5), "spare"))
+    for entry in proto.metadata_props:
+        if entry.key == "fuzzytree.version":
+            entry.value = "0.0.1"
+    onnx.save(proto, "grip.onnx")
+    code, out, err = call("check", "grip.yaml", "grip.onnx", *NATIVE)
+    assert code == 1
+    assert "  rows only, 1 difference\n" in out
+    told = "grip.onnx against a freshly written graph:\n"
+    assert told + "  constant 'spare' is not the model's: 13.5\n" in out
+    assert err.endswith(
+        " comparisons, and none disagrees; in 1 file only the rows agree, "
+        "which --rows-only accepts\n"
+    )
+    words = ("check", "grip.yaml", "grip.onnx", "--rows-only")
+    code, _, err = call(*words, *NATIVE)
+    assert code == 0
+    assert err.endswith("and none disagrees; in 1 file only the rows agree\n")
+    code, out, _ = call(*words, "--json", *NATIVE)
+    facts = json.loads(out)
+    assert (code, facts["ok"], facts["rows_only"]) == (0, True, True)
+    assert "rows only" in [one["verdict"] for one in facts["comparisons"]]

@@ -9,7 +9,7 @@ import pytest
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import onnx_steps
 from fuzzytree.exporters.onnx import OPSETS, write
-from fuzzytree.exporters.onnx_compare import graph_difference
+from fuzzytree.exporters.onnx_compare import differences
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.systems import infer_rows
@@ -97,9 +97,10 @@ def test_a_system_s_outputs_are_no_model_s() -> None:
 
 def test_a_graph_is_compared_with_a_fresh_one() -> None:
     content = write(SYSTEM).content
-    assert graph_difference(content, SYSTEM) is None
-    found = graph_difference(content, random_system(4, formulas="none"))
-    assert found is not None
+    assert differences(content, SYSTEM) == ((), ())
+    found = differences(content, random_system(4, formulas="none"))
+    assert found.graph
+    assert found.metadata
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_frames_of_ones_own_are_asked_as_well() -> None:
     rules = rules_from_tree(tree(), "raw")
     content = write_frames(rules, SENSOR, reject=0.2, outputs=("strengths",)).content
     frames = np.random.default_rng(0).integers(0, 256, (9, 4, 4))
-    found = check_shipped(rules, {"pad.onnx": content}, frames)
+    found = check_shipped(rules, {"pad.onnx": content}, frames, reject=0.2)
     assert found.ok
     assert found.comparisons[-1].rows == found.probes + 9
 
@@ -68,7 +68,6 @@ def test_a_file_of_another_model_is_told() -> None:
     content = write_frames(other, SENSOR).content
     found = check_shipped(tree(), {"pad.onnx": content})
     assert [one.detail for one in found.comparisons] == [
-        ("it was written of another model, 'tree'",),
         ("it asks for peak, and knows l, s",),
     ]
 
@@ -108,17 +107,39 @@ def test_the_metadata_say_which_sensor_it_is() -> None:
     assert json.loads(told["fuzzytree.sensor"])["threshold"] == 3
 
 
-def test_a_file_that_another_version_wrote_is_judged_by_its_answers() -> None:
+def test_a_file_that_another_version_wrote_is_compared_as_any() -> None:
     proto = onnx.load_model_from_string(write_frames(tree(), SENSOR).content)
     for entry in proto.metadata_props:
         if entry.key == "fuzzytree.version":
             entry.value = "0.0.1"
     proto.graph.node[-1].name += " of old"
-    found = check_shipped(tree(), {"pad.onnx": proto.SerializeToString()})
-    assert found.ok
-    assert [one.against for one in found.comparisons] == [
-        "the model's fingerprint", "plain Python",
+    files = {"pad.onnx": proto.SerializeToString()}
+    found = check_shipped(tree(), files)
+    assert not found.ok
+    assert [one.verdict for one in found.comparisons] == [
+        "agrees", "rows only", "agrees",
     ]  # fmt: skip
+    assert check_shipped(tree(), files, rows_only=True).ok
+
+
+def test_a_file_cannot_choose_its_sensor_and_reject() -> None:
+    rules = rules_from_tree(tree(), "raw")
+    content = write_frames(rules, Sensor(4, 4, threshold=200), reject=0.9).content
+    found = check_shipped(rules, {"pad.onnx": content}, sensor=SENSOR)
+    assert [one.verdict for one in found.comparisons] == [
+        "DISAGREES", "agrees", "agrees",
+    ]  # fmt: skip
+    assert found.comparisons[0].detail == (
+        "its sensor is 4 x 4 cells up to 255, threshold 200, "
+        "not 4 x 4 cells up to 255, threshold 3",
+        "its reject is 0.9, not 0.0",
+    )
+
+
+def test_a_sensor_that_only_the_file_states_is_reported() -> None:
+    content = write_frames(tree(), SENSOR).content
+    found = check_shipped(tree(), {"pad.onnx": content})
     assert found.skipped == (
-        "pad.onnx: another version, 0.0.1, wrote it, so only frames tell",
+        "pad.onnx: its sensor, which is 4 x 4 cells up to 255, threshold 3; "
+        "name the right one with --sensor or --board",
     )
