@@ -36,7 +36,9 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     Class k of the tree is named `str(classes_[k])`; its columns are those of the
     table it was fitted on, or `x1`, `x2`, ... Missing values are refused, as
     scikit-learn expects of a classifier without the tag `allow_nan`; `ft.learn` drops
-    and counts such rows instead. Sample weights are not supported.
+    and counts such rows instead. Sample weights are not supported. A pickle or a copy
+    of a fitted classifier holds its tree, with the range of each column and the centre
+    of each combination, and no training rows.
 
     Args:
         mode: `default`, or `paper` for the paper's algorithm to the letter.
@@ -134,7 +136,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
         Only statistics and a bounded sample of the rows are kept. The last tree is
         the one of a single `fit` on all rows, however they were cut; a first chunk
-        must hold rows of two classes.
+        must hold rows of two classes. A pickle and a copy leave these rows out: they
+        predict, and learn again from `fit` alone.
 
         Args:
             X: As in `fit`.
@@ -145,9 +148,15 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             The classifier itself.
 
         Raises:
-            ValueError: As `fit`, or if a label is not among the classes.
+            ValueError: As `fit`, or if a label is not among the classes, or if the
+                classifier is a pickle or a copy of a fitted one.
         """
         is_first = not hasattr(self, "_learner")
+        if is_first and hasattr(self, "tree_"):
+            raise ValueError(
+                "a pickled or copied classifier holds no training rows, so partial_fit "
+                "cannot continue; call fit, or partial_fit on the original"
+            )
         values, labels = _validated(self, X, y, dtype=np.float64, reset=is_first)
         check_classification_targets(labels)
         if is_first:
@@ -230,9 +239,10 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return self.tree_
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what is prepared from the tree."""
+        """Leave out training rows, and what is prepared from the tree."""
         state: Any = super().__getstate__()
-        return {name: value for name, value in state.items() if name != "_run"}
+        left_out = ("_learner", "_run")
+        return {name: value for name, value in state.items() if name not in left_out}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Prepare the tree again."""

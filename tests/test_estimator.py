@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+import io
 import pickle
+import struct
 from typing import TYPE_CHECKING, Any
 
+import joblib  # type: ignore[import-untyped]  # it has no types of its own
+import msgspec
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,7 +20,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from fuzzytree.estimator import FuzzyTreeClassifier
+from fuzzytree.estimator import FuzzyTreeClassifier, Mode
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import descend, evaluate
 from fuzzytree.rulebase import Band, Flank, Part, Term, Variable
@@ -97,6 +102,36 @@ def test_clones_and_pickles_learn_and_answer_alike() -> None:
     loaded = pickle.loads(pickle.dumps(model))
     assert model.tree_ == again.tree_ == loaded.tree_
     assert (loaded.predict_proba(IRIS) == model.predict_proba(IRIS)).all()
+
+
+@pytest.mark.parametrize("mode", ["default", "paper"])
+def test_a_pickle_holds_no_value_of_a_training_row(mode: Mode) -> None:
+    values = IRIS + np.random.default_rng(0).uniform(-0.01, 0.01, IRIS.shape)
+    model = FuzzyTreeClassifier(mode=mode).partial_fit(
+        values, SPECIES, classes=[0, 1, 2]
+    )
+    file = io.BytesIO()
+    joblib.dump(model, file)
+    pickles = [pickle.dumps(model), file.getvalue(), pickle.dumps(copy.deepcopy(model))]
+    shown = msgspec.json.encode(model.tree_)  # ranges and centres are values of rows
+    inner = [v for v in values.ravel().tolist() if repr(v).encode() not in shown]
+    assert len(inner) > 580
+    for content in pickles:
+        for order in "<>":
+            assert not [v for v in inner if struct.pack(order + "d", v) in content]
+
+
+def test_partial_fit_does_not_go_on_from_a_pickle_or_a_copy() -> None:
+    model = FuzzyTreeClassifier().partial_fit(IRIS, SPECIES, classes=[0, 1, 2])
+    for other in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):
+        with pytest.raises(ValueError, match="pickled or copied") as caught:
+            other.partial_fit(IRIS, SPECIES, classes=[0, 1, 2])
+        assert str(caught.value) == (
+            "a pickled or copied classifier holds no training rows, so partial_fit "
+            "cannot continue; call fit, or partial_fit on the original"
+        )
+        other.fit(IRIS, SPECIES).partial_fit(IRIS, SPECIES)
+    model.partial_fit(IRIS, SPECIES)
 
 
 def test_chunks_of_any_size_give_the_tree_of_the_whole_table() -> None:
