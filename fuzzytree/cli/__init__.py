@@ -150,6 +150,7 @@ def _error_text(error: FuzzyTreeError, verb: str) -> str:
     """Return a message with what it asks for in the words of the command line."""
     text = str(error).replace("pass dialect=", "pass --dialect ")
     text = text.replace("pass scores=", "pass --set scores=")
+    text = text.replace("pass missing='drop'", "pass --missing drop")
     offer = "pass allow_loss=True"
     if verb in ("run", "check", "convert", "export"):
         return text.replace(offer, "pass --allow-loss")

@@ -133,7 +133,7 @@ class Learner:
         if dropped and self.settings.missing == "refuse":
             raise LearningError(
                 f"{dropped} of {len(values)} rows hold a missing or infinite value "
-                "or no class\n  choose missing='drop' to leave them out"
+                "or no class\n  pass missing='drop' to leave them out"
             )
         if progress is not None:
             progress("counting", 1.0)

@@ -190,7 +190,7 @@ def test_missing_values_can_be_refused(call: Call) -> None:
     words = ("--target", "grip", "--missing", "refuse")
     assert _refused(call, FEW + ",soft\n", *words) == (
         "1 of 13 rows hold a missing or infinite value or no class\n"
-        "  choose missing='drop' to leave them out\n"
+        "  pass --missing drop to leave them out\n"
     )
 
 

@@ -362,7 +362,7 @@ def test_missing_values_can_be_refused() -> None:
         learn(values, labels, Settings(missing="refuse"))
     assert str(caught.value) == (
         "1 of 200 rows hold a missing or infinite value or no class\n"
-        "  choose missing='drop' to leave them out"
+        "  pass missing='drop' to leave them out"
     )
 
 
