@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fuzzytree.errors import FuzzyTreeError
     from fuzzytree.estimator import FuzzyTreeClassifier
     from fuzzytree.outputs import Outputs
+    from fuzzytree.readers.simpful import from_simpful
     from fuzzytree.readers.sklearn import from_sklearn
     from fuzzytree.rulebase import RuleBase
     from fuzzytree.system import FuzzySystem
@@ -55,6 +56,7 @@ __all__ = [
     "convert",
     "diff",
     "export",
+    "from_simpful",
     "from_sklearn",
     "learn",
     "load",
@@ -81,6 +83,7 @@ _HOMES = {
     "convert": "fuzzytree.verbs",
     "diff": "fuzzytree.verbs",
     "export": "fuzzytree.verbs",
+    "from_simpful": "fuzzytree.readers.simpful",
     "from_sklearn": "fuzzytree.readers.sklearn",
     "learn": "fuzzytree.verbs",
     "load": "fuzzytree.verbs",

@@ -29,6 +29,7 @@ from fuzzytree.losses import loss_text
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.options import Option, check_options
 from fuzzytree.probing import probes
+from fuzzytree.readers.simpful import from_simpful
 from fuzzytree.readers.sklearn import from_sklearn
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase
@@ -228,6 +229,7 @@ def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
 
 _OBJECT_READERS: dict[tuple[str, str], Callable[[object], Document]] = {
     ("sklearn.tree._classes", "DecisionTreeClassifier"): from_sklearn,
+    ("simpful.simpful", "FuzzySystem"): from_simpful,
 }
 """The module and name of a class of another library, and what reads its objects."""
 

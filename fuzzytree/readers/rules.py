@@ -1,12 +1,17 @@
-"""Rules of a file to rules of the hub: their sentences get their meaning."""
+"""Rules of a file or of another library to rules of the hub."""
 
 from __future__ import annotations
+
+import itertools
+import operator
+from collections.abc import Iterable
 
 from fuzzytree.readers import layout
 from fuzzytree.readers.binding import shortened
 from fuzzytree.readers.references import unknown_terms
 from fuzzytree.readers.sentences import Vocabulary, guess, readings
 from fuzzytree.rulebase import Clause, Mistake, Path, Rule
+from fuzzytree.system import And, Condition, Or, RuleBlock, SNorm, SystemRule, TNorm
 
 
 def read_rules(
@@ -61,3 +66,36 @@ def _written_out(clause: Clause) -> str:
     verb = "is not" if clause.negated else "is"
     terms = ", ".join(map(repr, clause.terms))
     return f"{{variable: {clause.variable!r}, {verb}: [{terms}]}}"
+
+
+def joined(join: type[And] | type[Or], left: Condition, right: Condition) -> Condition:
+    """Return two conditions joined, without parentheses that change only rounding.
+
+    Example:
+        >>> from fuzzytree.system import Is
+        >>> a, b, c = (Is("force", term) for term in "abc")
+        >>> joined(Or, a, joined(Or, b, c)) == Or((a, b, c))
+        True
+    """
+    first, last = (
+        one.parts if isinstance(one, join) else (one,) for one in (left, right)
+    )
+    return join((*first, *last))
+
+
+def blocks_of(
+    rules: Iterable[tuple[SystemRule, TNorm, SNorm]], implication: TNorm | None
+) -> tuple[RuleBlock, ...]:
+    """Return blocks of rules in their order, a new one where the operators change.
+
+    Args:
+        rules: Each rule with its AND and its OR.
+        implication: That of all blocks.
+    """
+    groups = itertools.groupby(rules, key=operator.itemgetter(1, 2))
+    return tuple(
+        RuleBlock(
+            tuple(rule for rule, *_ in some), conjunction, disjunction, implication
+        )
+        for (conjunction, disjunction), some in groups
+    )
