@@ -34,7 +34,8 @@ class Comparison(msgspec.Struct, frozen=True):
             ways of calling (no rows, one row, another memory order, a wrong width).
         rows: How many rows, points or calls.
         differing: In how many of them the two differ by more than is allowed.
-        largest_difference: Of any two strengths; 0 where none were compared.
+        largest_difference: Of any two strengths in rows that have a bound; 0 where none
+            were compared.
         allowed: The largest difference of a strength that the contract allows.
         origin: Where `allowed` comes from.
         flips: Rows in which the class differs.
@@ -43,6 +44,8 @@ class Comparison(msgspec.Struct, frozen=True):
         verdict: The result.
         detail: What differed, worst first, in sentences.
         told: The numbers of the rows in `detail`, from 0 in the whole of the rows.
+        unbounded: Rows in which the contract bounds no difference of strengths.
+        largest_unbounded: The largest difference of any two strengths in them.
     """
 
     carrier: str
@@ -58,6 +61,8 @@ class Comparison(msgspec.Struct, frozen=True):
     largest_flip_margin: float | None = None
     detail: tuple[str, ...] = ()
     told: tuple[int, ...] = ()
+    unbounded: int = 0
+    largest_unbounded: float = 0.0
 
 
 class Certified(msgspec.Struct, frozen=True):

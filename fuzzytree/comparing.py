@@ -152,21 +152,24 @@ def compare_within(
         found: The answers of the carrier examined.
         expected: The answers of the carrier it is held against.
         rows: The rows.
-        allowed: The largest difference of a strength, for each row. The result tells
-            the one of the row that comes closest to it or exceeds it most.
+        allowed: The largest difference of a strength, for each row. The result shows
+            that of the row that exceeds it most, or else of the largest difference.
         origin: Where the allowed differences come from.
     """
     is_bound = allowed < 1.0
-    gap = np.where(is_bound, strength_gap(found.outcome, expected.outcome), 0.0)
+    apart = strength_gap(found.outcome, expected.outcome)
+    gap = np.where(is_bound, apart, 0.0)
     flips = labels(found) != labels(expected)
     margin = margins(expected)
     close = np.zeros_like(flips) if margin is None else margin <= 2 * allowed
     wrong = is_bound & ((gap > allowed) | (flips & ~close))
-    worst = int(np.argmax(gap / np.maximum(allowed, 1e-300))) if gap.size else 0
-    limit = float(allowed[worst]) if gap.size else 0.0
-    if not is_bound.all():
-        origin += f"; no bound in {int((~is_bound).sum())} rows"
-    return _compared(found, expected, rows, wrong, gap, limit, origin)
+    excess = gap / np.maximum(allowed, 1e-300) if wrong.any() else gap
+    limit = float(allowed[np.argmax(excess)]) if gap.size else 0.0
+    return msgspec.structs.replace(
+        _compared(found, expected, rows, wrong, gap, limit, origin),
+        unbounded=int((~is_bound).sum()),
+        largest_unbounded=float(apart[~is_bound].max(initial=0.0)),
+    )
 
 
 def compare_answers(

@@ -118,6 +118,21 @@ def test_classes_may_differ_only_within_twice_the_bound() -> None:
     assert (narrow.verdict, narrow.differing) == ("DISAGREES", 1)
 
 
+def test_the_allowed_difference_is_that_of_the_row_with_the_largest_one() -> None:
+    moved = answers(
+        "moved",
+        [1, 2, 0],
+        [0, 0, 2],
+        [[0.90625, 0.2, 0.0], [0.5, 0.40625, 0.0], [0.8, 0.1, 0.5]],
+    )
+    moved.outcome.strengths[0, 1] = 0.25  # type: ignore[index]  # it has strengths
+    allowed = np.array([0.00625000001, 0.2, 1.0])
+    found = compare_within(moved, BASE, ROWS, allowed=allowed, origin="test")
+    assert found.verdict == "agrees"
+    assert (found.largest_difference, found.allowed) == (0.25 - 0.2, 0.2)
+    assert (found.unbounded, found.largest_unbounded) == (1, 0.5)
+
+
 def test_a_difference_by_design_is_told_and_no_fault() -> None:
     other = answers("other", [2, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
     told = compare_answers(other, BASE, ROWS, by_design=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fuzzytree.agreement import Agreement, Certified, Comparison
@@ -369,6 +370,12 @@ def _comparison_row(one: Comparison) -> tuple[str, ...]:
         verdict += f", {counted(one.flips, 'class', 'classes')} differ as allowed"
     if one.largest_flip_margin:
         verdict += f" (margin up to {one.largest_flip_margin:.2g})"
+    if one.unbounded:
+        verdict += f"; {counted(one.unbounded, 'row')} without a bound"
+        if one.largest_unbounded == math.inf:
+            verdict += ", some with a missing value on one side only"
+        elif one.largest_unbounded:
+            verdict += f" differ by up to {one.largest_unbounded:.2g}"
     return (
         one.carrier,
         one.against,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import onnx
 import pytest
+from msgspec.structs import replace
 from onnx import numpy_helper
 
 import fuzzytree as ft
@@ -169,3 +171,17 @@ def test_a_graph_that_is_not_written_now_ends_with_1_unless_accepted(
     facts = json.loads(out)
     assert (code, facts["ok"], facts["rows_only"]) == (0, True, True)
     assert "rows only" in [one["verdict"] for one in facts["comparisons"]]
+
+
+def test_rows_without_a_bound_stand_apart_from_the_others() -> None:
+    known = Comparison("native float32", "native", "rows", 9, "agrees", 0, 1e-5, 2e-5)
+    loose = replace(known, unbounded=2, largest_unbounded=0.0069)
+    lost = replace(known, unbounded=1, largest_unbounded=math.inf)
+    same = replace(known, unbounded=1)
+    found = Agreement("grip", "0" * 64, (known, loose, lost, same), probes=9)
+    assert [line.partition("2e-05    ")[2] for line in agreement_lines(found)][2:] == [
+        "agrees",
+        "agrees; 2 rows without a bound differ by up to 0.0069",
+        "agrees; 1 row without a bound, some with a missing value on one side only",
+        "agrees; 1 row without a bound",
+    ]
