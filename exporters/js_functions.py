@@ -193,9 +193,9 @@ function horner(coefficients, x) {
   return total;
 }
 
-/* Return a value held between 0 and high. */
+/* Return a value held between 0 and high; 0.0 of -0.0. */
 function clip(value, high) {
-  return smaller(larger(value, 0.0), high);
+  return smaller(larger(0.0, value), high);
 }
 """
 

@@ -121,7 +121,7 @@ def band(x, low, high, left, right):
 def flank(x, start, end, curve):
     \"\"\"Return a degree that falls from start to end, always below 1.\"\"\"
     q = clip((x - end) / (start - end), 1.0)
-    return min(max(horner(curve, q) * q, 0.0), 1.0 - 2.0**-53)
+    return min(max(0.0, horner(curve, q) * q), 1.0 - 2.0**-53)
 
 
 def lr(x, mean, left, right):
@@ -169,7 +169,7 @@ def horner(coefficients, x):
 
 def clip(value, high):
     \"\"\"Return a value held between 0 and high.\"\"\"
-    return min(max(value, 0.0), high)
+    return min(max(0.0, value), high)
 
 
 SHAPES = {"band": band, "lr": lr, "points": points}

@@ -29,6 +29,7 @@ from fuzzytree.comparing import (
     judged,
     labels,
     probed,
+    same_bits,
 )
 from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
 from fuzzytree.errors import FuzzyTreeError, LossError
@@ -308,7 +309,7 @@ def _is_same(one: Outcome, whole: Outcome, row: int) -> bool:
         return False
     if one.strengths is None or whole.strengths is None:
         return one.strengths is whole.strengths
-    return np.array_equal(one.strengths[:, 0], whole.strengths[:, row], equal_nan=True)
+    return bool(same_bits(one.strengths[:, 0], whole.strengths[:, row]).all())
 
 
 def _shipped(

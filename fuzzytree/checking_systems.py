@@ -17,7 +17,7 @@ import numpy as np
 
 from fuzzytree.agreement import Agreement, Comparison, Count
 from fuzzytree.checking import first_difference
-from fuzzytree.comparing import Rows, counted, judged
+from fuzzytree.comparing import Rows, counted, judged, same_bits
 from fuzzytree.contracts import Runtime, SystemOutcome, SystemRun
 from fuzzytree.errors import FuzzyTreeError, LossError
 from fuzzytree.likeness import is_alike
@@ -188,7 +188,7 @@ class _Gaps(msgspec.Struct, frozen=True):
 
 
 def _gaps(one: FloatArray, two: FloatArray, subject: _Subject, rows: Rows) -> _Gaps:
-    is_same = (one == two) | (np.isnan(one) & np.isnan(two))
+    is_same = same_bits(one, two)
     apart = np.flatnonzero(~is_same.all(axis=0))
     allowed = error_bounds(subject.program, rows.values[:, apart])
     if len(one) < len(allowed):  # without activations

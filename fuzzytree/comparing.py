@@ -134,9 +134,28 @@ def judged(
 
 
 def compare_bits(found: Answers, expected: Answers, rows: Rows) -> Comparison:
-    """Demand equal rules, classes, statuses, and strengths where both have them."""
+    """Demand equal rules, classes, statuses, and strengths where both have them.
+
+    Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value.
+    """
     gap = strength_gap(found.outcome, expected.outcome)
-    return _compared(found, expected, rows, _unequal(found, expected) | (gap > 0), gap)
+    wrong = _unequal(found, expected) | (gap > 0)
+    one, two = found.outcome.strengths, expected.outcome.strengths
+    if one is not None and two is not None and one.shape == two.shape:
+        wrong |= ~same_bits(one, two).all(axis=0)
+    return _compared(found, expected, rows, wrong, gap)
+
+
+def same_bits(one: FloatArray, two: FloatArray) -> BoolArray:
+    """Return where two arrays of a shape have the same bits; NaN is one value.
+
+    Example:
+        >>> zeros, others = np.array([0.0, 0.0, np.nan]), np.array([0.0, -0.0, np.nan])
+        >>> same_bits(zeros, others).tolist()
+        [True, False, True]
+    """
+    same: BoolArray = (one == two) & (np.signbit(one) == np.signbit(two))
+    return same | (np.isnan(one) & np.isnan(two))
 
 
 def compare_within(
@@ -311,7 +330,10 @@ def _apart(found: Answers, expected: Answers, row: int) -> str:
     if one is None or two is None or one.shape != two.shape:
         return ""
     gap = np.abs(one[:, row] - two[:, row])
-    rule = int(np.argmax(np.where(np.isnan(gap), np.inf, gap)))
+    gap = np.where(np.isnan(gap), np.inf, gap)
+    if not gap.any():  # they differ in the sign of a zero
+        gap = 1.0 - same_bits(one[:, row], two[:, row])
+    rule = int(np.argmax(gap))
     right, other = float(two[rule, row]), float(one[rule, row])
     return (
         f"; the strength of rule {rule + 1} is {right!r} in {expected.title}, "

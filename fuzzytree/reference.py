@@ -189,7 +189,7 @@ def degree(shape: Shape, value: float) -> float:
 def flank_degree(flank: Flank, value: float) -> float:
     """Return the degree off a plateau: 0 at and beyond the flank's end, below 1."""
     position = _clip((value - flank.end) / (flank.start - flank.end), 1.0)
-    return min(max(horner(flank.curve, position) * position, 0.0), BELOW_ONE)
+    return min(max(0.0, horner(flank.curve, position) * position), BELOW_ONE)
 
 
 def side_degree(side: Side, distance: float) -> float:
@@ -234,4 +234,4 @@ def horner(coefficients: tuple[float, ...], x: float) -> float:
 
 
 def _clip(value: float, high: float) -> float:
-    return min(max(value, 0.0), high)
+    return min(max(0.0, value), high)

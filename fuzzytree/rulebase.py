@@ -123,6 +123,12 @@ class Points(Value, frozen=True, tag="points"):
     values: tuple[float, ...]
     degrees: tuple[float, ...]
 
+    def __post_init__(self) -> None:
+        """Make a degree of -0.0 a 0.0, so that every runtime gives the same bits."""
+        if 0.0 in self.degrees:
+            degrees = tuple(degree + 0.0 for degree in self.degrees)
+            msgspec.structs.force_setattr(self, "degrees", degrees)
+
 
 Shape = Band | LR | Points
 

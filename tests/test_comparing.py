@@ -90,6 +90,21 @@ def test_one_ulp_of_a_strength_disagrees_with_equal_bits() -> None:
     )
 
 
+def test_a_zero_of_the_other_sign_disagrees_with_equal_bits() -> None:
+    signed = answers(
+        "signed",
+        [1, 2, 0],
+        [0, 0, 2],
+        [[0.9, 0.2, 0.0], [0.5, 0.4, -0.0], [0.8, 0.1, 0.0]],
+    )
+    found = compare_bits(signed, BASE, ROWS)
+    assert (found.verdict, found.differing) == ("DISAGREES", 1)
+    assert found.detail == (
+        "row 2: x 3.0: both answer b (uncovered); the strength of rule 2 is 0.0 in "
+        "base, -0.0 in signed",
+    )
+
+
 def test_another_rule_of_the_same_class_disagrees_with_equal_bits() -> None:
     other = answers("other", [3, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
     assert compare_bits(other, BASE, ROWS).verdict == "DISAGREES"

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from fuzzytree.comparing import same_bits
 from fuzzytree.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.errors import LossError
 from fuzzytree.lowering import forms
@@ -105,8 +106,7 @@ def unequal(one: Outcome, two: Outcome) -> BoolArray:
         return wrong
     if first.shape != second.shape:
         return np.ones_like(wrong)
-    same = (first == second) | (np.isnan(first) & np.isnan(second))
-    wrong |= ~same.all(axis=0)
+    wrong |= ~same_bits(first, second).all(axis=0)
     return wrong
 
 

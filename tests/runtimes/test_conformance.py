@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from fuzzytree.comparing import same_bits
 from fuzzytree.contracts import Dtype, Model, Outcome, Runtime
 from fuzzytree.errors import LossError
 from fuzzytree.lowering import rules_from_tree
@@ -21,6 +22,7 @@ from fuzzytree.rulebase import (
     Conjunction,
     Flank,
     Part,
+    Points,
     Rule,
     RuleBase,
     Semantics,
@@ -167,6 +169,38 @@ def assert_same_answers(found: Outcome, expected: Outcome) -> None:
     if found.strengths is not None:
         assert expected.strengths is not None
         np.testing.assert_array_equal(found.strengths, expected.strengths)
+        assert same_bits(found.strengths, expected.strengths).all()
+
+
+ENDS = RuleBase(
+    "ends",
+    ("x", "y"),
+    (
+        Variable(
+            "v",
+            (
+                Term("falls", Band(high=1.0, right=Flank(1.0, 3.0))),
+                Term("bends", Band(1.0, 2.0, right=Flank(2.0, 5.0, (0.5, 0.5)))),
+                Term("dips", Band(low=0.0, left=Flank(0.0, -4.0, (-0.25, 1.25)))),
+                Term("points", Points((0.0, 1.0, 2.0), (-0.0, 1.0, -0.0))),
+            ),
+        ),
+    ),
+    tuple(
+        Rule((Clause("v", (name,)),), "x")
+        for name in ("falls", "bends", "dips", "points")
+    ),
+)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 64])
+@pytest.mark.parametrize("runtime", RUNTIMES, ids=lambda runtime: runtime.name)
+def test_no_strength_is_a_negative_zero(runtime: Runtime, count: int) -> None:
+    ends = (3.0, 5.0, -4.0, math.nextafter(3.0, 4.0), -4.5, 0.0, 2.0, -1e300, 1e300)
+    for end in ends:
+        found = run_or_skip(runtime, ENDS, np.full((1, count), end))
+        if found.strengths is not None:
+            assert not np.signbit(found.strengths).any(), end
 
 
 @pytest.mark.parametrize("position", range(len(MODELS)), ids=map(name_of, MODELS))
