@@ -87,6 +87,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
         codes: The position of each row's class in `classes`.
         missing: How many cells are missing.
         unlabelled: How many rows were left out because they had no class.
+        target: The column of the classes; empty if they came by themselves.
     """
 
     name: str
@@ -96,6 +97,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     codes: IntArray
     missing: int = 0
     unlabelled: int = 0
+    target: str = ""
 
 
 class Batch(msgspec.Struct, frozen=True, eq=False):
@@ -171,7 +173,9 @@ def read_table(
             f"{first.name} has {values.shape[1]} rows, and there are "
             f"{len(names)} classes for them"
         )
-    return _labelled(first.name, numbers.names, values, names)
+    made = _labelled(first.name, numbers.names, values, names)
+    title = target if isinstance(target, str) else ""
+    return msgspec.structs.replace(made, target=title)
 
 
 def batches(

@@ -6,6 +6,7 @@ import hashlib
 import io
 import os
 import stat
+import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
@@ -38,6 +39,7 @@ from fuzzytree.options import Option
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase, name_choice
 from fuzzytree.runtimes import chosen_runtimes
 from fuzzytree.runtimes.onnxruntime import OnnxModel
+from fuzzytree.suitability import remarks
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tables import Batch, Table, batches, class_names, read_table
 from fuzzytree.tree import FuzzyTree
@@ -139,8 +141,13 @@ def learn(
 
     Raises:
         TableError: If a column is absent or holds text, or if there are no rows.
-        LearningError: If nothing can be learnt from the table.
+        LearningError: If nothing can be learnt from the table, or its target is
+            continuous.
         ValueError: If a setting is out of its range.
+
+    Warns:
+        UserWarning: If a column looks like an identifier, or there are many classes
+            with few rows for each.
 
     Example:
         >>> tree = learn(
@@ -171,6 +178,8 @@ def learn(
     found = read_table(
         table, target=target, ignore=ignore, columns=columns, delimiter=delimiter
     )
+    for column, text in remarks(found, lambda column: f"ignore=[{column!r}]"):
+        warnings.warn(f"{found.name}: {column} has {text}", stacklevel=2)
     return learn_table(
         found,
         name=name or _name_of(table),
