@@ -1,19 +1,20 @@
 """How well trees answer rows that they were not learnt from.
 
-Stratified folds, made from a seed. Large tables are sampled, class by class, and with
-thousands of classes fewer folds are tried, so that the test takes a bounded time and
-gives the same shares each time.
+Stratified folds, made from a seed. In small tables each fold chooses its settings
+anew. Large tables are sampled, class by class, and their folds take the settings that
+learning from all rows chose; with thousands of classes fewer folds are tried. So the
+test takes a bounded time, and gives the same shares each time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
-from fuzzytree.learning import Settings, learn_arrays
+from fuzzytree.learning import LearningReport, Settings, learn_arrays
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.tables import Table
 from fuzzytree.tree import FuzzyTree
@@ -24,8 +25,12 @@ if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
 
 FOLDS = 5
+ROWS = 20_000
 CELLS = 1 << 20
-"""The most numbers that the folds are made of; a larger table is sampled."""
+"""The most rows and numbers that the folds are made of; larger tables are sampled."""
+
+CHOOSING_CELLS = 1 << 15
+"""The most numbers of a table in which each fold chooses its own settings."""
 
 _CLASSES = 5000
 """The most classes times folds that are learnt; at least one fold is tried."""
@@ -41,11 +46,14 @@ class Accuracy(msgspec.Struct, frozen=True):
             as wrong.
         rows: How many rows the folds are made of.
         of: How many rows the table has.
+        is_nested: Whether each fold chose its own settings; if not, all folds took
+            those that learning from the whole table chose.
     """
 
     folds: tuple[float, ...]
     rows: int
     of: int
+    is_nested: bool
 
     @property
     def mean(self) -> float:
@@ -53,9 +61,58 @@ class Accuracy(msgspec.Struct, frozen=True):
         return sum(self.folds) / len(self.folds)
 
 
+class Summary(msgspec.Struct, frozen=True, kw_only=True):
+    """What `learn` read, learnt, tested and wrote.
+
+    Attributes:
+        file: The file that was written.
+        fingerprint: Of the tree.
+        rows: Rows of the table that have a class.
+        columns: The columns to learn from.
+        classes: The classes.
+        missing_cells: Cells without a value.
+        rows_without_class: Rows that were left out because they have no class.
+        remarks: Columns that look unsuitable, each with the reason.
+        inputs: The columns that the tree needs.
+        leaves: Leaves of the tree.
+        accuracy: The cross-validated accuracy, the mean over the folds; null without
+            a test.
+        majority: The accuracy of predicting the most common class for every row.
+        folds: The accuracy of each fold; null without a test.
+        rows_tested: How many rows the folds are made of; null without a test.
+        is_nested: Whether each fold chose its own settings; null without a test.
+        seed: Of the folds.
+        report: What learning counted and repaired.
+    """
+
+    file: str
+    fingerprint: str
+    rows: int
+    columns: tuple[str, ...]
+    classes: tuple[str, ...]
+    missing_cells: int
+    rows_without_class: int
+    remarks: dict[str, str]
+    inputs: tuple[str, ...]
+    leaves: int
+    accuracy: float | None
+    majority: float
+    folds: tuple[float, ...] | None
+    rows_tested: int | None
+    is_nested: bool | None
+    seed: int
+    report: LearningReport
+
+
+def majority(table: Table) -> float:
+    """Return the accuracy of predicting the most common class for every row."""
+    return int(np.bincount(table.codes).max()) / len(table.codes)
+
+
 def accuracy(
     table: Table,
     settings: Settings,
+    report: LearningReport,
     *,
     folds: int = FOLDS,
     seed: int = 0,
@@ -66,6 +123,7 @@ def accuracy(
     Args:
         table: The table.
         settings: How to learn.
+        report: Of learning from the whole table.
         folds: How many folds.
         seed: Of the shuffle.
         progress: Told what is done and which share of it.
@@ -74,7 +132,9 @@ def accuracy(
         The accuracies; None if the table has fewer than ten rows, or if some fold
         leaves one class to learn from.
     """
-    rows = sampled(table.codes, CELLS // max(len(table.columns), 1), seed)
+    width = max(len(table.columns), 1)
+    is_nested = len(table.codes) * width <= CHOOSING_CELLS or not report.chosen
+    rows = sampled(table.codes, min(ROWS, CELLS // width), seed)
     if len(rows) < _FEWEST:
         return None
     codes = table.codes[rows]
@@ -88,17 +148,34 @@ def accuracy(
         present, known = np.unique(table.codes[kept], return_inverse=True)
         if len(present) < 2:
             return None
+        classes = [table.classes[code] for code in present.tolist()]
         learnt = learn_arrays(
             table.values.T[kept],
             known.astype(np.int64),
             columns=table.columns,
-            classes=[table.classes[code] for code in present.tolist()],
-            settings=settings,
+            classes=classes,
+            settings=_of_fold(settings, None if is_nested else report, classes),
         )
         answered = _answered(learnt.tree, table, held)
         right = answered == table.codes[held]
         shares.append(float(np.count_nonzero(right)) / len(held))
-    return Accuracy(tuple(shares), len(rows), len(table.codes))
+    return Accuracy(tuple(shares), len(rows), len(table.codes), is_nested)
+
+
+def _of_fold(
+    settings: Settings, report: LearningReport | None, classes: Sequence[str]
+) -> Settings:
+    """Return settings for the classes of a fold, as a report says they were chosen."""
+    chosen = dict(report.chosen) if report else {}
+    patterns = settings.patterns_per_class
+    if report and chosen.pop("patterns_per_class", None):
+        patterns = report.patterns
+    if isinstance(patterns, Mapping):
+        patterns = {name: patterns.get(name, 1) for name in classes}
+    choices = () if report else settings.choices
+    return msgspec.structs.replace(
+        settings, patterns_per_class=patterns, choices=choices, **chosen
+    )
 
 
 def folds_of(codes: IntArray, folds: int, seed: int) -> IntArray:
@@ -129,8 +206,8 @@ def _by_class(codes: IntArray, seed: int) -> npt.NDArray[np.intp]:
 def _answered(tree: FuzzyTree, table: Table, rows: IntArray) -> IntArray:
     """Return the code of the class of each row; -1 for none."""
     position = {name: k for k, name in enumerate(table.columns)}
-    chosen = [position[name] for name in tree.inputs]
-    values: FloatArray = table.values[chosen][:, rows]
+    chosen = np.array([position[name] for name in tree.inputs], np.int64)
+    values: FloatArray = table.values[np.ix_(chosen, rows)]
     code = {label: k for k, label in enumerate(table.classes)}
     ends = np.array([-1, *(code[leaf.label] for leaf in tree.leaves)], np.int64)
     return ends[find_runtime("native").load(tree)(values).rule]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from fuzzytree import holdout
-from fuzzytree.holdout import accuracy, folds_of, sampled
-from fuzzytree.learning import Settings
+from fuzzytree.holdout import Accuracy, accuracy, folds_of, majority, sampled
+from fuzzytree.learning import Learnt, Settings, learn_arrays
 from fuzzytree.tables import Table, read_table
+from fuzzytree.verbs import learn_table
 
 
 def _table(rows: int, *, classes: int = 2) -> Table:
@@ -16,6 +19,12 @@ def _table(rows: int, *, classes: int = 2) -> Table:
     codes = np.arange(rows) % classes
     values = chance.normal(size=(rows, 2)) + 10.0 * codes[:, None]
     return read_table(values, target=codes)
+
+
+def _accuracy(table: Table, settings: Settings | None = None) -> Accuracy | None:
+    wanted = settings or Settings()
+    report = learn_table(table, name="t", units={}, settings=wanted).report
+    return accuracy(table, wanted, report)
 
 
 def test_each_fold_holds_each_class_in_its_share() -> None:
@@ -39,7 +48,7 @@ def test_a_sample_keeps_the_shares_of_the_classes() -> None:
 
 
 def test_classes_far_apart_are_told_apart() -> None:
-    found = accuracy(_table(60), Settings())
+    found = _accuracy(_table(60))
     assert found is not None
     assert found.mean == 1.0
     assert (found.rows, found.of) == (60, 60)
@@ -47,25 +56,73 @@ def test_classes_far_apart_are_told_apart() -> None:
 
 def test_a_large_table_is_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(holdout, "CELLS", 80)
-    found = accuracy(_table(1000), Settings())
+    found = _accuracy(_table(1000))
     assert found is not None
     assert (found.rows, found.of) == (40, 1000)
 
 
+def test_at_most_20_000_rows_are_tested() -> None:
+    found = _accuracy(_table(50_000), Settings(mode="paper"))
+    assert found is not None
+    assert (found.rows, found.of) == (20_000, 50_000)
+
+
+@pytest.mark.parametrize("cells", [599, 600])
+def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
+    monkeypatch: pytest.MonkeyPatch, cells: int
+) -> None:
+    used: list[Settings] = []
+
+    def learn(*args: Any, settings: Settings, **more: Any) -> Learnt:
+        used.append(settings)
+        return learn_arrays(*args, settings=settings, **more)
+
+    table = read_table(
+        np.random.default_rng(0).normal(size=(300, 2)) ** 2,
+        target=np.random.default_rng(1).integers(0, 2, 300),
+    )
+    wanted = Settings(choices=("alpha", "entry"))
+    report = learn_table(table, name="t", units={}, settings=wanted).report
+    monkeypatch.setattr(holdout, "CHOOSING_CELLS", cells)
+    monkeypatch.setattr(holdout, "learn_arrays", learn)
+    found = accuracy(table, wanted, report)
+    assert found is not None
+    assert found.is_nested == (cells == 600)
+    chosen = Settings(
+        patterns_per_class=report.patterns,
+        alpha=float(report.chosen["alpha"]),
+        entry=float(report.chosen["entry"]),
+    )
+    assert used == [wanted if cells == 600 else chosen] * 5
+
+
+def test_patterns_of_a_class_that_a_fold_lacks_are_no_error() -> None:
+    table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
+    found = _accuracy(table, Settings(patterns_per_class={"a": 2, "c": 1}))
+    assert found is not None
+
+
+def test_the_majority_is_the_share_of_the_most_common_class() -> None:
+    table = read_table(np.arange(8.0)[:, None], target=[*"aabbbbcb"])
+    assert majority(table) == 5 / 8
+
+
 def test_too_few_rows_are_not_tested() -> None:
-    assert accuracy(_table(8), Settings()) is None
+    assert _accuracy(_table(8)) is None
 
 
 def test_a_class_of_one_row_is_answered_wrong_and_not_an_error() -> None:
     table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
-    found = accuracy(table, Settings())
+    found = _accuracy(table)
     assert found is not None
     assert found.mean < 1.0
 
 
 def test_progress_is_told_fold_by_fold() -> None:
     told: list[str] = []
-    accuracy(_table(20), Settings(), progress=lambda text, _: told.append(text))
+    table = _table(20)
+    report = learn_table(table, name="t", units={}, settings=Settings()).report
+    accuracy(table, Settings(), report, progress=lambda text, _: told.append(text))
     assert told == [f"testing fold {k} of 5" for k in range(1, 6)]
 
 
@@ -73,6 +130,6 @@ def test_with_many_classes_fewer_folds_are_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(holdout, "_CLASSES", 4)
-    found = accuracy(_table(60), Settings())
+    found = _accuracy(_table(60))
     assert found is not None
     assert len(found.folds) == 2

@@ -17,6 +17,7 @@ from fuzzytree.agreement import Agreement
 from fuzzytree.auditing.difference_records import Difference, Verdict
 from fuzzytree.auditing.records import Audit
 from fuzzytree.criteria.results import Stability
+from fuzzytree.holdout import Summary
 from fuzzytree.recognition.experiment import Study as Experiment
 from fuzzytree.recognition.timing import FramesStudy
 from fuzzytree.savings import Report
@@ -30,6 +31,7 @@ FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
         "check.schema.json": Agreement,
         "diff.schema.json": Difference,
         "experiment.schema.json": Experiment,
+        "learn.schema.json": Summary,
         "needs.schema.json": Report,
         "stability.schema.json": Stability,
         "tactile-bench.schema.json": FramesStudy,

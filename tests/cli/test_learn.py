@@ -6,7 +6,9 @@ import json
 import re
 from pathlib import Path
 
+import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import msgspec
+import numpy as np
 import pytest
 
 import fuzzytree as ft
@@ -16,9 +18,9 @@ from fuzzytree.rulebase import RuleBase
 from fuzzytree.tree import FuzzyTree
 from tests.cli.conftest import Call
 
-WINE = str(
-    Path(__file__).resolve().parent.parent.parent / "examples" / "wine" / "wine.csv"
-)
+ROOT = Path(__file__).resolve().parent.parent.parent
+WINE = str(ROOT / "examples" / "wine" / "wine.csv")
+SCHEMAS = ROOT / "schemas"
 HELP = "\n  fuzzytree learn --help tells more\n"
 FEW = "a,grip\n" + "".join(f"{k},{'soft' if k < 6 else 'firm'}\n" for k in range(12))
 
@@ -43,10 +45,11 @@ def test_five_lines_tell_what_happened(call: Call) -> None:
     code, out, err = call("learn", "few.csv", "--target", "grip", "-o", "few.yaml")
     assert (code, out) == (0, "")
     assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
-        "read     few.csv  12 rows, 1 column, 2 classes\n"
+        "read     few.csv  12 rows, 1 column, 2 classes, 0 s\n"
         "learnt   2 leaves depth 1, 1 of 1 columns, 0 s\n"
         "repaired 2 sets   sides whose polynomial rises: 2\n"
-        "tested   accuracy 0.900 (5 folds: 0.500 to 1.000)\n"
+        "tested   accuracy 0.900 (majority class 0.500; 5 folds: 0.500 to "
+        "1.000), 0 s\n"
         "wrote    few.yaml next: fuzzytree check few.yaml --data few.csv\n"
     )
     tree = ft.load("few.yaml")
@@ -62,7 +65,7 @@ def test_what_was_left_out_is_told(call: Call) -> None:
     err = call(*words)[2]
     assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
         "read     t.csv    13 rows, 2 columns, 2 classes "
-        "(1 missing cell, 1 row without a class left out)\n"
+        "(1 missing cell, 1 row without a class left out), 0 s\n"
         "learnt   2 leaves depth 1, 1 of 2 columns, 0 s\n"
         "dropped  1 row    a value is missing or not finite\n"
         "ignored  1 column constant or too large: same\n"
@@ -80,6 +83,49 @@ def test_a_sample_is_told_where_not_all_rows_are_kept(call: Call) -> None:
     ) in err
 
 
+def test_a_large_table_is_tested_on_a_sample(call: Call) -> None:
+    numbers = np.random.default_rng(0).normal(size=(21_000, 2)).round(3)
+    numbers += 9.0 * (np.arange(21_000) % 2)[:, None]
+    lines = [f"{a},{b},{k % 2}" for k, (a, b) in enumerate(numbers)]
+    Path("t.csv").write_text("\n".join(["a,b,grip", *lines, ""]), "utf-8")
+    err = call("learn", "t.csv", "--target", "grip", "-o", "t.yaml")[2]
+    assert re.sub(r", [0-9.]+ s$", "", err.splitlines()[-2]) == (
+        "tested   accuracy 1.000 (majority class 0.500; 5 folds on 20,000 of 21,000 "
+        "rows, settings chosen on all rows: 1.000 to 1.000)"
+    )
+
+
+def test_an_identifier_is_remarked_on_before_learning(call: Call) -> None:
+    lines = [f"{k},{k % 7 + 9 * (k % 2)},{k % 2}" for k in range(30)]
+    Path("t.csv").write_text("\n".join(["row id,a,grip", *lines, ""]), "utf-8")
+    words = ("learn", "t.csv", "--target", "grip", "-o", "t.yaml", "--no-test")
+    code, out, err = call(*words, "--json")
+    said = (
+        "a different whole number in each row, as an identifier has; "
+        "--ignore 'row id' leaves it out"
+    )
+    assert code == 0
+    assert err.splitlines()[1] == f"remark   row id   has {said}"
+    assert json.loads(out)["remarks"] == {"row id": said}
+    assert "remark" not in call(*words, "--ignore", "row id")[2]
+
+
+def test_a_continuous_target_is_refused(call: Call) -> None:
+    err = _refused(
+        call,
+        Path(WINE).read_text("utf-8"),
+        "--target",
+        "alcohol",
+        "--ignore",
+        "cultivar",
+    )
+    assert err == (
+        "t.csv: the target 'alcohol' is continuous, with 126 different numbers in 178 "
+        "rows, and a tree predicts classes; divide the numbers into ranges and learn "
+        "these\n"
+    )
+
+
 def test_json_tells_the_same_facts(call: Call) -> None:
     code, out, err = call(
         "learn", WINE, "--target", "cultivar", "-o", "wine.yaml", "--json", "--quiet"
@@ -89,6 +135,11 @@ def test_json_tells_the_same_facts(call: Call) -> None:
     assert facts["rows"] == 178
     assert facts["classes"] == ["barbera", "barolo", "grignolino"]
     assert facts["accuracy"] == sum(facts["folds"]) / 5 > 0.9
+    assert facts["majority"] == 71 / 178
+    assert facts["rows_tested"] == 178
+    assert facts["is_nested"]
+    schema = json.loads((SCHEMAS / "learn.schema.json").read_text("utf-8"))
+    jsonschema.validate(facts, schema)
     assert facts["report"]["mode"] == "default"
 
 
