@@ -40,6 +40,8 @@ def answers(subject: Subject) -> Iterator[Answer]:
         measures.append(Measure("depth of the tree", depth(subject.tree)))
     index = nauck(subject)
     text = f"{counted(len(clauses), 'rule')} with {counted(sum(clauses), 'clause')}"
+    if subject.system is not None and subject.policy.decision == "all":
+        text = f"audited as {text}"  # ways count, and rules left out do not
     if index is not None:
         names = ("complexity", "coverage", "partition")
         measures += [

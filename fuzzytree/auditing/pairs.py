@@ -35,12 +35,10 @@ def answers(subject: Subject) -> Iterator[Answer]:
     compared = sides_of(subject)
     if compared.lower.is_empty:
         return
-    copies = [*_copies(subject, compared)]
-    same = {pair for pair, found in copies if not found.each.high}
-    yield from _subsumed(subject, compared, same)
+    yield from _subsumed(subject, compared)
     if subject.policy.decision == "strongest":
-        yield from _masked(subject, compared, same)
-    yield from _copied(subject, compared, copies)
+        yield from _masked(subject, compared)
+    yield from _copied(subject, compared)
     yield from _conflicts(subject, compared)
     if subject.policy.decision == "strongest":
         yield from clause_answers(subject)
@@ -74,15 +72,13 @@ def _noun(subject: Subject) -> str:
 # --- FT104 and FT105: is one rule at least as strong everywhere?
 
 
-def _subsumed(subject: Subject, compared: Sides, same: set[Pair]) -> Iterator[Answer]:
+def _subsumed(subject: Subject, compared: Sides) -> Iterator[Answer]:
     asked = undecided = 0
     found: dict[int, list[int]] = {}
     for pair in _pairs(subject, is_alike=True):
         if not all(compared.fires[number - 1] for number in pair):
             continue
         asked += 1
-        if pair in same:
-            continue
         forth, back = (
             compared.never_weaker(*each) for each in (pair, (pair[1], pair[0]))
         )
@@ -109,20 +105,20 @@ def _subsumed(subject: Subject, compared: Sides, same: set[Pair]) -> Iterator[An
     yield from _rest_of_strengths("FT104", subject, compared, *counts)
 
 
-def _masked(subject: Subject, compared: Sides, same: set[Pair]) -> Iterator[Answer]:
+def _masked(subject: Subject, compared: Sides) -> Iterator[Answer]:
     asked = undecided = 0
     found: dict[int, list[tuple[int, bool]]] = {}
     for first, second in _pairs(subject, is_alike=False):
         if not all(compared.fires[number - 1] for number in (first, second)):
             continue
         asked += 1
-        if (first, second) in same:
-            continue  # a contradiction, which says it already
         verdict = compared.never_weaker(first, second)
-        undecided += verdict == "open"
         if verdict == "always":
             found.setdefault(second, []).append((first, True))
-        elif compared.from_below.is_above(second, first):
+            continue
+        back = compared.from_below.above(second, first)
+        undecided += "open" in (verdict, back)
+        if back == "always":
             found.setdefault(first, []).append((second, False))
     for weak, strong in sorted(found.items()):
         number, is_before = strong[0]
@@ -196,20 +192,22 @@ def _rest_of_strengths(
 # --- FT106: do two rules ask the same?
 
 
-def _copies(subject: Subject, compared: Sides) -> Iterator[tuple[Pair, Distance]]:
+def _copied(subject: Subject, compared: Sides) -> Iterator[Answer]:
     count = len(subject.rules.rules)
-    for one, other in itertools.combinations(range(count), 2):
+    copies: list[tuple[Pair, Distance]] = []
+    pairs = near = 0
+    for pair in itertools.combinations(range(1, count + 1), 2):
         subject.clock.check()
-        if _is_one(subject, one + 1, other + 1):
+        if _is_one(subject, *pair):
             continue
-        found = compared.distance(one + 1, other + 1, NEARLY)
-        if found is not None and found.whole <= NEARLY:
-            yield (one + 1, other + 1), found
-
-
-def _copied(
-    subject: Subject, compared: Sides, copies: list[tuple[Pair, Distance]]
-) -> Iterator[Answer]:
+        pairs += 1
+        known = compared.distance(*pair, NEARLY)
+        if known is None:
+            near += compared.is_near(*pair, NEARLY)
+        elif known.whole <= NEARLY:
+            copies.append((pair, known))
+        else:
+            near += 1
     decides = subject.policy.decision == "strongest"
     for pair, found in copies:
         first, second = (subject.rule_name(number) for number in pair)
@@ -243,8 +241,6 @@ def _copied(
             rules=pair,
             measures=measures,
         )
-    count = len(subject.rules.rules)
-    pairs = count * (count - 1) // 2
     if not pairs:
         return
     among = counted(pairs, "pair")
@@ -253,7 +249,6 @@ def _copied(
     state: State = Proved(
         f"somewhere their degrees differ by more than {short(NEARLY)}"
     )
-    near = compared.count_near({pair for pair, _ in copies}, NEARLY)
     if near:
         reason = f"{counted(near, 'pair')} of degrees are too near to tell"
         sentence = f"{rest} are shown to have nearly the same antecedent, among "

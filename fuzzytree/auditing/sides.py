@@ -14,8 +14,7 @@ from above in both.
 from __future__ import annotations
 
 import functools
-import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
@@ -162,29 +161,16 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
             return None
         return distance(self.from_below.factored, one - 1, other - 1, most)
 
-    def is_apart(self, one: int, other: int, most: Fraction) -> bool:
-        """Return whether degrees of two rules that are held surely differ by more."""
+    def is_near(self, one: int, other: int, most: Fraction) -> bool:
+        """Return whether it is open whether degrees of two rules differ by more.
+
+        That is so only of rules that are held.
+        """
         limit = float(most) + _ROUNDING
-        return any(
+        return self.is_held(one, other) and not any(
             bool((low[a - 1] - high[b - 1] > limit).any())
             for low, high in self._degrees
             for a, b in ((one, other), (other, one))
-        )
-
-    def count_near(self, known: Collection[tuple[int, int]], most: Fraction) -> int:
-        """Return of how many pairs it is open whether they differ by more anywhere.
-
-        Args:
-            known: Pairs that do not.
-            most: By more than this.
-        """
-        if self.held is None:
-            return 0
-        pairs = itertools.combinations(range(1, len(self.lower.rules.rules) + 1), 2)
-        return sum(
-            not self.is_apart(*pair, most)
-            for pair in pairs
-            if pair not in known and self.is_held(*pair)
         )
 
     @functools.cached_property

@@ -22,7 +22,13 @@ import msgspec
 import numpy as np
 
 from fuzzytree.interrupts import checkpoint
-from fuzzytree.proving.factors import Factored, is_single, largest_ratio, least_ratios
+from fuzzytree.proving.factors import (
+    Factored,
+    is_single,
+    largest_ratio,
+    least_ratios,
+    meets,
+)
 from fuzzytree.proving.ground import Ground, Laid
 
 if TYPE_CHECKING:
@@ -168,17 +174,28 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
         verdicts: tuple[Verdict, ...] = ("always", "not", "open")
         return verdicts[found]
 
-    def is_above(self, strong: int, weak: int) -> bool:
-        """Return whether a rule is surely stronger than another wherever that fires."""
-        if self.never_weaker(strong, weak) != "always":
-            return False
+    def above(self, strong: int, weak: int) -> Verdict:
+        """Return whether a rule is stronger than another wherever that fires.
+
+        Args:
+            strong: The number of the rule, from 1.
+            weak: The number of the other one, which fires somewhere.
+        """
+        verdict = self.never_weaker(strong, weak)
+        if verdict != "always":
+            return verdict
         if self.is_product:
             most = largest_ratio(self.factored, strong - 1, weak - 1)
-            return most is not None and most.high < 1
-        found = not self._not_above(weak - 1)[strong - 1]
-        if not found and not self.ground.is_fine:
-            return self.fine.is_above(strong, weak)
-        return found
+            if most is not None and most.high < 1:
+                return "always"
+            is_met = meets(self.factored, strong - 1, weak - 1)
+            return "not" if is_met else "open"
+        may, surely = self._not_above(weak - 1)
+        if may[strong - 1] and not surely[strong - 1] and not self.ground.is_fine:
+            return self.fine.above(strong, weak)
+        if not may[strong - 1]:
+            return "always"
+        return "not" if surely[strong - 1] else "open"
 
     @functools.cached_property
     def _known(self) -> dict[tuple[str, int], ByteArray]:
@@ -202,23 +219,29 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
         self._known[key] = found.astype(np.int8)
         return self._known[key]
 
-    def _not_above(self, weak: int) -> BoolArray:
-        """For each rule: whether it may be no stronger than one where that fires."""
+    def _not_above(self, weak: int) -> tuple[BoolArray, BoolArray]:
+        """For each rule: whether it may be, and is, no stronger where one fires."""
         _, rests, reached = self.tops
-        found = np.full(len(self.ground.rules.rules), not self.sides)
+        may = np.full(len(self.ground.rules.rules), not self.sides)
+        surely = may.copy()
         for side, rest, is_reached in zip(self.sides, rests, reached, strict=True):
             high, may_meet = rest[weak], is_reached[weak]
-            # Equality with a supremum counts only where both are reached.
-            is_flat = side.least == side.most
-            equal = (is_flat & may_meet) | ~self._is_sharp(side.least)
-            fits = (side.least < high) | ((side.least == high) & equal)
-            cells = fits & (side.rank <= side.rank[weak]) & ~side.is_zero[weak]
-            equal = may_meet | ~self._is_sharp(side.at)
-            fits = (side.at < high) | ((side.at == high) & equal)
-            zones = fits & (side.at <= side.at[weak]) & ~side.is_zero_at[weak]
             first = 0 if side.has_start else 1
-            found |= cells.any(axis=1) | zones[:, first:].any(axis=1)
-        return found
+            # Equality with a supremum counts only where both are reached.
+            is_sharp, meets_it = self._is_sharp(side.least), side.least == high
+            is_flat = (side.least == side.most) & may_meet
+            cells = (side.rank <= side.rank[weak]) & ~side.is_zero[weak]
+            below = cells & (side.least < high)
+            may |= (below | (cells & meets_it & (is_flat | ~is_sharp))).any(axis=1)
+            surely |= (below | (cells & meets_it & is_flat & is_sharp)).any(axis=1)
+            is_sharp, meets_it = self._is_sharp(side.at), side.at == high
+            zones = (side.at <= side.at[weak]) & ~side.is_zero_at[weak]
+            fits = (side.at < high) | (meets_it & (may_meet | ~is_sharp))
+            may |= (zones & fits)[:, first:].any(axis=1)
+            zones &= (side.at < side.at[weak]) | is_sharp
+            fits = (side.at < high) | (meets_it & may_meet & is_sharp)
+            surely |= (zones & fits & (side.at[weak] > 0))[:, first:].any(axis=1)
+        return may, surely
 
     def _is_sharp(self, bands: IntArray) -> BoolArray:
         """Return whether bands are one level each; what is far is."""

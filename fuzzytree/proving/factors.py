@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -40,6 +40,9 @@ from fuzzytree.rulebase import Clause, Shape, shapes_of
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray
     from fuzzytree.proving.ground import BoolArray
+
+UNKNOWN: Final = Fraction(1 << 4096)
+"""The upper bound of a ratio of which none was found."""
 
 Group = tuple[tuple[int, ...], bool]
 """A clause: its elements, and whether the least of them counts, not the largest."""
@@ -242,15 +245,18 @@ def largest_ratio(of: Factored, strong: int, weak: int) -> Bounds | None:
         weak: The number of the one above it.
 
     Returns:
-        0 if `weak` never fires; None if there is no bound, or none was found.
+        0 if `weak` never fires; None if there is no bound; up to `UNKNOWN` if none was
+        found.
     """
     low = high = ONE
+    is_known = True
     for axis in range(len(of.laid)):
         found = _axis_ratio(of, axis, strong, weak)
         if found is None:
             return None
         low, high = low * found.low, high * found.high
-    return Bounds(low, high)
+        is_known &= found.high < UNKNOWN
+    return Bounds(low, high if is_known else UNKNOWN)
 
 
 def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | None:
@@ -284,10 +290,38 @@ def _axis_ratio(of: Factored, axis: int, strong: int, weak: int) -> Bounds | Non
         if all(beside) and is_single(of.laid[axis], a, b):
             high = max(high, ONE) if low < ONE else high
             continue
-        if not least:
-            return None
-        high = max(high, most / least)
+        high = max(high, most / least if least else UNKNOWN)
     return Bounds(low, high)
+
+
+def meets(of: Factored, strong: int, weak: int) -> bool:
+    """Return whether two rules are known to be equal on each axis, where they fire.
+
+    They are then equally strong somewhere. It is looked for where curves coincide and
+    at the ends of cells.
+
+    Args:
+        of: The rules.
+        strong: The number of a rule, from 0.
+        weak: The number of another one, which fires somewhere.
+    """
+    return all(_is_met(of, axis, strong, weak) for axis in range(len(of.laid)))
+
+
+def _is_met(of: Factored, axis: int, one: int, other: int) -> bool:
+    if of.asked[axis][one] == of.asked[axis][other]:
+        return True
+    if of.has_start(axis) and of.at_start(axis, one) == of.at_start(axis, other) != 0:
+        return True
+    cells = of.laid[axis].cells
+    for cell, (_, high) in enumerate(cells.between):
+        mine, theirs = (of.polynomial(axis, rule, cell) for rule in (one, other))
+        if mine == theirs and any(mine):
+            return True
+        low, end = cells.zones[cell + 1]
+        if low == end and value_at(mine, high) == value_at(theirs, high) != 0:
+            return True
+    return False
 
 
 def is_single(laid: Laid, low: Fraction, high: Fraction) -> bool:
@@ -315,7 +349,8 @@ def quotient(
         high: The upper one, above it.
 
     Returns:
-        0 where `top` is 0 everywhere; None if the quotient has no bound.
+        0 where `top` is 0 everywhere; None if the quotient has no bound; up to
+        `UNKNOWN` if none was found.
 
     Example:
         >>> x, square = (ZERO, ONE), (ZERO, ZERO, ONE)
@@ -348,7 +383,7 @@ def quotient(
         above = values_near(top, root.low, root.high)
         below = values_near(bottom, root.low, root.high)
         if below.low <= 0:
-            return None
+            return Bounds(least, UNKNOWN)
         least = max(least, above.low / below.high)
         most = max(most, above.high / below.low)
     return Bounds(least, most)

@@ -43,10 +43,8 @@ def _not_told_to_hide(case: Case, answer: Answer) -> None:
     counts["rules that never fire"] = silent
     counted(answer, counts, 3)
     told = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
-    copies = {one.rules for one in case.coded("FT106") if _is_copy(one)}
     for first, second in pairs:
-        is_told = (first, second) in told or (second, first) in told
-        if is_told or (first, second) in copies:
+        if (first, second) in told or (second, first) in told:
             continue
         one, other = case.asked(first), case.asked(second)
         require(case.beats(other, [one]), f"rule {second} hides behind {first}")
@@ -62,8 +60,8 @@ def _is_copy(answer: Answer) -> bool:
 def copied(case: Case, answer: Answer) -> None:
     """Ask whether one of two rules that are told to be alike is ever stronger."""
     if not answer.rules:
-        count = len(case.numbers)
-        counted(answer, {"pairs": count * (count - 1) // 2}, 1)
+        pairs = case.pairs(alike=True) + case.pairs(alike=False)
+        counted(answer, {"pairs": len(pairs)}, 1)
         text = "that no other two rules are nearly alike is not asked here"
         raise UndecidedError(text)
     first, second = answer.rules

@@ -198,7 +198,8 @@ FT404 P +info | {subject}
 FT404 P -info | terms and variables | variables in use; terms in use
   rules ask {variables in use:n variable} and {terms in use:n term}
 FT501 P -info | the rule base | *
-  {rules:n rule} with {clauses:n clause}[, index of Nauck {index of Nauck:s}]
+  [audited as ]{rules:n rule} with {clauses:n clause}[, index of Nauck
+  {index of Nauck:s}]
 FT701 S {seen}info | <rows with a missing value|rows outside the domain>
   on {hits:d} of {rows:d} rows a value is <missing|outside the domain>
 FT701 S {seen}info | <uncovered|weak|tied|close> rows

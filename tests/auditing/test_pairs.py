@@ -35,7 +35,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.system import Conclusion, Is, RuleBlock, SystemRule
+from fuzzytree.system import Conclusion, Is, Or, RuleBlock, SystemRule
 from tests.auditing.test_views import block_of, system_of
 from tests.proving.bases import random_base
 
@@ -43,6 +43,8 @@ LOW = Term("low", Points((0.0, 2.0, 4.0), (1.0, 1.0, 0.0)))
 HIGH = Term("high", Points((2.0, 4.0), (0.0, 1.0)))
 WIDE = Term("wide", Points((1.0, 2.0), (0.0, 1.0)))
 NONE = Term("none", Points((0.0, 1.0), (1.0, 0.0)))
+UP = Term("up", Points((0.0, 4.0), (0.0, 1.0)))
+DOWN = Term("down", Points((0.0, 4.0), (1.0, 0.0)))
 TERMS = (LOW, HIGH, WIDE, NONE)
 CONJUNCTIONS: tuple[Conjunction, ...] = ("min", "product")
 
@@ -162,6 +164,22 @@ def test_with_inputs_that_depend_on_each_other_nothing_is_ruled_out() -> None:
     assert answer.state.code == "FTD04"
 
 
+@pytest.mark.parametrize("conjunction", CONJUNCTIONS)
+def test_a_rule_with_the_antecedent_of_another_is_subsumed_or_masked(
+    conjunction: Conjunction,
+) -> None:
+    twice = ("slip is high, force is high", "hard")
+    assert told(base(*CLEAN, twice, conjunction=conjunction), "FT104") == [
+        "rule 3 is subsumed by rule 2: wherever it fires, rule 2 of the same class "
+        "is at least as strong"
+    ]
+    other = ("slip is high, force is high", "soft")
+    assert told(base(*CLEAN, other, conjunction=conjunction), "FT105") == [
+        "rule 3 is never answered: wherever it fires, rule 2 of class 'hard' "
+        "is at least as strong and stands before it"
+    ]
+
+
 # --- FT105
 
 
@@ -198,6 +216,22 @@ def test_a_rule_before_a_stronger_one_is_masked(conjunction: Conjunction) -> Non
         "rule 1 is never answered: wherever it fires, "
         "rule 2 of class 'hard' is stronger"
     ]
+
+
+def test_a_rule_that_only_comes_near_a_stronger_one_is_not_called_unmasked() -> None:
+    # The first is `down` times the second: it comes near it at 0, where both are 0.
+    rules = base(
+        ("force is up, force is down", "soft"),
+        ("force is up", "hard"),
+        conjunction="product",
+        more=(UP, DOWN),
+    )
+    (answer,) = asked(rules, "FT105")
+    assert isinstance(answer.state, Declined)
+    assert answer.sentence == (
+        "no rule is shown to be masked, among 1 pair of two classes: 1 pair of "
+        "strengths are too near to tell"
+    )
 
 
 def test_a_rule_that_ties_somewhere_before_the_other_is_answered_there() -> None:
@@ -240,7 +274,6 @@ def test_two_rules_that_ask_the_same_of_one_class_are_copies() -> None:
         "rule 2 and rule 3 have the same antecedent and the same class 'hard'"
     )
     assert answer.severity == "warning"
-    assert not told(base(*CLEAN, copy), "FT104")
     product = base(*CLEAN, copy, conjunction="product")
     assert not told(product, "FT106")  # the degree counts twice there
     assert told(product, "FT104")
@@ -260,6 +293,31 @@ def test_curves_that_agree_on_the_domain_only_are_the_same() -> None:
     rules = (*CLEAN, ("force is beyond, slip is high", "hard"))
     assert told(base(*rules, more=(beyond,)), "FT106")
     assert not told(base(*rules, more=(beyond,), high=5.0), "FT106")
+
+
+def test_two_ways_of_one_rule_are_no_pair() -> None:
+    system = system_of(block_of(Or((Is("a", "low"), Is("b", "low"))), Is("a", "high")))
+    (answer,) = audit(system, select=["FT106"]).answers
+    assert answer.sentence == (
+        "no two rules have nearly the same antecedent, among 2 pairs"
+    )
+
+
+def test_two_small_distances_under_the_product_are_left_open() -> None:
+    # Each degree differs by less than the tolerance, both together by more.
+    near = Term("near", Points((2.0, 4.0), (0.0, 1.0 - 2.0**-20)))
+    rules = base(
+        *CLEAN,
+        ("force is near, slip is near", "hard"),
+        conjunction="product",
+        more=(near,),
+    )
+    (answer,) = asked(rules, "FT106")
+    assert isinstance(answer.state, Declined)
+    assert answer.sentence == (
+        "no two rules are shown to have nearly the same antecedent, among 3 pairs: "
+        "1 pair of degrees are too near to tell"
+    )
 
 
 # --- FT201

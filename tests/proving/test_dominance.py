@@ -78,7 +78,7 @@ def test_under_the_product_no_point_of_a_grid_speaks_against_it(
         pairs = [(row[strong - 1], row[weak - 1]) for row in rows]
         if both.never_weaker(strong, weak) == "always":
             assert all(a >= b for a, b in pairs)
-        if both.is_above(strong, weak):
+        if both.above(strong, weak) == "always":
             assert all(a > b or not b for a, b in pairs)
         most = largest_ratio(both.factored, strong - 1, weak - 1)
         if most is not None:
@@ -96,9 +96,9 @@ def test_under_min_a_rule_that_is_above_is_stronger_wherever_the_other_fires(
     more = tuple(Rule((Clause("x1", (name,)),), "class 1") for name in ("half", "tall"))
     rules = replace(rules, variables=variables, rules=(*rules.rules, *more))
     both, rows = compared(rules), strengths(rules)
-    assert both.is_above(8, 7)
+    assert both.above(8, 7) == "always"
     for strong, weak in itertools.permutations(range(1, 9), 2):
-        if both.is_above(strong, weak):
+        if both.above(strong, weak) == "always":
             pairs = [(row[strong - 1], row[weak - 1]) for row in rows]
             assert all(a > b or not b for a, b in pairs)
 
@@ -121,7 +121,7 @@ def test_rules_that_ask_nothing_are_equal() -> None:
     for meant in (Semantics("min"), Semantics("product")):
         both = Compared(ground(replace(rules, semantics=meant), Domain(())))
         assert both.never_weaker(1, 2) == "always"
-        assert not both.is_above(1, 2)
+        assert both.above(1, 2) != "always"
         assert both.fires.all()
 
 
