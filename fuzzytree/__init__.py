@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fuzzytree.estimator import FuzzyTreeClassifier
     from fuzzytree.outputs import Outputs
     from fuzzytree.readers.simpful import from_simpful
+    from fuzzytree.readers.skfuzzy import from_skfuzzy
     from fuzzytree.readers.sklearn import from_sklearn
     from fuzzytree.rulebase import RuleBase
     from fuzzytree.system import FuzzySystem
@@ -57,6 +58,7 @@ __all__ = [
     "diff",
     "export",
     "from_simpful",
+    "from_skfuzzy",
     "from_sklearn",
     "learn",
     "load",
@@ -84,6 +86,7 @@ _HOMES = {
     "diff": "fuzzytree.verbs",
     "export": "fuzzytree.verbs",
     "from_simpful": "fuzzytree.readers.simpful",
+    "from_skfuzzy": "fuzzytree.readers.skfuzzy",
     "from_sklearn": "fuzzytree.readers.sklearn",
     "learn": "fuzzytree.verbs",
     "load": "fuzzytree.verbs",

@@ -30,6 +30,7 @@ from fuzzytree.lowering import rules_from_tree
 from fuzzytree.options import Option, check_options
 from fuzzytree.probing import probes
 from fuzzytree.readers.simpful import from_simpful
+from fuzzytree.readers.skfuzzy import from_skfuzzy
 from fuzzytree.readers.sklearn import from_sklearn
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase
@@ -230,6 +231,8 @@ def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
 _OBJECT_READERS: dict[tuple[str, str], Callable[[object], Document]] = {
     ("sklearn.tree._classes", "DecisionTreeClassifier"): from_sklearn,
     ("simpful.simpful", "FuzzySystem"): from_simpful,
+    ("skfuzzy.control.controlsystem", "ControlSystem"): from_skfuzzy,
+    ("skfuzzy.control.controlsystem", "ControlSystemSimulation"): from_skfuzzy,
 }
 """The module and name of a class of another library, and what reads its objects."""
 

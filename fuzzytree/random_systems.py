@@ -235,7 +235,8 @@ class _Maker:
         if is_weighted:
             return how
         samples = chance.choice((2, 3, 7, 16, 33, 100))
-        return Defuzzifier(how.method, samples, chance.choice(get_args(Grid)))
+        grids: tuple[Grid, ...] = ("middle", "ends", "half ends")
+        return Defuzzifier(how.method, samples, chance.choice(grids))
 
     def _block(
         self,

@@ -129,6 +129,7 @@ def exporter_models(seed: int = 0, rounds: int = 2) -> Iterator[tuple[str, Docum
         yield f"a system named {names}", _named_system(names)
     yield "rules with extreme numbers", _extreme_rules()
     yield "a system with extreme numbers", _extreme_system()
+    yield "a system by lines", _system_by_lines()
 
 
 ODD_NAMES = (
@@ -205,6 +206,30 @@ def _extreme_system() -> FuzzySystem:
     )
     inputs = (SystemInput("a", (label,), -1e308, 1e308),)
     return FuzzySystem("extreme", inputs, (output,), (RuleBlock(rules),))
+
+
+def _system_by_lines() -> FuzzySystem:
+    """Return a system whose output's curve is made of lines."""
+    ramp = Label("ramp", Points((0.0, 1.0), (0.0, 1.0)))
+    labels = (
+        Label("low", Points((0.0, 0.4, 1.0), (1.0, 0.25, 0.0))),
+        Label("high", Points((0.1, 0.5, 0.9), (0.0, 1.0, 0.3)), height=0.75),
+        Label("all", Points((0.0,), (0.125,))),
+    )
+    how = Defuzzifier("centroid", 6, "lines")
+    output = SystemOutput("y", labels, 0.0, 1.0, how, aggregation="maximum")
+    rules = tuple(
+        SystemRule(when, (Conclusion("y", name),), weight)
+        for name, weight, when in (
+            ("low", 1.0, Is("a", "ramp", ("not",))),
+            ("high", 0.5, Is("a", "ramp")),
+            ("all", 1.0, None),
+            ("high", 1.0, Is("a", "ramp", ("very",))),
+        )
+    )
+    inputs = (SystemInput("a", (ramp,), 0.0, 1.0),)
+    block = RuleBlock(rules, implication="minimum")
+    return FuzzySystem("lines", inputs, (output,), (block,))
 
 
 def random_tree(

@@ -750,7 +750,8 @@ def test_random_systems_show_everything_that_a_system_can_have() -> None:
     norms |= {f"or {name}" for name in get_args(SNorm)}
     norms |= {f"joined by {name}" for name in (None, *get_args(SNorm))}
     hedges = set(get_args(Hedge))
-    others = {*get_args(DefuzzifierMethod), *get_args(Grid)}
+    # `lines` needs one method and two operators; `exporter_models` has it.
+    others = {*get_args(DefuzzifierMethod), *get_args(Grid)} - {"lines"}
     assert kinds | norms | hedges | others <= seen
 
 

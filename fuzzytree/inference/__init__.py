@@ -12,6 +12,7 @@ words and formulas.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -48,6 +49,7 @@ from fuzzytree.system import (
     SystemInput,
     SystemOutput,
     TNorm,
+    is_drawn_by_lines,
 )
 
 __all__ = [
@@ -278,6 +280,8 @@ class _Run:
         """Return what an output's conclusions amount to; NaN if to nothing."""
         if output.defuzzifier.is_weighted:
             return self._weighted(output)
+        if is_drawn_by_lines(output):
+            return self._centroid_of_lines(output)
         xs = samples_of(output)
         degrees = self._aggregated(output, xs)
         match output.defuzzifier.method:
@@ -300,6 +304,41 @@ class _Run:
                 degree = self._label_degree(output.name, one.conclusion.label, x)
                 total[position] = join(total[position], cut(one.degree, degree))
         return total
+
+    def _centroid_of_lines(self, output: SystemOutput) -> float:
+        """Return the centroid of the area below the lines of the grid `lines`.
+
+        In a piece, `share` is 0 at its left end and 1 at its right end. Both sums are
+        twice what they are called.
+        """
+        known = {one.conclusion.label for one in self._of(output)}
+        labels = [label for label in output.labels if label.name in known]
+        cuts = [
+            (self._so_far(output, label.name), line_tables(output, label))
+            for label in labels
+        ]
+        areas: list[float] = []
+        moments: list[float] = []
+        for k, (left, right) in enumerate(itertools.pairwise(samples_of(output))):
+            shares = [
+                line.start[k] + (degree - line.level[k]) * line.slope[k]
+                for degree, line in cuts
+            ]
+            shares = [0.0, *sorted(min(max(one, 0.0), 1.0) for one in shares), 1.0]
+            heights = [
+                max((min(cut, one.at(k, share)) for cut, one in cuts), default=0.0)
+                for share in shares
+            ]
+            points = zip(shares, heights, strict=True)
+            area, moment = 0.0, 0.0
+            for (share, low), (after, high) in itertools.pairwise(points):
+                gap, both = after - share, low + high
+                area += gap * both
+                moment += gap * (share * (low + both) + after * (high + both))
+            width = right - left
+            areas.append(width * area)
+            moments.append(width * (left * area + width * moment / 3.0))
+        return quotient(tree_sum(moments), tree_sum(areas))
 
     def _weighted(self, output: SystemOutput) -> float:
         """Return the weighted sum or average of numbers, from left to right."""
@@ -383,6 +422,48 @@ def samples_of(output: SystemOutput) -> list[float]:
         return [low + (k + 0.5) * step for k in range(count)]
     step = (high - low) / (count - 1)
     return [*(low + k * step for k in range(count - 1)), high]
+
+
+class Lines(msgspec.Struct, frozen=True):
+    """A label's curve as a line between each two neighbouring samples.
+
+    Attributes:
+        left: The degree at a piece's left end.
+        rise: How much it rises up to the right end.
+        start: With `level` and `slope`: the line meets degree d at the share
+            `start + (d - level) slope` of the piece, if that lies in [0, 1].
+        level: The lower of the degrees at both ends; 0 where they are equal.
+        slope: 0 where they are equal.
+    """
+
+    left: tuple[float, ...]
+    rise: tuple[float, ...]
+    start: tuple[float, ...]
+    level: tuple[float, ...]
+    slope: tuple[float, ...]
+
+    def at(self, piece: int, share: float) -> float:
+        """Return the degree at a share of a piece."""
+        return self.left[piece] + share * self.rise[piece]
+
+
+@functools.lru_cache(maxsize=256)
+def line_tables(output: SystemOutput, label: Label) -> Lines:
+    """Return the lines of a label of an output whose grid is `lines`."""
+    degrees = [
+        label.height * curve_degree(label.curve, x, {}) for x in samples_of(output)
+    ]
+    rows: list[tuple[float, float, float, float, float]] = []
+    for left, right in itertools.pairwise(degrees):
+        rise = right - left
+        slope = quotient(1.0, rise)
+        if not math.isfinite(slope):
+            rows.append((left, rise, 0.0, 0.0, 0.0))
+        elif rise > 0.0:
+            rows.append((left, rise, 0.0, left, slope))
+        else:
+            rows.append((left, rise, 1.0, right, slope))
+    return Lines(*zip(*rows, strict=True))
 
 
 def _areas(output: SystemOutput, degrees: Sequence[float]) -> list[float]:

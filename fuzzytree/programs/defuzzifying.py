@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable, Sequence
 
+from fuzzytree.inference import Lines
 from fuzzytree.programs.formulas import as_number
 from fuzzytree.programs.steps import Maker
 from fuzzytree.system import SystemOutput
@@ -53,6 +55,57 @@ def defuzzified(make: Maker, output: SystemOutput, xs: int, degrees: int) -> int
         found = _end(make, output, xs, chosen, is_first=method.startswith("smallest"))
     is_any = make("less", make.constant(0.0), highest)
     return make("where", is_any, found, make.constant(math.nan))
+
+
+def centroid_of_lines(
+    make: Maker, output: SystemOutput, cuts: Sequence[tuple[int, Lines]]
+) -> int:
+    """Return an output's centroid on the grid `lines`, of its labels' degrees."""
+    xs = sample_values(output)
+    index = make.index(len(xs) - 1)
+
+    def row(numbers: Iterable[float]) -> int:
+        return make.table("pick", index, [*numbers])
+
+    zero, one = make.constant(0.0), make.constant(1.0)
+    sides = [(degree, row(line.left), row(line.rise)) for degree, line in cuts]
+    shares: list[int] = []
+    for degree, line in cuts:
+        above = make("subtract", degree, row(line.level))
+        share = make("add", row(line.start), make("multiply", above, row(line.slope)))
+        shares.append(make("minimum", make("maximum", share, zero), one))
+    shares = [zero, *_sorted(make, shares), one]
+    heights: list[int] = []
+    for share in shares:
+        lines = [
+            (cut, make("add", y, make("multiply", share, r))) for cut, y, r in sides
+        ]
+        heights.append(make.chain("maximum", [make("minimum", *one) for one in lines]))
+    areas: list[int] = []
+    moments: list[int] = []
+    points = itertools.pairwise(zip(shares, heights, strict=True))
+    for (share, low), (after, high) in points:
+        width, both = make("subtract", after, share), make("add", low, high)
+        areas.append(make("multiply", width, both))
+        first = make("multiply", share, make("add", low, both))
+        second = make("multiply", after, make("add", high, both))
+        moments.append(make("multiply", width, make("add", first, second)))
+    area, moment = make.chain("add", areas), make.chain("add", moments)
+    width = row(right - left for left, right in itertools.pairwise(xs))
+    inside = make("divide", make("multiply", width, moment), make.constant(3.0))
+    around = make("add", make("multiply", row(xs[:-1]), area), inside)
+    total = make("total", make("multiply", width, around))
+    return make("divide", total, make("total", make("multiply", width, area)))
+
+
+def _sorted(make: Maker, numbers: Sequence[int]) -> list[int]:
+    """Return numbers in rising order, by exchanging neighbours."""
+    found = [*numbers]
+    for last in range(len(found) - 1, 0, -1):
+        for k in range(last):
+            pair = found[k], found[k + 1]
+            found[k], found[k + 1] = make("minimum", *pair), make("maximum", *pair)
+    return found
 
 
 def _areas(make: Maker, output: SystemOutput, degrees: int) -> int:

@@ -13,10 +13,16 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
+from fuzzytree.inference import line_tables
 from fuzzytree.interrupts import checkpoint
 from fuzzytree.programs.choosing import passes, positive, proportional, ranked
 from fuzzytree.programs.curves import curve_degree, is_unit, value_at
-from fuzzytree.programs.defuzzifying import defuzzified, sample_values, samples_of
+from fuzzytree.programs.defuzzifying import (
+    centroid_of_lines,
+    defuzzified,
+    sample_values,
+    samples_of,
+)
 from fuzzytree.programs.formulas import as_number, is_nan, value_of
 from fuzzytree.programs.norms import KEEPS_UNIT, S_NORMS, T_NORMS, Norm, hedged
 from fuzzytree.programs.rules import DECIDED, MISSING, UNCOVERED, known_row
@@ -38,6 +44,7 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
     TNorm,
+    is_drawn_by_lines,
 )
 
 
@@ -333,6 +340,14 @@ class _Run:
             return self.make.constant(math.nan)
         if output.defuzzifier.is_weighted:
             return self._weighted(output)
+        if is_drawn_by_lines(output):
+            concluded = {one.label for one in self._of(output)}
+            cuts = [
+                (self._so_far(output, label.name), line_tables(output, label))
+                for label in output.labels
+                if label.name in concluded
+            ]
+            return centroid_of_lines(self.make, output, cuts)
         xs = samples_of(self.make, output)
         return defuzzified(self.make, output, xs, self._aggregated(output, xs))
 

@@ -222,6 +222,7 @@ _GRIDS = {
     "middle": "in the middle of equal pieces",
     "ends": "from end to end",
     "half ends": "from end to end, by the trapezoidal rule",
+    "lines": "from end to end, joined by lines",
 }
 
 

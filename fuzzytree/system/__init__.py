@@ -131,6 +131,7 @@ __all__ = [
     "Trapezoid",
     "TwoGaussians",
     "curve_mistakes",
+    "is_drawn_by_lines",
     "joints",
     "names_in",
     "questions",
@@ -163,7 +164,7 @@ DefuzzifierMethod = Literal[
     "weighted average",
     "weighted sum",
 ]
-Grid = Literal["middle", "ends", "half ends"]
+Grid = Literal["middle", "ends", "half ends", "lines"]
 
 
 class Defuzzifier(Value, frozen=True):
@@ -182,7 +183,11 @@ class Defuzzifier(Value, frozen=True):
         grid: `middle`: in the middle of as many equal pieces of the range. `ends`: the
             first at its low end and the last at its high end. `half ends`: like
             `ends`, and the first and the last count half in areas (the trapezoidal
-            rule); of no other meaning for maxima.
+            rule); of no other meaning for maxima. `lines`: like `ends`, and between
+            neighbours each label's curve is a line; the aggregated curve joins its
+            values there, and where a label's line meets the label's degree, by lines
+            too, and the centroid is that of the area below them (as in scikit-fuzzy).
+            It needs `centroid`, `maximum` as aggregation and `minimum` as implication.
     """
 
     method: DefuzzifierMethod
@@ -365,10 +370,21 @@ def _label_mistakes(
                     texts.append(text)
             case Formula(expression=expression) if not texts:
                 texts += _name_mistakes(expression, nameable)
+                if is_drawn_by_lines(variable):
+                    texts.append("the grid 'lines' takes no formula")
             case _:
                 pass
         for text in texts:
             yield place, f"{where}: {text}"
+
+
+def is_drawn_by_lines(variable: SystemInput | SystemOutput) -> bool:
+    """Return whether it is an output whose curve consists of lines."""
+    return (
+        isinstance(variable, SystemOutput)
+        and not variable.defuzzifier.is_weighted
+        and variable.defuzzifier.grid == "lines"
+    )
 
 
 def _name_mistakes(expression: Expression, names: Mapping[str, None]) -> Iterator[str]:
@@ -395,6 +411,15 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
         yield from ((path, text) for text in width_mistakes(output.low, output.high))
     if output.aggregation is None:
         yield path, f"output {output.name!r} needs an aggregation for its {how.method}"
+    if how.grid == "lines" and (how.method, output.aggregation) != (
+        "centroid",
+        "maximum",
+    ):
+        yield (
+            path,
+            f"output {output.name!r}: the grid 'lines' needs the centroid and the "
+            "aggregation maximum",
+        )
     if not 2 <= how.samples <= MOST_SAMPLES:
         yield (
             path,
@@ -440,3 +465,5 @@ def _conclusion_mistakes(
         is_curve = output is not None and not output.defuzzifier.is_weighted
         if is_curve and block.implication is None:
             yield f"{one.output!r} needs an implication in its block"
+        if output and is_drawn_by_lines(output) and block.implication != "minimum":
+            yield f"{one.output!r}, by 'lines', needs the implication minimum"

@@ -172,7 +172,7 @@ def systems(kind: str) -> dict[str, FuzzySystem]:
     if kind == "random":
         return {str(seed): random_system(seed) for seed in range(24)}
     models = {**samples(), **dict(exporter_models())}
-    chosen = [*samples(), "a system with extreme numbers"]
+    chosen = [*samples(), "a system with extreme numbers", "a system by lines"]
     return {n: m for n in chosen if isinstance(m := models[n], FuzzySystem)}
 
 
