@@ -30,7 +30,14 @@ from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.losses import refusal
 from fuzzytree.naming import Names, changes_text
 from fuzzytree.readers.engines import fuzzylite_losses
-from fuzzytree.readers.fis import DEFAULTS, DIALECT, places, reading
+from fuzzytree.readers.fis import (
+    DEFAULTS,
+    DIALECT,
+    always_concluded,
+    middle,
+    places,
+    reading,
+)
 from fuzzytree.readers.fis_words import (
     DIALECTS,
     METHODS,
@@ -113,6 +120,8 @@ def write(
     losses += lost
     system, lost = with_known_curves(_scaled(system, losses), dialect, tolerance)
     losses += [*lost, *_losses(system, dialect)]
+    if isinstance(model, FuzzySystem):  # of scores, a rule always fires
+        losses += _default_losses(system, dialect)
     terms = Terms(system, dialect, tolerance)
     lines = _lines(system, terms)
     losses += terms.losses
@@ -254,10 +263,6 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             if output.name not in joined:
                 what = "it is added in the order of the rules: only rounding differs"
             yield Loss(where, what)
-        if output.default is not None and dialect != "fuzzylite":
-            yield Loss(
-                where, f"FIS has no default, {output.default!r}, where no rule fires"
-            )
         if dialect == "fuzzylite":
             yield from fuzzylite_losses(output)
     for variable in system.variables:
@@ -265,6 +270,24 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
             what = "values are not moved into the range"
             yield Loss(f"variable {variable.name!r}", what)
     yield from _block_losses(system, dialect)
+
+
+def _default_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
+    """Yield the predictions without a rule that a dialect has no place for."""
+    always = always_concluded(system.rules)
+    for output in system.outputs:
+        where = f"output {output.name!r}"
+        if dialect == "octave" and output.default is not None:
+            what = f"FIS has no default, {output.default!r}, where no rule fires"
+            yield Loss(where, what)
+        elif dialect == "matlab" and output.name not in always:
+            found = [_term(output, label, dialect) for label in output.labels]
+            number = middle(*_range(output, found))
+            if number != output.default:
+                default = output.default
+                other = "no number" if default is None else repr(default)
+                what = f"where no rule fires, MATLAB answers {number!r}, not {other}"
+                yield Loss(where, what)
 
 
 def _block_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:

@@ -8,7 +8,7 @@ has; MATLAB's meaning is the default.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Final, NamedTuple
 
@@ -35,6 +35,7 @@ from fuzzytree.system import (
     SNorm,
     SystemInput,
     SystemOutput,
+    SystemRule,
     TNorm,
 )
 
@@ -215,6 +216,8 @@ def _system(
         methods.disjunction,
         None if is_weighted else methods.implication,
     )
+    if dialect == "matlab":
+        outputs = _with_middles(outputs, block.rules, notes)
     _compare(outputs, block, methods, dialect, notes)
     if dialect == "fuzzylite":
         for output in outputs:
@@ -405,6 +408,50 @@ def _note_enabled(entries: Mapping[str, Entry], name: str, notes: Notes) -> None
     if "Enabled" in entries and not _is_set(entries, "Enabled"):
         what = "it is not enabled in the file, and takes part here"
         notes.losses.append(Loss(f"variable {name!r}", what))
+
+
+def _with_middles(
+    outputs: Iterable[SystemOutput], rules: Sequence[SystemRule], notes: Notes
+) -> tuple[SystemOutput, ...]:
+    """Return outputs with what MATLAB answers where no rule fires."""
+    found = []
+    always = always_concluded(rules)
+    for one in outputs:
+        default = one.default
+        if default is None and one.name not in always:
+            default = middle(one.low, one.high)
+        found.append(msgspec.structs.replace(one, default=default))
+    if any(one.default is not None for one in found):
+        notes.remarks.append(
+            "where no rule fires, an output is the middle of its range, as in MATLAB"
+        )
+    return tuple(found)
+
+
+def always_concluded(rules: Iterable[SystemRule]) -> set[str]:
+    """Return the outputs that a rule without a condition concludes in every row.
+
+    Example:
+        >>> from fuzzytree.system import Conclusion
+        >>> always_concluded([SystemRule(None, (Conclusion("tip", "small"),))])
+        {'tip'}
+    """
+    return {
+        one.output
+        for rule in rules
+        if rule.when is None and rule.weight > 0.0
+        for one in rule.then
+    }
+
+
+def middle(low: float | None, high: float | None) -> float | None:
+    """Return what MATLAB answers where no rule fires, if the range is known.
+
+    Example:
+        >>> middle(0.0, 30.0)
+        15.0
+    """
+    return None if low is None or high is None else low / 2 + high / 2
 
 
 def _compare(

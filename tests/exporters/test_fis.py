@@ -19,7 +19,7 @@ from fuzzytree.exporters.fis import write
 from fuzzytree.exporters.fis_terms import term_of
 from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
-from fuzzytree.readers.fis import DEFAULTS, reading
+from fuzzytree.readers.fis import DEFAULTS, always_concluded, reading
 from fuzzytree.readers.fis_words import CONCLUDING_HEDGES, DIALECTS, HEDGES, Dialect
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Points, RuleBase
@@ -117,6 +117,11 @@ def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
         for k in range(2)
     )
     rules = tuple(_random_rule(chance, dialect, is_weighted) for _ in range(6))
+    if dialect == "matlab":  # there the middle of the range answers
+        always = always_concluded(rules)
+        outputs = tuple(
+            one if one.name in always else replace(one, default=0.0) for one in outputs
+        )
     norms: tuple[TNorm, TNorm] = ("minimum", "product")
     implication = None if is_weighted else chance.choice(norms)
     block = RuleBlock(rules, chance.choice(norms), "maximum", implication)
@@ -396,11 +401,30 @@ def test_what_the_one_set_of_methods_cannot_say_is_lost_by_name() -> None:
         "cannot write s as fis without loss:",
         "  output 'y': its curve is looked at in 200 values (middle), and FIS does not "
         "say so; octave takes 101 (half ends)",
-        "  output 'y': FIS has no default, 0.25, where no rule fires",
         "  variable 'y': values are not moved into the range",
         "  block 2 of rules: the file has one set of norms, those of the first block",
+        "  output 'y': FIS has no default, 0.25, where no rule fires",
         "  pass allow_loss=True to write it as stated",
     ]
+
+
+def test_what_matlab_answers_where_no_rule_fires_is_a_loss_if_the_model_differs() -> (
+    None
+):
+    rule = SystemRule(Is("a", "low"), (Conclusion("tip", "small"),))
+    system = _sugeno(rule)
+    with pytest.raises(LossError) as caught:
+        write(system, dialect="matlab")
+    assert str(caught.value).splitlines() == [
+        "cannot write s as fis without loss:",
+        "  output 'tip': where no rule fires, MATLAB answers 1.0, not no number",
+        "  pass allow_loss=True to write it as stated",
+    ]
+    (output,) = system.outputs
+    carried = replace(system, outputs=(replace(output, default=1.0),))
+    written = write(carried, dialect="matlab")
+    assert written.losses == ()
+    assert anonymous(reading(written.content, "s.fis").model) == anonymous(carried)
 
 
 def test_combinations_become_inputs_and_linear_conclusions_give_them_no_weight() -> (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 import pytest
@@ -10,6 +11,7 @@ from fuzzytree.errors import ReadError
 from fuzzytree.inference import infer
 from fuzzytree.readers.fis import reading
 from fuzzytree.readers.fis_words import FAR, KINDS, Dialect, curve_of
+from fuzzytree.reference import Status
 from fuzzytree.system import (
     And,
     Bell,
@@ -207,6 +209,28 @@ def test_octave_joins_the_rules_of_a_term_and_matlab_sums_them() -> None:
     assert "Octave would join them by maximum" in found.remarks[-1]
 
 
+@pytest.mark.parametrize(
+    ("dialect", "answer"),
+    [("matlab", 15.0), ("octave", math.nan), ("fuzzylite", math.nan)],
+)
+@pytest.mark.parametrize("is_mamdani", [False, True])
+def test_where_no_rule_fires_matlab_answers_the_middle_of_the_range(
+    is_mamdani: bool, dialect: Dialect, answer: float
+) -> None:
+    text = SUGENO.replace("2 -1, 2 (0.5)", "2 1, 2 (0.5)").replace(" : 2\n", " : 1\n")
+    if is_mamdani:
+        text = text.replace("sugeno", "mamdani").replace("wtaver", "centroid")
+        text = text.replace("'constant',[5]", "'trimf',[0 5 9]")
+        text = text.replace("'linear',[1 0.5 2]", "'trimf',[5 9 30]")
+    found = reading(text.encode(), "tip.fis", dialect=dialect)
+    assert isinstance(found.model, FuzzySystem)
+    inferred = infer(found.model, {"food": 5.0, "service": 9.0})
+    assert inferred.status is Status.UNCOVERED
+    assert repr(inferred.outputs) == repr((answer,))
+    remark = "where no rule fires, an output is the middle of its range, as in MATLAB"
+    assert (remark in found.remarks) == (dialect == "matlab")
+
+
 def test_samples_are_the_dialects() -> None:
     text = SUGENO.replace("sugeno", "mamdani").replace("wtaver", "centroid")
     text = text.replace("'constant',[5]", "'trimf',[0 5 9]").replace(
@@ -269,7 +293,7 @@ def test_names_that_stand_twice_are_told_apart_and_told() -> None:
     text = SUGENO.replace("'service'", "'food'").replace("'fair'", "'small'")
     found = reading(text.encode(), "tip.fis")
     assert found.model.columns == ("food", "food 2")
-    assert found.remarks[1:] == (
+    assert found.remarks[1:3] == (
         "input 2 is called 'food' like another; here it is 'food 2'",
         "term MF2 of 'tip %' is called 'small'; here it is 'small 2'",
     )
