@@ -40,6 +40,7 @@ from fuzzytree.readers.fis import (
 )
 from fuzzytree.readers.fis_words import (
     DIALECTS,
+    FAR,
     METHODS,
     PRIVATE,
     SNORMS,
@@ -389,9 +390,7 @@ def _text(
     rows = [_rule(line, system) for line in lines]
     blocks.append(["[Rules]", *rows])
     if any(one.low is None or one.high is None for one in system.inputs):
-        remarks.append(
-            "the range of an input is unknown; that of its terms' corners stands there"
-        )
+        remarks.append("the range of an input is unknown; all numbers lie in it")
     if dialect == "octave":
         remarks.append(
             "Octave refuses rows with a value outside the Range of its input"
@@ -429,7 +428,10 @@ def _variable(
 def _range(
     one: SystemInput | SystemOutput, terms: Iterable[tuple[str, str] | None]
 ) -> tuple[float, float]:
-    """Return a range, guessed from the terms' numbers where it is unknown."""
+    """Return a range; an end that is unknown is `FAR` away for an input.
+
+    Of an output it is guessed from the numbers of its terms.
+    """
     numbers: list[float] = []
     for kind, text in (term for term in terms if term is not None):
         if kind == "function" or kind == "linear":
@@ -437,6 +439,8 @@ def _range(
         found = [*map(float, text.split())]
         numbers += found[::2] if kind == "discretemf" else found
     near = [number for number in numbers if abs(number) < 1e290]
+    if isinstance(one, SystemInput):
+        near = [-FAR, FAR]
     low = one.low if one.low is not None else min(near, default=0.0)
     high = one.high if one.high is not None else max(near, default=1.0)
     if low >= high:

@@ -291,11 +291,16 @@ def _domain(one: SystemInput | SystemOutput) -> str:
 
 
 def _range(one: SystemInput | SystemOutput) -> tuple[float, float]:
-    """Return a range, guessed from the points of its terms where it is unknown."""
+    """Return a range; an end that is unknown is endless for an input.
+
+    Of an output it is guessed from the points of its terms: engines draw their curves.
+    """
     near: list[float] = []
     for label in one.labels:
         shape = shape_of(label.curve)
         near += shape.values if isinstance(shape, Points) else ()
+    if isinstance(one, SystemInput):
+        near = [-math.inf, math.inf]
     low = one.low if one.low is not None else min(near, default=0.0)
     high = one.high if one.high is not None else max(near, default=1.0)
     return (low, high) if low < high else (low - 1.0, low + 1.0)
@@ -431,8 +436,10 @@ def _clause(
 
 
 def _float(number: float) -> str:
-    """Return the shortest digits of a number; XML calls a missing one NaN."""
-    return "NaN" if math.isnan(number) else repr(float(number))
+    """Return the shortest digits of a number, and XML's words for what has none."""
+    if math.isfinite(number):
+        return repr(float(number))
+    return "NaN" if math.isnan(number) else "INF" if number > 0.0 else "-INF"
 
 
 FORMAT = Format(

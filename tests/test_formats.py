@@ -12,12 +12,20 @@ from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
+from sklearn import datasets
+from sklearn.tree import DecisionTreeClassifier
 
+from fuzzytree import from_sklearn
 from fuzzytree.abilities import MEANINGS, Ability, abilities, dialects_of
+from fuzzytree.casting import as_system
 from fuzzytree.contracts import Document, Loss, Written
 from fuzzytree.converting import export, formed
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, find_format
+from fuzzytree.inference import input_values
+from fuzzytree.learning import learn_arrays
+from fuzzytree.learning.arrays import FloatArray
+from fuzzytree.lowering import rules_from_tree
 from fuzzytree.report.formats import SIGNS, ability_table
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.samples import samples
@@ -49,6 +57,47 @@ def _page() -> str:
 def test_the_page_shows_what_was_found() -> None:
     shown = PAGE.read_text("utf-8")
     assert shown == _page(), "python tests/test_formats.py rewrites the page"
+
+
+@functools.cache
+def _learnt(name: str, *, by_sklearn: bool) -> tuple[RuleBase, FloatArray]:
+    values, labels = getattr(datasets, f"load_{name}")(return_X_y=True)
+    columns = [f"x{k}" for k in range(values.shape[1])]
+    if by_sklearn:
+        foreign = DecisionTreeClassifier(max_depth=4, random_state=0)
+        tree = from_sklearn(foreign.fit(values, labels), columns=columns)
+    else:
+        classes = [f"c{k}" for k in range(int(labels.max()) + 1)]
+        tree = learn_arrays(values, labels, columns=columns, classes=classes).tree
+        assert any(one.parts for one in tree.variables)
+    return rules_from_tree(tree), values
+
+
+@pytest.mark.parametrize("by_sklearn", [False, True])
+@pytest.mark.parametrize("name", ["iris", "wine", "breast_cancer"])
+@pytest.mark.parametrize("form", ["fcl", "fll", "fis", "fml"])
+def test_no_row_of_its_table_is_outside_a_range_of_a_file(
+    form: str, name: str, by_sklearn: bool
+) -> None:
+    rules, table = _learnt(name, by_sklearn=by_sklearn)
+    inputs = as_system(rules).inputs
+    columns = [f"x{k}" for k in range(table.shape[1])]
+    rows = [
+        [*input_values(inputs, dict(zip(columns, row, strict=True))).values()]
+        for row in table.tolist()
+    ]
+    format_ = find_format(form)
+    assert format_.read is not None
+    for dialect in dialects_of(format_) or (None,):
+        options = {} if dialect is None else {"dialect": dialect}
+        written = export(rules, form, allow_loss=True, tolerance=0.01, **options)
+        content = written.content.replace(b'"fuzzytree":1', b'"fuzzytree":0')
+        system = format_.read(content, "model").model
+        assert isinstance(system, FuzzySystem)
+        assert len(system.inputs) == len(inputs)
+        for one, values in zip(system.inputs, zip(*rows, strict=True), strict=True):
+            assert one.low is None or one.low <= min(values)
+            assert one.high is None or max(values) <= one.high
 
 
 def test_there_is_a_sample_of_every_kind_of_model() -> None:

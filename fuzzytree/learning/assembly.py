@@ -105,8 +105,6 @@ class _AxisSets:
     means: FloatArray
     fitted: FittedSets
     zero_spreads: int
-    low: float
-    high: float
 
 
 def assembled(
@@ -141,7 +139,9 @@ def assembled(
     ]
     for key, found in axes.items():
         if found.axis.is_combined:
-            variables.append(_combination(called[key], found, names, terms[key]))
+            variables.append(
+                _combination(called[key], found.axis, statistics, names, terms[key])
+            )
     tree = FuzzyTree(
         name=names.tree,
         classes=tuple(names.classes),
@@ -217,12 +217,10 @@ def _sets_on(
     owners = np.searchsorted(chosen, patterns.owners[members])
     totals = totals_of(values, owners, len(chosen))
     unit, usual = _Unit(), 1.0
-    low, high = float(values.min()), float(values.max())
     if not axis.is_combined:
         feature = int(axis.features[0])
         totals = _with_classes(totals, chosen, patterns, statistics.totals(feature))
         unit, usual = _Unit.of(axis, patterns.units), float(patterns.scale[feature])
-        low, high = statistics.extent(feature)
     counts = window_counts(values, owners, totals, points)
     means = totals.means()
     spreads = totals.spreads(unit.exponent)
@@ -233,7 +231,7 @@ def _sets_on(
     fitted = fitted_sets(moved, widths, counts, separate_sides=separate_sides)
     place = {int(p): k for k, p in enumerate(chosen)}
     zeros = int(np.count_nonzero(is_zero))
-    return _AxisSets(axis, unit, chosen, place, means, fitted, zeros, low, high)
+    return _AxisSets(axis, unit, chosen, place, means, fitted, zeros)
 
 
 def _with_classes(
@@ -558,9 +556,25 @@ def _input(
 
 
 def _combination(
-    name: str, found: _AxisSets, names: Names, terms: tuple[Term, ...]
+    name: str,
+    axis: Axis,
+    statistics: Statistics,
+    names: Names,
+    terms: tuple[Term, ...],
 ) -> Variable:
-    axis = found.axis
+    """Return a combination, whose range is that of all rows in its columns' ranges.
+
+    Rounding is monotone, so no such row lies outside it in double either.
+    """
+    extents = np.zeros((2, int(axis.features.max()) + 1))
+    for feature, weight in zip(
+        axis.features.tolist(), axis.weights.tolist(), strict=True
+    ):
+        ends = statistics.extent(feature)
+        extents[:, feature] = ends if weight > 0.0 else ends[::-1]
+    low, high = (
+        end if np.isfinite(end) else None for end in axis.values(extents).tolist()
+    )
     parts = tuple(
         Part(names.columns[int(feature)], weight, centre)
         for feature, weight, centre in zip(
@@ -570,7 +584,7 @@ def _combination(
             strict=True,
         )
     )
-    return Variable(name, terms, "", found.low, found.high, parts)
+    return Variable(name, terms, "", low, high, parts)
 
 
 def _leaves(

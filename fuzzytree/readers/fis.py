@@ -330,7 +330,7 @@ def _range(
         what = f"the Range must be two rising numbers, [0 1], not {entry.value[:40]!r}"
         notes.found.append((entry.line, entry.column, what))
         return None, None
-    low, high = (end if math.isfinite(end) else None for end in ends)
+    low, high = (end if abs(end) < words.FAR else None for end in ends)
     return low, high
 
 

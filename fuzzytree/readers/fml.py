@@ -246,10 +246,13 @@ def _input(element: Element, variables: Variables, notes: Notes) -> SystemInput:
     return SystemInput(name, tuple(labels), low, high, unit=unit)
 
 
-def _range(element: Element, notes: Notes) -> tuple[float, float]:
+def _range(element: Element, notes: Notes) -> tuple[float | None, float | None]:
+    """Return the two ends of a domain; None for one without end."""
     low, high = (
-        number(element, "domainleft", notes),
-        number(element, "domainright", notes),
+        None
+        if element.attributes.get(key, "").strip() == endless
+        else number(element, key, notes)
+        for key, endless in (("domainleft", "-INF"), ("domainright", "INF"))
     )
     return low, high
 
