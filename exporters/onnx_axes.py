@@ -53,7 +53,7 @@ def axes(
     """
     if not model.variables:
         return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=is_flat))
-    source = sheet.node("Transpose", sheet.source, perm=[1, 0])
+    source = sheet.node("Transpose", sheet.source, hint="columns", perm=[1, 0])
     direct = _direct(model)
     derived = sorted(
         (v for v in model.variables if v.parts), key=lambda v: len(v.parts)
@@ -64,13 +64,18 @@ def axes(
     elif direct:
         pieces = [sheet.take(source, [columns.index(name) for name in direct])]
     if derived:
-        pieces += _combinations(sheet, derived, source, columns, numbers.axis)
-    block = sheet.node("Concat", *pieces, axis=0) if len(pieces) > 1 else pieces[0]
+        with sheet.about("combinations"):
+            pieces += _combinations(sheet, derived, source, columns, numbers.axis)
+    block = pieces[0]
+    if len(pieces) > 1:
+        block = sheet.node("Concat", *pieces, hint="variables", axis=0)
     names = [*direct, *(variable.name for variable in derived)]
     # 0 * x is 0 for a finite x and NaN otherwise, and NaN survives every addition.
-    zeros = sheet.node("Mul", block, scalar(sheet, 0.0, numbers.axis))
+    zero = scalar(sheet, 0.0, numbers.axis)
+    zeros = sheet.node("Mul", block, zero, hint="zero_if_finite")
     if len(names) > 1 or is_flat:
-        zeros = sheet.total(zeros, axis=0, keepdims=0 if is_flat else 1)
+        with sheet.about("guard"):
+            zeros = sheet.total(zeros, axis=0, keepdims=0 if is_flat else 1)
     return Axes(block, {name: row for row, name in enumerate(names)}, zeros)
 
 
@@ -90,9 +95,11 @@ def flat_guard(
     source = sheet.source
     if model.inputs != tuple(columns):
         chosen = sheet.numbers([columns.index(name) for name in model.inputs], "rows")
-        source = sheet.node("Gather", source, chosen, axis=1)
-    zeros = sheet.node("Mul", source, scalar(sheet, 0.0, numbers.axis))
-    return Axes("", {}, sheet.total(zeros, axis=1, keepdims=0))
+        source = sheet.node("Gather", source, chosen, hint="columns", axis=1)
+    zero = scalar(sheet, 0.0, numbers.axis)
+    zeros = sheet.node("Mul", source, zero, hint="zero_if_finite")
+    with sheet.about("guard"):
+        return Axes("", {}, sheet.total(zeros, axis=1, keepdims=0))
 
 
 def _direct(model: Model) -> tuple[str, ...]:
@@ -107,7 +114,8 @@ def _direct(model: Model) -> tuple[str, ...]:
 
 def is_known(sheet: Sheet, frame: Axes, numbers: Numbers) -> str:
     """Return whether all values of a row are finite, in the guard's shape."""
-    return sheet.node("Equal", frame.guard, scalar(sheet, 0.0, numbers.axis))
+    zero = scalar(sheet, 0.0, numbers.axis)
+    return sheet.node("Equal", frame.guard, zero, hint="is_row_finite")
 
 
 def scalar(sheet: Sheet, value: float, kind: type[Real]) -> str:

@@ -240,9 +240,11 @@ def _fill(
     from fuzzytree.exporters.onnx_numbers import NUMBERS
     from fuzzytree.exporters.onnx_steps import add_steps
 
-    columns = _sums(sheet, made)
+    with sheet.about("sums"):
+        columns = _sums(sheet, made)
     *features, pressed = add_steps(sheet, made.program, columns)
-    is_pressed = sheet.node("Less", scalar(sheet, 0.0, np.float64), pressed)
+    zero = scalar(sheet, 0.0, np.float64)
+    is_pressed = sheet.node("Less", zero, pressed, hint="is_pressed")
     if features:
         _side_by_side(sheet, features)
     needed = [name for name in outputs if name != "features"]
@@ -263,14 +265,15 @@ def _fill(
 
         axes, strengths = rules_graph(sheet, model, numbers, model.inputs)
         add_winner(sheet, strengths, "winner")
-    known = sheet.node("And", is_pressed, _is_answer(sheet, model, axes))
+    answered = _is_answer(sheet, model, axes)
+    known = sheet.node("And", is_pressed, answered, hint="is_known")
     if reject:
-        known = sheet.node("And", known, _is_strong(sheet, strengths, reject))
+        is_strong = _is_strong(sheet, strengths, reject)
+        known = sheet.node("And", known, is_strong, hint="is_known")
     _ends(sheet, model, is_pressed, known, outputs)
     if "strengths" in outputs:
-        finite = sheet.node(
-            "And", is_pressed, _flat(sheet, is_known(sheet, axes, numbers))
-        )
+        finite = _flat(sheet, is_known(sheet, axes, numbers))
+        finite = sheet.node("And", is_pressed, finite, hint="is_finite")
         _all_strengths(sheet, model, strengths, finite)
 
 
@@ -281,22 +284,24 @@ def _sums(sheet: Sheet, made: FrameProgram) -> list[str]:
 
     sensor = made.sensor
     double, size = int(np_to_onnx(np.float64)), sensor.rows * sensor.columns
-    values = sheet.node("Reshape", "frames", sheet.numbers([-1, size], "shape"))
-    values = sheet.node("Cast", values, to=double)
+    shape = sheet.numbers([-1, size], "shape")
+    values = sheet.node("Reshape", "frames", shape, hint="cells")
+    values = sheet.node("Cast", values, hint="cells", to=double)
     if sensor.full != np.iinfo(frame_type(sensor)).max:
         full = scalar(sheet, float(sensor.full), np.float64)
-        values = sheet.node("Min", values, full)
+        values = sheet.node("Min", values, full, hint="cells")
     if offsets(sensor):
         baseline = np.array([offsets(sensor)], np.float64)
-        values = sheet.node("Sub", values, sheet.constant(baseline, "baseline"))
+        offset = sheet.constant(baseline, "baseline")
+        values = sheet.node("Sub", values, offset, hint="cells")
     is_pressed = ""
     counted = any(one.of == "count" for one in made.sums)
     if offsets(sensor) or sensor.threshold or counted:
         threshold = scalar(sheet, float(sensor.threshold), np.float64)
-        is_pressed = sheet.node("Less", threshold, values)
+        is_pressed = sheet.node("Less", threshold, values, hint="is_cell_pressed")
     if offsets(sensor) or sensor.threshold:
         zero = scalar(sheet, 0.0, np.float64)
-        values = sheet.node("Where", is_pressed, values, zero)
+        values = sheet.node("Where", is_pressed, values, zero, hint="pressures")
     return _taken(sheet, made.sums, values, is_pressed)
 
 
@@ -343,7 +348,8 @@ def _side_by_side(sheet: Sheet, names: Sequence[str]) -> None:
 
 
 def _flat(sheet: Sheet, truth: str) -> str:
-    return sheet.node("Reshape", truth, sheet.numbers([-1], "flat"))
+    shape = sheet.numbers([-1], "flat")
+    return sheet.node("Reshape", truth, shape, hint="is_row_finite")
 
 
 def _is_answer(sheet: Sheet, model: Model, axes: Axes) -> str:
@@ -354,7 +360,7 @@ def _is_answer(sheet: Sheet, model: Model, axes: Axes) -> str:
     semantics = model.semantics
     if isinstance(model, RuleBase) and semantics.uncovered is not None:
         return _flat(sheet, is_known(sheet, axes, NUMBERS["float64"]))
-    return sheet.node("Less", _whole(sheet, 0), "winner")
+    return sheet.node("Less", _whole(sheet, 0), "winner", hint="is_answer")
 
 
 def _is_strong(sheet: Sheet, strengths: str, reject: float) -> str:
@@ -362,11 +368,12 @@ def _is_strong(sheet: Sheet, strengths: str, reject: float) -> str:
     from fuzzytree.exporters.onnx_axes import scalar
     from fuzzytree.exporters.onnx_steps import reduced
 
-    strongest = reduced(sheet, "ReduceMax", strengths, axis=0, keepdims=0)
-    floor = scalar(sheet, reject, np.float64)
-    is_strong = sheet.node("LessOrEqual", floor, strongest)
-    is_none = sheet.node("Equal", "winner", _whole(sheet, 0))
-    return sheet.node("Or", is_none, is_strong)
+    with sheet.about("strongest"):
+        strongest = reduced(sheet, "ReduceMax", strengths, axis=0, keepdims=0)
+        floor = scalar(sheet, reject, np.float64)
+        is_strong = sheet.node("LessOrEqual", floor, strongest)
+        is_none = sheet.node("Equal", "winner", _whole(sheet, 0))
+        return sheet.node("Or", is_none, is_strong)
 
 
 def _ends(
@@ -378,7 +385,7 @@ def _ends(
             _whole(sheet, state)
             for state in (State.OBJECT, State.UNKNOWN, State.NOTHING)
         )
-        state = sheet.node("Where", known, seen, unknown)
+        state = sheet.node("Where", known, seen, unknown, hint="state_if_pressed")
         sheet.node("Where", is_pressed, state, nothing, named="state")
     if "rule" in outputs:
         sheet.node("Where", known, "winner", _whole(sheet, 0), named="rule")
@@ -389,7 +396,8 @@ def _ends(
             else [rule.then for rule in model.rules]
         )
         texts = [model.semantics.uncovered or "", *labels, ""]
-        place = sheet.node("Where", known, "winner", _whole(sheet, len(texts) - 1))
+        nothing = _whole(sheet, len(texts) - 1)
+        place = sheet.node("Where", known, "winner", nothing, hint="label_number")
         table = sheet.texts(texts, "labels")
         sheet.node("Gather", table, place, axis=0, named="label")
 
@@ -400,8 +408,9 @@ def _all_strengths(sheet: Sheet, model: Model, strengths: str, finite: str) -> N
 
     count = len(model.rules) if isinstance(model, RuleBase) else 0
     ends = [sheet.numbers([end], "end") for end in (1, 1 + count)]
-    real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
-    real = sheet.node("Where", finite, real, scalar(sheet, 0.0, np.float64))
+    with sheet.about("strengths"):
+        real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
+        real = sheet.node("Where", finite, real, scalar(sheet, 0.0, np.float64))
     sheet.node("Transpose", real, perm=[1, 0], named="strengths")
 
 

@@ -6,12 +6,15 @@ same calls give the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 import onnx
 from onnx import helper, numpy_helper
+
+from fuzzytree.naming import Names
 
 DOMAIN = "fuzzytree"
 """The domain of our own functions, in readable files."""
@@ -21,6 +24,14 @@ TREES = "ai.onnx.ml"
 
 Constant = npt.NDArray[np.generic]
 Body = Callable[["Sheet", Sequence[str], str], str]
+
+_LONGEST_NAME = 60
+
+_ENDS = (
+    *("inputs", "frames", "outputs", "activations", "label", "rule", "winner"),
+    *("status", "strengths", "state", "features"),
+)
+"""Names that only a graph's own inputs and outputs bear."""
 
 
 Attribute = int | Sequence[int] | onnx.TensorProto
@@ -39,12 +50,35 @@ def _is_mistaken(value: Constant) -> bool:
     return float(np.float32(number)) in (0.0, 1.0)
 
 
+def identifier(title: str) -> str:
+    """Return words as a name that ONNX accepts, of at most 60 characters.
+
+    Example:
+        >>> identifier("Größe (mm) is not very big")
+        'Grosse_mm_is_not_very_big'
+    """
+    return Names.of([title], longest=_LONGEST_NAME).accepted[title]
+
+
+def _number_name(value: Constant, hint: str) -> str:
+    """Return the name of a constant: of a single number, what it is."""
+    if value.size != 1:
+        return hint
+    kind = {"f": "number", "i": "whole", "b": "is"}[value.dtype.kind]
+    if value.shape:
+        kind = "index" if kind == "whole" else hint
+    text = str(value.item()).lower().removesuffix(".0")
+    text = text.replace("-", "minus_").replace("+", "")
+    return identifier(f"{kind}_{text}")
+
+
 class Sheet:
     """Nodes, constants and functions, collected; every result is known by its name.
 
     Attributes:
         opset: The version of the operators.
         source: The name of the values that a model is asked with, (rows, columns).
+        topic: What the next nodes are part of: their names begin with it.
         is_readable: Whether `block` makes functions or writes their nodes in place.
         nodes: The nodes so far.
         tensors: The constants so far, equal ones once.
@@ -56,13 +90,14 @@ class Sheet:
     ) -> None:
         self.opset = opset
         self.source = "inputs"
+        self.topic = ""
         self.is_readable = is_readable
         self.nodes: list[onnx.NodeProto] = []
         self.tensors: list[onnx.TensorProto] = []
         self.functions: dict[str, onnx.FunctionProto] = {}
         self._in_function = in_function
         self._known: dict[tuple[str, tuple[int, ...], bytes], str] = {}
-        self._taken: dict[str, int] = {}
+        self._taken: dict[str, int] = dict.fromkeys(_ENDS, 1)
         self._results: dict[tuple[str, ...], str] = {}
         self._mistaken: dict[str, Constant] = {}
 
@@ -71,6 +106,7 @@ class Sheet:
         op: str,
         *inputs: str,
         named: str = "",
+        hint: str = "",
         domain: str = "",
         **attributes: Attribute,
     ) -> str:
@@ -81,7 +117,9 @@ class Sheet:
         Args:
             op: The operator.
             inputs: The names of its inputs.
-            named: The name of the result; made from the operator unless given.
+            named: The name of the result, which must be the only one.
+            hint: What the result is, as a name that may get a number behind it; the
+                operator unless given.
             domain: The operator's domain.
             attributes: The operator's own settings.
         """
@@ -91,8 +129,8 @@ class Sheet:
         if op in _NEUTRAL and not self._mistaken.keys().isdisjoint(inputs):
             turned = self._turned(op, inputs)
             if turned:
-                return self.node("Neg", turned, named=named)
-        result = named or self._fresh(op.lower())
+                return self.node("Neg", turned, named=named, hint=hint)
+        result = named or self._fresh(hint or f"{self.topic}_{op.lower()}".strip("_"))
         if not (named or attributes or domain):
             self._results[key] = result
         # Some versions of onnxruntime mistake nodes without a name for one another.
@@ -106,7 +144,7 @@ class Sheet:
         """Return the name of a constant, made the first time that it is asked for."""
         key = (value.dtype.str, value.shape, value.tobytes())
         if key not in self._known:
-            name = self._fresh(hint)
+            name = self._fresh(_number_name(value, hint))
             tensor = numpy_helper.from_array(np.ascontiguousarray(value), name)
             tensor = tensor if value.shape else numpy_helper.from_array(value, name)
             if self._in_function:
@@ -158,7 +196,12 @@ class Sheet:
         return self.constant(np.array(values, np.int64), hint)
 
     def block(
-        self, name: str, body: Body, inputs: Mapping[str, str], *, named: str = ""
+        self,
+        name: str,
+        body: Body,
+        inputs: Mapping[str, str],
+        *,
+        named: str = "",
     ) -> str:
         """Add what a body makes of its inputs: in place, or as a call of a function.
 
@@ -186,6 +229,13 @@ class Sheet:
             )
         return self.node(name, *inputs.values(), named=named, domain=DOMAIN)
 
+    @contextlib.contextmanager
+    def about(self, topic: str) -> Iterator[None]:
+        """Name the nodes that are added within after what they are part of."""
+        before, self.topic = self.topic, topic
+        yield
+        self.topic = before
+
     def take(self, source: str, rows: Sequence[int]) -> str:
         """Return the named rows of a block; the same ones are taken once."""
         chosen = self.numbers(rows, "rows")
@@ -207,8 +257,13 @@ class Sheet:
         return [one for one in self.tensors if one.name in taken]
 
     def _fresh(self, hint: str) -> str:
-        number = self._taken[hint] = self._taken.get(hint, 0) + 1
-        return hint if number == 1 else f"{hint}_{number}"
+        name, number = hint, self._taken.get(hint, 0)
+        while name in self._taken:
+            number += 1
+            name = f"{hint}_{number}"
+        self._taken[hint] = max(number, 1)
+        self._taken.setdefault(name, 1)
+        return name
 
 
 class Table:

@@ -48,9 +48,10 @@ def add_rule_outputs(
         _add_status(sheet, frame, strengths, winner, numbers)
     if "strengths" in outputs:
         ends = [sheet.numbers([end], "end") for end in (1, 1 + len(rules.rules))]
-        real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
-        unknown = scalar(sheet, np.nan, numbers.degree)
-        real = sheet.node("Where", is_known(sheet, frame, numbers), real, unknown)
+        with sheet.about("strengths"):
+            real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
+            unknown = scalar(sheet, np.nan, numbers.degree)
+            real = sheet.node("Where", is_known(sheet, frame, numbers), real, unknown)
         sheet.node("Transpose", real, perm=[1, 0], named="strengths")
 
 
@@ -74,7 +75,8 @@ def _add_label(
     if semantics.missing != semantics.uncovered:
         missing = _whole(sheet, len(labels))
         labels.append(semantics.missing or "")
-        position = sheet.node("Where", _flat(sheet, frame, numbers), winner, missing)
+        known = _flat(sheet, frame, numbers)
+        position = sheet.node("Where", known, winner, missing, hint="label_number")
     table = sheet.texts(labels, "labels")
     sheet.node("Gather", table, position, axis=0, named="label")
 
@@ -83,18 +85,26 @@ def _add_status(
     sheet: Sheet, frame: Axes, strengths: str, winner: str, numbers: Numbers
 ) -> None:
     """Compare the first with the last of the strongest; no rule is number 0."""
-    last = sheet.node("ArgMax", strengths, axis=0, keepdims=0, select_last_index=1)
+    last = sheet.node(
+        "ArgMax",
+        strengths,
+        hint="last_winner",
+        axis=0,
+        keepdims=0,
+        select_last_index=1,
+    )
     decided, tie, uncovered, missing = (_whole(sheet, status) for status in Status)
-    is_one = sheet.node("Equal", winner, last)
-    status = sheet.node("Where", is_one, decided, tie)
-    is_none = sheet.node("Equal", winner, _whole(sheet, 0))
-    status = sheet.node("Where", is_none, uncovered, status)
+    is_one = sheet.node("Equal", winner, last, hint="is_one_winner")
+    status = sheet.node("Where", is_one, decided, tie, hint="tie_status")
+    is_none = sheet.node("Equal", winner, _whole(sheet, 0), hint="is_uncovered")
+    status = sheet.node("Where", is_none, uncovered, status, hint="status_if_known")
     sheet.node("Where", _flat(sheet, frame, numbers), status, missing, named="status")
 
 
 def _flat(sheet: Sheet, frame: Axes, numbers: Numbers) -> str:
     known = is_known(sheet, frame, numbers)
-    return sheet.node("Reshape", known, sheet.numbers([-1], "flat"))
+    shape = sheet.numbers([-1], "flat")
+    return sheet.node("Reshape", known, shape, hint="is_row_finite")
 
 
 def _whole(sheet: Sheet, value: int) -> str:

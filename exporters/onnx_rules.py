@@ -100,7 +100,8 @@ def rules_graph(
     table = Table(sheet)
     sequences = _degrees(sheet, table, rules, numbers, frame)
     is_product = rules.semantics.conjunction == "product"
-    return frame, _strengths(sheet, table, sequences, is_product=is_product)
+    with sheet.about("rules"):
+        return frame, _strengths(sheet, table, sequences, is_product=is_product)
 
 
 def _parts(variable: str, shape: Shape) -> list[Part]:
@@ -146,7 +147,8 @@ def _degrees(
         for part in parts[clause.variable, term]
     )
     row = _primitives(sheet, table, [*wanted, *found], numbers, frame)
-    rows_of = _clauses(sheet, table, live, parts, row, numbers)
+    with sheet.about("terms"):
+        rows_of = _clauses(sheet, table, live, parts, row, numbers)
     rows_of |= dict.fromkeys(constant - true, (row[NOTHING],))
     always = (row[ALWAYS],) if ALWAYS in row else ()
     sequences = [tuple(r for c in when for r in rows_of[c]) for when in kept]
@@ -165,28 +167,34 @@ def _primitives(
     if slopes or lines:  # an edge of NaN is 1, but a slope of NaN is NaN
         zero = scalar(sheet, 0.0, numbers.axis)
         known = is_known(sheet, frame, numbers)
-        block = sheet.node("Where", known, block, zero)
+        block = sheet.node("Where", known, block, zero, hint="finite_variables")
     values, place = Table(sheet), {(GUARD, 1): 0}
     values.append(frame.guard, 1)
     for sign in (1, -1):
         if any(part.sign in (sign, sign - 1) and part.variable for part in parts):
-            signed = block if sign > 0 else sheet.node("Neg", block)
+            signed = block
+            if sign < 0:
+                signed = sheet.node("Neg", block, hint="minus_variables")
             first = values.append(signed, len(frame.order))
             place |= {(name, sign): first + i for name, i in frame.order.items()}
     row: dict[Part, int] = {}
-    taken = values.take([place[edge.variable, edge.sign] for edge in edges])
-    first = table.append(_edges(sheet, taken, edges, numbers), len(edges))
+    with sheet.about("edges"):
+        taken = values.take([place[edge.variable, edge.sign] for edge in edges])
+        first = table.append(_edges(sheet, taken, edges, numbers), len(edges))
     row |= {edge: first + number for number, edge in enumerate(edges)}
     if slopes:
-        taken = values.take([place[s.variable, s.sign or 1] for s in slopes])
-        first = table.append(_slopes(sheet, taken, slopes, numbers), len(slopes))
+        with sheet.about("slopes"):
+            taken = values.take([place[s.variable, s.sign or 1] for s in slopes])
+            first = table.append(_slopes(sheet, taken, slopes, numbers), len(slopes))
         row |= {slope: first + number for number, slope in enumerate(slopes)}
     for is_short in (True, False):
         group = [line for line in lines if is_chained(line) == is_short]
         if group:
-            taken = values.take([place[line.variable, 1] for line in group])
             shapes = [line.points for line in group]
-            first = table.append(polylines(sheet, taken, shapes, numbers), len(group))
+            with sheet.about("points"):
+                taken = values.take([place[line.variable, 1] for line in group])
+                block = polylines(sheet, taken, shapes, numbers)
+            first = table.append(block, len(group))
             row |= {line: first + number for number, line in enumerate(group)}
     return row
 
@@ -358,7 +366,8 @@ def _clauses(
     double = list(dict.fromkeys(ends.values()))  # terms of one curve are one
     if double:
         left, right = (table.take([pair[i] for pair in double]) for i in (0, 1))
-        first = table.append(sheet.node("Min", left, right), len(double))
+        block = sheet.node("Min", left, right, hint="terms")
+        first = table.append(block, len(double))
         place = {pair: first + number for number, pair in enumerate(double)}
         of_term |= {key: place[pair] for key, pair in ends.items()}
     lists = {
@@ -370,7 +379,8 @@ def _clauses(
     if negated:
         degrees = table.take([of_clause[clause] for clause in negated])
         one = scalar(sheet, 1.0, numbers.degree)
-        first = table.append(sheet.node("Sub", one, degrees), len(negated))
+        block = sheet.node("Sub", one, degrees, hint="negations")
+        first = table.append(block, len(negated))
         of_clause |= {clause: first + number for number, clause in enumerate(negated)}
     return pairs | {clause: (found,) for clause, found in of_clause.items()}
 
@@ -386,7 +396,8 @@ def _largest(
         for clause in active:
             rows = lists[clause]
             right += rows[1::2] + rows[-1:] * (len(rows) % 2)
-        block = sheet.node("Max", table.take(left), table.take(right))
+        either = table.take(left), table.take(right)
+        block = sheet.node("Max", *either, hint="alternatives")
         first = table.append(block, len(left))
         for clause in active:
             half = (len(lists[clause]) + 1) // 2

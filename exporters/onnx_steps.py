@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.exporters.onnx_graph import Sheet
+from fuzzytree.exporters.onnx_graph import Sheet, identifier
 from fuzzytree.programs.evaluate import Found, still_results
 from fuzzytree.programs.steps import Program, Step
 
@@ -93,7 +93,7 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
     Returns:
         A block of shape (rows,) for each result.
     """
-    source = sheet.node("Transpose", sheet.source, perm=[1, 0])
+    source = sheet.node("Transpose", sheet.source, hint="columns", perm=[1, 0])
     still = still_results(program)
     names: dict[int, str] = {}
     links = _links(program, still)
@@ -107,9 +107,11 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
     for place, step in enumerate(program.steps):
         if still[place] is not None:
             continue
+        title = program.titles[place] if program.titles else step.name
+        sheet.topic = identifier(title) if title else ""
         if step.operation == "input":
             row = _whole(sheet, columns.index(step.name))
-            names[place] = sheet.node("Gather", source, row)
+            names[place] = sheet.node("Gather", source, row, hint=sheet.topic)
             continue
         first = step.arguments[0]
         given = [
@@ -119,9 +121,11 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
         if place in links:
             links[place] = given
         elif len(given) > 2 and step.operation in _CHAINS:
-            names[place] = sheet.node(_CHAINS[step.operation], *given)
+            chain = _CHAINS[step.operation]
+            names[place] = sheet.node(chain, *given, hint=sheet.topic)
         else:
             names[place] = _node(sheet, step, given, program)
+    sheet.topic = ""
     places = [result.step for result in program.results]
     return [
         named(place) if still[place] is None else _spread(sheet, source, named(place))
@@ -179,7 +183,7 @@ def _whole(sheet: Sheet, value: int) -> str:
 
 def _node(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> str:
     if step.operation in _NODES:
-        return sheet.node(_NODES[step.operation], *given)
+        return sheet.node(_NODES[step.operation], *given, hint=sheet.topic)
     match step.operation:
         case "is_finite":
             size = sheet.node("Abs", *given)

@@ -132,10 +132,10 @@ def _columns(sheet: Sheet, names: Sequence[str], named: str) -> None:
         return
     line = sheet.numbers([0], "axes")
     if sheet.opset >= 13:
-        lines = [sheet.node("Unsqueeze", name, line) for name in names]
+        lines = [sheet.node("Unsqueeze", name, line, hint=name) for name in names]
     else:
-        lines = [sheet.node("Unsqueeze", name, axes=[0]) for name in names]
-    block = sheet.node("Concat", *lines, axis=0)
+        lines = [sheet.node("Unsqueeze", name, hint=name, axes=[0]) for name in names]
+    block = sheet.node("Concat", *lines, hint=named, axis=0)
     sheet.node("Transpose", block, perm=[1, 0], named=named)
 
 

@@ -61,13 +61,14 @@ def tree_graph(
     if not questions:
         leaf = sheet.constant(np.array(1, np.int64), "leaf")
     elif is_plain:
-        leaf = _walk(sheet, questions, frame, numbers, start=_root(tree))
+        with sheet.about("path"):
+            leaf = _walk(sheet, questions, frame, numbers, start=_root(tree))
     else:
         place = {name: columns.index(name) for name in tree.inputs}
         values = sheet.source
         if not is_direct:
             place = frame.order
-            values = sheet.node("Transpose", frame.block, perm=[1, 0])
+            values = sheet.node("Transpose", frame.block, hint="values", perm=[1, 0])
         leaf = _ensemble(sheet, questions, values, place, numbers, start=_root(tree))
     zero = sheet.constant(np.array(0, np.int64), "nothing")
     known = is_known(sheet, frame, numbers)
@@ -155,6 +156,7 @@ def _ensemble(
     leaf = sheet.node(
         "TreeEnsemble",
         values,
+        hint="leaf",
         domain=TREES,
         n_targets=1,
         aggregate_function=1,
@@ -170,8 +172,8 @@ def _ensemble(
         leaf_targetids=[0] * len(leaves),
         leaf_weights=_tensor(np.array(leaves, numbers.axis)),
     )
-    whole = sheet.node("Cast", leaf, to=onnx.TensorProto.INT64)
-    return sheet.node("Reshape", whole, sheet.numbers([-1], "flat"))
+    whole = sheet.node("Cast", leaf, hint="leaf", to=onnx.TensorProto.INT64)
+    return sheet.node("Reshape", whole, sheet.numbers([-1], "flat"), hint="leaf")
 
 
 def _tensor(values: Constant) -> onnx.TensorProto:

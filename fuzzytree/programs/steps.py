@@ -37,6 +37,7 @@ Example:
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
 from collections.abc import Iterable, Iterator, Sequence
@@ -97,6 +98,13 @@ class Result(Value, frozen=True):
     name: str
     step: int
 
+    @property
+    def title(self) -> str:
+        """What it is, in words."""
+        if self.kind in ("activation", "strength"):
+            return f"rule {self.name} {self.kind}"
+        return self.name
+
 
 class Program(Value, frozen=True):
     """Steps in the order in which they are run, and what they are run for.
@@ -106,6 +114,7 @@ class Program(Value, frozen=True):
         inputs: The names of its inputs, in order; each may be asked for or not.
         steps: The steps; every argument stands before the step that uses it.
         results: What is wanted, of steps with one number for a row.
+        titles: What each step computes, in words, or "" for it; () for no words.
 
     Raises:
         ValueError: If a step is no operation on steps before it; it names the first.
@@ -115,6 +124,7 @@ class Program(Value, frozen=True):
     inputs: tuple[str, ...]
     steps: tuple[Step, ...]
     results: tuple[Result, ...]
+    titles: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a program that cannot be run."""
@@ -140,6 +150,8 @@ class Maker:
 
     def __init__(self) -> None:
         self._steps: list[Step] = []
+        self._titles: list[str] = []
+        self._topic = ""
         self._known: dict[tuple[object, ...], int] = {}
 
     def constant(self, number: float) -> int:
@@ -183,6 +195,29 @@ class Maker:
             samples = max((step.samples for step in given), default=0)
         return self._added(Step(operation, arguments, samples=samples))
 
+    @contextlib.contextmanager
+    def topic(self, title: str) -> Iterator[None]:
+        """Title the steps that are added within after what they are part of.
+
+        Example:
+            >>> make = Maker()
+            >>> with make.topic("force is low"):
+            ...     low = make("negate", make.input("force"))
+            >>> strength = Result("output", "strength", make("absolute", low))
+            >>> make.program("p", ("force",), (strength,)).titles
+            ('force', 'force is low negate', 'strength')
+        """
+        before, self._topic = self._topic, title
+        yield
+        self._topic = before
+
+    def titled(self, place: int, title: str) -> int:
+        """Title a step, unless it has a title from elsewhere, and return its place."""
+        step = self._steps[place]
+        if step.operation not in _LEAVES and self._titles[place] == self._part(step):
+            self._titles[place] = title
+        return place
+
     def number(self, place: int) -> float | None:
         """Return the number of a constant, None if the step is none."""
         step = self._steps[place]
@@ -213,7 +248,10 @@ class Maker:
         new = {old: place for place, old in enumerate(sorted(needed))}
         steps = tuple(_moved(self._steps[old], new) for old in new)
         moved = tuple(Result(one.kind, one.name, new[one.step]) for one in results)
-        return Program(name, inputs, steps, moved)
+        titles = [self._titles[old] for old in new]
+        for one in moved:
+            titles[one.step] = titles[one.step] or one.title
+        return Program(name, inputs, steps, moved, tuple(titles))
 
     def _added(self, step: Step) -> int:
         key = (
@@ -227,7 +265,14 @@ class Maker:
         if key not in self._known:
             self._known[key] = len(self._steps)
             self._steps.append(step)
+            self._titles.append(self._part(step))
         return self._known[key]
+
+    def _part(self, step: Step) -> str:
+        """Return the title of a step that is part of the topic."""
+        if step.operation in _LEAVES or not self._topic:
+            return step.name
+        return f"{self._topic} {step.operation.replace('_', ' ')}"
 
 
 def _moved(step: Step, new: dict[int, int]) -> Step:

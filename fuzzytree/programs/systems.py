@@ -88,13 +88,16 @@ def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
         run.activate(block)
     numbers: list[int] = []
     for output in system.outputs:
-        numbers.append(run.number(output))
-        values[output.name] = _answer(make, output, numbers[-1])
+        with make.topic(output.name):
+            numbers.append(run.number(output))
+            values[output.name] = _answer(make, output, numbers[-1])
     nothing = make.constant(math.nan)
-    results = [
-        Result("output", one.name, make("where", known, values[one.name], nothing))
-        for one in system.outputs
-    ]
+    results: list[Result] = []
+    for one in system.outputs:
+        with make.topic(one.name):
+            number = make("where", known, values[one.name], nothing)
+            make.titled(number, one.name)
+        results.append(Result("output", one.name, number))
     if activations:
         for rule, degree in enumerate(run.activations, 1):
             shown = make("where", known, degree, nothing)
@@ -108,10 +111,14 @@ def _values(make: Maker, system: FuzzySystem) -> tuple[int, dict[str, int]]:
     found: list[int] = []
     values: dict[str, int] = {}
     for one in system.inputs:
-        value = _combined(make, one, values) if one.parts else make.input(one.name)
-        found.append(value)
-        values[one.name] = _held(make, one, value) if one.clips else value
-    return known_row(make, found), values
+        with make.topic(one.name):
+            value = _combined(make, one, values) if one.parts else make.input(one.name)
+            make.titled(value, one.name)
+            found.append(value)
+            values[one.name] = _held(make, one, value) if one.clips else value
+            make.titled(values[one.name], f"{one.name} clamped")
+    with make.topic("inputs"):
+        return known_row(make, found), values
 
 
 def _combined(make: Maker, one: SystemInput, values: dict[str, int]) -> int:
@@ -142,23 +149,22 @@ def _answer(make: Maker, output: SystemOutput, number: int) -> int:
 
 
 def _status(make: Maker, known: int, numbers: Sequence[int]) -> int:
-    is_none = make.chain("or", [is_nan(make, number) for number in numbers])
-    uncovered, decided = make.constant(UNCOVERED), make.constant(DECIDED)
-    status = make("where", is_none, uncovered, decided)
-    return make("where", known, status, make.constant(MISSING))
+    with make.topic("status"):
+        is_none = make.chain("or", [is_nan(make, number) for number in numbers])
+        uncovered, decided = make.constant(UNCOVERED), make.constant(DECIDED)
+        status = make("where", is_none, uncovered, decided)
+        return make("where", known, status, make.constant(MISSING))
 
 
 class _Concluded(msgspec.Struct):
     """A conclusion with its degree, 0 where its rule is not activated.
 
     Attributes:
-        output: The output's name.
         label: The label's name.
         degree: Its place.
         implication: The block's.
     """
 
-    output: str
     label: str
     degree: int
     implication: TNorm
@@ -180,8 +186,12 @@ class _Run:
             for label in variable.labels
         }
         self.activations: list[int] = []
-        self.concluded: dict[tuple[int, int], _Concluded] = {}
+        self.concluded: dict[str, dict[tuple[int, int], _Concluded]] = {
+            name: {} for name in self.outputs
+        }
         self.units: set[int] = {make.constant(0.0), make.constant(1.0)}
+        self.propositions: dict[Is, int] = {}
+        self.degrees: dict[tuple[str, str, int], int] = {}
 
     def activate(self, block: RuleBlock) -> None:
         """Add the rules of a block, and note what each concludes."""
@@ -190,18 +200,24 @@ class _Run:
         order = range(len(block.rules))
         if how.method in ("highest", "lowest", "proportional"):
             # Which rules are activated is known when all degrees are.
-            found = [self._rule_degree(block, rule) for rule in block.rules]
+            found = [
+                self._rule_degree(block, rule, number)
+                for number, rule in enumerate(block.rules, first + 1)
+            ]
             degrees = self._chosen(how, found)
             for index in order:
-                self._conclude(block, index, first + index, degrees[index])
+                with self.make.topic(f"rule {first + index + 1}"):
+                    self._conclude(block, index, first + index, degrees[index])
         else:
             # Each rule sees what those before it concluded.
             degrees = [0] * len(block.rules)
             count = self.make.constant(0.0)
             for index in reversed(order) if how.method == "last" else order:
-                degree = self._rule_degree(block, block.rules[index])
-                degrees[index], count = self._passed(how, degree, count)
-                self._conclude(block, index, first + index, degrees[index])
+                rule = block.rules[index]
+                degree = self._rule_degree(block, rule, first + index + 1)
+                with self.make.topic(f"rule {first + index + 1}"):
+                    degrees[index], count = self._passed(how, degree, count)
+                    self._conclude(block, index, first + index, degrees[index])
         self.activations += degrees
 
     def _chosen(self, how: Activation, found: Sequence[int]) -> list[int]:
@@ -239,12 +255,14 @@ class _Run:
             self.units.add(place)
         return place
 
-    def _rule_degree(self, block: RuleBlock, rule: SystemRule) -> int:
+    def _rule_degree(self, block: RuleBlock, rule: SystemRule, number: int) -> int:
         checkpoint()
         make = self.make
         when = rule.when
-        degree = make.constant(1.0) if when is None else self._degree(when, block)
-        found = make("multiply", make.constant(rule.weight), degree)
+        with make.topic(f"rule {number}"):
+            degree = make.constant(1.0) if when is None else self._degree(when, block)
+            found = make("multiply", make.constant(rule.weight), degree)
+            make.titled(found, f"rule {number} strength")
         return self._unit(found, if_all=[degree])
 
     def _degree(self, condition: Condition, block: RuleBlock) -> int:
@@ -274,27 +292,45 @@ class _Run:
         return total
 
     def _asked(self, asked: Is) -> int:
+        if asked in self.propositions:
+            return self.propositions[asked]
         if asked.label is None:
             degree = self.make.constant(math.nan)  # the hedge `any` makes 1 of it
         elif asked.variable in self.outputs:
             degree = self._so_far(self.outputs[asked.variable], asked.label)
         else:
             label = self.labels[asked.variable, asked.label]
-            degree = self._label_degree(label, self.values[asked.variable])
-        return self._unit(hedged(self.make, asked.hedges, degree), if_all=[degree])
+            value = self.values[asked.variable]
+            degree = self._label_degree(asked.variable, label, value)
+        words = (asked.variable, "is", *asked.hedges, asked.label or "")
+        with self.make.topic(" ".join(words)):
+            found = hedged(self.make, asked.hedges, degree)
+            self.make.titled(found, " ".join(words))
+        if asked.variable not in self.outputs:  # of those, each rule changes it
+            self.propositions[asked] = found
+        return self._unit(found, if_all=[degree])
 
-    def _label_degree(self, label: Label, x: int) -> int:
-        degree = curve_degree(self.make, label.curve, x, self.values)
-        height = self.make.constant(label.height)
-        found = self.make("multiply", height, degree)
-        if is_unit(label.curve):
-            self.units.add(found)
-        return found
+    def _label_degree(self, variable: str, label: Label, x: int) -> int:
+        key = variable, label.name, x
+        if key not in self.degrees:
+            with self.make.topic(f"{variable} is {label.name}"):
+                degree = curve_degree(self.make, label.curve, x, self.values)
+                height = self.make.constant(label.height)
+                found = self.make("multiply", height, degree)
+                self.make.titled(found, f"{variable} is {label.name}")
+            if is_unit(label.curve):
+                self.units.add(found)
+            self.degrees[key] = found
+        return self.degrees[key]
 
     def _so_far(self, output: SystemOutput, label: str) -> int:
         """Return how far a label was concluded: its degrees, aggregated from 0 on."""
+        found = [one for one in self._of(output) if one.label == label]
+        return self._aggregate(output, found)
+
+    def _aggregate(self, output: SystemOutput, found: Sequence[_Concluded]) -> int:
         name = output.aggregation or "sum"
-        degrees = [one.degree for one in self._of(output) if one.label == label]
+        degrees = [one.degree for one in found]
         if not degrees or degrees[0] not in self.units:
             degrees.insert(0, self.make.constant(0.0))
         # 0 OR the first is the first, if that lies in [0, 1].
@@ -302,11 +338,8 @@ class _Run:
 
     def _of(self, output: SystemOutput) -> list[_Concluded]:
         """Return what is concluded of an output, in the order of the rules."""
-        return [
-            self.concluded[place]
-            for place in sorted(self.concluded)
-            if self.concluded[place].output == output.name
-        ]
+        concluded = self.concluded[output.name]
+        return [concluded[place] for place in sorted(concluded)]
 
     def _conclude(
         self, block: RuleBlock, index: int, rule: int, activation: int
@@ -327,12 +360,8 @@ class _Run:
                 is_active = make("less", zero, activation)
                 noted = make("where", is_active, self._positive(degree), zero)
                 self._unit(noted, if_all=[degree])
-            self.concluded[rule, offset] = _Concluded(
-                one.output,
-                one.label,
-                noted,
-                block.implication or "minimum",
-            )
+            how = block.implication or "minimum"
+            self.concluded[one.output][rule, offset] = _Concluded(one.label, noted, how)
 
     def number(self, output: SystemOutput) -> int:
         """Return what an output's conclusions amount to; NaN if to nothing."""
@@ -359,7 +388,8 @@ class _Run:
         is_finite = all(map(math.isfinite, sample_values(output)))
         total = zero
         for one in self._gathered(output):
-            curve = self._label_degree(self.labels[output.name, one.label], xs)
+            label = self.labels[output.name, one.label]
+            curve = self._label_degree(output.name, label, xs)
             cut = T_NORMS[one.implication](make, one.degree, curve)
             is_safe = is_finite and curve in self.units and one.degree in self.units
             if is_safe and one.implication in KEEPS_UNIT and total == zero:
@@ -405,7 +435,8 @@ class _Run:
         weights: list[int] = []
         products: list[int] = []
         for label, degree, concluded in self._weights(output):
-            number = self._number_of(output, label, degree)
+            with make.topic(label.name):
+                number = self._number_of(output, label, degree)
             product = make("multiply", degree, number)
             known = make.number(number)
             is_finite = known is not None and math.isfinite(known)
@@ -430,10 +461,12 @@ class _Run:
             for one in found:
                 yield self.labels[output.name, one.label], one.degree, [one]
             return
+        owners: dict[str, list[_Concluded]] = {}
+        for one in found:
+            owners.setdefault(one.label, []).append(one)
         for label in output.labels:
-            own = [one for one in found if one.label == label.name]
-            if own:
-                yield label, self._so_far(output, label.name), own
+            if own := owners.get(label.name):
+                yield label, self._aggregate(output, own), own
 
     def _is_there(self, concluded: Sequence[_Concluded]) -> int:
         """Return whether a row has any of some conclusions."""
@@ -457,4 +490,6 @@ class _Run:
             case curve:
                 height = make.constant(label.height)
                 found = value_at(make, curve, make("divide", degree, height))
-                return self._label_degree(label, degree) if found is None else found
+                if found is not None:
+                    return found
+                return self._label_degree(output.name, label, degree)

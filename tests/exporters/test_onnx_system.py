@@ -1,11 +1,14 @@
 """Fuzzy systems as ONNX: what stands in the file, and what is refused."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import onnx
 import pytest
 
+from fuzzytree.converting import read
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import onnx_steps
 from fuzzytree.exporters.onnx import OPSETS, write
@@ -13,9 +16,23 @@ from fuzzytree.exporters.onnx_compare import differences
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.system import (
+    Conclusion,
+    Defuzzifier,
+    FuzzySystem,
+    Is,
+    Label,
+    Points,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+)
 from fuzzytree.testing import random_rows, random_system
 
 SYSTEM = random_system(3, formulas="none")
+TIPPER = read(Path(__file__).parents[2] / "examples" / "tipper.fll").model
 
 
 def test_the_same_system_gives_the_same_bytes() -> None:
@@ -32,6 +49,37 @@ def test_the_file_says_what_it_is() -> None:
     assert {one.domain for one in found.opset_import} == {""}
     assert [one.name for one in found.graph.output] == ["outputs", "status"]
     onnx.checker.check_model(found, full_check=True)
+
+
+def test_nodes_bear_the_names_of_propositions_rules_and_outputs() -> None:
+    found = onnx.load_model_from_string(write(TIPPER).content)
+    names = {node.name for node in found.graph.node}
+    assert {"service", "service_is_poor", "food_is_rancid"} <= names
+    assert {"rule_1_strength", "rule_3_strength", "tip"} <= names
+    constants = {tensor.name for tensor in found.graph.initializer}
+    assert {"number_1_5", "number_minus_0_5", "whole_0"} <= constants
+
+
+def test_hostile_names_become_short_unique_identifiers() -> None:
+    hostile = ["outputs", "a; b\n", "a  b", "\u5ea6" * 40, "x" * 400, "1\x1b[2J"]
+    half = Label("x; DROP", Points((0.0, 1.0), (0.0, 1.0)))
+    rules = [
+        SystemRule(Is(name, half.name), (Conclusion("status", "o"),))
+        for name in hostile
+    ]
+    one = Label("o", Singleton(1.0))
+    output = SystemOutput("status", (one,), None, None, Defuzzifier("weighted sum"))
+    inputs = tuple(SystemInput(name, (half,)) for name in hostile)
+    system = FuzzySystem("s", inputs, (output,), (RuleBlock(tuple(rules)),))
+    content = write(system).content
+    graph = onnx.load_model_from_string(content).graph
+    onnx.checker.check_model(content, full_check=True)
+    names = [node.name for node in graph.node]
+    names += [tensor.name for tensor in graph.initializer]
+    assert len(set(names)) == len(names)
+    assert [one for one in names if not re.fullmatch(r"[A-Za-z_]\w*", one, re.A)] == []
+    assert max(map(len, names)) <= 64
+    assert {"outputs_2", "a_b_is_x_DROP", "a_b_is_x_DROP_2"} <= set(names)
 
 
 def test_an_opened_file_runs() -> None:

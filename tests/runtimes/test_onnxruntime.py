@@ -348,7 +348,7 @@ HOSTILE = {
     ),
     "external data": (
         _changed(_move_out),
-        "constant 'rows' lies in another file",
+        "constant 'index_1' lies in another file",
     ),
     "custom operator": (
         _changed(_call_home),

@@ -149,14 +149,15 @@ def _program(
 ) -> Program:
     """Return the program of some features, with those of the inputs that it needs."""
     pressed = make.steps("where", make.moments.is_pressed, make.one, make.zero)
-    results = [
-        Result("output", feature.name, make.feature(feature)) for feature in features
-    ]
+    results: list[Result] = []
+    for feature in features:
+        with make.steps.topic(feature.name):
+            results.append(Result("output", feature.name, make.feature(feature)))
     results.append(Result("output", PRESSED, pressed))
     whole = make.steps.program("features", tuple(inputs), tuple(results))
     asked = {step.name for step in whole.steps if step.operation == "input"}
     needed = tuple(name for name in inputs if name in asked)
-    return Program(whole.name, needed, whole.steps, whole.results)
+    return Program(whole.name, needed, whole.steps, whole.results, whole.titles)
 
 
 class _Maker:
@@ -203,7 +204,8 @@ class _Maker:
     def parts(self, p: int, q: int) -> tuple[Noisy, Noisy]:
         """Return the parts of C_pq, noise settled to 0."""
         if (p, q) not in self._parts:
-            self._parts[p, q] = complex_moment(self.moments, p, q)
+            with self.steps.topic(f"C{p}{q}"):
+                self._parts[p, q] = complex_moment(self.moments, p, q)
         return self._parts[p, q]
 
     def _scaled(self, value: int, degree: int, feature: Feature) -> int:
