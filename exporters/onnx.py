@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
 from fuzzytree.contracts import Dtype, Format, Loss, Model, Written
-from fuzzytree.errors import LossError, MissingExtraError
+from fuzzytree.errors import LossError, MissingExtraError, install_hint
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
@@ -221,9 +221,7 @@ def _range_text(what: str, known: range, value: int) -> str:
 def require(package: str, purpose: str) -> None:
     """Refuse to go on without a package of the extra `onnx`."""
     if importlib.util.find_spec(package) is None:
-        raise MissingExtraError(
-            f"{purpose} the extra 'onnx': pip install 'fuzzytree-toolkit[onnx]'"
-        )
+        raise MissingExtraError(f"{purpose} {install_hint('onnx')}")
 
 
 def _loss_text(model: Model, dtype: Dtype, lost: Sequence[Loss]) -> str:

@@ -50,5 +50,32 @@ class MissingExtraError(FuzzyTreeError, ImportError):
     """A verb that needs an optional package which is not installed."""
 
 
+def install_hint(extra: str) -> str:
+    """Return which packages an optional part needs, and the command that gets them.
+
+    The packages come from the metadata of the installation, so the command works
+    whether fuzzytree came from an index, a wheel or a checkout.
+
+    Example:
+        >>> install_hint("parquet")
+        "pyarrow: pip install 'pyarrow>=15'"
+    """
+    import importlib.metadata
+    import re
+
+    try:
+        listed = importlib.metadata.requires("fuzzytree-toolkit") or []
+    except importlib.metadata.PackageNotFoundError:
+        return f"the packages that pyproject.toml lists for the extra {extra!r}"
+    needed = [
+        one.partition(";")[0].strip()
+        for one in listed
+        if re.search(rf"""extra == ['"]{re.escape(extra)}['"]""", one)
+    ]
+    names = [re.split(r"[^\w.-]", one)[0] for one in needed]
+    command = " ".join(f"'{one}'" for one in needed)
+    return f"{' and '.join(names)}: pip install {command}"
+
+
 class PortError(FuzzyTreeError, OSError):
     """A serial port that cannot be used, or that gives what its board does not send."""

@@ -8,15 +8,22 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from sklearn.base import BaseEstimator, ClassifierMixin
-from sklearn.utils.multiclass import check_classification_targets
-from sklearn.utils.validation import check_is_fitted, validate_data
 
+from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import Learner, LearningReport, Settings
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import Status
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.tree import FuzzyTree
+
+try:
+    from sklearn.base import BaseEstimator, ClassifierMixin
+    from sklearn.utils.multiclass import check_classification_targets
+    from sklearn.utils.validation import check_is_fitted, validate_data
+except ImportError as error:
+    raise MissingExtraError(
+        f"FuzzyTreeClassifier needs {install_hint('sklearn')}"
+    ) from error
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import Carrier, FloatArray, IntArray, Outcome, Run

@@ -25,7 +25,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.errors import MissingExtraError, TableError
+from fuzzytree.errors import MissingExtraError, TableError, install_hint
 from fuzzytree.files import reason
 
 if TYPE_CHECKING:
@@ -611,8 +611,7 @@ def _parquet_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[Piece]:
         import pyarrow.parquet as pq
     except ImportError as error:
         raise MissingExtraError(
-            "reading parquet needs the extra 'parquet': "
-            "pip install 'fuzzytree-toolkit[parquet]'"
+            f"reading parquet needs {install_hint('parquet')}"
         ) from error
     whole = stream if stream.seekable() else io.BytesIO(stream.read())
     try:

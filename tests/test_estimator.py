@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import importlib
 import io
 import pickle
 import struct
+import sys
 from typing import TYPE_CHECKING, Any
 
 import joblib  # type: ignore[import-untyped]  # it has no types of its own
@@ -20,6 +22,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
+from fuzzytree.errors import MissingExtraError
 from fuzzytree.estimator import FuzzyTreeClassifier, Mode
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import descend, evaluate
@@ -211,3 +214,15 @@ def test_missing_values_are_refused() -> None:
     model = FuzzyTreeClassifier().fit(WINE.data, WINE.target)
     with pytest.raises(ValueError, match="Input X contains NaN"):
         model.predict(pd.DataFrame([[np.nan] * 13], columns=WINE.data.columns))
+
+
+def test_without_scikit_learn_the_classifier_says_what_installs_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "sklearn.base", None)
+    monkeypatch.delitem(sys.modules, "fuzzytree.estimator")
+    with pytest.raises(MissingExtraError) as caught:
+        importlib.import_module("fuzzytree.estimator")
+    assert str(caught.value) == (
+        "FuzzyTreeClassifier needs scikit-learn: pip install 'scikit-learn>=1.6'"
+    )

@@ -326,8 +326,7 @@ def test_drawing_without_matplotlib_names_the_extra(
     with pytest.raises(MissingExtraError) as caught:
         plots.work_precision(small(), rows=1000)
     assert str(caught.value) == (
-        "drawing pictures needs the extra 'plots': "
-        "pip install 'fuzzytree-toolkit[plots]'"
+        "drawing pictures needs matplotlib: pip install 'matplotlib>=3.8'"
     )
 
 

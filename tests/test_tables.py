@@ -106,8 +106,7 @@ def test_parquet_without_its_library_names_the_extra(
     with pytest.raises(MissingExtraError) as caught:
         _values(io.BytesIO(b"PAR1"), ["a"])
     assert str(caught.value) == (
-        "reading parquet needs the extra 'parquet': "
-        "pip install 'fuzzytree-toolkit[parquet]'"
+        "reading parquet needs pyarrow: pip install 'pyarrow>=15'"
     )
 
 

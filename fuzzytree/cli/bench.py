@@ -21,7 +21,7 @@ from fuzzytree.cli.talk import (
     table_source,
     wrong_options,
 )
-from fuzzytree.errors import MissingExtraError
+from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import check_place, write_atomically
 
 if TYPE_CHECKING:
@@ -186,10 +186,7 @@ def _check_places(output: str | None, plots: Sequence[str]) -> None:
             known = " or ".join(SUFFIXES)
             raise click.UsageError(f"--plot {place}: a picture ends in {known}")
     if plots and importlib.util.find_spec("matplotlib") is None:
-        raise MissingExtraError(
-            "fuzzytree bench --plot needs the extra 'plots': "
-            "pip install 'fuzzytree-toolkit[plots]'"
-        )
+        raise MissingExtraError(f"fuzzytree bench --plot needs {install_hint('plots')}")
 
 
 def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:

@@ -12,7 +12,7 @@ import click
 
 import fuzzytree
 from fuzzytree.cli.talk import answer, answer_json, json_option
-from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.errors import FuzzyTreeError, install_hint
 
 CORE = ("numpy", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark")
 
@@ -81,10 +81,7 @@ def command(as_json: bool) -> int:
         return 1 if faults else 0
     answer("\n".join(text.aligned(versions.items())))
     for extra in missing:
-        answer(
-            f"extra {extra!r} is not installed: "
-            f"pip install 'fuzzytree-toolkit[{extra}]'"
-        )
+        answer(f"extra {extra!r} is not installed; it needs {install_hint(extra)}")
     for fault in faults:
         answer(f"self-test: {fault}")
     if not faults:

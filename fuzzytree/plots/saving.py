@@ -10,7 +10,7 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fuzzytree.errors import MissingExtraError
+from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import PathLike, write_atomically
 
 if TYPE_CHECKING:
@@ -35,10 +35,7 @@ def style() -> Generator[None]:
         MissingExtraError: If matplotlib is not installed.
     """
     if importlib.util.find_spec("matplotlib") is None:
-        raise MissingExtraError(
-            "drawing pictures needs the extra 'plots': "
-            "pip install 'fuzzytree-toolkit[plots]'"
-        )
+        raise MissingExtraError(f"drawing pictures needs {install_hint('plots')}")
     import matplotlib as mpl
     from matplotlib import style as styles
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.errors import MissingExtraError
+from fuzzytree.errors import MissingExtraError, install_hint
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray
@@ -91,8 +91,7 @@ def peer_answers(
     """
     if not are_there():
         raise MissingExtraError(
-            "comparing with other learners needs the extra 'sklearn': "
-            "pip install 'fuzzytree-toolkit[sklearn]'"
+            f"comparing with other learners needs {install_hint('sklearn')}"
         )
     mean = train.mean(axis=1, keepdims=True)
     spread = train.std(axis=1, keepdims=True)

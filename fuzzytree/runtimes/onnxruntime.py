@@ -23,7 +23,7 @@ from fuzzytree.contracts import (
     SystemOutcome,
     SystemRun,
 )
-from fuzzytree.errors import LossError, MissingExtraError, ReadError
+from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
 from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
 from fuzzytree.rulebase import Semantics
 from fuzzytree.system import FuzzySystem
@@ -237,10 +237,7 @@ def _require_packages(doing: str) -> None:
 
     for package in ("onnx", "onnxruntime"):
         if importlib.util.find_spec(package) is None:
-            raise MissingExtraError(
-                f"{doing} onnx files needs the extra 'onnx': "
-                "pip install 'fuzzytree-toolkit[onnx]'"
-            )
+            raise MissingExtraError(f"{doing} onnx files needs {install_hint('onnx')}")
 
 
 def _run(session: Session, facts: Facts, values: FloatArray) -> Outcome:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fuzzytree.contracts import Model, Outcome, Run, Runtime
-from fuzzytree.errors import LossError, MissingExtraError
+from fuzzytree.errors import LossError, MissingExtraError, install_hint
 from fuzzytree.rulebase import Clause, RuleBase, Shape
 
 if TYPE_CHECKING:
@@ -51,8 +51,7 @@ def load(model: Model) -> Run:
         from skfuzzy.control.controlsystem import CrispValueCalculator
     except ImportError as error:
         raise MissingExtraError(
-            "running scikit-fuzzy needs the extra 'skfuzzy': "
-            "pip install 'fuzzytree-toolkit[skfuzzy]'"
+            f"running scikit-fuzzy needs {install_hint('skfuzzy')}"
         ) from error
     import numpy as np
 

@@ -251,10 +251,7 @@ def test_a_missing_extra_for_pictures_is_named(
         "find_spec",
         lambda name, *rest: None if name == "matplotlib" else real(name, *rest),
     )
-    message = (
-        "fuzzytree bench --plot needs the extra 'plots': "
-        "pip install 'fuzzytree-toolkit[plots]'\n"
-    )
+    message = "fuzzytree bench --plot needs matplotlib: pip install 'matplotlib>=3.8'\n"
     assert call("bench", "grip.yaml", "--plot", "a.svg") == (2, "", message)
 
 

@@ -88,8 +88,9 @@ def test_the_doctor_tells_how_to_install_what_is_missing(
     code, out, _ = call("doctor")
     assert code == 0
     assert (
-        "extra 'onnx' is not installed: pip install 'fuzzytree-toolkit[onnx]'\n" in out
-    )
+        "extra 'onnx' is not installed; it needs onnx and onnxruntime: "
+        "pip install 'onnx>=1.16' 'onnxruntime>=1.18'\n"
+    ) in out
 
 
 def test_a_failed_self_test_is_exit_one(

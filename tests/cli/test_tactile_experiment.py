@@ -117,8 +117,8 @@ def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
     assert code == 0
     assert "learner" not in out
     assert err == (
-        "without other learners: they need the extra 'sklearn': "
-        "pip install 'fuzzytree-toolkit[sklearn]'\n"
+        "without other learners: they need scikit-learn: "
+        "pip install 'scikit-learn>=1.6'\n"
     )
 
 

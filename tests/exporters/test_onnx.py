@@ -445,7 +445,7 @@ def test_a_missing_package_is_named_with_what_installs_it(
     )
     with pytest.raises(MissingExtraError) as caught:
         write(grip_tree())
-    hint = "the extra 'onnx': pip install 'fuzzytree-toolkit[onnx]'"
+    hint = "onnx and onnxruntime: pip install 'onnx>=1.16' 'onnxruntime>=1.18'"
     assert str(caught.value) == f"{text} {hint}"
     if absent == "onnxruntime":
         assert write(grip_tree(), verify=False).losses == ()

@@ -199,8 +199,8 @@ def test_without_the_extra_a_peer_says_what_is_missing(
     with pytest.raises(MissingExtraError) as told:
         peer_answers("LDA", np.ones((1, 2)), np.array([0, 1]), np.ones((1, 1)))
     assert str(told.value) == (
-        "comparing with other learners needs the extra 'sklearn': "
-        "pip install 'fuzzytree-toolkit[sklearn]'"
+        "comparing with other learners needs scikit-learn: "
+        "pip install 'scikit-learn>=1.6'"
     )
 
 

@@ -327,8 +327,7 @@ def test_a_line_without_its_library_names_the_extra(
         with pytest.raises(MissingExtraError) as caught:
             call()
         assert str(caught.value) == (
-            "reading a serial port needs the extra 'serial': "
-            "pip install 'fuzzytree-toolkit[serial]'"
+            "reading a serial port needs pyserial: pip install 'pyserial>=3.5'"
         )
 
 

@@ -20,7 +20,7 @@ from fuzzytree.cli.talk import (
     say_rows,
     wrong_options,
 )
-from fuzzytree.errors import WriteError
+from fuzzytree.errors import WriteError, install_hint
 from fuzzytree.files import write_atomically
 
 if TYPE_CHECKING:
@@ -154,8 +154,7 @@ def command(
     answer(outcome.study.to_json() if as_json else "\n".join(lines))
     if not (peers or no_peers):
         say(
-            "without other learners: they need the extra 'sklearn': "
-            "pip install 'fuzzytree-toolkit[sklearn]'",
+            f"without other learners: they need {install_hint('sklearn')}",
             quiet=quiet,
         )
     if output is not None:
@@ -277,8 +276,7 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
 
     if importlib.util.find_spec("matplotlib") is None:
         say(
-            "without pictures: they need the extra 'plots': "
-            "pip install 'fuzzytree-toolkit[plots]'",
+            f"without pictures: they need {install_hint('plots')}",
             quiet=quiet,
         )
         return {}

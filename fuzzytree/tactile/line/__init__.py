@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self
 
 import numpy as np
 
-from fuzzytree.errors import MissingExtraError, PortError
+from fuzzytree.errors import MissingExtraError, PortError, install_hint
 from fuzzytree.tactile.boards import Board
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.line.decoding import decoder_of
@@ -391,7 +391,4 @@ def _known(text: str | None) -> str:
 
 
 def _missing() -> MissingExtraError:
-    return MissingExtraError(
-        "reading a serial port needs the extra 'serial': "
-        "pip install 'fuzzytree-toolkit[serial]'"
-    )
+    return MissingExtraError(f"reading a serial port needs {install_hint('serial')}")
