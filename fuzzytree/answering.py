@@ -21,7 +21,7 @@ from fuzzytree.contracts import (
     SystemOutcome,
 )
 from fuzzytree.converting import CALLED, as_model, carrier_of
-from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
+from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.files import read_bounded
 from fuzzytree.outputs import Outputs, joined_outputs
 from fuzzytree.rulebase import RuleBase
@@ -282,12 +282,7 @@ def _runtime(name: str, model: Document) -> Runtime:
             f"{' or '.join(runtime.runs)}, not a {CALLED[carrier]}"
         )
     if not is_installed(runtime):
-        if runtime.programs:
-            text = f"the runtime {name!r} needs {needed_by(runtime)}"
-            raise MissingExtraError(text)
-        raise MissingExtraError(
-            f"the runtime {name!r} needs {install_hint(runtime.extra or '')}"
-        )
+        raise MissingExtraError(f"the runtime {name!r} needs {needed_by(runtime)}")
     return runtime
 
 

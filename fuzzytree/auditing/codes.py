@@ -418,8 +418,8 @@ _CODES = (
         what="A runtime is not installed, or cannot run this model, so its answers "
         "were not compared.",
         why="Nothing is known about it, and that is said.",
-        example="onnxruntime float64 is not installed (extra 'onnx')",
-        remedy="Install the extra or the program that the reason names.",
+        example="c is not installed (one of the programs gcc, cc, clang)",
+        remedy="Install the packages or the program that the reason names.",
     ),
 )
 

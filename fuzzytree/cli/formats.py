@@ -67,11 +67,11 @@ def _abilities(
 ) -> tuple[Ability, ...] | str:
     """Return what a format can carry, or why that cannot be tried."""
     from fuzzytree.abilities import abilities
-    from fuzzytree.errors import FuzzyTreeError
+    from fuzzytree.errors import FuzzyTreeError, install_hint
     from fuzzytree.exporters import TABLE
 
     if form.extra in missing:
-        return f"not tried: the extra {form.extra!r} is not installed"
+        return f"not tried: it needs {install_hint(form.extra)}"
     try:
         return abilities(form, dialect=dialect)
     except FuzzyTreeError as error:

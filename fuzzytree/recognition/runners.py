@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzytree.contracts import Model
+from fuzzytree.errors import install_hint
 from fuzzytree.exporters.c_frames import write_frames_c
 from fuzzytree.recognition.recogniser import Recogniser
 from fuzzytree.rulebase import RuleBase
@@ -106,7 +107,7 @@ def runners(
     if all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
         found.append(_onnx(model, sensor, reject))
     else:
-        missing.append("onnx: not installed (extra 'onnx')")
+        missing.append(f"onnx: not installed ({install_hint('onnx')})")
     if any(map(shutil.which, COMPILERS)):
         found.append(_c(model, sensor, reject))
     else:

@@ -14,6 +14,7 @@ import shutil
 from collections.abc import Sequence
 
 from fuzzytree.contracts import Runtime
+from fuzzytree.errors import install_hint
 
 TABLE = (
     "fuzzytree.runtimes.reference",
@@ -71,7 +72,7 @@ def needed_by(runtime: Runtime) -> str:
     """
     if runtime.programs:
         return f"one of the programs {', '.join(runtime.programs)}"
-    return f"extra {runtime.extra!r}"
+    return install_hint(runtime.extra or "")
 
 
 def _runtimes_of(module: str) -> tuple[Runtime, ...]:

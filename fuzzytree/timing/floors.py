@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fuzzytree.errors import install_hint
 from fuzzytree.timing.records import Candidate, Found, Loaded, Omission, Question
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def floors(question: Question) -> tuple[list[Candidate], list[Omission]]:
         )
     ]
     if not all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
-        return found, [Omission(SESSION, "not installed (extra 'onnx')")]
+        return found, [Omission(SESSION, f"not installed ({install_hint('onnx')})")]
     note = "onnxruntime hands the same table back"
     session = Candidate(
         SESSION, question, "floor", _load_session, note=note, is_foreign=True

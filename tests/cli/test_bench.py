@@ -220,7 +220,7 @@ def test_a_study_of_nothing_leaves_files_as_they_were(
     monkeypatch.setattr(verbs, "bench", lambda *_, **__: study())
     code, out, err = call(*words)
     assert (code, err) == (2, "nothing could be measured\n")
-    assert out.endswith("not installed (extra 'peers')\n")
+    assert out.endswith("not installed (pip install treelite)\n")
     early = replace(study(), is_interrupted=True, is_complete=False)
     monkeypatch.setattr(verbs, "bench", lambda *_, **__: early)
     code, _, err = call(*words)

@@ -84,7 +84,7 @@ def study(*points: Point, most: float | None = None) -> Study:
         "grasps.csv, 200 rows",
         machine,
         points,
-        (Omission("treelite: rules", "not installed (extra 'peers')"),),
+        (Omission("treelite: rules", "not installed (pip install treelite)"),),
         advice=advice(points, most),
         fronts=fronts(points),
         seconds=12.3,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.contracts import Dtype, Outcome, Run, Runtime
+from fuzzytree.errors import install_hint
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.numerics import bounds
 from fuzzytree.rulebase import RuleBase
@@ -126,8 +127,8 @@ def test_what_is_not_installed_is_an_omission(monkeypatch: pytest.MonkeyPatch) -
     found, omitted = own(TREE, lambda rules, dtype: None, Layouts())
     assert not any(one.is_foreign for one in found)
     whys = {one.name: one.why for one in omitted}
-    assert whys["scikit-fuzzy"] == "not installed (extra 'skfuzzy')"
-    assert whys["onnxruntime mixed"] == "not installed (extra 'onnx')"
+    assert whys["scikit-fuzzy"] == f"not installed ({install_hint('skfuzzy')})"
+    assert whys["onnxruntime mixed"] == f"not installed ({install_hint('onnx')})"
 
 
 def test_a_variant_tells_its_bound_once_it_is_loaded() -> None:

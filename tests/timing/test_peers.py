@@ -531,8 +531,8 @@ Present = Callable[[str], object]
 @pytest.mark.parametrize(
     ("module", "names", "why"),
     [
-        ("treelite", ["treelite"], "not installed (extra 'peers')"),
-        ("simpful", ["simpful"], "not installed (extra 'peers')"),
+        ("treelite", ["treelite"], "not installed (pip install treelite)"),
+        ("simpful", ["simpful"], "not installed (pip install simpful)"),
         (
             "fuzzylite",
             ["pyfuzzylite"],
@@ -547,12 +547,12 @@ Present = Callable[[str], object]
                 "m2cgen python",
                 "m2cgen c",
             ],
-            "not installed (extra 'sklearn')",
+            "not installed (pip install scikit-learn)",
         ),
-        ("onnx", ["skl2onnx", "onnx evaluator"], "not installed (extra 'onnx')"),
+        ("onnx", ["skl2onnx", "onnx evaluator"], "not installed (pip install onnx)"),
     ],
 )
-def test_a_peer_that_is_not_installed_is_named_with_its_extra(
+def test_a_peer_that_is_not_installed_is_named_with_what_installs_it(
     module: str, names: Sequence[str], why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     find: Present = importlib.util.find_spec

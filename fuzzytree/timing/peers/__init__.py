@@ -87,12 +87,8 @@ TREE_PEERS = (
 )
 """Peers for the question `tree`."""
 
-_EXTRAS = {
-    "sklearn": "extra 'sklearn'",
-    "onnx": "extra 'onnx'",
-    "onnxruntime": "extra 'onnx'",
-    "fuzzylite": "pip install --no-deps pyfuzzylite",
-}
+_PACKAGES = {"sklearn": "scikit-learn", "fuzzylite": "--no-deps pyfuzzylite"}
+"""What pip calls the modules that have another name there."""
 
 
 def _uncertified(rules: RuleBase, dtype: Dtype) -> None:
@@ -233,8 +229,7 @@ def _absent(modules: tuple[str, ...], program: str | None = None) -> str:
     """Return what is not installed, and how to get it; nothing if all is there."""
     for module in modules:
         if importlib.util.find_spec(module) is None:
-            how = _EXTRAS.get(module, "extra 'peers'")
-            return f"not installed ({how})"
+            return f"not installed (pip install {_PACKAGES.get(module, module)})"
     if program and shutil.which(program) is None:
         return f"the program {program!r} is not installed"
     return ""
