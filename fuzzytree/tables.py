@@ -17,6 +17,7 @@ import math
 import operator
 import os
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, cast
@@ -423,7 +424,8 @@ def _learnt_columns(
 ) -> list[int]:
     wanted = [*([target] if isinstance(target, str) else []), *ignore]
     _refuse_absent(piece, wanted, "")
-    chosen = [k for k, column in enumerate(piece.columns) if column not in wanted]
+    left_out = frozenset(wanted)
+    chosen = [k for k, column in enumerate(piece.columns) if column not in left_out]
     nameless = [k + 1 for k in chosen if not piece.columns[k].strip()]
     if nameless:
         raise TableError(f"{piece.name}: column {nameless[0]} has no name")
@@ -447,11 +449,13 @@ def _needed_columns(
         columns = wanted
     else:
         _refuse_absent(piece, inputs, ", which the model needs")
-    return [columns.index(name) for name in inputs]
+    position = {column: k for k, column in enumerate(columns)}
+    return [position[name] for name in inputs]
 
 
 def _refuse_absent(piece: Piece, wanted: Sequence[str], why: str) -> None:
-    absent = [name for name in wanted if name not in piece.columns]
+    known_names = frozenset(piece.columns)
+    absent = [name for name in wanted if name not in known_names]
     if not absent:
         return
     known = ", ".join(piece.columns[:20]) + (", ..." if len(piece.columns) > 20 else "")
@@ -463,7 +467,7 @@ def _refuse_absent(piece: Piece, wanted: Sequence[str], why: str) -> None:
 
 
 def _refuse_repeated(name: str, columns: Sequence[str]) -> None:
-    twice = [c for c in dict.fromkeys(columns) if c and columns.count(c) > 1]
+    twice = [c for c, count in Counter(columns).items() if c and count > 1]
     if twice:
         word = "column" if len(twice) == 1 else "columns"
         verb = "stands" if len(twice) == 1 else "stand"

@@ -152,18 +152,13 @@ class Statistics:
             units: Of the columns; the table's own unless given.
         """
         self._absorb()
-        shape = (self.classes, self.features)
-        means, spreads = np.zeros(shape), np.zeros(shape)
-        for feature in range(self.features):
-            totals = self.totals(feature)
-            if units is None:
-                means[:, feature] = totals.means()
-                spreads[:, feature] = totals.spreads()
-            elif units.is_sound[feature]:
-                exponent = int(units.exponents[feature])
-                origin = float(units.origins[feature])
-                means[:, feature] = totals.means(origin, exponent)
-                spreads[:, feature] = totals.spreads(exponent)
+        counts = self._counts.tolist()
+        if units is None:
+            means, spreads = self._sums.moments(counts)
+        else:
+            origins = np.where(units.is_sound, units.origins, 0.0)
+            means, spreads = self._sums.moments(counts, origins, units.exponents)
+            means[:, ~units.is_sound] = spreads[:, ~units.is_sound] = 0.0
         lows, highs = self._lows.copy(), self._highs.copy()
         if units is not None:
             filled = self._counts > 0

@@ -16,6 +16,7 @@ exact all the same.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -67,12 +68,10 @@ class Totals:
             origin: One of the values, or 0.
             exponent: Of the unit.
         """
-        start = whole(origin, self.unit)
+        start, unit = whole(origin, self.unit), self.unit - exponent
         return np.array(
             [
-                rounded_ratio(total - count * start, count, self.unit - exponent)
-                if count
-                else math.nan
+                _mean(count, total, start, unit)
                 for count, total in zip(self.counts, self.sums, strict=True)
             ]
         )
@@ -86,18 +85,9 @@ class Totals:
         Args:
             exponent: Of the unit.
         """
-        return np.array(
-            [
-                rounded_root(
-                    self.variance(group),
-                    count * max(count - 1, 1),
-                    self.unit - exponent,
-                )
-                if count
-                else math.nan
-                for group, count in enumerate(self.counts)
-            ]
-        )
+        columns = zip(self.counts, self.sums, self.squares, strict=True)
+        unit = self.unit - exponent
+        return np.array([_spread(*numbers, unit) for numbers in columns])
 
     @property
     def exponent(self) -> int:
@@ -111,8 +101,20 @@ class Totals:
         return self.counts[group] * self.squares[group] - total * total
 
 
+def _mean(count: int, total: int, start: int, unit: int) -> float:
+    return rounded_ratio(total - count * start, count, unit) if count else math.nan
+
+
+def _spread(count: int, total: int, square: int, unit: int) -> float:
+    if not count:
+        return math.nan
+    return rounded_root(count * square - total * total, count * max(count - 1, 1), unit)
+
+
 def whole(value: float, unit: int) -> int:
     """Return a value as a multiple of `2**unit`, which it must be."""
+    if value == 0.0:
+        return 0
     top, bottom = value.as_integer_ratio()
     return (top << max(-unit, 0)) // (bottom << max(unit, 0))
 
@@ -126,7 +128,7 @@ def rounded_ratio(top: int, bottom: int, exponent: int) -> float:
         >>> rounded_ratio(1, 3, -1) == (1 / 3) / 2
         True
     """
-    return (top << max(exponent, 0)) / (bottom << max(-exponent, 0))
+    return (top << exponent) / bottom if exponent >= 0 else top / (bottom << -exponent)
 
 
 def rounded_root(top: int, bottom: int, exponent: int) -> float:
@@ -283,6 +285,34 @@ class Sums:
         for part in (self, other):
             joined._take(part, *everything)
         return joined
+
+    def moments(
+        self,
+        counts: Sequence[int],
+        origins: FloatArray | None = None,
+        exponents: IntArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the means and the spreads of all columns, shape (groups, features).
+
+        Args:
+            counts: The rows of each group.
+            origins: For each column what `Totals.means` takes; 0 unless given.
+            exponents: For each column what both methods take; 0 unless given.
+        """
+        self._settle()
+        units = self._unit if exponents is None else self._unit - exponents
+        shifts = units.tolist()
+        starts = [0] * self.features
+        if origins is not None:
+            starts = list(map(whole, origins.tolist(), self._unit.tolist()))
+        means = np.empty((self.groups, self.features))
+        spreads = np.empty_like(means)
+        for group, count in enumerate(counts):
+            sums, squares = self._sums[group].tolist(), self._squares[group].tolist()
+            rows = itertools.repeat(count)
+            means[group] = list(map(_mean, rows, sums, starts, shifts))
+            spreads[group] = list(map(_spread, rows, sums, squares, shifts))
+        return means, spreads
 
     def totals(self, feature: int, counts: Sequence[int]) -> Totals:
         """Return the totals of one column.
