@@ -18,6 +18,19 @@ LIMIT = 256 * 2**20
 PathLike = str | os.PathLike[str]
 
 
+def check_stream(path: PathLike) -> None:
+    """Refuse what is no file and no pipe: a device may never end.
+
+    Raises:
+        OSError: If it is a folder, a device or a socket, or is not there.
+    """
+    mode = Path(path).stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(None, "is a directory")
+    if not (stat.S_ISREG(mode) or stat.S_ISFIFO(mode)):
+        raise OSError(None, "it is neither a file nor a pipe")
+
+
 def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
     """Return the content of a file, unless it is larger than the limit.
 
@@ -30,6 +43,7 @@ def read_bounded(path: PathLike, limit: int = LIMIT) -> bytes:
     """
     name = os.fspath(path)
     try:
+        check_stream(path)
         with Path(path).open("rb") as file:
             content = file.read(limit + 1)
     except (OSError, ValueError) as error:

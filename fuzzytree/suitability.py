@@ -40,6 +40,7 @@ def remarks(table: Table, ignoring: Callable[[str], str]) -> Iterator[tuple[str,
             some have fractions, more than half of the rows have one to themselves.
     """
     _refuse_measurements(table)
+    yield from table.remarks
     rows, classes = len(table.codes), len(table.classes)
     if classes > _MANY and rows < _ROWS_PER_CLASS * classes:
         text = f"{classes} classes in {rows} rows, {rows / classes:.1f} rows for each"

@@ -8,48 +8,54 @@ number nor missing is an error that says where it stands.
 
 from __future__ import annotations
 
-import contextlib
-import csv
+import codecs
 import difflib
 import io
 import itertools
 import math
-import operator
 import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias, cast
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.errors import MissingExtraError, TableError, install_hint
-from fuzzytree.files import reason
+from fuzzytree.csv_rows import BLOCK, Rows, blocks
+from fuzzytree.errors import TableError
+from fuzzytree.files import LIMIT, check_stream, reason
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from narwhals.typing import IntoDataFrame, IntoLazyFrame
+
+    Cells: TypeAlias = Sequence[object] | npt.NDArray[np.generic] | pa.ChunkedArray
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-Cells = Sequence[object] | npt.NDArray[np.generic]
 Only = frozenset[str] | None
 
 MISSING = frozenset({"", "na", "n/a", "nan", "null", "none"})
 """The texts, in small letters, that stand for a missing number."""
 
-PIECE = 4096
-"""How many rows of a file are read at a time."""
+PIECE = 1 << 14
+"""The most rows of a file that are handed on at a time."""
 
 _REAL = frozenset("biuf")  # numpy's letters for truth values, integers, floats
+_MOST_NAMES = 20
+_NUMBERS = (bool, int, float, np.bool_, np.integer, np.floating)
+_NO_NUMBER = frozenset("cmMSV")  # complex, times, bytes
+_MISSING = f"(?i)^(?:{'|'.join(sorted(MISSING))})$"
 _DELIMITERS = (",", ";", "\t")
 _NUMBER = re.compile(
     r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf|infinity|nan)",
     re.IGNORECASE,
 )
 
+_ARROW, _PARQUET = b"ARROW1", b"PAR1"
 _NO_DELIMITER = '"\r\n\0'
 
 
@@ -58,11 +64,13 @@ class Piece(msgspec.Struct, frozen=True, eq=False):
 
     Attributes:
         name: What messages call the table.
-        columns: The names of all columns.
+        columns: The names of all columns, without blanks around them; `column 3` for
+            a third one that has none.
         cells: One entry for each column, each with one cell for each row; empty for
-            a column that was not asked for.
+            a column that is not wanted.
         rows: How many rows these are.
         where: The place of a row of this piece, as messages name it.
+        written: The names of all columns, as they came.
         is_named: Whether the names came with the table; if not they are x1, x2, ...
         whole: All cells as one array of shape (columns, rows), where they are one.
     """
@@ -72,6 +80,7 @@ class Piece(msgspec.Struct, frozen=True, eq=False):
     cells: tuple[Cells, ...]
     rows: int
     where: Callable[[int], str]
+    written: tuple[str, ...]
     is_named: bool = True
     whole: FloatArray | None = None
 
@@ -89,6 +98,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
         missing: How many cells are missing.
         unlabelled: How many rows were left out because they had no class.
         target: The column of the classes; empty if they came by themselves.
+        remarks: Columns, and what they have and is left out.
     """
 
     name: str
@@ -99,6 +109,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     missing: int = 0
     unlabelled: int = 0
     target: str = ""
+    remarks: tuple[tuple[str, str], ...] = ()
 
 
 class Batch(msgspec.Struct, frozen=True, eq=False):
@@ -143,7 +154,6 @@ def read_table(
     Raises:
         TableError: If a column is absent, stands twice or holds text, if there is no
             row, or if rows have different lengths; all such columns are named.
-        MissingExtraError: If the table is Parquet and pyarrow is not installed.
         TypeError: If the source is no table.
 
     Example:
@@ -153,15 +163,16 @@ def read_table(
     """
     found = pieces(source, columns=columns, delimiter=delimiter, name=name)
     first = next(found)
-    chosen = _learnt_columns(first, target, ignore)
+    target = target.strip() if isinstance(target, str) else target
+    chosen = _learnt_columns(first, target, [c.strip() for c in names_of(ignore)])
     numbers = _Numbers(first.name, [first.columns[k] for k in chosen])
     classes: list[Cells] = [] if isinstance(target, str) else [target]
     for piece in itertools.chain([first], found):
         numbers.add(piece, chosen)
         if isinstance(target, str):
-            classes.append(piece.cells[piece.columns.index(target)])
+            classes.append(piece.cells[first.columns.index(target)])
     if numbers.faults:
-        hint = " ".join(f"--ignore {_quoted(k)}" for k in numbers.faults)
+        hint = " ".join(f"--ignore {_quoted(k)}" for k in _some(numbers.faults))
         raise TableError(
             f"{numbers.fault_text()}\n  leave columns out with ignore ({hint})"
         )
@@ -174,9 +185,18 @@ def read_table(
             f"{first.name} has {values.shape[1]} rows, and there are "
             f"{len(names)} classes for them"
         )
-    made = _labelled(first.name, numbers.names, values, names)
+    is_kept = [not _is_count(first, k, values[row]) for row, k in enumerate(chosen)]
+    if not all(is_kept):
+        values = values[is_kept]
+        if not len(values):
+            raise TableError(f"{first.name} has no column to learn from")
+    columns = list(itertools.compress(numbers.names, is_kept))
+    left_out = itertools.compress(numbers.names, (not kept for kept in is_kept))
+    text = "no name and counts the rows; it is left out"
+    remarks = [*((column, text) for column in left_out), *trimmed(first)]
+    table = _labelled(first.name, columns, values, names)
     title = target if isinstance(target, str) else ""
-    return msgspec.structs.replace(made, target=title)
+    return msgspec.structs.replace(table, target=title, remarks=tuple(remarks))
 
 
 def batches(
@@ -209,10 +229,11 @@ def batches(
     Raises:
         TableError: If a column is absent, stands twice or holds text, or rows have
             different lengths.
-        MissingExtraError: If the table is Parquet and pyarrow is not installed.
         TypeError: If the source is no table.
     """
     chosen: list[int] | None = None
+    inputs, trained = ([c.strip() for c in names] for names in (inputs, trained))
+    _refuse_repeated("the model", inputs)
     only = None if with_others else frozenset(inputs)
     for piece in pieces(
         source, columns=columns, delimiter=delimiter, name=name, only=only
@@ -246,7 +267,6 @@ def pieces(
 
     Raises:
         TableError: If columns have no names of their own, or rows no equal length.
-        MissingExtraError: If the table is Parquet and pyarrow is not installed.
         TypeError: If the source is no table.
     """
     match source:
@@ -254,14 +274,20 @@ def pieces(
             path = cast("str | os.PathLike[str]", source)
             return _file_pieces(path, delimiter, name, only)
         case io.TextIOBase():
-            return _csv_pieces(source, name or "the table", delimiter, only)
+            return _text_pieces(source, name or "the table", delimiter, only)
         case io.BufferedReader() | io.BytesIO():
             return _stream_pieces(source, name or "the table", delimiter, only)
         case np.ndarray():
             array = cast("npt.NDArray[np.generic]", source)
-            return iter([_array_piece(array, columns, name or "the array")])
+            names = None if columns is None else names_of(columns)
+            return iter([_array_piece(array, names, name or "the array")])
         case _:
             return iter([_frame_piece(source, name or "the table", only=only)])
+
+
+def names_of(given: str | Sequence[str]) -> tuple[str, ...]:
+    """Return names as a tuple; a text is one name, and no sequence of letters."""
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 def class_names(cells: Sequence[Cells]) -> list[str | None]:
@@ -274,11 +300,7 @@ def class_names(cells: Sequence[Cells]) -> list[str | None]:
         >>> class_names([[1.0, 2.0, None], ["01", ""]])
         ['1', '2', None, '01', None]
     """
-    values = [
-        value
-        for part in cells
-        for value in (part.tolist() if isinstance(part, np.ndarray) else part)
-    ]
+    values = [value for part in cells for value in plain(part)]
     floats = [v for v in values if isinstance(v, float) and math.isfinite(v)]
     is_whole = all(v.is_integer() for v in floats)
     return [_class_name(value, is_whole=is_whole) for value in values]
@@ -337,15 +359,29 @@ class _Numbers:
             is_all = list(chosen) == list(range(len(piece.columns)))
             self._take(piece.whole if is_all else piece.whole[list(chosen)])
             return
+        texts = [piece.cells[index] for index in chosen]
+        if (
+            texts
+            and piece.rows
+            and not any(isinstance(c, np.ndarray | Sequence) for c in texts)
+        ):
+            parsed = _parsed(texts)
+            if parsed is not None:
+                self._take(parsed.reshape(len(texts), piece.rows))
+                return
         values = np.empty((len(chosen), piece.rows))
         for row, index in enumerate(chosen):
-            cells = piece.cells[index]
-            values[row], bad = _numbers(cells)
-            if bad:
-                where, text, count = self.faults.get(
-                    self.names[row], (piece.where(bad[0]), str(cells[bad[0]]), 0)
+            cells, name = piece.cells[index], self.names[row]
+            if isinstance(cells, np.ndarray) and cells.dtype.kind in _NO_NUMBER:
+                raise TableError(
+                    f"{self.name}: column {name!r} holds {cells.dtype}, and no numbers"
                 )
-                self.faults[self.names[row]] = (where, text, count + len(bad))
+            values[row], bad = _numbers(cells)
+            if bad and name not in self.faults:
+                self.faults[name] = (piece.where(bad[0]), str(cells[bad[0]]), 0)
+            if bad:
+                where, text, count = self.faults[name]
+                self.faults[name] = (where, text, count + len(bad))
         self._take(values)
 
     def _take(self, values: FloatArray) -> None:
@@ -354,11 +390,15 @@ class _Numbers:
 
     def fault_text(self) -> str:
         """Return a sentence for each column that holds text."""
-        return "\n".join(
+        shown = [
             f"{where}: column {column!r} holds text where a number is needed: "
             f"{_shortened(text)!r}{_decimal_hint(text)}{_more(count)}"
             for column, (where, text, count) in self.faults.items()
-        )
+        ]
+        others = len(shown) - _MOST_NAMES
+        if others > 0:
+            shown[_MOST_NAMES:] = [f"and {_counted(others, 'column')} more hold text"]
+        return "\n".join(shown)
 
     def joined(self) -> FloatArray:
         """Return all pieces as one array of shape (columns, rows)."""
@@ -367,6 +407,10 @@ class _Numbers:
 
 def _missing_cells(values: FloatArray) -> int:
     return sum(int(np.count_nonzero(np.isnan(row))) for row in values)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _shortened(text: str) -> str:
@@ -386,22 +430,54 @@ def _quoted(column: str) -> str:
     return column if re.fullmatch(r"[\w.-]+", column) else repr(column)
 
 
+def plain(cells: Cells) -> Sequence[object]:
+    """Return cells as Python's own values."""
+    if isinstance(cells, np.ndarray) and cells.dtype.kind in "mM":
+        times = cast("npt.NDArray[np.datetime64]", cells)
+        return [None if np.isnat(time) else str(time) for time in times]
+    if isinstance(cells, np.ndarray):
+        return cast("Sequence[object]", cells.tolist())
+    return cells if isinstance(cells, Sequence) else cells.to_pylist()
+
+
 def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:
     """Return cells as numbers, NaN where missing, and the positions of the others."""
-    if isinstance(cells, np.ndarray):
-        if cells.dtype.kind in _REAL:
-            return cells.astype(np.float64), []
-        cells = cells.tolist()
-    with contextlib.suppress(ValueError, TypeError):
-        # Digits of other scripts and 1_000 are numbers to Python, and text to us.
-        joined = "".join(cast("Sequence[str]", cells))
-        if joined.isascii() and "_" not in joined:
-            made = map(float, cast("Sequence[str]", cells))
-            return np.fromiter(made, np.float64, len(cells)), []
-    found = [_number(cell) for cell in cells]
+    if isinstance(cells, np.ndarray) and cells.dtype.kind in _REAL:
+        return cells.astype(np.float64), []
+    if len(cells) and not isinstance(cells, np.ndarray | Sequence):
+        parsed = _parsed([cells])
+        if parsed is not None:
+            return parsed, []
+    found = [_number(cell) for cell in plain(cells)]
     bad = [row for row, value in enumerate(found) if value is None]
     filled = [math.nan if value is None else value for value in found]
     return np.array(filled, np.float64), bad
+
+
+def _parsed(columns: Sequence[pa.ChunkedArray]) -> FloatArray | None:
+    """Return columns of text as numbers, one after another; None if not all are.
+
+    What this parses is the same double as `_number` makes of it. What is rare, such
+    as infinity and blanks of other scripts, is left to `_number`.
+    """
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    # pa.array, pa.scalar and to_numpy would import pandas where it is installed.
+    cells = pa.concat_arrays([part for column in columns for part in column.chunks])
+    for has_missing in (False, True):
+        missing = 0
+        if has_missing:
+            cells = pc.ascii_trim_whitespace(cells)
+            cells = pc.replace_substring_regex(cells, _MISSING, "nan")
+            missing = pc.sum(pc.match_substring_regex(cells, "^nan$")).as_py()
+        try:
+            values = np.from_dlpack(pc.cast(cells, pa.float64()))
+        except pa.ArrowInvalid:
+            continue
+        if np.count_nonzero(np.isfinite(values)) == len(values) - missing:
+            return cast("FloatArray", values)
+    return None
 
 
 def _number(cell: object) -> float | None:
@@ -413,8 +489,40 @@ def _number(cell: object) -> float | None:
         return float(text) if _NUMBER.fullmatch(text) else None
     if _is_missing(cell):
         return math.nan
-    is_number = isinstance(cell, bool | int | float) or type(cell).__name__ == "Decimal"
+    is_number = isinstance(cell, _NUMBERS) or type(cell).__name__ == "Decimal"
+    is_number = is_number and not isinstance(cell, np.timedelta64)
     return float(cast("float", cell)) if is_number else None
+
+
+def trimmed(piece: Piece) -> list[tuple[str, str]]:
+    """Return a remark on names that stand between blanks, if there are any."""
+    pairs = zip(piece.written, piece.columns, strict=True)
+    found = [title for title, name in pairs if title != name and title.strip()]
+    text = f"blanks around its name, which are left out{_more(len(found))}"
+    return [(repr(title), text) for title in found[:1]]
+
+
+def _is_count(piece: Piece, column: int, values: FloatArray) -> bool:
+    """Return whether a column without a name counts the rows, from 0 or 1.
+
+    Raises:
+        TableError: If it has no name and holds something else.
+    """
+    if piece.written[column].strip():
+        return False
+    count = np.arange(len(values))
+    if np.array_equal(values, count) or np.array_equal(values, count + 1):
+        return True
+    raise TableError(
+        f"{piece.name}: column {column + 1} has no name\n  name it, or leave it out "
+        f"with ignore (--ignore 'column {column + 1}')"
+    )
+
+
+def _some(names: Iterable[str]) -> list[str]:
+    """Return the first few of many names, and three dots for the others."""
+    found = list(itertools.islice(names, _MOST_NAMES + 1))
+    return [*found[:_MOST_NAMES], "..."] if len(found) > _MOST_NAMES else found
 
 
 def _learnt_columns(
@@ -426,9 +534,6 @@ def _learnt_columns(
     _refuse_absent(piece, wanted, "")
     left_out = frozenset(wanted)
     chosen = [k for k, column in enumerate(piece.columns) if column not in left_out]
-    nameless = [k + 1 for k in chosen if not piece.columns[k].strip()]
-    if nameless:
-        raise TableError(f"{piece.name}: column {nameless[0]} has no name")
     if not chosen:
         raise TableError(f"{piece.name} has no column to learn from")
     return chosen
@@ -458,7 +563,7 @@ def _refuse_absent(piece: Piece, wanted: Sequence[str], why: str) -> None:
     absent = [name for name in wanted if name not in known_names]
     if not absent:
         return
-    known = ", ".join(piece.columns[:20]) + (", ..." if len(piece.columns) > 20 else "")
+    known = ", ".join(_some(piece.columns))
     close = difflib.get_close_matches(absent[0], piece.columns, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close and len(absent) == 1 else ""
     word = "column" if len(absent) == 1 else "columns"
@@ -466,8 +571,19 @@ def _refuse_absent(piece: Piece, wanted: Sequence[str], why: str) -> None:
     raise TableError(f"{piece.name} has no {word} {names}{why}; it has {known}{hint}")
 
 
+def _named(name: str, written: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of columns without blanks around them, each of them once.
+
+    Raises:
+        TableError: If one stands there twice.
+    """
+    columns = tuple(c.strip() or f"column {k}" for k, c in enumerate(written, 1))
+    _refuse_repeated(name, columns)
+    return columns
+
+
 def _refuse_repeated(name: str, columns: Sequence[str]) -> None:
-    twice = [c for c, count in Counter(columns).items() if c and count > 1]
+    twice = [c for c, count in Counter(columns).items() if count > 1]
     if twice:
         word = "column" if len(twice) == 1 else "columns"
         verb = "stands" if len(twice) == 1 else "stand"
@@ -491,6 +607,7 @@ def _file_pieces(
 
 def _opened(path: str | os.PathLike[str], title: str) -> io.BufferedReader:
     try:
+        check_stream(path)
         return Path(path).open("rb")
     except (OSError, ValueError) as error:
         raise TableError(f"{title}: cannot be read: {reason(error)}") from error
@@ -502,47 +619,125 @@ def _stream_pieces(
     delimiter: str | None,
     only: Only,
 ) -> Iterator[Piece]:
-    if isinstance(stream, io.BytesIO):  # which has no peek
-        stream = io.BufferedReader(cast("io.RawIOBase", io.BytesIO(stream.read())))
-    if stream.peek(4)[:4] == b"PAR1":
-        yield from _parquet_pieces(stream, name, only)
+    head = stream.read(BLOCK)
+    if not head.startswith((_PARQUET, _ARROW)):
+        if Path(name).suffix.lower() in (".parquet", ".pq"):
+            what = "is no Parquet file: it must begin with PAR1"
+            raise TableError(f"{name} {what if head else 'is empty'}")
+        yield from _csv_pieces(head, stream.read, name, delimiter, only)
         return
-    text = io.TextIOWrapper(stream, "utf-8-sig", newline="")
+    if stream.seekable():
+        stream.seek(-len(head), io.SEEK_CUR)
+        yield from _arrow_pieces(stream, name, only)
+        return
+    content = head + stream.read(LIMIT)
+    if len(content) > LIMIT:
+        raise TableError(
+            f"{name}: a binary table in a pipe is larger than {LIMIT} bytes; "
+            "write it to a file and name the file"
+        )
+    yield from _arrow_pieces(io.BytesIO(content), name, only)
+
+
+def _text_pieces(
+    text: io.TextIOBase, name: str, delimiter: str | None, only: Only
+) -> Iterator[Piece]:
+    def read(size: int) -> bytes:
+        return text.read(size).encode(errors="surrogatepass")
+
     try:
-        yield from _csv_pieces(text, name, delimiter, only)
-    finally:
-        text.detach()  # the stream belongs to whoever opened it
+        yield from _csv_pieces(read(BLOCK), read, name, delimiter, only)
+    except UnicodeDecodeError as error:
+        raise TableError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
+
+
+def _arrow_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[Piece]:
+    """Yield a Parquet file, or an Arrow file of record batches (also Feather)."""
+    import pyarrow as pa
+
+    try:
+        names, found = _record_batches(stream, name, only)
+        first = 0
+        for batch in found:
+            yield _frame_piece(pa.table(batch), name, first, only, names)
+            first += batch.num_rows
+    except pa.ArrowMemoryError:
+        raise
+    except pa.ArrowException as error:
+        raise TableError(f"{name}: broken Parquet or Arrow file: {error}") from error
+
+
+def _record_batches(
+    stream: BinaryIO, name: str, only: Only
+) -> tuple[tuple[str, ...], Iterator[pa.RecordBatch]]:
+    """Return the names of all columns, and batches with those that are wanted."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    found: Iterator[pa.RecordBatch]
+    is_arrow = stream.read(len(_ARROW)) == _ARROW
+    stream.seek(-len(_ARROW), io.SEEK_CUR)
+    if is_arrow:
+        file = pa.ipc.open_file(stream)
+        count, schema = file.num_record_batches, file.schema
+        found = map(file.get_batch, range(count))
+    else:
+        parquet = pq.ParquetFile(stream)
+        count, schema = parquet.metadata.num_rows, parquet.schema_arrow
+        pairs = zip(schema.names, _named(name, schema.names), strict=True)
+        wanted = [written for written, c in pairs if only is None or c in only]
+        found = parquet.iter_batches(batch_size=PIECE, columns=wanted)
+    if not count:
+        found = iter([pa.RecordBatch.from_pylist([], schema)])
+    return tuple(schema.names), found
 
 
 def _csv_pieces(
-    text: io.TextIOBase, name: str, delimiter: str | None, only: Only
+    head: bytes,
+    read: Callable[[int], bytes],
+    name: str,
+    delimiter: str | None,
+    only: Only,
 ) -> Iterator[Piece]:
-    reader = None
+    """Yield the rows of a CSV file, of which `head` has been read already."""
     try:
-        first = text.readline()
+        head = head.removeprefix(codecs.BOM_UTF8)
+        first = re.split(rb"[\r\n]", head, maxsplit=1)[0].decode()
         if not first.strip():
             raise TableError(f"{name} is empty: it needs a line with column names")
         mark = delimiter or _delimiter(first, name)
-        if len(mark) != 1 or mark in _NO_DELIMITER:
+        if len(mark) != 1 or mark in _NO_DELIMITER or not mark.isascii():
             raise TableError(
                 f"{name}: a delimiter is one character such as ';', "
                 f"and not {mark[:20]!r}"
             )
-        lines = itertools.chain([first], cast("Iterable[str]", text))
-        reader = csv.reader(lines, delimiter=mark, strict=True)
-        columns = tuple(next(reader))
-        _refuse_repeated(name, columns)
-        before, count = reader.line_num, 0
-        while rows := list(itertools.islice(reader, PIECE)):
-            yield _csv_piece(name, columns, rows, before, only)
-            before, count = reader.line_num, count + len(rows)
-        if not count:
-            yield _csv_piece(name, columns, [], before, only)
+        written: tuple[str, ...] = ()
+        for rows in blocks(head, read, mark.encode(), name):
+            is_first = not written
+            written = written or rows.header()
+            yield from _rows_pieces(rows, written, only, is_first=is_first)
     except UnicodeDecodeError as error:
         raise TableError(f"{name}: is no UTF-8 text; save it as UTF-8") from error
-    except csv.Error as error:
-        line = reader.line_num if reader else 1
-        raise TableError(f"{name}:{line}: broken CSV: {error}") from error
+
+
+def _rows_pieces(
+    rows: Rows, written: tuple[str, ...], only: Only, *, is_first: bool
+) -> Iterator[Piece]:
+    """Yield the rows of a block; at least one piece, if it is the first one."""
+    columns = _named(rows.name, written)
+    wanted = [k for k, column in enumerate(columns) if only is None or column in only]
+    table = rows.table(len(columns), wanted)
+    start = 1 if is_first else 0  # the first row holds the names
+    for first in range(start, max(table.num_rows, 2 * start), PIECE):
+        count = min(PIECE, table.num_rows - first)
+        cells: list[Cells] = [()] * len(columns)
+        for place, column in zip(wanted, table.columns, strict=False):
+            cells[place] = column.slice(first, count)
+
+        def where(row: int, first: int = first) -> str:
+            return f"{rows.name}:{rows.line_of(first + row)}"
+
+        yield Piece(rows.name, columns, tuple(cells), count, where, written)
 
 
 def _delimiter(line: str, name: str) -> str:
@@ -557,108 +752,42 @@ def _delimiter(line: str, name: str) -> str:
     return found[0] if found else ","
 
 
-def _csv_piece(
-    name: str,
-    columns: tuple[str, ...],
-    rows: list[list[str]],
-    before: int,
-    only: Only,
-) -> Piece:
-    def where(row: int) -> str:
-        return f"{name}:{lines[row] + 1 + sum(_breaks(r) for r in full[:row])}"
-
-    full, lines = rows, range(before, before + len(rows))
-    kept: Sequence[int] = lines
-    if set(map(len, rows)) - {len(columns)}:
-        for row, cells in enumerate(rows):
-            if len(cells) not in (0, len(columns)):
-                raise TableError(
-                    f"{where(row)}: {_counted(len(cells), 'cell')}, and line 1 names "
-                    f"{_counted(len(columns), 'column')}"
-                )
-        kept = [row for row, cells in enumerate(rows) if cells]  # not the empty lines
-        rows = [rows[row] for row in kept]
-        return _columns_piece(name, columns, rows, lambda row: where(kept[row]), only)
-    return _columns_piece(name, columns, rows, where, only)
-
-
-def _columns_piece(
-    name: str,
-    columns: tuple[str, ...],
-    rows: list[list[str]],
-    where: Callable[[int], str],
-    only: Only,
-) -> Piece:
-    cells: tuple[Cells, ...] = ((),) * len(columns)
-    if rows and only is None:
-        cells = tuple(zip(*rows, strict=True))
-    elif rows:
-        cells = tuple(
-            tuple(map(operator.itemgetter(k), rows)) if column in (only or ()) else ()
-            for k, column in enumerate(columns)
-        )
-    return Piece(name, columns, cells, len(rows), where)
-
-
-def _breaks(cells: list[str]) -> int:
-    """Return how many more lines than one a row has."""
-    return sum(len(re.findall(r"\r\n|\r|\n", cell)) for cell in cells)
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def _parquet_pieces(stream: BinaryIO, name: str, only: Only) -> Iterator[Piece]:
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError as error:
-        raise MissingExtraError(
-            f"reading parquet needs {install_hint('parquet')}"
-        ) from error
-    whole = stream if stream.seekable() else io.BytesIO(stream.read())
-    try:
-        file = pq.ParquetFile(whole)
-        names = tuple(file.schema_arrow.names)
-        _refuse_repeated(name, names)
-        wanted = [column for column in names if only is None or column in only]
-        first = 0
-        empty = [pa.Table.from_batches([], file.schema_arrow)]
-        read = file.iter_batches(PIECE, columns=wanted or None)  # [] has no rows
-        groups = (pa.Table.from_batches([part]) for part in read)
-        for group in itertools.chain(groups, empty):
-            if group.num_rows or not first:
-                yield _frame_piece(group, name, first, only, names)
-            first += group.num_rows
-    except pa.ArrowException as error:
-        raise TableError(f"{name}: broken Parquet: {error}") from error
-
-
 # --- tables in memory
 
 
 def _array_piece(
     array: npt.NDArray[np.generic], columns: Sequence[str] | None, name: str
 ) -> Piece:
+    where, count = _row_names(name), len(array) if array.ndim else 0
     if array.dtype.names is not None:
-        names = array.dtype.names
+        written = array.dtype.names
         fields = cast("npt.NDArray[np.void]", array)
-        cells: tuple[Cells, ...] = tuple(fields[column] for column in names)
-        return Piece(name, names, cells, len(array), _row_names(name))
+        cells = tuple(_unmasked(fields[column]) for column in written)
+        return Piece(name, _named(name, written), cells, count, where, written)
     if array.ndim != 2:
         raise TableError(f"{name} has shape {array.shape}, not (rows, columns)")
     width = array.shape[1]
     if columns is not None and len(columns) != width:
         raise TableError(f"{name} has {width} columns and {len(columns)} names")
-    named = tuple(columns or (f"x{number}" for number in range(1, width + 1)))
-    _refuse_repeated(name, named)
+    written = tuple(columns or (f"x{number}" for number in range(1, width + 1)))
+    array = _unmasked(array)
     cells = tuple(array[:, k] for k in range(width))
-    where, is_named = _row_names(name), columns is not None
+    is_named = columns is not None
     whole = (
         array.astype(np.float64, copy=False).T if array.dtype.kind in _REAL else None
     )
-    return Piece(name, named, cells, array.shape[0], where, is_named, whole)
+    named = _named(name, written)
+    return Piece(name, named, cells, count, where, written, is_named, whole)
+
+
+def _unmasked(array: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+    """Return an array whose masked cells are missing."""
+    if not np.ma.isMaskedArray(array) or array.dtype.kind in _NO_NUMBER:
+        return array
+    is_real = array.dtype.kind in _REAL
+    filled = np.ma.getdata(array).astype(np.float64 if is_real else object)
+    filled[np.ma.getmaskarray(array)] = math.nan if is_real else None
+    return filled
 
 
 def _frame_piece(
@@ -666,9 +795,9 @@ def _frame_piece(
     name: str,
     first: int = 0,
     only: Only = None,
-    named: tuple[str, ...] | None = None,
+    written: tuple[str, ...] | None = None,
 ) -> Piece:
-    """Return a frame's columns; `named` are those of the table that it is part of."""
+    """Return a frame's columns; `written` are those of the table it is part of."""
     import narwhals as nw
     from narwhals.exceptions import DuplicateError
 
@@ -683,22 +812,25 @@ def _frame_piece(
             "arrow table, or a numpy array"
         ) from error
     if isinstance(frame, nw.LazyFrame):
-        names = frame.collect_schema().names()
-        wanted = [column for column in names if only is None or column in only]
-        named = tuple(names)
+        names = tuple(frame.collect_schema().names())
+        pairs = zip(names, _named(name, names), strict=True)
+        wanted = [column for column, c in pairs if only is None or c in only]
+        written = names
         frame = frame.select(wanted or names).collect()
-    columns = named or tuple(map(str, frame.columns))
-    _refuse_repeated(name, columns)
+    written = written or tuple(map(str, frame.columns))
+    columns = _named(name, written)
     there = dict(zip(map(str, frame.columns), frame.columns, strict=True))
     cells: list[Cells] = []
-    for column in columns:
-        if column not in there or not (only is None or column in only):
+    for title, column in zip(written, columns, strict=True):
+        if title not in there or not (only is None or column in only):
             cells.append(())
             continue
-        series = frame.get_column(there[column])
+        series = frame.get_column(there[title])
         is_number = series.dtype.is_numeric()
         cells.append(series.to_numpy() if is_number else series.to_list())
-    return Piece(name, columns, tuple(cells), len(frame), _row_names(name, first))
+    return Piece(
+        name, columns, tuple(cells), len(frame), _row_names(name, first), written
+    )
 
 
 def _row_names(name: str, first: int = 0) -> Callable[[int], str]:

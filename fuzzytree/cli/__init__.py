@@ -124,6 +124,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(f"cannot go on: {reason(error)}")
         _forget_stdout()
         return 2
+    except MemoryError:
+        say("cannot go on: there is not enough memory")
+        return 2
     except (KeyboardInterrupt, click.Abort):
         say("interrupted; files are as they were")
         return 130

@@ -14,7 +14,7 @@ import fuzzytree
 from fuzzytree.cli.talk import answer, answer_json, json_option
 from fuzzytree.errors import FuzzyTreeError, install_hint
 
-CORE = ("numpy", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark")
+CORE = ("numpy", "pyarrow", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark")
 
 EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -25,7 +25,6 @@ EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "scipy": "scipy",
             "networkx": "networkx",
         },
-        "parquet": {"pyarrow": "pyarrow"},
         "plots": {"matplotlib": "matplotlib"},
         "serial": {"pyserial": "serial"},
         "witnesses": {

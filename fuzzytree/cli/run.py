@@ -130,12 +130,10 @@ def _answered(answers: Answers | Outputs, strengths: By | None, model: str) -> C
 
 
 def _kept(batch: Batch) -> Columns:
-    import numpy as np
+    from fuzzytree.tables import plain
 
-    columns: Columns = {}
-    for name, cells in zip(batch.piece.columns, batch.piece.cells, strict=True):
-        columns[name] = cells.tolist() if isinstance(cells, np.ndarray) else cells
-    return columns
+    cells = map(plain, batch.piece.cells)
+    return dict(zip(batch.piece.columns, cells, strict=True))
 
 
 def _add(columns: Columns, more: Columns, name: str) -> None:

@@ -38,15 +38,15 @@ LEARN = (
 
 LOADED = {
     ("show", "grip.yaml"): "",
-    ("run", "grip.yaml", "grasps.csv", "--quiet"): "",
+    ("run", "grip.yaml", "grasps.csv", "--quiet"): "pyarrow",
     ("export", "grip.yaml", "-o", "other.yaml", "--quiet"): "",
     ("export", "grip.yaml", "-o", "other.py", "--quiet"): "",
-    LEARN: "",
+    LEARN: "pyarrow",
     ("check", "grip.yaml", "--runtime", "native", *WIDE): "",
     ("formats", "--format", "onnx"): "onnx onnxruntime",
     ("needs", "grip.yaml", "--quiet"): "onnx",
     ("export", "grip.yaml", "-o", "other.onnx", "--quiet"): "onnx onnxruntime",
-    ("run", "grip.onnx", "grasps.csv", "--quiet"): "onnx onnxruntime",
+    ("run", "grip.onnx", "grasps.csv", "--quiet"): "onnx onnxruntime pyarrow",
 }
 
 

@@ -1,0 +1,246 @@
+"""CSV text in blocks of whole rows; pyarrow parses each into columns of text."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.errors import TableError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+IntArray = npt.NDArray[np.int64]
+
+BLOCK = 1 << 20
+"""How many bytes are read at a time; more where rows are wide."""
+
+LONGEST = 1 << 26
+"""The most bytes that a row may have."""
+
+_ROWS = 64  # of the width of the first one, in a block of wide rows
+_NEW_LINE, _RETURN, _QUOTE = b'\n\r"'
+
+
+class Rows(msgspec.Struct, frozen=True, eq=False):
+    """Some whole rows of a CSV file.
+
+    Attributes:
+        name: What messages call the file.
+        content: The text of the rows.
+        line: The number of the first line.
+        mark: The delimiter.
+    """
+
+    name: str
+    content: bytes
+    line: int
+    mark: bytes
+
+    def header(self) -> tuple[str, ...]:
+        """Return the cells of the first row.
+
+        Raises:
+            TableError: If they are broken CSV.
+        """
+        ends = self.ends()
+        text = self.content[: ends[0] if len(ends) else None].decode()
+        try:
+            [names] = csv.reader([text], delimiter=self.mark.decode(), strict=True)
+        except csv.Error as error:
+            raise self._error(0, f"broken CSV: {error}") from error
+        return tuple(names)
+
+    def table(self, width: int, wanted: Sequence[int]) -> pa.Table:
+        """Return some columns, each cell as the text that it is.
+
+        Args:
+            width: How many cells each row has; empty lines are left out.
+            wanted: The positions of the columns; if there is none, the first is read.
+
+        Raises:
+            TableError: If a row has another length, or the text is no UTF-8.
+        """
+        import pyarrow as pa
+        from pyarrow import csv as arrow_csv
+
+        names = list(map(str, range(width)))
+        chosen = [names[k] for k in wanted or [0]]
+        types = dict.fromkeys(chosen, pa.string())
+        content = self.content
+        if content.startswith(codecs.BOM_UTF8):
+            content = b"\n" + content  # inside a file it is text, which would be lost
+        try:
+            return arrow_csv.read_csv(
+                pa.BufferReader(content),
+                arrow_csv.ReadOptions(column_names=names, block_size=len(content) + 1),
+                arrow_csv.ParseOptions(
+                    delimiter=self.mark.decode(), newlines_in_values=True
+                ),
+                arrow_csv.ConvertOptions(column_types=types, include_columns=chosen),
+            )
+        except pa.ArrowInvalid as error:
+            raise self._refusal(width, error) from error
+
+    def _refusal(self, width: int, error: Exception) -> TableError:
+        """Return which row has another length than the first one, or what it is."""
+        starts, stops = self._rows()
+        outside = self._outside(np.flatnonzero(self._bytes() == self.mark[0]))
+        cells = 1 + np.searchsorted(outside, stops) - np.searchsorted(outside, starts)
+        for row in np.flatnonzero(cells != width)[:1].tolist():
+            text = (
+                f"{_counted(int(cells[row]), 'cell')}, and line 1 names "
+                f"{_counted(width, 'column')}"
+            )
+            return self._error(int(starts[row]), text)
+        if "UTF8" in str(error):
+            return TableError(f"{self.name}: is no UTF-8 text; save it as UTF-8")
+        return TableError(f"{self.name}: broken CSV: {error}")
+
+    def line_of(self, row: int) -> int:
+        """Return the number of the line in which a row begins."""
+        return self._line_at(int(self._rows()[0][row]))
+
+    def ends(self) -> IntArray:
+        """Return where rows end: the line breaks that no quotes enclose."""
+        text = self._bytes()
+        breaks = np.flatnonzero((text == _NEW_LINE) | (text == _RETURN))
+        return self._outside(breaks)
+
+    def refuse_open_quote(self) -> None:
+        """Raise a TableError if a quote is not closed."""
+        quotes = self._quotes()
+        if len(quotes) % 2:
+            raise self._error(int(quotes[-1]), "broken CSV: a quote is not closed")
+
+    def _rows(self) -> tuple[IntArray, IntArray]:
+        """Return where the rows begin and end, without the empty ones."""
+        ends = self.ends()
+        starts = np.concatenate([[0], ends + 1])
+        stops = np.concatenate([ends, [len(self.content)]])
+        is_row = stops > starts
+        return starts[is_row], stops[is_row]
+
+    def _bytes(self) -> npt.NDArray[np.uint8]:
+        return np.frombuffer(self.content, np.uint8)
+
+    def _outside(self, places: IntArray) -> IntArray:
+        """Return the places that no quotes enclose."""
+        is_outside = np.searchsorted(self._quotes(), places) % 2 == 0
+        outside: IntArray = places[is_outside]
+        return outside
+
+    def _quotes(self) -> IntArray:
+        """Return where quotes open and close, by turns; a doubled one does both.
+
+        Where every quote stands at the end of a cell, or beside another one, their
+        order tells which is which. Elsewhere each is looked at.
+
+        Raises:
+            TableError: If text follows a closing quote.
+        """
+        text = self._bytes()
+        places = np.flatnonzero(text == _QUOTE)
+        is_beside = np.diff(places) == 1
+        ends = np.zeros(256, np.bool_)
+        ends[[_NEW_LINE, _RETURN, self.mark[0]]] = True
+        opens, closes = places[0::2], places[1::2]
+        is_start = ends[text[opens - 1]] | (opens == 0)
+        is_start[1:] |= is_beside[1::2]
+        is_stop = ends[text[np.minimum(closes + 1, len(text) - 1)]]
+        is_stop |= closes == len(text) - 1
+        is_stop[: len(opens) - 1] |= is_beside[1::2]
+        if is_start.all() and is_stop.all():
+            return places
+        return np.array(list(self._quotes_one_by_one(places.tolist())), np.int64)
+
+    def _quotes_one_by_one(self, places: list[int]) -> Iterator[int]:
+        ends = (b"", b"\n", b"\r", self.mark)
+        is_inside, known = False, frozenset(places)
+        found = iter(places)
+        for place in found:
+            before = self.content[max(place - 1, 0) : place]
+            if not is_inside and before not in ends:
+                continue  # inside a cell that is not quoted, a quote is text
+            if is_inside and place + 1 in known:
+                next(found)
+                continue
+            after = self.content[place + 1 : place + 2]
+            if is_inside and after not in ends:
+                raise self._error(place, "broken CSV: text follows a closing quote")
+            is_inside = not is_inside
+            yield place
+
+    def _line_at(self, place: int) -> int:
+        return self.line + count_breaks(self.content[:place])
+
+    def _error(self, place: int, text: str) -> TableError:
+        return TableError(f"{self.name}:{self._line_at(place)}: {text}")
+
+
+def blocks(
+    head: bytes, read: Callable[[int], bytes], mark: bytes, name: str
+) -> Iterator[Rows]:
+    """Yield a file in blocks of whole rows; the first one holds the names.
+
+    Args:
+        head: What has been read of it already.
+        read: Reads so many bytes more; fewer at the end alone.
+        mark: The delimiter.
+        name: What messages call the file.
+
+    Raises:
+        TableError: If a row is longer than `LONGEST`, or a quote is not closed.
+    """
+    wide = min(_ROWS * (head.find(b"\n") + 1), LONGEST)
+    rest, line = head, 1
+    while True:
+        size = _whole(Rows(name, rest, line, mark))
+        if rest[:size].strip(b"\r\n"):
+            yield Rows(name, rest[:size], line, mark)
+        if size:
+            line += count_breaks(rest[:size])
+            rest = rest[size:]
+        elif len(rest) > LONGEST:
+            text = f"a row is longer than {LONGEST} bytes; is a quote not closed?"
+            raise TableError(f"{name}:{line}: {text}")
+        more = read(max(BLOCK, wide, len(rest)))
+        if not more:
+            break
+        rest += more
+    if rest.strip(b"\r\n"):
+        last = Rows(name, rest, line, mark)
+        last.refuse_open_quote()
+        yield last
+
+
+def _whole(rows: Rows) -> int:
+    """Return how many bytes of a text are whole rows for sure."""
+    text = rows.content
+    if b'"' not in text:
+        return max(text.rfind(b"\n"), text.rfind(b"\r", 0, -1)) + 1
+    ends = rows.ends()
+    if len(ends) and text[ends[-1]] == _RETURN and ends[-1] == len(text) - 1:
+        ends = ends[:-1]  # what comes next may belong to it
+    return int(ends[-1]) + 1 if len(ends) else 0
+
+
+def count_breaks(text: bytes) -> int:
+    r"""Return how many lines end in a text.
+
+    Example:
+        >>> count_breaks(b"a\r\nb\rc\n")
+        3
+    """
+    pairs = text.count(b"\r\n") if b"\r" in text else 0
+    return text.count(b"\n") + text.count(b"\r") - pairs
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
