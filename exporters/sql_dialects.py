@@ -89,9 +89,9 @@ class Query:
         return many[0]
 
     def clip(self, value: str, high: float) -> str:
-        """Return a value held between 0 and high."""
+        """Return a value clamped to 0 and high; 0.0 of -0.0, as the first of equals."""
         zero = self.number(0.0)
-        return self.least(self.greatest(value, zero), self.number(high))
+        return self.least(self.greatest(zero, value), self.number(high))
 
 
 _RESERVED = frozenset(

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import fuzzytree as ft
+from fuzzytree.comparing import same_bits
 from fuzzytree.contracts import Model, Outcome
 from fuzzytree.exporters.sql import Dialect, write
 from fuzzytree.lowering import rules_from_tree
@@ -59,7 +60,7 @@ def _assert_equal(found: list[list[float | None]], right: Outcome) -> None:
     assert [row[1] for row in found] == right.status.tolist()
     if right.strengths is not None:
         given = [[math.nan if s is None else s for s in row[2:]] for row in found]
-        np.testing.assert_array_equal(np.array(given).T, right.strengths)
+        assert same_bits(np.array(given).T, right.strengths).all()
 
 
 def _query(model: Model, dialect: Dialect) -> str:
