@@ -154,7 +154,7 @@ class Agreement(msgspec.Struct, frozen=True):
     def wrong(self) -> tuple[Comparison | Certified, ...]:
         """What makes `ok` false."""
         bad = ("DISAGREES",) if self.rows_only else ("DISAGREES", "rows only")
-        every = (*self.comparisons, *self.certificates)
+        every: list[Comparison | Certified] = [*self.comparisons, *self.certificates]
         return tuple(one for one in every if one.verdict in bad)
 
     def to_json(self) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 
 from fuzzytree import cells
 from fuzzytree.agreement import Agreement, Certified, Comparison, Count
+from fuzzytree.checking_programs import ProgramFile, check_program
 from fuzzytree.comparing import (
     Answers,
     BoolArray,
@@ -24,12 +25,13 @@ from fuzzytree.comparing import (
     compare_bits,
     compare_exact,
     compare_excused,
+    compare_labels,
     compare_within,
     counted,
     judged,
-    labels,
     probed,
     same_bits,
+    without_status,
 )
 from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
 from fuzzytree.errors import FuzzyTreeError, LossError
@@ -82,7 +84,7 @@ Finding = Comparison | str
 
 def check(
     model: Model,
-    *others: Model | OnnxModel,
+    *others: Model | OnnxModel | ProgramFile,
     data: FloatArray | None = None,
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
@@ -93,8 +95,8 @@ def check(
 
     Args:
         model: A tree or a rule base.
-        others: Carriers that were shipped with it: trees, rule bases, opened ONNX
-            files (`fuzzytree.runtimes.onnxruntime.open_onnx`).
+        others: Files that were made of it: trees, rule bases, opened ONNX files
+            (`fuzzytree.runtimes.onnxruntime.open_onnx`), programs.
         data: Rows of one's own, shape (inputs, rows), in the order of `model.inputs`.
         names: What to call each of the others; `file 1`, `file 2` unless given.
         runtimes: The names of the runtimes to run; all that are installed if None.
@@ -313,10 +315,12 @@ def _is_same(one: Outcome, whole: Outcome, row: int) -> bool:
 
 
 def _shipped(
-    title: str, other: Model | OnnxModel, model: Model, rows: Rows
+    title: str, other: Model | OnnxModel | ProgramFile, model: Model, rows: Rows
 ) -> Iterator[Finding]:
     """Compare a file that was shipped beside a model: its content, then its answers."""
-    if isinstance(other, FuzzyTree | RuleBase):
+    if isinstance(other, ProgramFile):
+        yield from check_program(title, other, model, rows)
+    elif isinstance(other, FuzzyTree | RuleBase):
         yield from _shipped_model(title, other, model, rows)
     else:
         yield from _shipped_onnx(title, other, model, rows)
@@ -441,7 +445,7 @@ def _onnx_rows(
     if expected is not None:
         found, right = Answers(title, held, other.run(rows.values)), base
         if "status" not in other.outputs:
-            found, right = _without_status(found), _without_status(base)
+            found, right = without_status(found), without_status(base)
         yield (
             compare_excused(found, right, rows, excused=excused, origin=_FLOAT32_TREE)
             if is_rounded
@@ -449,33 +453,7 @@ def _onnx_rows(
         )
     if other.labels is not None:
         told = other.labels(rows.values)
-        yield _onnx_labels(title, told, base, rows, excused)
-
-
-def _without_status(answers: Answers) -> Answers:
-    """Keep of the statuses what a rule number tells."""
-    outcome = answers.outcome
-    status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
-    kept = msgspec.structs.replace(outcome, status=status.astype(np.int64))
-    return msgspec.structs.replace(answers, outcome=kept)
-
-
-def _onnx_labels(
-    title: str,
-    told: Sequence[str | None],
-    base: Answers,
-    rows: Rows,
-    excused: BoolArray,
-) -> Comparison:
-    """Compare the texts that a file answers with the classes of the model."""
-    classes = base.model.classes
-    right = [classes[n] if n >= 0 else None for n in labels(base).tolist()]
-    faults = [
-        f"{rows.name(row)}: label {found!r} where {label!r} is right"
-        for row, (found, label) in enumerate(zip(told, right, strict=True))
-        if found != label and not excused[row]
-    ]
-    return counted("rows", title, "the model's classes", len(right), faults)
+        yield compare_labels(title, told, base, rows, excused)
 
 
 def _counterpart(other: Model, model: Model) -> Model | None:

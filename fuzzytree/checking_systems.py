@@ -17,6 +17,7 @@ import numpy as np
 
 from fuzzytree.agreement import Agreement, Comparison, Count
 from fuzzytree.checking import first_difference
+from fuzzytree.checking_programs import ProgramFile, check_program
 from fuzzytree.comparing import Rows, counted, judged, same_bits
 from fuzzytree.contracts import Runtime, SystemOutcome, SystemRun
 from fuzzytree.errors import FuzzyTreeError, LossError
@@ -63,7 +64,7 @@ class _Subject(msgspec.Struct, frozen=True):
 
 def check_system(
     system: FuzzySystem,
-    *others: FuzzySystem | OnnxModel,
+    *others: FuzzySystem | OnnxModel | ProgramFile,
     data: FloatArray | None = None,
     names: Sequence[str] = (),
     runtimes: Sequence[str] | None = None,
@@ -74,8 +75,7 @@ def check_system(
 
     Args:
         system: The system.
-        others: Carriers that were shipped with it: systems read from files, opened
-            ONNX files.
+        others: Files that were made of it: systems, opened ONNX files, programs.
         data: Rows of one's own, shape (columns, rows), in the order of
             `system.columns`.
         names: What to call each of the others; `file 1`, `file 2` unless given.
@@ -343,9 +343,12 @@ def _calls(title: str, run: SystemRun, rows: Rows, subject: _Subject) -> Compari
 
 
 def _shipped(
-    title: str, other: FuzzySystem | OnnxModel, subject: _Subject
+    title: str, other: FuzzySystem | OnnxModel | ProgramFile, subject: _Subject
 ) -> Iterator[Finding]:
     """Compare a file that was shipped beside a system: content, then answers."""
+    if isinstance(other, ProgramFile):
+        yield from check_program(title, other, subject.system, subject.rows)
+        return
     if isinstance(other, FuzzySystem):
         yield from _shipped_system(title, other, subject)
         return

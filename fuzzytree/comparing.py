@@ -219,6 +219,32 @@ def compare_excused(
     return _compared(found, expected, rows, wrong, np.zeros(wrong.shape), 0.0, origin)
 
 
+def without_status(answers: Answers) -> Answers:
+    """Keep of the statuses what a rule number tells."""
+    outcome = answers.outcome
+    status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
+    kept = msgspec.structs.replace(outcome, status=status.astype(np.int64))
+    return msgspec.structs.replace(answers, outcome=kept)
+
+
+def compare_labels(
+    title: str,
+    found: Sequence[str | None],
+    base: Answers,
+    rows: Rows,
+    excused: BoolArray,
+) -> Comparison:
+    """Compare the texts that a file answers with the classes of the model."""
+    classes = base.model.classes
+    right = [classes[n] if n >= 0 else None for n in labels(base).tolist()]
+    faults = [
+        f"{rows.name(row)}: label {given!r} where {label!r} is right"
+        for row, (given, label) in enumerate(zip(found, right, strict=True))
+        if given != label and not excused[row]
+    ]
+    return counted("rows", title, "the model's classes", len(right), faults)
+
+
 def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
     """Return the largest difference of a strength in each row; NaN equals NaN.
 

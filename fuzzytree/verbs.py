@@ -17,6 +17,7 @@ from fuzzytree import lowering
 from fuzzytree.agreement import Agreement
 from fuzzytree.answering import Answering, Carried, answering, opened, run
 from fuzzytree.casting import as_rules, as_system
+from fuzzytree.checking_programs import ProgramFile
 from fuzzytree.contracts import Document, Dtype, Model, ModelSource, Written
 from fuzzytree.converting import (
     CALLED,
@@ -351,6 +352,7 @@ def check(
     runtimes: Sequence[str] | None = None,
     limit: int | None = None,
     rows_only: bool = False,
+    run_code: bool = False,
     allow_loss: bool = False,
 ) -> Agreement:
     """Compare a model with everything that is made of it, in every runtime.
@@ -367,10 +369,13 @@ def check(
         limit: The most probes; 20,000 unless given, and 2,000 for a system.
         rows_only: Whether files whose rows agree are accepted with other content: a
             graph that this version would not write, or a system with other numbers.
+        run_code: Whether a program (C, Python, JavaScript, SQL, PMML) is run even if
+            its text is not what this version writes of the model.
         allow_loss: As in `load`, for every file.
 
     Raises:
         ReadError: If a file cannot be read, or holds another kind of model.
+        MissingExtraError: If what runs a file is not installed.
         LossError: As `load`.
         TableError: If a column is absent or holds text, or the table has no row.
         ValueError: If a runtime is unknown.
@@ -385,7 +390,10 @@ def check(
         names[k] if k < len(names) else _title(other, k)
         for k, other in enumerate(others)
     ]
-    rest = [opened(other, allow_loss=allow_loss) for other in others]
+    rest = [
+        _program(other, run_code) or opened(other, allow_loss=allow_loss)
+        for other in others
+    ]
     values = rows_of(data, first, columns=columns, delimiter=delimiter)
     if isinstance(first, FuzzySystem):
         from fuzzytree.checking_systems import check_system
@@ -412,7 +420,19 @@ def check(
     )
 
 
-def _as_system(model: Document | OnnxModel, title: str) -> FuzzySystem | OnnxModel:
+def _program(source: Carried, may_run: bool) -> ProgramFile | None:
+    """Return what the path of a file that is run and not read stands for."""
+    if not isinstance(source, str | os.PathLike):
+        return None
+    form = format_of(source)
+    if form.read is not None or form.name == "onnx":
+        return None
+    return ProgramFile(form.name, read_bounded(source), may_run)
+
+
+def _as_system(
+    model: Document | OnnxModel | ProgramFile, title: str
+) -> FuzzySystem | OnnxModel | ProgramFile:
     """Return what is compared with a system: a rule base as the number of its class.
 
     Raises:
@@ -425,7 +445,9 @@ def _as_system(model: Document | OnnxModel, title: str) -> FuzzySystem | OnnxMod
     return model
 
 
-def _as_deciding(model: Document | OnnxModel, title: str) -> Model | OnnxModel:
+def _as_deciding(
+    model: Document | OnnxModel | ProgramFile, title: str
+) -> Model | OnnxModel | ProgramFile:
     """Return what is compared with a tree or rules: rules that a system stands for.
 
     Raises:

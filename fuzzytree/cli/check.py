@@ -34,6 +34,11 @@ from fuzzytree.cli.talk import (
 @click.option("--rows", "is_full", is_flag=True, help="Tell rows that may differ, too.")
 @delimiter_option
 @rows_only_option
+@click.option(
+    "--run-code",
+    is_flag=True,
+    help="Run a program even if its text is not what is written now.",
+)
 @allow_loss_option
 @json_option
 @quiet_option
@@ -46,6 +51,7 @@ def command(
     is_full: bool,
     delimiter: str | None,
     rows_only: bool,
+    run_code: bool,
     allow_loss: bool,
     as_json: bool,
     quiet: bool,
@@ -53,7 +59,8 @@ def command(
     """Compare MODEL, any file that can be read, with FILES made of it.
 
     The tree, its rules, each runtime and each file answer the same rows; so do a fuzzy
-    system, each runtime and each file. Exit 1 if two of them disagree.
+    system, each runtime and each file. Exit 1 if two of them disagree. A program (C,
+    Python, JavaScript, SQL, PMML) runs if its text is what is written now.
     """
     from fuzzytree import verbs
     from fuzzytree.report import text
@@ -67,6 +74,7 @@ def command(
             runtimes=runtimes or None,
             limit=limit,
             rows_only=rows_only,
+            run_code=run_code,
             allow_loss=allow_loss,
         )
     if as_json:

@@ -112,8 +112,34 @@ def load(model: Model, dtype: Dtype = "float64", *, has_strengths: bool = True) 
     except LossError as error:
         text = str(error).replace("cannot write", "cannot run", 1)
         raise LossError(text.partition("\n  pass allow_loss")[0]) from error
+    return load_content(content, model, dtype, has_strengths=has_strengths)
+
+
+def load_content(
+    content: bytes,
+    model: Model,
+    dtype: Dtype = "float64",
+    *,
+    prefix: str = "model",
+    has_strengths: bool = True,
+) -> Run:
+    """Return the same for a file that `fuzzytree.exporters.c` wrote of a model.
+
+    Args:
+        content: The file.
+        model: The model.
+        dtype: The type of all numbers.
+        prefix: The beginning of all names in the file.
+        has_strengths: As in `load`.
+
+    Raises:
+        MissingExtraError: As `load`.
+        FuzzyTreeError: As `load`.
+    """
     find = _EITHER if isinstance(model, RuleBase) else _DECIDE
-    decide = compiled(content, _LOOP.replace("FIND", find), 4)
+    loop = _LOOP.replace("FIND", find).replace("model_", f"{prefix}_")
+    loop = loop.replace("MODEL_", f"{prefix.upper()}_")
+    decide = compiled(content, loop, 4, function=f"{prefix}_many")
     count = len(model.rules) if isinstance(model, RuleBase) and has_strengths else 0
     real = np.dtype(dtype)
 
@@ -179,15 +205,22 @@ def _at(array: npt.NDArray[np.generic] | None) -> int | None:
 
 
 @lru_cache(maxsize=64)
-def compiled(content: bytes, loop: str, pointers: int, speed: str = "-O2") -> Decide:
-    """Return the function `model_many` of a file and a loop behind it.
+def compiled(
+    content: bytes,
+    loop: str,
+    pointers: int,
+    speed: str = "-O2",
+    function: str = "model_many",
+) -> Decide:
+    """Return a function of a loop behind a file.
 
     Args:
-        content: A file whose names begin with `model_`.
+        content: A file.
         loop: C behind it. The function takes a pointer, a number of rows, and more
             pointers.
         pointers: How many pointers follow.
         speed: An option of the compiler.
+        function: Its name.
 
     Raises:
         MissingExtraError: If no compiler is installed.
@@ -208,7 +241,7 @@ def compiled(content: bytes, loop: str, pointers: int, speed: str = "-O2") -> De
         if done.returncode:
             said = done.stderr.decode("utf-8", "replace").strip()[:1000]
             raise FuzzyTreeError(f"{compiler} cannot compile the model: {said}")
-        found = ctypes.CDLL(str(path)).model_many
+        found = getattr(ctypes.CDLL(str(path)), function)
     pointer = ctypes.c_void_p
     found.argtypes = [pointer, ctypes.c_size_t, *[pointer] * pointers]
     found.restype = None

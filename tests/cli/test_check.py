@@ -185,3 +185,22 @@ def test_rows_without_a_bound_stand_apart_from_the_others() -> None:
         "agrees; 1 row without a bound, some with a missing value on one side only",
         "agrees; 1 row without a bound",
     ]
+
+
+def test_a_program_is_run_only_if_it_is_the_one_that_is_written_now(
+    call: Call,
+) -> None:
+    ft.save(grip(), "grip.py")
+    words = ("check", "grip.yaml", "grip.py", *NATIVE)
+    assert call(*words)[0] == 0
+    text = Path("grip.py").read_text("utf-8")
+    Path("grip.py").write_text(f"{text}\n# a note\n", "utf-8")
+    code, out, _ = call(*words)
+    assert code == 1
+    assert "grip.py against a freshly written file:\n  line " in out
+    told = "grip.py: its answers: only --run-code runs a file with another text\n"
+    assert f"not examined: {told}" in out
+    code, _, err = call(*words, "--run-code")
+    assert code == 1
+    assert err.endswith("in 1 file only the rows agree, which --rows-only accepts\n")
+    assert call(*words, "--run-code", "--rows-only")[0] == 0

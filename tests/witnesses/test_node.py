@@ -35,6 +35,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.runtimes.written import numbers_of
 from fuzzytree.samples import samples
 from fuzzytree.system import FuzzySystem
 from fuzzytree.testing import exporter_models, random_system, random_tree, with_points
@@ -53,41 +54,16 @@ HOSTILE = (
     "constructor",
     "é ☂ 😀",
 )
-CLASSES = """
-const kept = (found) => [CLASSES.indexOf(found.label), found.rule, found.status,
-  ...(found.strengths ?? [])];
-"""
-NUMBERS = """
-const kept = (found) => [...found.outputs, found.status, ...found.activations];
-"""
-RUN = """
-import { readFileSync, writeFileSync } from "node:fs";
-const bytes = readFileSync("rows.bin");
-const rows = new Float64Array(bytes.buffer, bytes.byteOffset, bytes.length / 8);
-const found = [];
-for (let row = 0; row < COUNT; row += 1) {
-  found.push(...kept(answer(rows.subarray(row * WIDTH, (row + 1) * WIDTH))));
-}
-writeFileSync("found.bin", new Float64Array(found));
-"""
 Array = np.typing.NDArray[np.float64]
 
 
-def answered(node: str, model: Document, rows: Sequence[Row], folder: Path) -> Array:
+def answered(model: Document, rows: Sequence[Row]) -> Array:
     """Return what node makes of rows: of shape (rows, numbers for each)."""
     inputs = model.columns if isinstance(model, FuzzySystem) else model.inputs
-    values = np.array([[row[name] for name in inputs] for row in rows], np.float64)
-    (folder / "model.mjs").write_bytes(write(model).content)
-    (folder / "rows.bin").write_bytes(values.tobytes())
-    names, kept = "CLASSES, answer", CLASSES
-    if isinstance(model, FuzzySystem):
-        names, kept = "answer", NUMBERS
-    text = f'import {{ {names} }} from "./model.mjs";\n{kept}{RUN}'
-    text = text.replace("COUNT", str(len(rows))).replace("WIDTH", str(len(inputs)))
-    (folder / "run.mjs").write_text(text)
-    subprocess.run([node, "run.mjs"], cwd=folder, check=True, timeout=300)
-    found = np.frombuffer((folder / "found.bin").read_bytes())
-    return found.reshape(len(rows), -1)
+    values = np.array([[row[name] for row in rows] for name in inputs], np.float64)
+    values = values.reshape(len(inputs), len(rows))
+    classes = () if isinstance(model, FuzzySystem) else model.classes
+    return numbers_of(write(model).content, "javascript", values, classes)
 
 
 def expected(model: Model, row: Row) -> list[float]:
@@ -139,20 +115,21 @@ def models() -> dict[str, Model]:
 
 @pytest.mark.parametrize("name", models())
 def test_node_has_the_bits_of_the_reference_on_all_probes(
-    tmp_path: Path, program: Need, name: str
+    program: Need, name: str
 ) -> None:
     model = models()[name]
     rows = probes(model, limit=3000)
-    found = answered(program("node"), model, rows, tmp_path)
+    program("node")
+    found = answered(model, rows)
     assert len(rows) >= 100
     assert same_bits(found, np.array([expected(model, row) for row in rows]))
 
 
 @pytest.mark.parametrize("entry", [2.0, 25.0])
 def test_node_answers_the_wine_table_as_the_reference(
-    tmp_path: Path, program: Need, entry: float
+    program: Need, entry: float
 ) -> None:
-    node = program("node")
+    program("node")
     tree = ft.learn(WINE, target="cultivar", entry=entry)
     lines = WINE.read_text("utf-8").splitlines()
     header = lines[0].split(",")[:-1]  # without the class
@@ -163,7 +140,7 @@ def test_node_answers_the_wine_table_as_the_reference(
     relative, raw = rules_from_tree(tree, "relative"), rules_from_tree(tree, "raw")
     models: list[Model] = [tree, relative, raw]
     for model in models:
-        found = answered(node, model, table, tmp_path)
+        found = answered(model, table)
         assert len(found) == 178
         assert same_bits(found, np.array([expected(model, row) for row in table]))
 
@@ -181,12 +158,13 @@ def systems(kind: str) -> dict[str, FuzzySystem]:
     [("samples", 4_000), pytest.param("random", 5_000, marks=pytest.mark.heavy)],
 )
 def test_node_has_the_numbers_of_every_system_within_derived_bounds(
-    tmp_path: Path, program: Need, kind: str, fewest: int
+    program: Need, kind: str, fewest: int
 ) -> None:
-    node, exact = program("node"), 0
+    program("node")
+    exact = 0
     for name, system in systems(kind).items():
         rows = system_probes(system, limit=60)
-        found = answered(node, system, rows, tmp_path)
+        found = answered(system, rows)
         values = np.array([[row[n] for row in rows] for n in system.columns])
         values = values.reshape(len(system.columns), len(rows))
         kept = from_system(system, activations=True)
@@ -332,8 +310,9 @@ def test_every_model_that_exporters_are_tried_on_tests_itself(
     assert count > 60
 
 
-def test_missing_values_are_told(tmp_path: Path, program: Need) -> None:
+def test_missing_values_are_told(program: Need) -> None:
     tree = random_tree(5)
     rows = [dict.fromkeys(tree.inputs, math.nan), dict.fromkeys(tree.inputs, math.inf)]
-    found = answered(program("node"), tree, rows, tmp_path)
+    program("node")
+    found = answered(tree, rows)
     assert found.tolist() == [[-1.0, 0.0, 3.0]] * 2

@@ -1,0 +1,250 @@
+"""Written programs, each run by an engine of its language.
+
+A file runs as it is. `fuzzytree.checking_programs` compares its text first.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import math
+import shutil
+import sqlite3
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from fuzzytree.contracts import Model, Outcome
+from fuzzytree.errors import FuzzyTreeError, MissingExtraError
+from fuzzytree.exporters.c import beginning
+from fuzzytree.reference import Status
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.runtimes import c
+
+if TYPE_CHECKING:
+    from fuzzytree.contracts import FloatArray
+    from fuzzytree.options import Option
+
+Options = Mapping[str, "Option"]
+_LONGEST_WAIT = 600.0  # seconds
+
+
+class Result(NamedTuple):
+    """What a program answered.
+
+    Attributes:
+        outcome: Rules, statuses and strengths.
+        labels: The classes; None if the program gives only their places.
+        has_status: Whether the statuses are the program's own.
+    """
+
+    outcome: Outcome
+    labels: tuple[str | None, ...] | None
+    has_status: bool = True
+
+
+Engine = Callable[[bytes, Model, Options, "FloatArray"], Result]
+
+_PYTHON = """
+import array, json, runpy
+answer = runpy.run_path("model.py")["answer"]
+facts = json.load(open("facts.json", encoding="utf-8"))
+width, classes = facts["width"], facts["classes"]
+rows, found = array.array("d"), array.array("d")
+rows.frombytes(open("rows.bin", "rb").read())
+for row in range(facts["count"]):
+    label, *numbers = answer(rows[row * width : (row + 1) * width].tolist())
+    found.append(-1 if label is None else classes.index(label))
+    found.extend(numbers[:2])
+    found.extend(numbers[2] if len(numbers) > 2 else ())
+open("found.bin", "wb").write(found.tobytes())
+"""
+_NODE = """
+import { readFileSync, writeFileSync } from "node:fs";
+import { answer } from "./model.mjs";
+const { width, count, classes } = JSON.parse(readFileSync("facts.json", "utf-8"));
+const kept = (found) => found.outputs === undefined
+  ? [classes.indexOf(found.label), found.rule, found.status, ...(found.strengths ?? [])]
+  : [...found.outputs, found.status, ...found.activations];
+const bytes = readFileSync("rows.bin");
+const rows = new Float64Array(bytes.buffer, bytes.byteOffset, bytes.length / 8);
+const found = [];
+for (let row = 0; row < count; row += 1) {
+  found.push(...kept(answer(rows.subarray(row * width, (row + 1) * width))));
+}
+writeFileSync("found.bin", new Float64Array(found));
+"""
+
+
+def numbers_of(
+    content: bytes, language: str, values: FloatArray, classes: Sequence[str]
+) -> FloatArray:
+    """Run a program of Python or JavaScript in a process of its own.
+
+    Args:
+        content: The file.
+        language: `python` or `javascript`.
+        values: Shape (inputs, rows).
+        classes: Of the model; none for a fuzzy system.
+
+    Returns:
+        For each row the place of the class, the rule, the status and all strengths;
+        of a system its outputs, the status and all activations.
+
+    Raises:
+        MissingExtraError: If node is not installed.
+        FuzzyTreeError: If the program fails.
+    """
+    is_python = language == "python"
+    program = sys.executable if is_python else shutil.which("node")
+    if program is None:
+        raise MissingExtraError("running JavaScript needs node, which is not installed")
+    width, count = values.shape
+    facts = {"width": width, "count": count, "classes": list(classes)}
+    runner, text = ("run.py", _PYTHON) if is_python else ("run.mjs", _NODE)
+    with tempfile.TemporaryDirectory(prefix="fuzzytree-") as place:
+        folder = Path(place)
+        (folder / f"model.{'py' if is_python else 'mjs'}").write_bytes(content)
+        (folder / "facts.json").write_text(json.dumps(facts), "utf-8")
+        (folder / "rows.bin").write_bytes(np.ascontiguousarray(values.T).tobytes())
+        (folder / runner).write_text(text, "utf-8")
+        words = [program, *(("-I",) if is_python else ()), runner]
+        try:
+            done = subprocess.run(
+                words, cwd=folder, capture_output=True, timeout=_LONGEST_WAIT
+            )
+        except subprocess.TimeoutExpired as error:
+            text = f"{language} did not end within {_LONGEST_WAIT:.0f} seconds"
+            raise FuzzyTreeError(text) from error
+        found = folder / "found.bin"
+        if done.returncode or not found.is_file():
+            said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            why = said[-1] if said else f"exit code {done.returncode}"
+            raise FuzzyTreeError(f"{language} cannot run it: {why}")
+        numbers = np.frombuffer(found.read_bytes())
+    if not count or numbers.size % count:
+        raise FuzzyTreeError(f"{language} does not answer each row")
+    return numbers.reshape(count, -1)
+
+
+def _script(language: str) -> Engine:
+    def run(content: bytes, model: Model, _: Options, values: FloatArray) -> Result:
+        found = numbers_of(content, language, values, model.classes)
+        labels = tuple(None if k < 0 else model.classes[int(k)] for k in found[:, 0])
+        return Result(_outcome(model, found[:, 1:].tolist()), labels)
+
+    return run
+
+
+def _outcome(model: Model, rows: Sequence[Sequence[float | None]]) -> Outcome:
+    """Return rows of a rule, a status and any strengths, None for NaN, as an outcome.
+
+    Raises:
+        FuzzyTreeError: If there are more or fewer strengths than rules.
+    """
+    table = np.array(rows, np.float64).reshape(len(rows), -1)
+    count = len(model.rules) if isinstance(model, RuleBase) else 0
+    if table.shape[1] not in (2, 2 + count):
+        raise FuzzyTreeError(f"it gives {table.shape[1] - 2} strengths, not {count}")
+    strengths = table[:, 2:].T if table.shape[1] > 2 else None
+    last = len(model.rules if isinstance(model, RuleBase) else model.leaves)
+    for what, numbers, most in (
+        ("rule", table[:, 0], last),
+        ("status", table[:, 1], 3),
+    ):
+        if not np.isin(numbers, np.arange(most + 1)).all():
+            raise FuzzyTreeError(f"it answers a {what} that is none of 0 to {most}")
+    rule, status = table[:, :2].T.astype(np.int64)
+    return Outcome(rule, status, strengths)
+
+
+def _c(content: bytes, model: Model, options: Options, values: FloatArray) -> Result:
+    dtype: c.Dtype = "float32" if options.get("dtype") == "float32" else "float64"
+    run = c.load_content(content, model, dtype, prefix=beginning(model.name, None))
+    return Result(run(values), None)
+
+
+def _sql(content: bytes, model: Model, options: Options, values: FloatArray) -> Result:
+    """Answer by the standard library's sqlite3, or by duckdb, in memory."""
+    dialect = options.get("dialect", "sqlite")
+    if dialect == "duckdb":
+        _need("duckdb", "running SQL of the dialect duckdb")
+        duckdb: Any = importlib.import_module("duckdb")
+        connection, failure = duckdb.connect(), duckdb.Error
+    else:
+        connection, failure = sqlite3.connect(":memory:"), sqlite3.Error
+    kind = "DOUBLE" if dialect == "duckdb" else "REAL"
+    try:
+        return _queried(connection, content, model, kind, values)
+    except failure as error:
+        text = f"{dialect} cannot run it: {str(error).splitlines()[0]}"
+        raise FuzzyTreeError(text) from error
+    finally:
+        connection.close()
+
+
+def _queried(
+    connection: Any, content: bytes, model: Model, kind: str, values: FloatArray
+) -> Result:
+    quoted = ['"' + name.replace('"', '""') + '"' for name in model.inputs]
+    columns = ", ".join(f"{name} {kind}" for name in quoted)
+    connection.execute(f"CREATE TABLE data ({columns})")
+    marks = ", ".join("?" * len(quoted))
+    connection.executemany(f"INSERT INTO data VALUES ({marks})", values.T.tolist())
+    cursor = connection.execute(content.decode("utf-8"))
+    found = cursor.fetchall()
+    width = len(quoted)
+    kept = np.array([row[:width] for row in found], np.float64).reshape(-1, width)
+    if not np.array_equal(kept, values.T, equal_nan=True):
+        raise FuzzyTreeError("it does not give each row with its inputs, in order")
+    outcome = _outcome(model, [row[width + 1 :] for row in found])
+    return Result(outcome, tuple(row[width] for row in found))
+
+
+def _pmml(content: bytes, model: Model, _: Options, values: FloatArray) -> Result:
+    for package in ("jpmml_evaluator", "pandas"):
+        _need(package, "running PMML")
+    if shutil.which("java") is None:
+        raise MissingExtraError("running PMML needs java, which is not installed")
+    pandas: Any = importlib.import_module("pandas")
+    engine: Any = importlib.import_module("jpmml_evaluator")
+    evaluator = engine.make_evaluator(content).verify()
+    table = pandas.DataFrame(dict(zip(model.inputs, values, strict=True)))
+    found = evaluator.evaluateAll(table, error_col=None)[0]
+    labels = tuple(None if one != one else one for one in found["answer"])
+    count = len(model.rules) if isinstance(model, RuleBase) else 0
+    names = [f"strength of rule {k}" for k in range(1, count + 1)]
+    known = np.logical_and.reduce(np.isfinite(values), axis=0).tolist()
+    rows = []
+    for place, line in enumerate(found.to_dict("records")):
+        is_none = line["rule"] is None or line["rule"] != line["rule"]
+        rule = 0 if is_none else int(line["rule"])
+        status = Status.DECIDED if rule else Status.UNCOVERED
+        fired = [line[name] if known[place] else math.nan for name in names]
+        rows.append([rule, status if known[place] else Status.MISSING, *fired])
+    return Result(_outcome(model, rows), labels, has_status=False)
+
+
+def _need(package: str, purpose: str) -> None:
+    if importlib.util.find_spec(package) is None:
+        text = f"{purpose} needs the package {package!r}, which is not installed"
+        raise MissingExtraError(text)
+
+
+ENGINES: Final[Mapping[str, Engine]] = MappingProxyType(
+    {
+        "c": _c,
+        "python": _script("python"),
+        "javascript": _script("javascript"),
+        "sql": _sql,
+        "pmml": _pmml,
+    }
+)
+"""What runs a program, by the name of its format."""
