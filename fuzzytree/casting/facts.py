@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from fuzzytree.casting.scores import Always, Scores, as_system
+from fuzzytree.casting.scores import Always, Scores, as_system, flattened
 from fuzzytree.casting.shapes import shape_of
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.rulebase import (
@@ -164,18 +164,20 @@ def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
     """
     if facts is None:
         return _recognised(system)
+    system, _ = flattened(system)
     try:
         found = _decoded(facts)
     except (msgspec.DecodeError, UnicodeEncodeError, RecursionError):
         return None
     if found is None or not _may_fit(system, found):
         return None
-    curves = _shapes(system, [len(one.terms) for one in found.variables])
+    places = _places(found)
+    curves = _shapes(system, [len(found.variables[place].terms) for place in places])
     if curves is None:
         return None
     try:
-        rules = _rules(found, curves)
-        expected = as_system(rules, found.scores, always=found.always)
+        rules = _rules(found, dict(zip(places, curves, strict=True)))
+        expected, _ = flattened(as_system(rules, found.scores, always=found.always))
     except (FuzzyTreeError, IndexError, ValueError):
         return None
     is_winner = found.scores == "winner"
@@ -231,6 +233,26 @@ def numbers_of(facts: str) -> tuple[int, ...]:
     return tuple(range(first, first + len(labels)))
 
 
+def places_of(facts: str) -> tuple[int | None, ...]:
+    """Return for each variable of a rule base the place of the file's input, if any.
+
+    Args:
+        facts: A line that `as_rules` took.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0, leaves=2, combinations=1.0))
+        >>> places_of(facts_of(rules))
+        (None, None, None, 0)
+    """
+    found = _decoded(facts)
+    if found is None:
+        return ()
+    places = {place: k for k, place in enumerate(_places(found))}
+    return tuple(places.get(place) for place in range(len(found.variables)))
+
+
 def _decoded(facts: str) -> _Facts | None:
     data = facts.encode()
     if len(data) > _MOST:
@@ -252,7 +274,7 @@ def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
         if not all(0 <= k < len(sizes) for k in clauses):
             return False
         asked += sum(sizes[k] for k in clauses) if clauses else 1
-    if len(facts.variables) != len(system.inputs):
+    if len(_places(facts)) != len(system.inputs):
         return False
     found = sum(1 for rule in system.rules for _ in questions(rule.when))
     return asked <= found + 2 * len(facts.rules) + 1
@@ -274,20 +296,30 @@ def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | No
     return found
 
 
-def _rules(facts: _Facts, curves: list[list[Term]]) -> RuleBase:
+def _places(facts: _Facts) -> list[int]:
+    """Return which variables a file has: not those that serve for sums alone."""
+    summed = {part.input for one in facts.variables for part in one.parts}
+    return [
+        place
+        for place, one in enumerate(facts.variables)
+        if one.terms or one.name not in summed
+    ]
+
+
+def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
     variables = tuple(
         Variable(
             v.name,
             tuple(
                 Term(name, term.shape)
-                for name, term in zip(v.terms, terms, strict=True)
+                for name, term in zip(v.terms, curves.get(place, ()), strict=True)
             ),
             v.unit,
             v.low,
             v.high,
             v.parts,
         )
-        for v, terms in zip(facts.variables, curves, strict=True)
+        for place, v in enumerate(facts.variables)
     )
     clauses = [
         Clause(

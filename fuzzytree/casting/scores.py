@@ -47,6 +47,7 @@ from fuzzytree.system import (
     Conclusion,
     Condition,
     Defuzzifier,
+    Formula,
     FuzzySystem,
     Is,
     Label,
@@ -59,14 +60,15 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
     TNorm,
+    questions,
 )
 
 Scores = Literal["rule", "class", "winner"]
 """What the outputs of a system say about a rule base."""
 
 Always = Literal["nothing", "any", "term"]
-"""What a rule without clauses asks: nothing; `first input is any`; or whether the first
-input is a term of degree 1 everywhere."""
+"""What a rule without clauses asks: nothing; `input is any`; or whether the input is a
+term of degree 1 everywhere. The input is the first that is not for sums alone."""
 
 _AVERAGE = Defuzzifier("weighted average")
 _EVERYWHERE = Points((0.0,), (1.0,))
@@ -192,7 +194,8 @@ def cast_remarks(rules: RuleBase, scores: Scores = "rule") -> tuple[str, ...]:
 def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
     """Return a system whose combinations are inputs, and a loss for each of them.
 
-    Who runs it must compute the sum that the loss names, in that order.
+    The caller must compute the sum that the loss names, in that order. An input that
+    serves for sums alone is left out.
 
     Example:
         >>> from fuzzytree.rulebase import Part
@@ -200,6 +203,8 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
         >>> output = SystemOutput("y", (), 0.0, 1.0, Defuzzifier("weighted average"))
         >>> inputs = SystemInput("a"), SystemInput("b"), mixed
         >>> flat, losses = flattened(FuzzySystem("s", inputs, (output,), ()))
+        >>> flat.columns
+        ('mix',)
         >>> losses[0].what
         "it is an input, to be given as 2.0 * ('a' - 0.5) + -1.0 * ('b' - 0.0)"
     """
@@ -218,7 +223,7 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
         return system, ()
     return replace(
         system,
-        inputs=tuple(replace(one, parts=()) for one in system.inputs),
+        inputs=tuple(replace(one, parts=()) for one in _kept(system)),
         outputs=tuple(
             replace(
                 one,
@@ -227,6 +232,17 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
             for one in system.outputs
         ),
     ), losses
+
+
+def _kept(system: FuzzySystem) -> Iterator[SystemInput]:
+    """Yield the inputs that something other than a combination uses."""
+    summed = {part.input for one in system.inputs for part in one.parts}
+    used = {one.variable for r in system.rules for one in questions(r.when)}
+    curves = [label.curve for one in system.variables for label in one.labels]
+    is_computed = any(isinstance(curve, Linear | Formula) for curve in curves)
+    for one in system.inputs:
+        if one.labels or one.name not in summed or one.name in used or is_computed:
+            yield one
 
 
 def _widened(label: Label, inputs: tuple[SystemInput, ...]) -> Label:
@@ -279,13 +295,16 @@ def _held(
         raise LossError(
             "a rule without clauses must ask an input, and the rule base has none"
         )
-    asked = inputs[0]
+    summed = {part.input for one in inputs for part in one.parts}
+    asked = next(one for one in inputs if one.labels or one.name not in summed)
     if always == "any":
         return inputs, Is(asked.name, None, ("any",))
     name = unlike("always", {label.name for label in asked.labels})
     label = Label(name, _EVERYWHERE)
     changed = replace(asked, labels=(*asked.labels, label))
-    return (changed, *inputs[1:]), Is(asked.name, name)
+    return tuple(changed if one is asked else one for one in inputs), Is(
+        asked.name, name
+    )
 
 
 def _conditions(rules: RuleBase, held: Condition | None) -> list[Condition | None]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from fuzzytree.casting.facts import numbers_of
+from fuzzytree.casting.facts import numbers_of, places_of
 from fuzzytree.readers.nodes import Found
 from fuzzytree.rulebase import Mistake, Path
 
@@ -34,12 +34,15 @@ class Spots(msgspec.Struct, frozen=True, gc=False):
         blocks: Each block with its rules.
         rules: Where the file stands for a rule base: for each rule the place of the
             rule of the system that holds it, over all blocks.
+        variables: Likewise for each variable the place of the input, None if the file
+            does not have it.
     """
 
     inputs: tuple[Group, ...]
     outputs: tuple[Group, ...]
     blocks: tuple[Group, ...]
     rules: tuple[int, ...] = ()
+    variables: tuple[int | None, ...] = ()
 
     def find(self, path: Path) -> Spot | None:
         """Return where a part of the system, or of its rule base, stands.
@@ -53,8 +56,11 @@ class Spots(msgspec.Struct, frozen=True, gc=False):
             case ("rules", int(place), *_):
                 every = [spot for block in self.blocks for spot in block.parts]
                 return every[self.rules[place] if self.rules else place]
-            case ("variables", int(), *_):
-                return self.find(in_system(path))
+            case ("variables", int(place), *rest):
+                found = self.variables[place] if self.variables else place
+                if found is None:
+                    return None
+                return self.find(in_system(("variables", found, *rest)))
             case (("inputs" | "outputs" | "blocks") as field, int(place), *rest):
                 group: Group = getattr(self, field)[place]
             case _:
@@ -73,8 +79,10 @@ class Spots(msgspec.Struct, frozen=True, gc=False):
 
     def of_facts(self, facts: str | None) -> Spots:
         """Return the same for a file that stands for the rule base of its facts."""
-        numbers = () if facts is None else numbers_of(facts)
-        return msgspec.structs.replace(self, rules=numbers)
+        if facts is None:
+            return self
+        rules, variables = numbers_of(facts), places_of(facts)
+        return msgspec.structs.replace(self, rules=rules, variables=variables)
 
 
 def in_system(path: Path) -> Path:

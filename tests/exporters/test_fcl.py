@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fuzzytree.casting import winner
+from fuzzytree.casting import as_system, flattened, winner
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import check_list, write
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
-from fuzzytree.inference import infer
+from fuzzytree.inference import infer, input_values
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.random_systems import random_rows, random_system
 from fuzzytree.readers.fcl import read
@@ -122,13 +122,10 @@ def test_the_scores_of_a_file_decide_as_the_rules_do(
         for _ in range(40):
             row = {name: chance.uniform(-3.0, 3.0) for name in rules.inputs}
             expected = evaluate(rules, row)
-            values = [row.get(name, 0.0) for name in rules.inputs]
-            mixed = [
-                sum(p.weight * (row[p.input] - p.centre) for p in v.parts)
-                for v in rules.variables
-                if v.parts
-            ]
-            named = dict(zip(system.columns, [*values, *mixed], strict=True))
+            values = input_values(as_system(rules).inputs, row)
+            flat = flattened(as_system(rules))[0]
+            given = [values[name] for name in flat.columns]
+            named = dict(zip(system.columns, given, strict=True))
             answer = winner(rules, infer(system, named).outputs)
             if kind == "relative":
                 assert answer == expected.label

@@ -10,9 +10,13 @@ import importlib
 import math
 import subprocess
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from fuzzytree.casting import as_system, flattened
+from fuzzytree.inference import input_values
+from fuzzytree.rulebase import RuleBase
 
 DECIMALS = 17
 """With how many decimals the program prints."""
@@ -140,3 +144,13 @@ def largest_difference(
             difference = abs(one - other) if one != other else 0.0
             largest = max(largest, math.inf if difference != difference else difference)
     return largest
+
+
+def file_rows(
+    rules: RuleBase, rows: Iterable[Mapping[str, float]]
+) -> list[list[float]]:
+    """Return the values of the inputs of a rule base's file, in their order."""
+    system = as_system(rules)
+    columns = flattened(system)[0].columns
+    values = (input_values(system.inputs, row) for row in rows)
+    return [[row[name] for name in columns] for row in values]

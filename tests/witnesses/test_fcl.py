@@ -17,11 +17,11 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import write
 from fuzzytree.exporters.fcl_dialects import Dialect
 from fuzzytree.exporters.fll import write as write_fll
-from fuzzytree.inference import infer, input_values
+from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.readers.fcl import read
 from fuzzytree.reference import evaluate
-from fuzzytree.rulebase import Kind, Points, RuleBase
+from fuzzytree.rulebase import Kind, Points
 from fuzzytree.samples import samples
 from fuzzytree.system import And, Condition, Defuzzifier, FuzzySystem, Or
 from fuzzytree.testing import (
@@ -33,7 +33,11 @@ from fuzzytree.testing import (
 )
 from tests.exporters.fcl_systems import tamed
 from tests.witnesses.corpus_rows import EXACT
-from tests.witnesses.fuzzylite_engine import largest_difference, run_program
+from tests.witnesses.fuzzylite_engine import (
+    file_rows,
+    largest_difference,
+    run_program,
+)
 
 WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
 
@@ -49,12 +53,6 @@ def _wine_rows(inputs: Sequence[str]) -> list[Row]:
         return [
             {name: float(row[name]) for name in inputs} for row in csv.DictReader(file)
         ]
-
-
-def _given(rules: RuleBase, rows: Sequence[Row]) -> list[list[float]]:
-    """Return rows with the value of each combination, as a file asks for them."""
-    inputs = as_system(rules).inputs
-    return [list(input_values(inputs, row).values()) for row in rows]
 
 
 def _mixes(condition: Condition | None) -> bool:
@@ -84,7 +82,7 @@ def test_the_wine_rules_decide_alike_on_every_row(
     rows = _wine_rows(rules.inputs)
     assert len(rows) == 178
     written = write(rules, allow_loss=True, dialect=dialect, tolerance=1e-4)
-    given = _given(rules, rows)
+    given = file_rows(rules, rows)
     path = program("fuzzylite")
     answers = run_program(path, written.content, given, tmp_path, kind="fcl")
     count = len(rules.rules)

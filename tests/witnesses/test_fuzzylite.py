@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from fuzzytree import learn
 from fuzzytree.casting import Scores, pointed, winner
 from fuzzytree.exporters.fll import write
-from fuzzytree.inference import infer, input_values
+from fuzzytree.inference import infer
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.probing import probes
 from fuzzytree.readers.fll import read
@@ -33,6 +33,7 @@ from fuzzytree.testing import random_rows, random_tree
 from tests.exporters.fll_systems import plain_system
 from tests.witnesses.fuzzylite_engine import (
     Answers,
+    file_rows,
     largest_difference,
     run_library,
     run_program,
@@ -75,14 +76,6 @@ def finite(rows: Iterable[Row]) -> list[Row]:
     return [row for row in rows if all(map(math.isfinite, row.values()))]
 
 
-def given(rules: RuleBase, rows: Sequence[Row]) -> list[list[float]]:
-    """Return rows with the value of each combination, as a file asks for them."""
-    from fuzzytree.casting import as_system
-
-    inputs = as_system(rules, "winner").inputs
-    return [list(input_values(inputs, row).values()) for row in rows]
-
-
 def assert_decided_alike(
     engine: Engine, rules: RuleBase, rows: Sequence[Row], scores: Scores = "winner"
 ) -> None:
@@ -90,7 +83,7 @@ def assert_decided_alike(
     written = write(rules, allow_loss=True, scores=scores, tolerance=1e-4)
     model = read(written.content, "model.fll").model
     assert isinstance(model, RuleBase)
-    answers = engine(written.content, given(rules, rows))
+    answers = engine(written.content, file_rows(rules, rows))
     extra = scores != "winner"
     count = len({rule.then for rule in rules.rules}) if scores == "class" else None
     assert answers.rules == (count or len(rules.rules)) + extra
@@ -113,7 +106,7 @@ def test_the_wine_rules_decide_alike_on_every_row(
     assert_decided_alike(engine, rules, rows, scores)
     if kind == "relative":
         written = write(rules, allow_loss=True)
-        answers = engine(written.content, given(rules, rows))
+        answers = engine(written.content, file_rows(rules, rows))
         labels = [rules.classes[round(number) - 1] for (number,) in answers.outputs]
         assert labels == [evaluate(rules, row).label for row in rows]
 
@@ -127,7 +120,7 @@ def test_relative_rules_of_random_trees_decide_alike_at_their_edges(
     rules = rules_from_tree(tree)
     rows = finite(probes(rules, limit=300))
     written = write(rules, allow_loss=True, tolerance=1e-3)
-    answers = engine(written.content, given(rules, rows))
+    answers = engine(written.content, file_rows(rules, rows))
     assert answers.rules == len(rules.rules)
     for row, (number,) in zip(rows, answers.outputs, strict=True):
         found = evaluate(rules, row)
@@ -170,7 +163,7 @@ def test_scores_are_the_strengths_of_rules(engine: Engine, scores: Scores) -> No
     rules, _ = pointed(rules_from_tree(random_tree(2, combinations=0.0), "raw"), 1e-2)
     rows = finite(probes(rules, limit=100))
     written = write(rules, allow_loss=True, scores=scores)
-    answers = engine(written.content, given(rules, rows))
+    answers = engine(written.content, file_rows(rules, rows))
     for row, outputs in zip(rows, answers.outputs, strict=True):
         strengths: dict[object, float] = {}
         found = zip(rules.rules, evaluate(rules, row).strengths, strict=True)

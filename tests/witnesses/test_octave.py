@@ -8,12 +8,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+from sklearn import datasets
 
 from fuzzytree import learn
 from fuzzytree.casting import as_system, flattened, winner
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis import write
-from fuzzytree.inference import infer, input_values
+from fuzzytree.inference import infer
+from fuzzytree.learning import learn_arrays
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.readers.fis import reading
 from fuzzytree.reference import evaluate
@@ -22,7 +24,11 @@ from fuzzytree.system import FuzzySystem
 from fuzzytree.testing import random_rows
 from tests.exporters.test_fis import random_fis
 from tests.witnesses.corpus_rows import EXACT
-from tests.witnesses.fuzzylite_engine import largest_difference, run_program
+from tests.witnesses.fuzzylite_engine import (
+    file_rows,
+    largest_difference,
+    run_program,
+)
 from tests.witnesses.fuzzylite_exact import compiled, exact_answers
 from tests.witnesses.octave_engine import DISCRETEMF, answers
 
@@ -73,8 +79,7 @@ def test_the_wine_rules_have_the_same_scores_in_octave_and_decide_alike(
                     {name: float(row[name]) for name in rules.inputs}
                     for row in csv.DictReader(file)
                 ]
-            inputs = as_system(rules).inputs
-            given = [list(input_values(inputs, row).values()) for row in rows]
+            given = file_rows(rules, rows)
             written = write(rules, allow_loss=True, tolerance=1e-4)
             name = f"{kind}{int(entry)}"
             files[name] = written.content, given
@@ -92,6 +97,25 @@ def test_the_wine_rules_have_the_same_scores_in_octave_and_decide_alike(
 
 
 @pytest.mark.heavy
+@pytest.mark.parametrize("name", ["iris", "breast_cancer"])
+def test_octave_answers_every_row_that_a_tree_of_combinations_was_learnt_from(
+    program: Need, tmp_path: Path, name: str
+) -> None:
+    values, labels = getattr(datasets, f"load_{name}")(return_X_y=True)
+    columns = [f"x{k}" for k in range(values.shape[1])]
+    classes = [f"c{k}" for k in range(int(labels.max()) + 1)]
+    tree = learn_arrays(values, labels, columns=columns, classes=classes).tree
+    assert any(one.parts for one in tree.variables)
+    rules = rules_from_tree(tree)
+    rows = [dict(zip(columns, row, strict=True)) for row in values.tolist()]
+    written = write(rules, allow_loss=True, tolerance=1e-4)
+    files = {name: (written.content, file_rows(rules, rows))}
+    found = answers(program("octave"), tmp_path, files)[name]
+    for row, scores in zip(rows, found.rows, strict=True):
+        assert winner(rules, scores) == evaluate(rules, row).label
+
+
+@pytest.mark.heavy
 @pytest.mark.parametrize(("entry", "is_mixed"), [(25.0, True), (1e9, False)])
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
@@ -106,8 +130,7 @@ def test_the_wine_rules_have_the_same_scores_in_fuzzylite(
             {name: float(row[name]) for name in rules.inputs}
             for row in csv.DictReader(file)
         ]
-    inputs = as_system(rules).inputs
-    given = [list(input_values(inputs, row).values()) for row in rows]
+    given = file_rows(rules, rows)
     content = write(rules, allow_loss=True, dialect="fuzzylite", tolerance=1e-4).content
     run = run_program(fuzzylite, content, given, tmp_path, kind="fis")
     assert run.rules == len(rules.rules) + 1
