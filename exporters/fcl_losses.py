@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from fuzzytree.casting import number_losses
 from fuzzytree.contracts import Loss
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fcl_rules import rule_losses, uses
@@ -40,6 +41,8 @@ def losses_of(system: FuzzySystem, words: Words) -> Iterator[Loss]:
         if words.name == "fuzzylite":
             yield from fuzzylite_losses(output)
         yield from _accu_losses(output, system, words)
+    if has_accu(words):
+        yield from number_losses(system)
     yield from rule_losses(system, words)
     for k, block in enumerate(system.blocks, 1):
         pairs = JFUZZYLOGIC_PAIRS if words.name == "jfuzzylogic" else PAIRS
@@ -97,8 +100,9 @@ def _accu_losses(
             said = None
     elif is_weighted:
         said = None
+    curves = {one.name: one.curve for one in output.labels}
     counts = Counter(
-        one.label
+        curves[one.label]
         for rule in system.rules
         for one in rule.then
         if one.output == output.name

@@ -21,6 +21,7 @@ from fuzzytree.casting import (
     facts_of,
     flattened,
     joined_outputs,
+    number_losses,
     pointed,
 )
 from fuzzytree.contracts import Format, Loss, Written
@@ -270,6 +271,8 @@ def _losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
         if variable.clips and dialect != "fuzzylite":
             what = "values are not moved into the range"
             yield Loss(f"variable {variable.name!r}", what)
+    if dialect == "octave":
+        yield from number_losses(system)
     yield from _block_losses(system, dialect)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.casting.facts import FACTS, as_rules, as_written, facts_of
-from fuzzytree.casting.joining import joined_outputs
+from fuzzytree.casting.joining import joined_by_number, joined_outputs, number_losses
 from fuzzytree.casting.points import check_tolerance, pointed
 from fuzzytree.casting.scores import (
     Always,
@@ -27,7 +27,9 @@ __all__ = [
     "check_tolerance",
     "facts_of",
     "flattened",
+    "joined_by_number",
     "joined_outputs",
+    "number_losses",
     "pointed",
     "winner",
 ]

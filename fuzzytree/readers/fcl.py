@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from fuzzytree.casting import as_rules
+from fuzzytree.casting import as_rules, joined_by_number
 from fuzzytree.contracts import Document, Locate, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.readers.fcl_blocks import Block, blocks_of
@@ -142,7 +142,7 @@ def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
     except InvalidModelError as error:
         found = parts.spots().placed(error.mistakes)
         raise report(name, list(found)) from error
-    model, facts = _model(system, text.text, notes)
+    model, facts = _model(joined_by_number(system), text.text, notes)
     reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
     return reading, parts, facts
 

@@ -8,13 +8,13 @@ has; MATLAB's meaning is the default.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 from typing import Final, NamedTuple
 
 import msgspec
 
-from fuzzytree.casting import as_written
+from fuzzytree.casting import as_written, joined_by_number
 from fuzzytree.contracts import Locate, Loss, Reading
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.naming import numbered
@@ -228,7 +228,7 @@ def _system(
     except InvalidModelError as error:
         notes.found.extend(text.spots_of(*given).placed(error.mistakes))
         return None
-    return _Parts(system, *given)
+    return _Parts(joined_by_number(system), *given)
 
 
 def _keyed(
@@ -461,13 +461,11 @@ def _compare(
     dialect: Dialect,
     notes: Notes,
 ) -> None:
-    """Say where Octave and the others would answer otherwise."""
-    if not methods.defuzzifier.is_weighted or methods.aggregation in (None, "sum"):
+    """Say where Octave would answer otherwise than the others."""
+    is_weighted = methods.defuzzifier.is_weighted
+    if not is_weighted or methods.aggregation in (None, "sum") or dialect == "octave":
         return
     for output in outputs:
-        if dialect == "octave":
-            notes.losses.extend(_alike(output))
-            continue
         concluded = [
             one.label
             for r in block.rules
@@ -479,15 +477,4 @@ def _compare(
                 f"output {output.name!r}: several rules conclude one term, and their "
                 f"degrees are summed, as {dialect} does; Octave would join them by "
                 f"{methods.aggregation}"
-            )
-
-
-def _alike(output: SystemOutput) -> Iterator[Loss]:
-    seen: dict[object, str] = {}
-    for label in output.labels:
-        other = seen.setdefault(label.curve, label.name)
-        if other != label.name:
-            yield Loss(
-                f"terms {other!r} and {label.name!r} of {output.name!r}",
-                "Octave joins the degrees of equal numbers; here each term counts",
             )

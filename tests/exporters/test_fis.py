@@ -427,6 +427,29 @@ def test_what_matlab_answers_where_no_rule_fires_is_a_loss_if_the_model_differs(
     assert anonymous(reading(written.content, "s.fis").model) == anonymous(carried)
 
 
+def test_terms_of_one_number_are_a_loss_where_octave_joins_their_rules() -> None:
+    number = Singleton(5.0)
+    output = SystemOutput(
+        "tip", (Label("small", number), Label("tiny", number)), 0.0, 9.0, _AVERAGE,
+        "maximum",
+    )  # fmt: skip
+    rules = [
+        SystemRule(Is("a", term), (Conclusion("tip", then),))
+        for term, then in (("low", "small"), ("high", "tiny"))
+    ]
+    system = replace(
+        _sugeno(), outputs=(output,), blocks=(RuleBlock(tuple(rules), "minimum"),)
+    )
+    with pytest.raises(LossError) as caught:
+        write(system)
+    assert str(caught.value).splitlines() == [
+        "cannot write s as fis without loss:",
+        "  terms 'small' and 'tiny' of 'tip': they are one number, and rules of both "
+        "are joined by maximum; here each term counts",
+        "  pass allow_loss=True to write it as stated",
+    ]
+
+
 def test_combinations_become_inputs_and_linear_conclusions_give_them_no_weight() -> (
     None
 ):

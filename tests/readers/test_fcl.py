@@ -177,6 +177,30 @@ def _mistakes(text: str) -> list[str]:
     return str(caught.value).splitlines()
 
 
+@pytest.mark.parametrize("method", ["COGS", "COGF"])
+@pytest.mark.parametrize(("accu", "minutes"), [("MAX", 8.0), ("SUM", 7.4)])
+def test_accu_joins_the_rules_of_terms_with_one_number(
+    method: str, accu: str, minutes: float
+) -> None:
+    text = STANDARD.replace(
+        "TERM short := 20; TERM long := 60;",
+        "TERM short := 5; TERM brief := 5; TERM long := 9;",
+    )
+    text = text.replace("METHOD : COGS", f"METHOD : {method}").replace("MAX", accu)
+    rules = text.index("    RULE 1")
+    text = (
+        text[:rules]
+        + """\
+    RULE 1 : IF dirt IS little THEN minutes IS short;
+    RULE 2 : IF dirt IS little THEN minutes IS brief;
+    RULE 3 : IF dirt IS much THEN minutes IS long;
+"""
+        + text[text.index("  END_RULEBLOCK") :]
+    )
+    (found,) = infer(_system(text), {"dirt": 7.5, "load": 0.0}).outputs
+    assert found == pytest.approx(minutes)
+
+
 def test_a_file_in_the_manner_of_the_standard_is_read_over_several_lines() -> None:
     reading = _read(STANDARD)
     system = reading.model

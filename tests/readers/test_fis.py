@@ -231,6 +231,28 @@ def test_where_no_rule_fires_matlab_answers_the_middle_of_the_range(
     assert (remark in found.remarks) == (dialect == "matlab")
 
 
+@pytest.mark.parametrize(("dialect", "tip"), [("octave", 8.0), ("matlab", 7.4)])
+def test_octave_joins_the_rules_of_terms_with_one_number(
+    dialect: Dialect, tip: float
+) -> None:
+    text = SUGENO.replace("AggMethod='sum'", "AggMethod='max'")
+    for old, new in (
+        ("NumMFs=2\nMF1='small'", "NumMFs=3\nMF1='small'"),
+        ("'linear',[1 0.5 2]", "'constant',[5]\nMF3='big':'constant',[9]"),
+        ("NumRules=2", "NumRules=3"),
+        ("'trapmf',[-1 0 2 4]", "'trapmf',[-1 0 0 10]"),
+        ("'linsmf',[2 4]", "'linsmf',[0 10]"),
+        ("1 1, 1 (1)", "1 0, 1 (1) : 1\n1 0, 2 (1)"),
+        ("2 -1, 2 (0.5) : 2", "2 0, 3 (1) : 1"),
+    ):
+        text = text.replace(old, new)
+    found = reading(text.encode(), "tip.fis", dialect=dialect)
+    assert isinstance(found.model, FuzzySystem)
+    assert found.losses == ()
+    (number,) = infer(found.model, {"food": 7.5, "service": 0.0}).outputs
+    assert number == pytest.approx(tip)
+
+
 def test_samples_are_the_dialects() -> None:
     text = SUGENO.replace("sugeno", "mamdani").replace("wtaver", "centroid")
     text = text.replace("'constant',[5]", "'trimf',[0 5 9]").replace(
