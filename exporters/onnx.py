@@ -13,6 +13,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
+import msgspec
+
 from fuzzytree.contracts import Dtype, Format, Loss, Model, Written
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
 from fuzzytree.rulebase import fingerprint
@@ -327,7 +329,6 @@ def _facts(
     model: Model, dtype: Dtype, columns: Sequence[str], outputs: Sequence[Output]
 ) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists and records."""
-    semantics = model.semantics
     units = {v.name: v.unit for v in model.variables if not v.parts}
     kind = "descent" if isinstance(model, FuzzyTree) else model.kind or "rules"
     texts = {
@@ -346,11 +347,7 @@ def _facts(
         "classes": list(model.classes),
         "rules": _rule_count(model),
         "outputs": list(outputs),
-        "semantics": {
-            "conjunction": semantics.conjunction,
-            "uncovered": semantics.uncovered,
-            "missing": semantics.missing,
-        },
+        "semantics": msgspec.to_builtins(model.semantics),
     }
     facts = {
         key: json.dumps(value, ensure_ascii=False) for key, value in records.items()

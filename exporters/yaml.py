@@ -223,7 +223,7 @@ def _branch(branch: Branch) -> Short:
 
 
 def _semantics(semantics: Semantics) -> dict[str, Entry]:
-    return {
+    entries: dict[str, Entry] = {
         "and": semantics.conjunction,
         "or": "max",
         "not": "1 - degree",
@@ -232,6 +232,9 @@ def _semantics(semantics: Semantics) -> dict[str, Entry]:
             _answer(semantics.missing), "where a needed value is missing or infinite"
         ),
     }
+    if semantics.label_type:
+        entries["label type"] = Noted(semantics.label_type, "of predicted classes")
+    return entries
 
 
 def _answer(label: str | None) -> str:

@@ -111,6 +111,8 @@ def run(
 ) -> Answers | Outputs:
     """Answer the rows of a table: classes, or the numbers of a fuzzy system.
 
+    Classes are numbers, booleans or text, as the labels that the model was learnt from.
+
     Args:
         model: The model; see `Carried`.
         table: A path, a pandas, polars or arrow table, or an array of shape
@@ -268,6 +270,7 @@ def _answering_onnx(
             outcome.rule,
             outcome.status,
             strengths=outcome.strengths if with_strengths else None,
+            label_type=model.semantics.label_type,
         )
 
     return Answering(model.inputs, model.columns, answer)

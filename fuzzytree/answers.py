@@ -6,18 +6,28 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import msgspec
 import numpy as np
 
 from fuzzytree.reference import Status, axis_values, clause_degree, evaluate
-from fuzzytree.rulebase import RuleBase, Semantics, Shape, clause_text, shapes_of
+from fuzzytree.rulebase import (
+    Label,
+    LabelType,
+    RuleBase,
+    Semantics,
+    Shape,
+    clause_text,
+    label_of,
+    shapes_of,
+)
 
 if TYPE_CHECKING:
     from fuzzytree.contracts import FloatArray, IntArray, Outcome
 
 By = Literal["class", "rule"]
+T = TypeVar("T")
 
 
 class Answers(msgspec.Struct, frozen=True, eq=False):
@@ -31,6 +41,7 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         owners: The position in `choices` of each rule's class; empty if not known.
         strengths: Shape (rules, rows), NaN in rows with missing values; None if they
             were not asked for or if only one path of a tree was followed.
+        label_type: What the names of classes stand for, if not text.
     """
 
     choices: tuple[str, ...]
@@ -39,16 +50,29 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
     status: IntArray
     owners: tuple[int, ...] = ()
     strengths: FloatArray | None = None
+    label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
 
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(self.codes)
 
     @property
-    def classes(self) -> list[str | None]:
-        """The class of each row; None for no class."""
-        names = (*self.choices, None)  # position -1 is the last one
-        return [names[code] for code in self.codes.tolist()]
+    def classes(self) -> list[Label | None]:
+        """The class of each row; None for no class.
+
+        They are of the type of the labels that the model was learnt from: numbers,
+        booleans or text.
+        """
+        labels = [label_of(name, self.label_type) for name in self.choices]
+        return self._of_rows([*labels, None])
+
+    @property
+    def names(self) -> list[str | None]:
+        """The name of the class of each row, as files have it; None for no class."""
+        return self._of_rows([*self.choices, None])
+
+    def _of_rows(self, labels: list[T]) -> list[T]:
+        return [labels[code] for code in self.codes.tolist()]  # -1 is the last one
 
     @property
     def class_strengths(self) -> FloatArray | None:
@@ -96,7 +120,7 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
         """
         words = [status.name.lower() for status in Status]
         found: dict[str, Sequence[object]] = {
-            "class": [name or "" for name in self.classes],
+            "class": [name or "" for name in self.names],
             "rule": self.rule.tolist(),
             "status": [words[status] for status in self.status.tolist()],
         }
@@ -144,6 +168,7 @@ def joined(parts: Sequence[Answers]) -> Answers:
         np.concatenate([p.status for p in parts]),
         first.owners,
         np.hstack(strengths) if len(strengths) == len(parts) else None,
+        first.label_type,
     )
 
 
@@ -161,7 +186,7 @@ def answers_of(
         outcome: What a runtime found.
         choices: The classes.
         ends: The class of each rule or leaf.
-        semantics: The answers where no rule wins.
+        semantics: The answers where no rule wins, and the type of the labels.
         with_strengths: Whether to keep the strengths.
     """
     position = {name: k for k, name in enumerate(choices)}
@@ -174,7 +199,15 @@ def answers_of(
         code = -1 if answer is None else position[answer]
         codes[outcome.status == status] = code
     strengths = outcome.strengths if with_strengths else None
-    return Answers(choices, codes, outcome.rule, outcome.status, owners, strengths)
+    return Answers(
+        choices,
+        codes,
+        outcome.rule,
+        outcome.status,
+        owners,
+        strengths,
+        semantics.label_type,
+    )
 
 
 def reasons(rules: RuleBase, values: FloatArray, answers: Answers) -> list[str]:

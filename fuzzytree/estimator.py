@@ -13,8 +13,9 @@ from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import Learner, LearningReport, Settings
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import Status
+from fuzzytree.rulebase import label_type_of
 from fuzzytree.runtimes import find_runtime
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.tree import FuzzyTree, with_label_type
 
 try:
     from sklearn.base import BaseEstimator, ClassifierMixin
@@ -186,7 +187,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _learn(self, values: FloatArray, labels: LabelArray) -> Self:
         self._learner.partial_fit(values, np.searchsorted(self.classes_, labels))
         learnt = self._learner.finish()
-        self.tree_, self.report_ = learnt.tree, learnt.report
+        self.tree_ = with_label_type(learnt.tree, label_type_of(self.classes_.tolist()))
+        self.report_ = learnt.report
         self._run = _prepared(self.tree_)
         return self
 

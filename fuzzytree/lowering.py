@@ -14,6 +14,8 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Literal
 
+import msgspec
+
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
     Clause,
@@ -21,7 +23,6 @@ from fuzzytree.rulebase import (
     Kind,
     Rule,
     RuleBase,
-    Semantics,
     Term,
     Variable,
 )
@@ -93,11 +94,9 @@ def rules_from_tree(
                 )
             ]
         )
-    semantics = Semantics(
-        conjunction or tree.semantics.conjunction,
-        tree.semantics.uncovered,
-        tree.semantics.missing,
-    )
+    semantics = tree.semantics
+    if conjunction:
+        semantics = msgspec.structs.replace(semantics, conjunction=conjunction)
     return RuleBase(
         name=tree.name,
         classes=tree.classes,

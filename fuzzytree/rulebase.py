@@ -193,6 +193,12 @@ class Rule(Value, frozen=True):
 
 Conjunction = Literal["min", "product"]
 
+LabelType = Literal["number", "boolean"]
+"""What class names stand for where they are no text."""
+
+Label = str | float | bool
+"""The label of a class; a whole number is an `int`."""
+
 
 class Semantics(Value, frozen=True):
     """What the rules leave open and an answer depends on.
@@ -204,11 +210,14 @@ class Semantics(Value, frozen=True):
         uncovered: The answer where no rule fires; None answers "no class".
         missing: The answer where a needed value is missing or not finite, or a
             combination overflows; None answers "no class".
+        label_type: What the class names stand for, if not text: a number, such as
+            "1" or "0.5", or a boolean, "False" or "True". Predictions have these.
     """
 
     conjunction: Conjunction = "min"
     uncovered: str | None = None
     missing: str | None = None
+    label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
 
 
 Kind = Literal["relative", "raw"]
@@ -294,6 +303,52 @@ def fingerprint(value: msgspec.Struct) -> str:
     return hashlib.sha256(msgspec.json.encode(value)).hexdigest()
 
 
+def label_type_of(labels: Iterable[object]) -> LabelType | msgspec.UnsetType:
+    """Return the type of labels that are all numbers or all booleans.
+
+    Example:
+        >>> label_type_of([0, 1.5]), label_type_of([True]), label_type_of([True, 2])
+        ('number', 'boolean', UNSET)
+    """
+    found = [*labels]
+    if all(isinstance(label, bool) for label in found):
+        return "boolean"
+    if any(isinstance(label, bool) for label in found):
+        return msgspec.UNSET
+    is_number = all(isinstance(label, int | float) for label in found)
+    return "number" if is_number else msgspec.UNSET
+
+
+def label_of(name: str, label_type: LabelType | msgspec.UnsetType) -> Label:
+    """Return the label that a class name stands for.
+
+    Raises:
+        ValueError: If the name is not what Python writes for such a label.
+
+    Example:
+        >>> label_of("1", "number"), label_of("1", msgspec.UNSET)
+        (1, '1')
+    """
+    if label_type is msgspec.UNSET:
+        return name
+    if label_type == "boolean":
+        label: Label = name == "True"
+    else:
+        label = int(name) if name.lstrip("-").isdecimal() else float(name)
+    if str(label) != name:
+        raise ValueError(name)
+    return label
+
+
+def is_label(name: str, label_type: LabelType | msgspec.UnsetType) -> bool:
+    """Return whether a class name is what Python writes for a label of a type."""
+    try:
+        label_of(name, label_type)
+    except ValueError:
+        return False
+    return True
+
+
 def naming_mistakes(
     name: str, classes: tuple[str, ...], semantics: Semantics
 ) -> Iterator[Mistake]:
@@ -308,6 +363,9 @@ def naming_mistakes(
     for position, label in enumerate(classes):
         if not label:
             yield ("classes", position), "a class name cannot be empty"
+        elif not is_label(label, semantics.label_type):
+            text = f"the label type is {semantics.label_type}"
+            yield ("classes", position), f"{text}, and the class {label!r} is none"
     for field in ("uncovered", "missing"):
         answer: str | None = getattr(semantics, field)
         if answer is not None and answer not in classes:

@@ -27,6 +27,7 @@ import numpy.typing as npt
 from fuzzytree.csv_rows import BLOCK, Rows, blocks
 from fuzzytree.errors import TableError
 from fuzzytree.files import LIMIT, check_stream, reason
+from fuzzytree.rulebase import LabelType, is_label, label_type_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -99,6 +100,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
         unlabelled: How many rows were left out because they had no class.
         target: The column of the classes; empty if they came by themselves.
         remarks: Columns, and what they have and is left out.
+        label_type: What the names of classes stand for, if not text.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Table(msgspec.Struct, frozen=True, eq=False):
     unlabelled: int = 0
     target: str = ""
     remarks: tuple[tuple[str, str], ...] = ()
+    label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
 
 
 class Batch(msgspec.Struct, frozen=True, eq=False):
@@ -196,7 +199,11 @@ def read_table(
     remarks = [*((column, text) for column in left_out), *trimmed(first)]
     table = _labelled(first.name, columns, values, names)
     title = target if isinstance(target, str) else ""
-    return msgspec.structs.replace(table, target=title, remarks=tuple(remarks))
+    is_csv = not isinstance(classes[0], list | np.ndarray) and bool(title)
+    label_type = _label_type(classes, names, is_csv=is_csv)
+    return msgspec.structs.replace(
+        table, target=title, remarks=tuple(remarks), label_type=label_type
+    )
 
 
 def batches(
@@ -315,6 +322,26 @@ def _class_name(value: object, *, is_whole: bool) -> str | None:
         is_short = is_whole and math.isfinite(value)
         return str(int(value)) if is_short else repr(float(value))
     return str(value)
+
+
+def _label_type(
+    cells: Sequence[Cells], names: Sequence[str | None], *, is_csv: bool
+) -> LabelType | msgspec.UnsetType:
+    """Return what the names of classes stand for.
+
+    In a CSV file that are numbers or booleans where all names are written so.
+    """
+    known = {name for name in names if name is not None}
+    if is_csv:
+        kinds: tuple[LabelType, ...] = ("boolean", "number")
+        fitting = [kind for kind in kinds if all(is_label(k, kind) for k in known)]
+        return fitting[0] if fitting else msgspec.UNSET
+    values = itertools.chain.from_iterable(map(plain, cells))
+    return label_type_of(
+        value.item() if isinstance(value, np.generic) else value
+        for value in values
+        if not _is_missing(value)
+    )
 
 
 def _is_missing(value: object) -> bool:
@@ -437,7 +464,9 @@ def plain(cells: Cells) -> Sequence[object]:
         return [None if np.isnat(time) else str(time) for time in times]
     if isinstance(cells, np.ndarray):
         return cast("Sequence[object]", cells.tolist())
-    return cells if isinstance(cells, Sequence) else cells.to_pylist()
+    if hasattr(cells, "to_pylist"):
+        return cells.to_pylist()
+    return [*cells]  # a pandas or polars series is no Sequence
 
 
 def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:

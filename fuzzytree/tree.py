@@ -13,10 +13,13 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
+import msgspec
+
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.rulebase import (
     Band,
     Clause,
+    LabelType,
     Mistake,
     Path,
     Semantics,
@@ -143,6 +146,14 @@ class FuzzyTree(Value, frozen=True):
     def __str__(self) -> str:
         """Show the tree as an indented outline."""
         return "\n".join(outline(self))
+
+
+def with_label_type(
+    tree: FuzzyTree, label_type: LabelType | msgspec.UnsetType
+) -> FuzzyTree:
+    """Return a tree whose class names stand for labels of a type."""
+    semantics = msgspec.structs.replace(tree.semantics, label_type=label_type)
+    return msgspec.structs.replace(tree, semantics=semantics)
 
 
 def outline(tree: FuzzyTree) -> Iterator[str]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
+import msgspec
 import numpy as np
 
 from fuzzytree import lowering
@@ -43,7 +44,7 @@ from fuzzytree.runtimes.onnxruntime import OnnxModel
 from fuzzytree.suitability import remarks
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tables import Batch, Table, batches, class_names, read_table
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.tree import FuzzyTree, with_label_type
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -212,7 +213,7 @@ def learn_table(
         raise TableError(
             f"a unit for {absent[0]!r}, which is no column; it has {known}"
         )
-    return learn_arrays(
+    learnt = learn_arrays(
         table.values.T,
         table.codes,
         columns=table.columns,
@@ -222,6 +223,8 @@ def learn_table(
         settings=settings,
         progress=progress,
     )
+    tree = with_label_type(learnt.tree, table.label_type)
+    return msgspec.structs.replace(learnt, tree=tree)
 
 
 def _name_of(table: object) -> str:

@@ -149,6 +149,10 @@ def _answer_drafts(
             text += f", and was {answer_text(was)}"
             path = ("semantics", field)
             yield Draft("answer", text, shown, path, path)
+    if one.label_type != other.label_type:
+        text = f"the label type is {other.label_type or 'text'}"
+        text += f", and was {one.label_type or 'text'}"
+        yield Draft("class", text, "never", ("semantics",), ("semantics",))
     if one.conjunction != other.conjunction:
         text = f"the AND of rules is {other.conjunction}, and was {one.conjunction}"
         path = ("semantics", "conjunction")

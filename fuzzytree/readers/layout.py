@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Final, Literal
 import msgspec
 from msgspec import Meta, field
 
-from fuzzytree.rulebase import MOST_POINTS
+from fuzzytree.rulebase import MOST_POINTS, LabelType
 
 FORMAT: Final = "fuzzytree/1"
 LONGEST_NAME: Final = 1000
@@ -184,6 +184,7 @@ class RuleSemantics(Record, frozen=True, kw_only=True):
     not_: Literal["1 - degree"] = field(name="not")
     uncovered: Answer
     missing: Answer
+    label_type: LabelType | None = field(name="label type", default=None)
     answer: Literal["the class of the first of the strongest rules"]
 
 
@@ -194,6 +195,7 @@ class TreeSemantics(Record, frozen=True, kw_only=True):
     and_: Literal["min", "product"] = field(name="and")
     uncovered: Answer
     missing: Answer
+    label_type: LabelType | None = field(name="label type", default=None)
     cuts: Literal["a value equal to a cut lies below it"]
     answer: Literal["the class of the leaf that the nodes lead to"]
 

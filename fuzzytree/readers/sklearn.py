@@ -14,10 +14,20 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.rulebase import Band, Flank, Semantics, Term, Variable, name_choice
+from fuzzytree.rulebase import (
+    Band,
+    Flank,
+    LabelType,
+    Semantics,
+    Term,
+    Variable,
+    label_type_of,
+    name_choice,
+)
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, interval_names
 
 _BEYOND = 2.0**128  # where the floats of 32 bits would go on
@@ -82,7 +92,7 @@ def from_sklearn(
         variables=tuple(Variable(one, terms[one]) for one in inputs),
         nodes=tuple(_named(nodes)),
         leaves=leaves,
-        semantics=Semantics(missing=missing),
+        semantics=Semantics(missing=missing, label_type=named.label_type),
         columns=named.columns,
     )
 
@@ -137,6 +147,7 @@ class _Names(NamedTuple):
 
     columns: tuple[str, ...]
     classes: tuple[str, ...]
+    label_type: LabelType | msgspec.UnsetType
 
     @staticmethod
     def of(
@@ -148,14 +159,17 @@ class _Names(NamedTuple):
             columns = [str(one) for one in own]
         if columns is None:
             columns = [f"x{number}" for number in range(1, count + 1)]
-        found = [str(one) for one in grown.classes_.tolist()]
+        labels = grown.classes_.tolist()
+        found = [str(one) for one in labels]
         for what, given, needed in (
             ("columns", columns, count),
             ("classes", classes or found, len(found)),
         ):
             if len(given) != needed:
                 raise ValueError(f"{len(given)} names for {needed} {what}")
-        return _Names(tuple(columns), tuple(found if classes is None else classes))
+        if classes is not None:
+            return _Names(tuple(columns), tuple(classes), msgspec.UNSET)
+        return _Names(tuple(columns), tuple(found), label_type_of(labels))
 
 
 class _Arrays(NamedTuple):

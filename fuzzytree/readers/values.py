@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from fuzzytree.readers import layout
 from fuzzytree.rulebase import (
     LR,
@@ -65,7 +67,12 @@ def semantics(given: layout.RuleSemantics | layout.TreeSemantics | None) -> Sema
     """Return the semantics, the defaults if there are none."""
     if given is None:
         return Semantics()
-    return Semantics(given.and_, _answer(given.uncovered), _answer(given.missing))
+    return Semantics(
+        given.and_,
+        _answer(given.uncovered),
+        _answer(given.missing),
+        given.label_type or msgspec.UNSET,
+    )
 
 
 def _answer(text: str) -> str | None:

@@ -50,6 +50,7 @@ def compact(value: Any) -> str:
     if not names:
         return f"[{','.join(map(compact, value))}]"
     given: list[tuple[str, Any]] = [*zip(names, value, strict=True)]
+    given = [pair for pair in given if pair != ("label_type", None)]
     tag = _TAGS.get(type(value))
     if isinstance(value, Curve):
         tag, given = value.kind, [*value.facts]

@@ -92,6 +92,7 @@ class Semantics(NamedTuple):
     conjunction: Literal["min", "product"]
     uncovered: str | None
     missing: str | None
+    label_type: str | None = None  # number or boolean; None for text
 
 
 class Rules(NamedTuple):

@@ -89,9 +89,8 @@ def _tree_facts(found: Any) -> dict[str, Any]:
 
 
 def _head(top: dict[str, Any], fixed: dict[str, str], decides: str) -> dict[str, Any]:
-    meant = keys_of(
-        top["semantics"], f"and, uncovered, missing, answer, {', '.join(fixed)}"
-    )
+    needed = f"and, uncovered, missing, answer, {', '.join(fixed)}"
+    meant = keys_of(top["semantics"], needed, "label type")
     fixed["answer"] = f"the class of the {decides}"
     wrong = [key for key, text in fixed.items() if meant[key] != text]
     if wrong or top["format"] != "fuzzytree/1":
@@ -103,7 +102,7 @@ def _head(top: dict[str, Any], fixed: dict[str, str], decides: str) -> dict[str,
         if text != "no class" and not text.startswith("class "):
             raise CannotRunError(f"not an answer: {text!r:.60}")
         answers.append(None if text == "no class" else text.removeprefix("class "))
-    semantics = {"conjunction": meant["and"]}
+    semantics = {"conjunction": meant["and"], "label_type": meant.get("label type")}
     return {
         "name": top["name"],
         "classes": top["classes"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 
 import msgspec
+import numpy as np
 import pytest
 
 from fuzzytree.auditing.codes import CODES
@@ -28,12 +29,14 @@ from fuzzytree.rechecking.yaml import read_yaml
 from fuzzytree.rulebase import RuleBase, fingerprint
 from fuzzytree.testing import random_tree
 from fuzzytree.tree import FuzzyTree
+from fuzzytree.verbs import learn
 from tests.proving.bases import random_base
 from tests.rechecking.reading import models, read
 
 
 def test_its_reading_of_a_file_is_ours() -> None:
-    for model in [*models(0), random_tree(5, leaves=40)]:
+    numbers = learn(np.arange(8.0)[:, None], target=[0] * 4 + [1] * 4)
+    for model in [*models(0), random_tree(5, leaves=40), numbers]:
         found = read(model)
         assert compact(found) == msgspec.json.encode(model).decode()
         assert fingerprints.fingerprint(found) == fingerprint(model)
