@@ -464,9 +464,12 @@ def plain(cells: Cells) -> Sequence[object]:
         return [None if np.isnat(time) else str(time) for time in times]
     if isinstance(cells, np.ndarray):
         return cast("Sequence[object]", cells.tolist())
-    if hasattr(cells, "to_pylist"):
-        return cells.to_pylist()
-    return [*cells]  # a pandas or polars series is no Sequence
+    if isinstance(cells, Sequence):
+        return cells
+    found: list[object] = (  # a pandas or polars series is no Sequence either
+        cells.to_pylist() if hasattr(cells, "to_pylist") else [*cells]
+    )
+    return found
 
 
 def _numbers(cells: Cells) -> tuple[FloatArray, list[int]]:
