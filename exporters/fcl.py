@@ -19,6 +19,7 @@ from fuzzytree.casting import (
     facts_of,
     flattened,
     pointed,
+    refuse_singletons,
 )
 from fuzzytree.casting.scores import Always
 from fuzzytree.contracts import Format, Loss, Written
@@ -112,6 +113,7 @@ def write(
     else:
         if scores != "rule":
             raise ValueError("scores: are of rules; a system has outputs of its own")
+        refuse_singletons(model, "fcl")
         system = plain_linear(model) if dialect == "jfuzzylogic" else model
         system = with_conditions(system, words)
         if system != model:

@@ -23,6 +23,7 @@ from fuzzytree.casting import (
     joined_outputs,
     number_losses,
     pointed,
+    refuse_singletons,
 )
 from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
@@ -54,7 +55,6 @@ from fuzzytree.system import (
     FuzzySystem,
     Label,
     Linear,
-    RuleBlock,
     Singleton,
     SNorm,
     SystemInput,
@@ -117,6 +117,7 @@ def write(
         remarks += cast_remarks(model)
         comments.append(FACTS + facts_of(rules, always="term"))
     else:
+        refuse_singletons(model, "fis")
         system = model
     system, lost = flattened(system)
     losses += lost
@@ -316,7 +317,7 @@ def _block_losses(system: FuzzySystem, dialect: Dialect) -> Iterator[Loss]:
 
 def _methods(system: FuzzySystem, dialect: Dialect) -> dict[str, str]:
     """Return the methods of a file by their keys."""
-    block = system.blocks[0] if system.blocks else RuleBlock(())
+    block = system.blocks[0]
     output = system.outputs[0]
     is_weighted = output.defuzzifier.is_weighted
     aggregation = output.aggregation or ("sum" if is_weighted else "maximum")

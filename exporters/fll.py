@@ -23,6 +23,7 @@ from fuzzytree.casting import (
     facts_of,
     flattened,
     pointed,
+    refuse_singletons,
 )
 from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
@@ -44,17 +45,23 @@ from fuzzytree.rulebase import LR, Band, Points, RuleBase
 from fuzzytree.system import (
     FUNCTIONS,
     Activation,
+    Conclusion,
     Defuzzifier,
     FuzzySystem,
     Label,
     RuleBlock,
+    Singleton,
     SystemInput,
     SystemOutput,
+    SystemRule,
     Trapezoid,
 )
 
 _RESERVED: Final = (*RULE_WORDS, *FUNCTIONS, "fabs", "pow", "pi", "inf", "nan", "x")
-_NO_OUTPUT: Final = SystemOutput("y", (), None, None, Defuzzifier("weighted sum"))
+_ONE: Final = SystemOutput(
+    "y", (Label("one", Singleton(1.0)),), None, None, Defuzzifier("weighted sum")
+)
+_ALWAYS: Final = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
 _FINEST: Final = 1e-3
 _TITLE: Final = "Written by fuzzytree."
 
@@ -104,6 +111,7 @@ def write(
     else:
         if scores != "winner":
             raise ValueError("scores: are of rules; a system has outputs of its own")
+        refuse_singletons(model, "fll")
         system, lost = pointed(model, tolerance, allowed=KNOWN)
         losses += lost
         system, lost = _with_pointed_numbers(system, tolerance)
@@ -169,7 +177,7 @@ def _with_pointed_numbers(
         if shapes:
             carrier = (SystemInput("of it", shapes),)
             found, lost = pointed(
-                FuzzySystem(system.name, carrier, (_NO_OUTPUT,), ()), tolerance
+                FuzzySystem(system.name, carrier, (_ONE,), (_ALWAYS,)), tolerance
             )
             known = {one.name: one for one in found.inputs[0].labels}
             labels = tuple(known.get(one.name, one) for one in output.labels)

@@ -23,6 +23,7 @@ from fuzzytree.casting import (
     flattened,
     joined_outputs,
     pointed,
+    refuse_singletons,
 )
 from fuzzytree.casting.shapes import shape_of
 from fuzzytree.contracts import Format, Loss, Written
@@ -149,6 +150,8 @@ def _with_known_curves(
     has_heights = any(
         label.height != 1.0 for one in system.variables for label in one.labels
     )
+    if has_heights:
+        refuse_singletons(system, "fml with the heights of terms")
     is_one_sided = all(
         _shape(label.curve) is not None
         for one in system.variables
@@ -196,7 +199,10 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
             yield Loss(where, what)
         if how.is_weighted:
             continue
-        if (how.samples, how.grid) != (USUAL.samples, USUAL.grid):
+        has_grid = not all(
+            isinstance(label.curve, Singleton) for label in output.labels
+        )
+        if has_grid and (how.samples, how.grid) != (USUAL.samples, USUAL.grid):
             yield Loss(
                 where,
                 f"its curve is looked at in {how.samples} values ({how.grid}), and FML "
@@ -386,6 +392,8 @@ def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
             is_peak = b == c
             numbers = (a, b, d) if is_peak else (a, b, c, d)
             return "triangularShape" if is_peak else "trapezoidShape", numbers
+        case Singleton(value=value):
+            return "singletonShape", (value,)
         case Gaussian(mean=mean, deviation=deviation):
             return "gaussianShape", (mean, deviation)
         case TwoGaussians(left=c, left_deviation=s, right=right) if right >= FAR:

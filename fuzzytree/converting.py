@@ -24,6 +24,7 @@ from fuzzytree.contracts import (
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import all_formats, find_format
 from fuzzytree.files import read_bounded
+from fuzzytree.inference import unsampled_terms
 from fuzzytree.likeness import likeness
 from fuzzytree.losses import loss_text
 from fuzzytree.lowering import rules_from_tree
@@ -34,7 +35,7 @@ from fuzzytree.readers.skfuzzy import from_skfuzzy
 from fuzzytree.readers.sklearn import from_sklearn
 from fuzzytree.reference import evaluate
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase
-from fuzzytree.system import FuzzySystem
+from fuzzytree.system import FuzzySystem, sampled_values
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
@@ -160,7 +161,16 @@ def read_content(content: bytes, form: Format, *, name: str) -> Reading:
     if not content:
         raise ReadError(f"{name}:1:1: the file is empty")
     assert form.read is not None  # refused above; for type checkers
-    return form.read(content, name)
+    found = form.read(content, name)
+    if not isinstance(found.model, FuzzySystem):
+        return found
+    narrow = [
+        f"term {label.name!r} of {output.name!r} is 0 at all "
+        f"{len(sampled_values(output))} values at which the range is sampled: rules "
+        "that conclude it change nothing"
+        for output, label in unsampled_terms(found.model)
+    ]
+    return msgspec.structs.replace(found, remarks=(*found.remarks, *narrow))
 
 
 def load(

@@ -213,6 +213,11 @@ class _Maker:
             else self._curve(scale, nameable)
             for _ in range(count)
         ]
+        if not is_weighted:  # formats that sample ranges refuse singletons
+            curves = [
+                Gaussian(one.value, scale) if isinstance(one, Singleton) else one
+                for one in curves
+            ]
         norms: tuple[SNorm | None, ...] = get_args(SNorm)
         return SystemOutput(
             name,

@@ -250,6 +250,14 @@ def _mean_of_maximum() -> FuzzySystem:
     return _mamdani(Defuzzifier("mean of maximum"))
 
 
+def _singletons() -> FuzzySystem:
+    """Return a classifier as JFML writes them: terms without width, and a maximum."""
+    system = _mamdani(Defuzzifier("smallest of maximum", 1000))
+    labels = (Label("slow", Singleton(1.0)), Label("fast", Singleton(3.5)))
+    output = replace(system.outputs[0], labels=labels)
+    return replace(system, outputs=(output,))
+
+
 def _fine() -> FuzzySystem:
     return _mamdani(Defuzzifier("centroid", samples=777))
 
@@ -388,6 +396,7 @@ SAMPLES: Mapping[str, Callable[[], Document]] = MappingProxyType(
         "Tsukamoto": _monotone,
         "Mamdani, centroid": _mamdani,
         "Mamdani, mean of maximum": _mean_of_maximum,
+        "Mamdani, singletons": _singletons,
         "number of samples": _fine,
         "weights of rules": _weights,
         "hedges": _hedges,

@@ -18,7 +18,6 @@ from fuzzytree.inference import (
     hedged,
     infer,
     s_norm,
-    samples_of,
     t_norm,
     tree_sum,
     value_at,
@@ -68,6 +67,7 @@ from fuzzytree.system import (
     TNorm,
     Trapezoid,
     TwoGaussians,
+    sampled_values,
 )
 from fuzzytree.testing import random_rows, random_system
 
@@ -470,7 +470,7 @@ def mamdani(degrees: Sequence[float], method: DefuzzifierMethod, grid: Grid) -> 
     """Return the number of an output whose curve has these degrees at its samples."""
     how = Defuzzifier(method, len(degrees), grid)
     bare = SystemOutput("y", (), 0.0, 2.0, how, "maximum")
-    points = Points(tuple(samples_of(bare)), tuple(degrees))
+    points = Points(tuple(sampled_values(bare)), tuple(degrees))
     found = system(
         [rule(None)], [Label("one", points)], method,
         samples=len(degrees), grid=grid, aggregation="maximum",
@@ -768,7 +768,7 @@ def test_a_rule_that_was_not_chosen_concludes_nothing_under_a_hedge() -> None:
 def test_the_last_sample_is_the_end_of_the_range() -> None:
     for grid in ("ends", "half ends"):
         how = Defuzzifier("centroid", 12, grid)
-        found = samples_of(SystemOutput("y", (), 0.1, 0.9, how, "maximum"))
+        found = sampled_values(SystemOutput("y", (), 0.1, 0.9, how, "maximum"))
         assert len(found) == 12
         assert found[0] == 0.1
         assert found[-1] == 0.9

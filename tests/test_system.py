@@ -61,6 +61,12 @@ RULE = SystemRule(Is("a", "low"), (Conclusion("y", "one"),))
 WHOLE = FuzzySystem("whole", (INPUT,), (WEIGHTED,), (RuleBlock((RULE,)),))
 
 
+def concluding(label: str) -> tuple[RuleBlock, ...]:
+    """Return a block of one rule, which always fires."""
+    rule = SystemRule(None, (Conclusion("y", label),))
+    return (RuleBlock((rule,), implication="minimum"),)
+
+
 def mistakes(**changes: object) -> list[tuple[tuple[str | int, ...], str]]:
     """Return what is wrong with a system when parts of it are changed."""
     with pytest.raises(InvalidModelError) as caught:
@@ -218,7 +224,8 @@ def test_samples_have_limits() -> None:
         how = Defuzzifier("bisector", count)
         output = replace(CENTROID, defuzzifier=how)
         text = f"output 'y': {count} samples; there must be 2 to {MOST_SAMPLES}"
-        assert mistakes(outputs=(output,), blocks=()) == [(("outputs", 0), text)]
+        found = mistakes(outputs=(output,), blocks=concluding("low"))
+        assert found == [(("outputs", 0), text)]
     how = Defuzzifier("weighted sum", 0)
     output = replace(WEIGHTED, defuzzifier=how)
     assert mistakes(outputs=(output,)) == [(("outputs", 0), "output 'y': 0 samples")]
@@ -226,7 +233,7 @@ def test_samples_have_limits() -> None:
 
 def test_a_range_that_is_too_wide_to_be_looked_at_is_refused() -> None:
     output = replace(CENTROID, low=-1e308, high=1e308)
-    assert mistakes(outputs=(output,), blocks=()) == [
+    assert mistakes(outputs=(output,), blocks=concluding("low")) == [
         (("outputs", 0), "-1e+308 and 1e+308 are too far apart")
     ]
 
@@ -306,11 +313,12 @@ def test_a_formula_names_inputs_earlier_outputs_and_x() -> None:
         return replace(WEIGHTED, name=name, labels=(labelled(Formula(formula)),))
 
     fine = (output("y", Name("a")), output("z", Call("+", (Name("y"), Name("x")))))
-    assert replace(WHOLE, outputs=fine, blocks=()).outputs == fine
+    blocks = concluding("made")
+    assert replace(WHOLE, outputs=fine, blocks=blocks).outputs == fine
     found = mistakes(
         inputs=(replace(INPUT, labels=(labelled(Formula(Name("y"))),)),),
         outputs=(output("y", Name("y")), output("z", Name("yy"))),
-        blocks=(),
+        blocks=blocks,
     )
     assert [text for _, text in found] == [
         "term 'made' of 'a': no variable 'y'; there is a",
@@ -321,9 +329,9 @@ def test_a_formula_names_inputs_earlier_outputs_and_x() -> None:
 
 def test_x_is_either_a_variable_or_the_value_itself() -> None:
     named = replace(INPUT, name="x")
-    assert replace(WHOLE, inputs=(named,), blocks=()).columns == ("x",)
+    assert replace(WHOLE, inputs=(named,), blocks=concluding("one")).columns == ("x",)
     formula = replace(named, labels=(labelled(Formula(Name("x"))),))
-    assert mistakes(inputs=(formula,), blocks=()) == [
+    assert mistakes(inputs=(formula,), blocks=concluding("one")) == [
         (
             ("inputs", 0, "labels", 0),
             "term 'made' of 'x': 'x' is a variable, and in a formula it is the value "
@@ -336,10 +344,11 @@ def test_a_linear_term_is_a_weighted_number_with_a_weight_for_each_column() -> N
     mix = SystemInput("mix", parts=(Part("a", 2.0),))
     line = labelled(Linear((1.0,)))
     fine = replace(WEIGHTED, labels=(line,))
-    assert replace(WHOLE, inputs=(INPUT, mix), outputs=(fine,), blocks=())
+    blocks = concluding("made")
+    assert replace(WHOLE, inputs=(INPUT, mix), outputs=(fine,), blocks=blocks)
     two = replace(WEIGHTED, labels=(labelled(Linear((1.0, 2.0))),))
     curve = replace(CENTROID, name="z", labels=(line,))
-    found = mistakes(outputs=(two, curve), blocks=())
+    found = mistakes(outputs=(two, curve), blocks=blocks)
     assert [text for _, text in found] == [
         "term 'made' of 'y': it needs a weight for each column: 1, not 2",
         "term 'made' of 'z': only a weighted average or sum takes a linear term",

@@ -12,6 +12,7 @@ from fuzzytree.casting.scores import (
     cast_losses,
     cast_remarks,
     flattened,
+    refuse_singletons,
     winner,
 )
 
@@ -31,5 +32,6 @@ __all__ = [
     "joined_outputs",
     "number_losses",
     "pointed",
+    "refuse_singletons",
     "winner",
 ]

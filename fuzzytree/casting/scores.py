@@ -191,6 +191,22 @@ def cast_remarks(rules: RuleBase, scores: Scores = "rule") -> tuple[str, ...]:
     return tuple(found)
 
 
+def refuse_singletons(system: FuzzySystem, to: str) -> None:
+    """Refuse a system whose singletons a format that samples ranges would miss.
+
+    Raises:
+        LossError: If an output that is not weighted has a singleton.
+    """
+    for output in system.outputs:
+        for label in output.labels if not output.defuzzifier.is_weighted else ():
+            if isinstance(label.curve, Singleton):
+                raise LossError(
+                    f"cannot write {system.name[:100]} as {to}: its engines sample the "
+                    f"range of {output.name!r} and miss the singleton {label.name!r}; "
+                    "fml and yaml keep it"
+                )
+
+
 def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
     """Return a system whose combinations are inputs, and a loss for each of them.
 
@@ -200,9 +216,12 @@ def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
     Example:
         >>> from fuzzytree.rulebase import Part
         >>> mixed = SystemInput("mix", parts=(Part("a", 2.0, 0.5), Part("b", -1.0)))
-        >>> output = SystemOutput("y", (), 0.0, 1.0, Defuzzifier("weighted average"))
+        >>> labels = (Label("one", Singleton(1.0)),)
+        >>> how = Defuzzifier("weighted average")
+        >>> output = SystemOutput("y", labels, 0.0, 1.0, how)
+        >>> block = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
         >>> inputs = SystemInput("a"), SystemInput("b"), mixed
-        >>> flat, losses = flattened(FuzzySystem("s", inputs, (output,), ()))
+        >>> flat, losses = flattened(FuzzySystem("s", inputs, (output,), (block,)))
         >>> flat.columns
         ('mix',)
         >>> losses[0].what

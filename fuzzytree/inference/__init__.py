@@ -50,6 +50,7 @@ from fuzzytree.system import (
     SystemOutput,
     TNorm,
     is_drawn_by_lines,
+    sampled_values,
 )
 
 __all__ = [
@@ -59,9 +60,9 @@ __all__ = [
     "hedged",
     "infer",
     "s_norm",
-    "samples_of",
     "t_norm",
     "tree_sum",
+    "unsampled_terms",
     "value_at",
     "value_of",
 ]
@@ -282,7 +283,7 @@ class _Run:
             return self._weighted(output)
         if is_drawn_by_lines(output):
             return self._centroid_of_lines(output)
-        xs = samples_of(output)
+        xs = sampled_values(output)
         degrees = self._aggregated(output, xs)
         match output.defuzzifier.method:
             case "centroid":
@@ -319,7 +320,7 @@ class _Run:
         ]
         areas: list[float] = []
         moments: list[float] = []
-        for k, (left, right) in enumerate(itertools.pairwise(samples_of(output))):
+        for k, (left, right) in enumerate(itertools.pairwise(sampled_values(output))):
             shares = [
                 line.start[k] + (degree - line.level[k]) * line.slope[k]
                 for degree, line in cuts
@@ -403,25 +404,25 @@ def _chosen(how: Activation, found: Sequence[float]) -> list[float]:
     return [degree if index in ranked else 0.0 for index, degree in enumerate(found)]
 
 
-def samples_of(output: SystemOutput) -> list[float]:
-    """Return the values at which an output's curve is looked at.
+def unsampled_terms(system: FuzzySystem) -> Iterator[tuple[SystemOutput, Label]]:
+    """Yield the terms that rules conclude and whose degree is 0 at every sample.
 
-    `middle`: low + (k + 1/2) step with step = (high - low) / n. `ends` and `half ends`:
-    low + k step with step = (high - low) / (n - 1), and `high` itself as the last.
-
-    Example:
-        >>> from fuzzytree.system import Defuzzifier
-        >>> how = Defuzzifier("centroid", samples=4)
-        >>> samples_of(SystemOutput("o", (), 0.0, 2.0, how, "maximum"))
-        [0.25, 0.75, 1.25, 1.75]
+    A rule that concludes such a term changes no answer. Terms with a formula are left
+    out.
     """
-    low, high = output.low or 0.0, output.high or 0.0
-    count = output.defuzzifier.samples
-    if output.defuzzifier.grid == "middle":
-        step = (high - low) / count
-        return [low + (k + 0.5) * step for k in range(count)]
-    step = (high - low) / (count - 1)
-    return [*(low + k * step for k in range(count - 1)), high]
+    concluded = {(one.output, one.label) for rule in system.rules for one in rule.then}
+    for output in system.outputs:
+        if output.defuzzifier.is_weighted:
+            continue
+        samples = sampled_values(output)
+        for label in output.labels:
+            if (output.name, label.name) not in concluded:
+                continue
+            curve = label.curve
+            if not isinstance(curve, Formula) and not any(
+                curve_degree(curve, x) > 0.0 for x in samples
+            ):
+                yield output, label
 
 
 class Lines(msgspec.Struct, frozen=True):
@@ -451,7 +452,7 @@ class Lines(msgspec.Struct, frozen=True):
 def line_tables(output: SystemOutput, label: Label) -> Lines:
     """Return the lines of a label of an output whose grid is `lines`."""
     degrees = [
-        label.height * curve_degree(label.curve, x, {}) for x in samples_of(output)
+        label.height * curve_degree(label.curve, x, {}) for x in sampled_values(output)
     ]
     rows: list[tuple[float, float, float, float, float]] = []
     for left, right in itertools.pairwise(degrees):

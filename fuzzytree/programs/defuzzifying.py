@@ -9,11 +9,14 @@ from collections.abc import Iterable, Sequence
 from fuzzytree.inference import Lines
 from fuzzytree.programs.formulas import as_number
 from fuzzytree.programs.steps import Maker
-from fuzzytree.system import SystemOutput
+from fuzzytree.system import Singleton, SystemOutput, sampled_values
 
 
 def samples_of(make: Maker, output: SystemOutput) -> int:
-    """Return the values at which an output's range is looked at."""
+    """Return the values at which an output's curve is sampled."""
+    if any(isinstance(label.curve, Singleton) for label in output.labels):
+        values = sampled_values(output)
+        return make.table("pick", make.index(len(values)), values)
     low, high = output.low or 0.0, output.high or 0.0
     count = output.defuzzifier.samples
     index, start = make.index(count), make.constant(low)
@@ -25,17 +28,6 @@ def samples_of(make: Maker, output: SystemOutput) -> int:
     value = make("add", start, make("multiply", index, step))
     is_last = make("equal", index, make.constant(float(count - 1)))
     return make("where", is_last, make.constant(high), value)
-
-
-def sample_values(output: SystemOutput) -> list[float]:
-    """Return the same values as numbers."""
-    low, high = output.low or 0.0, output.high or 0.0
-    count = output.defuzzifier.samples
-    if output.defuzzifier.grid == "middle":
-        step = (high - low) / count
-        return [low + (k + 0.5) * step for k in range(count)]
-    step = (high - low) / (count - 1)
-    return [*(low + k * step for k in range(count - 1)), high]
 
 
 def defuzzified(make: Maker, output: SystemOutput, xs: int, degrees: int) -> int:
@@ -61,7 +53,7 @@ def centroid_of_lines(
     make: Maker, output: SystemOutput, cuts: Sequence[tuple[int, Lines]]
 ) -> int:
     """Return an output's centroid on the grid `lines`, of its labels' degrees."""
-    xs = sample_values(output)
+    xs = sampled_values(output)
     index = make.index(len(xs) - 1)
 
     def row(numbers: Iterable[float]) -> int:
@@ -142,11 +134,11 @@ def _end(
     """Return the first or the last of the chosen samples."""
     outside = make.constant(math.inf if is_first else -math.inf)
     find = "lowest" if is_first else "highest"
-    numbers = sample_values(output)
+    numbers = sampled_values(output)
     if all(one <= two for one, two in itertools.pairwise(numbers)):
         return make(find, make("where", chosen, xs, outside))
     # A range of a few neighbouring doubles: its samples need not rise.
-    index = make.index(output.defuzzifier.samples)
+    index = make.index(len(numbers))
     return make.table(
         "pick", make(find, make("where", chosen, index, outside)), numbers
     )

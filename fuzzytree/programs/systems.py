@@ -20,7 +20,6 @@ from fuzzytree.programs.curves import curve_degree, is_unit, value_at
 from fuzzytree.programs.defuzzifying import (
     centroid_of_lines,
     defuzzified,
-    sample_values,
     samples_of,
 )
 from fuzzytree.programs.formulas import as_number, is_nan, value_of
@@ -45,6 +44,7 @@ from fuzzytree.system import (
     SystemRule,
     TNorm,
     is_drawn_by_lines,
+    sampled_values,
 )
 
 
@@ -385,7 +385,8 @@ class _Run:
         make = self.make
         join = S_NORMS[output.aggregation or "maximum"]
         zero = make.constant(0.0)
-        is_finite = all(map(math.isfinite, sample_values(output)))
+        values = sampled_values(output)
+        is_finite = all(map(math.isfinite, values))
         total = zero
         for one in self._gathered(output):
             label = self.labels[output.name, one.label]
@@ -400,7 +401,7 @@ class _Run:
                 joined = make("where", make("less", zero, one.degree), joined, total)
             total = joined
         if not make.samples(total):  # curves that are the same everywhere
-            index = make.index(output.defuzzifier.samples)
+            index = make.index(len(values))
             total = make("add", total, make("multiply", zero, index))
         return total
 

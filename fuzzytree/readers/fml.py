@@ -284,9 +284,10 @@ def _output(
     if element.name == "fuzzyVariable":
         how = _defuzzifier(element, notes)
         aggregation = _word(element, "accumulation", words.SNORMS, "MAX", notes)
-        notes.remarks.append(
-            f"output {name!r}: FML says nothing of samples; read with {how.samples}"
-        )
+        if not all(isinstance(label.curve, Singleton) for label in labels):
+            notes.remarks.append(
+                f"output {name!r}: FML says nothing of samples; read with {how.samples}"
+            )
     elif element.attributes.get("combination", "WA") != "WA":
         notes.wrong(element, "the combination must be WA, the weighted average")
     return SystemOutput(

@@ -106,6 +106,8 @@ def curve_of(term: Element, where: str, notes: Notes) -> Curve | None:
         return None
     for text in curve_mistakes(curve):
         notes.wrong(shape, f"{where}: {text}")
+    if isinstance(curve, Trapezoid) and curve.a == curve.d:
+        return Singleton(curve.b)  # JFML samples the corners of each shape
     return curve
 
 

@@ -230,7 +230,7 @@ def _output_lines(one: SystemOutput, columns: Sequence[str]) -> Iterator[str]:
     how = one.defuzzifier
     facts: list[str] = [how.method]
     if not how.is_weighted:
-        facts = [f"{how.method} at {how.samples} values {_GRIDS[how.grid]}"]
+        facts = [f"{how.method} {_samples_text(one)}"]
     if one.aggregation:
         facts.append(f"joined by {one.aggregation}")
     default = "nan" if one.default is None else number(one.default)
@@ -238,6 +238,15 @@ def _output_lines(one: SystemOutput, columns: Sequence[str]) -> Iterator[str]:
     yield one.name + _span(one)
     yield f"  {'; '.join(facts)}"
     yield from _label_lines(one.labels, columns)
+
+
+def _samples_text(one: SystemOutput) -> str:
+    how = one.defuzzifier
+    single = sum(isinstance(label.curve, Singleton) for label in one.labels)
+    if single and single == len(one.labels):
+        return "of its singletons"
+    text = f"at {how.samples} values {_GRIDS[how.grid]}"
+    return f"{text} and at its singletons" if single else text
 
 
 def _span(one: SystemInput | SystemOutput) -> str:

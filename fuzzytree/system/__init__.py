@@ -135,6 +135,7 @@ __all__ = [
     "joints",
     "names_in",
     "questions",
+    "sampled_values",
 ]
 
 MOST_SAMPLES = 100_000
@@ -171,7 +172,8 @@ class Defuzzifier(Value, frozen=True):
     """How an output's activated conclusions become a number.
 
     `centroid`, `bisector`, `smallest of maximum`, `largest of maximum` and `mean of
-    maximum` look at the aggregated curve at `samples` values of the output's range.
+    maximum` look at the aggregated curve at `samples` values of the output's range, and
+    at the value of each singleton (`sampled_values`).
     `weighted average` and `weighted sum` weight each conclusion's number with its
     degree of activation: a singleton's, a linear one's or a formula's own; for a
     monotone curve the value whose degree is the activation's (after Tsukamoto, see
@@ -198,6 +200,40 @@ class Defuzzifier(Value, frozen=True):
     def is_weighted(self) -> bool:
         """Whether conclusions are weighted numbers, and no curve is looked at."""
         return self.method.startswith("weighted")
+
+
+def sampled_values(output: SystemOutput) -> list[float]:
+    """Return the values at which an output's curve is sampled.
+
+    `middle`: low + (k + 1/2) step with step = (high - low) / n. `ends` and `half ends`:
+    low + k step with step = (high - low) / (n - 1), and `high` itself as the last.
+
+    The value of a singleton is a sample as well; no other value could show it. Where
+    all terms are singletons, with two or more values, these are the only samples.
+
+    Example:
+        >>> how = Defuzzifier("centroid", samples=4)
+        >>> output = SystemOutput("o", (), 0.0, 2.0, how, "maximum")
+        >>> sampled_values(output)
+        [0.25, 0.75, 1.25, 1.75]
+        >>> from msgspec.structs import replace
+        >>> labels = (Label("a", Singleton(0.3)), Label("b", Singleton(1.7)))
+        >>> sampled_values(replace(output, labels=labels))
+        [0.3, 1.7]
+    """
+    curves = [label.curve for label in output.labels]
+    singles = {one.value for one in curves if isinstance(one, Singleton)}
+    if len(singles) > 1 and all(isinstance(one, Singleton) for one in curves):
+        return sorted(singles)
+    low, high = output.low or 0.0, output.high or 0.0
+    count = output.defuzzifier.samples
+    if output.defuzzifier.grid == "middle":
+        step = (high - low) / count
+        values = [low + (k + 0.5) * step for k in range(count)]
+    else:
+        step = (high - low) / (count - 1)
+        values = [*(low + k * step for k in range(count - 1)), high]
+    return sorted({*values, *singles}) if singles else values
 
 
 class SystemInput(Value, frozen=True):
@@ -303,6 +339,8 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     yield from name_mistakes(("name",), "name", [system.name])
     if not system.outputs:
         yield ("outputs",), "a system needs at least one output"
+    if not system.rules:
+        yield ("blocks",), "a system needs at least one rule"
     yield from _variable_name_mistakes(system)
     known: dict[str, bool] = {}
     nameable = dict.fromkeys(one.name for one in system.inputs)
@@ -322,6 +360,9 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
         nameable[output.name] = None
         yield from _defuzzifier_mistakes(path, output)
     yield from _rule_mistakes(system)
+    for position, output in enumerate(system.outputs):
+        if not any(_defuzzifier_mistakes((), output)):
+            yield from _width_mistakes(("outputs", position), output, system)
 
 
 def _variable_name_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
@@ -426,6 +467,46 @@ def _defuzzifier_mistakes(path: Path, output: SystemOutput) -> Iterator[Mistake]
             f"output {output.name!r}: {how.samples} samples; "
             f"there must be 2 to {MOST_SAMPLES}",
         )
+    for label in output.labels:
+        if isinstance(label.curve, Singleton) and (
+            how.method == "bisector" or how.grid in ("half ends", "lines")
+        ):
+            what = how.method if how.method == "bisector" else f"grid {how.grid}"
+            yield (
+                path,
+                (
+                    f"output {output.name!r}: the {what} measures an area, and the "
+                    f"singleton {label.name!r} has none"
+                ),
+            )
+            return
+
+
+def _width_mistakes(
+    path: Path, output: SystemOutput, system: FuzzySystem
+) -> Iterator[Mistake]:
+    """Yield the terms without width that rules conclude and that no sample shows."""
+    thin = {
+        label.name: (index, label.curve.b)
+        for index, label in enumerate(output.labels)
+        if isinstance(label.curve, Trapezoid)
+        and label.curve.a == label.curve.b == label.curve.d
+    }
+    if not thin or output.defuzzifier.is_weighted:
+        return
+    samples = sampled_values(output)
+    then = [one for rule in system.rules for one in rule.then]
+    concluded = {one.label for one in then if one.output == output.name}
+    for name, (index, value) in thin.items():
+        if name in concluded and value not in samples:
+            yield (
+                (*path, "labels", index),
+                (
+                    f"term {name!r} of {output.name!r} has no width, and none of the "
+                    f"{len(samples)} values at which the range is sampled is "
+                    f"{value!r}; rules that conclude it would change nothing"
+                ),
+            )
 
 
 def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:

@@ -36,7 +36,7 @@ from fuzzytree.rulebase import (
     Variable,
 )
 from fuzzytree.system import Conclusion, Is, Or, RuleBlock, SystemRule
-from tests.auditing.test_views import block_of, system_of
+from tests.auditing.test_views import A_LOW, block_of, system_of
 from tests.proving.bases import random_base
 
 LOW = Term("low", Points((0.0, 2.0, 4.0), (1.0, 1.0, 0.0)))
@@ -457,14 +457,14 @@ def test_the_conflicts_of_a_combination_are_points_of_the_inputs() -> None:
 def test_only_conclusions_about_one_output_conflict(
     conclusions: tuple[tuple[str, str], ...], count: int
 ) -> None:
-    (power,) = system_of(block_of()).outputs
+    (power,) = system_of(block_of(A_LOW)).outputs
     labels = (*power.labels, replace(power.labels[0], name="small"))
     outputs = tuple(replace(power, name=n, labels=labels) for n in ("power", "fan"))
     rules = tuple(
         SystemRule(Is(name, "high"), (Conclusion(output, label),))
         for name, (output, label) in zip("ab", conclusions, strict=True)
     )
-    empty = system_of(block_of())
+    empty = system_of(block_of(A_LOW))
     system = replace(empty, outputs=outputs, blocks=(RuleBlock(rules),))
     assert len(audit(system, select=["FT201"]).findings) == count
     alike = replace(rules[1], when=rules[0].when)

@@ -27,7 +27,7 @@ from fuzzytree.rulebase import (
     Variable,
 )
 from fuzzytree.rulebase import Side as Half
-from tests.auditing.test_views import block_of, system_of
+from tests.auditing.test_views import A_LOW, block_of, system_of
 
 LOW = Term("low", Points((0.0, 1.0, 2.0), (1.0, 1.0, 0.0)))
 HIGH = Term("high", Points((1.0, 2.0, 4.0), (0.0, 1.0, 1.0)))
@@ -245,7 +245,7 @@ def test_an_input_of_a_combination_that_is_asked_is_used() -> None:
 
 
 def test_a_system_is_read_itself_and_not_its_view() -> None:
-    system = system_of(block_of())
+    system = system_of(block_of(A_LOW))
     made = audit(system, select=["FT404"])
     told = [answer.sentence for answer in made.findings]
     assert all(text.startswith("no rule asks") for text in told)

@@ -106,7 +106,7 @@ def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
         SystemOutput(
             f"y{k}",
             tuple(
-                Label(f"t{n}", numbers[n] if is_weighted else random_curve(chance))
+                Label(f"t{n}", numbers[n] if is_weighted else _wide_curve(chance))
                 for n in range(3)
             ),
             -5.0,
@@ -126,6 +126,11 @@ def random_fis(seed: int, dialect: Dialect) -> FuzzySystem:
     implication = None if is_weighted else chance.choice(norms)
     block = RuleBlock(rules, chance.choice(norms), "maximum", implication)
     return FuzzySystem("s", inputs, outputs, (block,))
+
+
+def _wide_curve(chance: random.Random) -> Curve:
+    curve = random_curve(chance)
+    return Gaussian(curve.value, 1.0) if isinstance(curve, Singleton) else curve
 
 
 def _random_rule(
@@ -168,7 +173,9 @@ def test_any_asks_no_term_in_fuzzylite_which_would_not_load_the_rule() -> None:
     block = replace(system.blocks[0], rules=(SystemRule(question, then),))
     text = write(replace(system, blocks=(block,)), dialect="fuzzylite").content.decode()
     assert text.partition("[Rules]\n")[2].startswith("-0.99 0 0, 1 0 (1.0) : 1\n")
-    found = reading(text.replace("-0.99", "-2.99").encode(), "s.fis")
+    rule = "1 1 1, 1 1 (1.0) : 1\n"
+    text = text.replace("-0.99", "-2.99").replace("NumRules=1", "NumRules=2") + rule
+    found = reading(text.encode(), "s.fis")
     assert [(loss.where, loss.what) for loss in found.losses] == [
         (
             "rule 1",

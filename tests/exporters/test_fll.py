@@ -271,7 +271,9 @@ def test_what_is_lost_is_listed_and_refused() -> None:
 
 def test_words_are_reserved_in_small_letters_only() -> None:
     inputs = tuple(SystemInput(name) for name in ("X", "Min", "and", "très", "tres"))
-    system = replace(TANK, inputs=inputs, blocks=(), outputs=TANK.outputs[:1])
+    rule = SystemRule(None, (Conclusion("valve", "shut"),))
+    blocks = (replace(TANK.blocks[0], rules=(rule,)),)
+    system = replace(TANK, inputs=inputs, blocks=blocks, outputs=TANK.outputs[:1])
     lines = write(system).content.decode().splitlines()
     names = [line.split(": ")[1] for line in lines if line.startswith("InputV")]
     assert names == ["X", "Min", "and_", "tres_2", "tres"]

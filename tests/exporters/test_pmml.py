@@ -41,6 +41,7 @@ from fuzzytree.system import (
     Name,
     Number,
     RuleBlock,
+    Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
@@ -284,8 +285,10 @@ def test_a_system_may_have_any_names() -> None:
     how = Defuzzifier("weighted average")
     names = ("step 1", "step", "result", "number add", "a\x00")
     inputs = tuple(map(SystemInput, names))
-    output = SystemOutput("a_", (), None, None, how, default=4.0)
-    written = write(FuzzySystem("s", inputs, (output,), ()))
+    labels = (Label("four", Singleton(4.0)),)
+    output = SystemOutput("a_", labels, None, None, how)
+    rule = SystemRule(None, (Conclusion("a_", "four"),))
+    written = write(FuzzySystem("s", inputs, (output,), (RuleBlock((rule,)),)))
     assert written.remarks == (
         "variable 'a\\x00' is called 'a_ 2': XML has no such characters",
     )

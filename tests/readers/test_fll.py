@@ -86,6 +86,11 @@ RuleBlock: all
 """  # noqa: E501
 
 
+def with_rule(text: str, conclusion: str) -> str:
+    """Return a file with a block of one rule, `any` of input a."""
+    return f"{text}\nRuleBlock: r\n  rule: if a is any then {conclusion}"
+
+
 def system_of(text: str) -> FuzzySystem:
     model = read(text.encode(), "tipper.fll").model
     assert isinstance(model, FuzzySystem)
@@ -219,12 +224,14 @@ def test_every_class_of_terms_has_its_curve(text: str, curve: Curve) -> None:
 
 def term_of(text: str, head: str = "") -> Label:
     file = f"InputVariable: a\n term: t {text}\nOutputVariable: b\n {head}\n"
-    return system_of(f"{file}defuzzifier: WeightedSum").inputs[0].labels[0]
+    file += "defuzzifier: WeightedSum\n term: one Constant 1"
+    return system_of(with_rule(file, "b is one")).inputs[0].labels[0]
 
 
 def output_of(term: str, defuzzifier: str) -> Label:
     lines = ["InputVariable: a", "OutputVariable: b", f"defuzzifier: {defuzzifier}"]
-    return system_of("\n".join([*lines, f"term: t {term}"])).outputs[0].labels[0]
+    text = "\n".join([*lines, f"term: t {term}"])
+    return system_of(with_rule(text, "b is t")).outputs[0].labels[0]
 
 
 MONOTONE = [
@@ -277,8 +284,9 @@ def test_only_monotone_terms_are_asked_where_they_have_a_degree() -> None:
 
 
 def test_mixing_numbers_and_monotone_terms_is_a_loss() -> None:
-    lines = ["OutputVariable: b", "defuzzifier: WeightedAverage", "term: t Ramp 0 1"]
-    reading = read("\n".join([*lines, "term: u Constant 1"]).encode(), "x.fll")
+    lines = ["InputVariable: a", "OutputVariable: b", "defuzzifier: WeightedAverage"]
+    text = "\n".join([*lines, "term: t Ramp 0 1", "term: u Constant 1"])
+    reading = read(with_rule(text, "b is t").encode(), "x.fll")
     assert [loss.where for loss in reading.losses] == ["output 'b'"]
 
 
@@ -432,16 +440,19 @@ def test_what_is_disabled_says_nothing_and_this_is_told() -> None:
 
 
 def test_an_answer_that_is_remembered_is_a_loss() -> None:
-    text = "OutputVariable: y\n defuzzifier: WeightedSum\n lock-previous: true"
-    assert [one.where for one in read(text.encode(), "l.fll").losses] == ["output 'y'"]
+    lines = ["InputVariable: a", "OutputVariable: y", "defuzzifier: WeightedSum"]
+    text = "\n".join([*lines, "term: t Constant 1", "lock-previous: true"])
+    found = read(with_rule(text, "y is t").encode(), "l.fll")
+    assert [one.where for one in found.losses] == ["output 'y'"]
 
 
 def test_of_two_terms_with_one_name_the_second_counts_and_the_first_is_a_loss() -> None:
-    lines = ["OutputVariable: y", "defuzzifier: WeightedSum", "term: t Constant 1"]
-    reading = read("\n".join([*lines, "term: t Constant 2"]).encode(), "t.fll")
+    lines = ["InputVariable: a", "OutputVariable: y", "defuzzifier: WeightedSum"]
+    text = "\n".join([*lines, "term: t Constant 1", "term: t Constant 2"])
+    reading = read(with_rule(text, "y is t").encode(), "t.fll")
     assert isinstance(reading.model, FuzzySystem)
     assert reading.model.outputs[0].labels == (Label("t", Singleton(2.0)),)
-    assert [one.where for one in reading.losses] == ["line 3"]
+    assert [one.where for one in reading.losses] == ["line 4"]
 
 
 @pytest.mark.parametrize(

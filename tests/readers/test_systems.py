@@ -16,6 +16,7 @@ from fuzzytree.readers.yaml import read
 from fuzzytree.system import (
     MOST_LEVELS,
     Call,
+    Conclusion,
     Expression,
     Formula,
     FuzzySystem,
@@ -28,6 +29,7 @@ from fuzzytree.system import (
     RuleBlock,
     SystemInput,
     SystemOutput,
+    SystemRule,
 )
 from fuzzytree.testing import random_rows, random_system
 
@@ -152,8 +154,9 @@ def test_a_system_that_yaml_cannot_hold_is_not_written() -> None:
     for _ in range(MOST_LEVELS - 1):
         deep = Call("+", (Number(1.0), deep))
     first = replace(whole.inputs[0], labels=(Label("deep", Formula(deep)),))
+    rule = SystemRule(None, (Conclusion("y1", whole.outputs[0].labels[0].name),))
     text = refusal(
-        replace(whole, inputs=(first, *whole.inputs[1:]), blocks=(RuleBlock(()),))
+        replace(whole, inputs=(first, *whole.inputs[1:]), blocks=(RuleBlock((rule,)),))
     )
     assert text == (
         "cannot write random 8 as yaml: term 'deep' of 'x1': its formula is too long "

@@ -20,7 +20,6 @@ from fuzzytree.inference import (
     hedged,
     infer,
     s_norm,
-    samples_of,
     t_norm,
     value_at,
     value_of,
@@ -61,6 +60,7 @@ from fuzzytree.system import (
     TNorm,
     Trapezoid,
     TwoGaussians,
+    sampled_values,
 )
 from fuzzytree.testing import random_rows, random_system
 from tests.witnesses import pyfuzzylite_engine as witness
@@ -245,7 +245,7 @@ def polyline(
 
     how = Defuzzifier(method, len(degrees))
     bare = SystemOutput("y", (), -1.5, 2.0, how, "maximum")
-    label = Label("given", Points(tuple(samples_of(bare)), degrees))
+    label = Label("given", Points(tuple(sampled_values(bare)), degrees))
     output = SystemOutput("y", (label,), -1.5, 2.0, how, "maximum")
     rule = SystemRule(None, (Conclusion("y", "given"),))
     system = FuzzySystem(
