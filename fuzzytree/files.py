@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
+import shlex
 import stat
+import sys
 from collections.abc import Generator, Iterable
 from pathlib import Path
 from typing import BinaryIO
@@ -14,6 +17,8 @@ from fuzzytree.errors import ReadError, WriteError
 
 LIMIT = 256 * 2**20
 """The most bytes that a model file may have, unless told otherwise."""
+
+_PART = re.compile(r"[0-9a-f]{16}\.part")
 
 PathLike = str | os.PathLike[str]
 
@@ -82,8 +87,7 @@ def check_place(path: PathLike) -> None:
     name, target = os.fspath(path), Path(path)
     if target.is_dir():
         raise WriteError(f"{name}: cannot be written: it is a folder")
-    if not target.parent.is_dir():
-        raise WriteError(f"{name}: cannot be written: no such file or directory")
+    _check_folder(path)
     needed = [target] if target.exists() else []
     if target.is_file() or not needed:  # a new file takes the old one's place
         needed.append(target.parent)
@@ -126,7 +130,9 @@ def open_atomically(path: PathLike, *, replace: bool = True) -> Generator[Binary
         # Of the path itself: /dev/stdout leads to a pipe that has no name.
         mode = _mode(Path(path))
         target = Path(os.path.realpath(path))
-        if mode is not None and not replace:
+        if mode is None:
+            _check_folder(path)
+        elif not replace:
             raise FileExistsError
         if mode is None or stat.S_ISREG(mode):
             with _appearing(target, mode, replace=replace) as file:
@@ -148,11 +154,10 @@ def open_atomically(path: PathLike, *, replace: bool = True) -> Generator[Binary
 def _appearing(target: Path, mode: int | None, *, replace: bool) -> Generator[BinaryIO]:
     if mode is not None and not os.access(target, os.W_OK):
         raise PermissionError(None, "it is write-protected")
-    temporary = target.with_name(f".{target.name[:80]}.{secrets.token_hex(8)}.part")
-    # Created with 0o666, so that the kernel applies the user's mask.
-    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    _remove_leftovers(target)
+    temporary, file = _new_part(target)
     try:
-        with os.fdopen(handle, "wb") as file:
+        with file:
             if mode is not None:
                 temporary.chmod(stat.S_IMODE(mode))
             yield file
@@ -165,6 +170,60 @@ def _appearing(target: Path, mode: int | None, *, replace: bool) -> Generator[Bi
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+def _new_part(target: Path) -> tuple[Path, BinaryIO]:
+    """Open a new file beside the target, locked for as long as it is open."""
+    while True:
+        temporary = target.with_name(
+            f"{_part_prefix(target)}{secrets.token_hex(8)}.part"
+        )
+        # Created with 0o666, so that the kernel applies the user's mask.
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        with contextlib.suppress(OSError):  # a file system without locks
+            _lock(handle)
+        if os.fstat(handle).st_nlink or os.name == "nt":
+            return temporary, os.fdopen(handle, "wb")
+        os.close(handle)  # another process took it for a leftover before the lock
+
+
+def _remove_leftovers(target: Path) -> None:
+    """Remove what processes that were killed have left of the same file."""
+    with contextlib.suppress(OSError):
+        for path in target.parent.iterdir():
+            prefix, end = path.name[:-21], path.name[-21:]
+            if prefix != _part_prefix(target) or not _PART.fullmatch(end):
+                continue
+            with contextlib.suppress(OSError), path.open("r+b") as file:
+                _lock(file.fileno(), waits=False)
+                path.unlink()
+
+
+def _part_prefix(target: Path) -> str:
+    return f".{target.name[:80]}."
+
+
+def _lock(handle: int, *, waits: bool = True) -> None:
+    """Lock an open file against other processes, until it is closed.
+
+    Raises:
+        OSError: If it cannot be locked, or another process has locked it.
+    """
+    if sys.platform != "win32":  # where an open file cannot be removed
+        import fcntl
+
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
+
+
+def _check_folder(path: PathLike) -> None:
+    folder = Path(path).parent
+    if folder.is_dir():
+        folder = Path(os.path.realpath(path)).parent  # where a link leads
+    if not folder.is_dir():
+        raise WriteError(
+            f"{os.fspath(path)}: cannot be written: there is no folder "
+            f"{os.fspath(folder)!r}; mkdir -p {shlex.quote(os.fspath(folder))} makes it"
+        )
 
 
 def _name_anew(temporary: Path, target: Path) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -149,25 +151,10 @@ def test_a_folder_is_no_place_to_write_to(tmp_path: Path) -> None:
     assert str(caught.value) == f"{tmp_path}: cannot be written: it is a folder"
 
 
-def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
-    path = tmp_path / "absent" / "grip.yaml"
+def test_a_folder_is_refused_beforehand(tmp_path: Path) -> None:
     with pytest.raises(WriteError) as caught:
-        write_atomically(path, b"new")
-    assert str(caught.value) == f"{path}: cannot be written: no such file or directory"
-
-
-@pytest.mark.parametrize(
-    ("name", "why"),
-    [("folder", "it is a folder"), ("absent/x.yaml", "no such file or directory")],
-)
-def test_an_impossible_place_is_refused_beforehand(
-    tmp_path: Path, name: str, why: str
-) -> None:
-    (tmp_path / "folder").mkdir()
-    path = tmp_path / name
-    with pytest.raises(WriteError) as caught:
-        check_place(path)
-    assert str(caught.value) == f"{path}: cannot be written: {why}"
+        check_place(tmp_path)
+    assert str(caught.value) == f"{tmp_path}: cannot be written: it is a folder"
     check_place(tmp_path / "possible.yaml")
 
 
@@ -270,3 +257,53 @@ def _interrupted(path: Path) -> None:
 
 def _names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
+
+
+def test_what_a_killed_writer_left_is_removed_by_the_next_one(tmp_path: Path) -> None:
+    path = tmp_path / "grip.yaml"
+    code = (
+        "import os, signal\n"
+        "from fuzzytree.files import open_atomically\n"
+        f"with open_atomically({os.fspath(path)!r}) as file:\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    for _ in range(2):
+        subprocess.run([sys.executable, "-c", code], check=False)
+        assert [name[-5:] for name in _names(tmp_path)] == [".part"]
+    other = tmp_path / ".notes.yaml.0123456789abcdef.part"
+    other.touch()
+    write_atomically(path, b"new")
+    assert _names(tmp_path) == [other.name, "grip.yaml"]
+
+
+def test_two_writers_of_one_file_do_not_disturb_each_other(tmp_path: Path) -> None:
+    path = tmp_path / "grip.yaml"
+    with open_atomically(path) as file:
+        file.write(b"slow")
+        write_atomically(path, b"quick")
+        assert path.read_bytes() == b"quick"
+    assert path.read_bytes() == b"slow"
+    assert _names(tmp_path) == ["grip.yaml"]
+
+
+def test_a_missing_folder_is_named_with_what_makes_it(tmp_path: Path) -> None:
+    path = tmp_path / "new folder" / "grip.yaml"
+    text = (
+        f"{path}: cannot be written: there is no folder '{path.parent}'; "
+        f"mkdir -p '{path.parent}' makes it"
+    )
+    with pytest.raises(WriteError) as caught:
+        check_place(path)
+    assert str(caught.value) == text
+    with pytest.raises(WriteError) as caught:
+        write_atomically(path, b"new")
+    assert str(caught.value) == text
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no such device")
+def test_a_device_is_not_read() -> None:
+    with pytest.raises(ReadError) as caught:
+        read_bounded("/dev/zero")
+    assert str(caught.value) == (
+        "/dev/zero: cannot be read: it is neither a file nor a pipe"
+    )

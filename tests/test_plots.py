@@ -315,7 +315,7 @@ def test_another_suffix_is_refused(tmp_path: Path) -> None:
 
 def test_a_place_that_is_none_is_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "nowhere" / "study.svg"
-    with pytest.raises(WriteError, match="no such file or directory"):
+    with pytest.raises(WriteError, match="there is no folder"):
         plots.save(picture(), path)
 
 

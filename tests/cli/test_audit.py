@@ -294,7 +294,10 @@ HELP = "\n  fuzzytree audit --help tells more\n"
         ),
         (
             ("--page", "none/x.html"),
-            "none/x.html: cannot be written: no such file or directory\n",
+            (
+                "none/x.html: cannot be written: "
+                "there is no folder 'none'; mkdir -p none makes it\n"
+            ),
         ),
     ],
     ids=lambda found: " ".join(found) if isinstance(found, tuple) else "",

@@ -236,7 +236,10 @@ def test_a_place_that_cannot_be_written_is_told_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(verbs, "bench", None)
-    message = "no/such.json: cannot be written: no such file or directory\n"
+    message = (
+        "no/such.json: cannot be written: "
+        "there is no folder 'no'; mkdir -p no makes it\n"
+    )
     assert call("bench", "grip.yaml", "-o", "no/such.json") == (2, "", message)
     code, _, err = call("bench", "grip.yaml", "--plot", "no/such.svg")
     assert (code, err) == (2, message.replace("json", "svg"))

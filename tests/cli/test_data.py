@@ -50,5 +50,8 @@ def test_needs_refuses_a_place_without_a_folder_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("fuzzytree.savings.report", None)
-    message = "no/left.yaml: cannot be written: no such file or directory\n"
+    message = (
+        "no/left.yaml: cannot be written: "
+        "there is no folder 'no'; mkdir -p no makes it\n"
+    )
     assert call("needs", "grip.yaml", "-o", "no/left.yaml") == (2, "", message)

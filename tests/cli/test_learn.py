@@ -267,7 +267,10 @@ def test_classes_that_look_like_words_or_numbers_are_answered_as_they_are(
 
 def test_a_place_that_cannot_be_written_is_refused_before_learning(call: Call) -> None:
     words = ("learn", "few.csv", "--target", "grip", "-o", "absent/few.yaml")
-    message = "absent/few.yaml: cannot be written: no such file or directory\n"
+    message = (
+        "absent/few.yaml: cannot be written: "
+        "there is no folder 'absent'; mkdir -p absent makes it\n"
+    )
     assert call(*words) == (2, "", message)
 
 

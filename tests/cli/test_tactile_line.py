@@ -316,7 +316,10 @@ def test_the_board_of_a_recording_becomes_its_file(call: Call, place: Path) -> N
         (("none",), "none: cannot be read: no such file or directory"),
         (
             ("a.ftr", "-o", "no/a.csv"),
-            "no/a.csv: cannot be written: no such file or directory",
+            (
+                "no/a.csv: cannot be written: "
+                "there is no folder 'no'; mkdir -p no makes it"
+            ),
         ),
     ],
 )

@@ -289,7 +289,7 @@ def test_a_file_that_would_not_be_read_again_is_refused(
     with pytest.raises(LossError) as caught:
         write(random_tree(1))
     assert str(caught.value) == (
-        "cannot write random 7 as yaml: a file of more than 500 bytes or 4,000,000 "
+        "cannot write random 7 as yaml: a file of more than 500 bytes or 1,000,000 "
         "entries is not read again"
     )
 
