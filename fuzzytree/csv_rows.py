@@ -202,7 +202,7 @@ def blocks(
     rest, line = head, 1
     while True:
         size = _whole(Rows(name, rest, line, mark))
-        if rest[:size].strip(b"\r\n"):
+        if size and not _is_blank(rest[:size]):
             yield Rows(name, rest[:size], line, mark)
         if size:
             line += count_breaks(rest[:size])
@@ -214,10 +214,15 @@ def blocks(
         if not more:
             break
         rest += more
-    if rest.strip(b"\r\n"):
+    if rest and not _is_blank(rest):
         last = Rows(name, rest, line, mark)
         last.refuse_open_quote()
         yield last
+
+
+def _is_blank(text: bytes) -> bool:
+    """Return whether all lines are empty; one of blanks is a row."""
+    return text.isspace() and not text.strip(b"\r\n")
 
 
 def _whole(rows: Rows) -> int:

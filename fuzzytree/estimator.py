@@ -15,6 +15,7 @@ from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import label_type_of
 from fuzzytree.runtimes import find_runtime
+from fuzzytree.tables import numbers_only
 from fuzzytree.tree import FuzzyTree, with_label_type
 
 try:
@@ -34,8 +35,20 @@ Mode = Literal["default", "paper"]
 PatternsPerClass = int | Literal["auto"] | Mapping[str, int] | None
 Choice = Literal["alpha", "l_max", "shrinkage", "entry"]
 
-_validated: Callable[..., Any] = validate_data
-"""scikit-learn's check of X and y; what it takes and returns has no types there."""
+
+def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
+    """Return what scikit-learn's check makes of X and y, where masked is missing."""
+    if isinstance(X, np.ndarray):
+        X = numbers_only(X, "X")
+    elif hasattr(X, "__array__"):
+        numbers_only(np.asarray(X), "X")  # a frame of times would become numbers
+    return validate_data(estimator, X, *map(_unmasked_labels, y), **options)
+
+
+def _unmasked_labels(y: Any) -> Any:
+    if np.ma.is_masked(y):
+        raise ValueError("y holds masked labels")
+    return y
 
 
 class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # both are untyped

@@ -33,6 +33,16 @@ _SPELT = {
 }
 
 
+def as_names(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names as a tuple; a text is one name, and no sequence of letters.
+
+    Example:
+        >>> as_names("slip"), as_names(["force", "slip"])
+        (('slip',), ('force', 'slip'))
+    """
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
 def printable(text: str) -> str:
     r"""Return a text for a terminal; what that might obey is written as an escape.
 

@@ -27,6 +27,7 @@ import numpy.typing as npt
 from fuzzytree.csv_rows import BLOCK, Rows, blocks
 from fuzzytree.errors import TableError
 from fuzzytree.files import LIMIT, check_stream, reason
+from fuzzytree.naming import as_names
 from fuzzytree.rulebase import LabelType, is_label, label_type_of
 
 if TYPE_CHECKING:
@@ -167,7 +168,7 @@ def read_table(
     found = pieces(source, columns=columns, delimiter=delimiter, name=name)
     first = next(found)
     target = target.strip() if isinstance(target, str) else target
-    chosen = _learnt_columns(first, target, [c.strip() for c in names_of(ignore)])
+    chosen = _learnt_columns(first, target, [c.strip() for c in as_names(ignore)])
     numbers = _Numbers(first.name, [first.columns[k] for k in chosen])
     classes: list[Cells] = [] if isinstance(target, str) else [target]
     for piece in itertools.chain([first], found):
@@ -286,15 +287,31 @@ def pieces(
             return _stream_pieces(source, name or "the table", delimiter, only)
         case np.ndarray():
             array = cast("npt.NDArray[np.generic]", source)
-            names = None if columns is None else names_of(columns)
+            names = None if columns is None else as_names(columns)
             return iter([_array_piece(array, names, name or "the array")])
         case _:
             return iter([_frame_piece(source, name or "the table", only=only)])
 
 
-def names_of(given: str | Sequence[str]) -> tuple[str, ...]:
-    """Return names as a tuple; a text is one name, and no sequence of letters."""
-    return (given,) if isinstance(given, str) else tuple(given)
+def numbers_only(array: npt.NDArray[np.generic], name: str) -> npt.NDArray[np.generic]:
+    """Return an array of numbers, NaN where it is masked.
+
+    Raises:
+        TableError: If it holds times, complex numbers or bytes.
+    """
+    if array.dtype.kind in _NO_NUMBER:
+        raise TableError(f"{name} holds {array.dtype}, and no numbers")
+    return unmasked(array)
+
+
+def unmasked(array: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+    """Return an array whose masked cells are missing: NaN, or None in objects."""
+    if not np.ma.isMaskedArray(array) or array.dtype.kind in _NO_NUMBER:
+        return array
+    is_real = array.dtype.kind in _REAL
+    filled = np.ma.getdata(array).astype(np.float64 if is_real else object)
+    filled[np.ma.getmaskarray(array)] = math.nan if is_real else None
+    return filled
 
 
 def class_names(cells: Sequence[Cells]) -> list[str | None]:
@@ -399,10 +416,8 @@ class _Numbers:
         values = np.empty((len(chosen), piece.rows))
         for row, index in enumerate(chosen):
             cells, name = piece.cells[index], self.names[row]
-            if isinstance(cells, np.ndarray) and cells.dtype.kind in _NO_NUMBER:
-                raise TableError(
-                    f"{self.name}: column {name!r} holds {cells.dtype}, and no numbers"
-                )
+            if isinstance(cells, np.ndarray):
+                cells = numbers_only(cells, f"{self.name}: column {name!r}")
             values[row], bad = _numbers(cells)
             if bad and name not in self.faults:
                 self.faults[name] = (piece.where(bad[0]), str(cells[bad[0]]), 0)
@@ -794,7 +809,7 @@ def _array_piece(
     if array.dtype.names is not None:
         written = array.dtype.names
         fields = cast("npt.NDArray[np.void]", array)
-        cells = tuple(_unmasked(fields[column]) for column in written)
+        cells = tuple(unmasked(fields[column]) for column in written)
         return Piece(name, _named(name, written), cells, count, where, written)
     if array.ndim != 2:
         raise TableError(f"{name} has shape {array.shape}, not (rows, columns)")
@@ -802,7 +817,7 @@ def _array_piece(
     if columns is not None and len(columns) != width:
         raise TableError(f"{name} has {width} columns and {len(columns)} names")
     written = tuple(columns or (f"x{number}" for number in range(1, width + 1)))
-    array = _unmasked(array)
+    array = unmasked(array)
     cells = tuple(array[:, k] for k in range(width))
     is_named = columns is not None
     whole = (
@@ -810,16 +825,6 @@ def _array_piece(
     )
     named = _named(name, written)
     return Piece(name, named, cells, count, where, written, is_named, whole)
-
-
-def _unmasked(array: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
-    """Return an array whose masked cells are missing."""
-    if not np.ma.isMaskedArray(array) or array.dtype.kind in _NO_NUMBER:
-        return array
-    is_real = array.dtype.kind in _REAL
-    filled = np.ma.getdata(array).astype(np.float64 if is_real else object)
-    filled[np.ma.getmaskarray(array)] = math.nan if is_real else None
-    return filled
 
 
 def _frame_piece(

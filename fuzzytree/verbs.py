@@ -37,6 +37,7 @@ from fuzzytree.converting import (
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import read_bounded, reason, write_atomically
+from fuzzytree.naming import as_names
 from fuzzytree.options import Option
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase, name_choice
 from fuzzytree.runtimes import chosen_runtimes
@@ -389,6 +390,7 @@ def check(
         True
     """
     first = as_model(model, allow_loss=allow_loss)
+    names = as_names(names)
     titles = [
         names[k] if k < len(names) else _title(other, k)
         for k, other in enumerate(others)

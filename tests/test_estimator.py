@@ -226,3 +226,20 @@ def test_without_scikit_learn_the_classifier_says_what_installs_it(
     assert str(caught.value) == (
         "FuzzyTreeClassifier needs scikit-learn: pip install 'scikit-learn>=1.6'"
     )
+
+
+def test_masked_cells_and_times_are_no_numbers_to_the_classifier() -> None:
+    values, labels = np.array([[1.0], [1.5], [7.0], [8.0]]), [0, 0, 1, 1]
+    model = FuzzyTreeClassifier().fit(values, labels)
+    masked = np.ma.MaskedArray(values, [[True], [False], [False], [False]])
+    for call in (model.predict, lambda rows: model.fit(rows, labels)):
+        with pytest.raises(ValueError, match="Input X contains NaN"):
+            call(masked)
+        times = values.astype("datetime64[s]")
+        for wrong in (times, pd.DataFrame(times)):
+            with pytest.raises(
+                ValueError, match=r"^X holds datetime64\[s\], and no numbers$"
+            ):
+                call(wrong)
+    with pytest.raises(ValueError, match=r"^y holds masked labels$"):
+        model.fit(values, np.ma.MaskedArray(labels, [True, False, False, False]))

@@ -287,3 +287,10 @@ def test_a_number_type_that_does_not_exist_is_refused() -> None:
     text = r"^there is no number type 'float16'; there are float64, mixed, float32$"
     with pytest.raises(ValueError, match=text):
         ft.certify(random_tree(1), "float16")  # type: ignore[arg-type] # the mistake
+
+
+def test_a_text_is_one_name_in_every_argument_that_takes_names() -> None:
+    tree = random_tree(1)
+    assert ft.check(tree, runtimes="native", limit=100).ok
+    assert ft.stability(tree, runtimes="native", only="N3").ok
+    assert ft.audit(tree, select="FT501").is_complete

@@ -9,6 +9,7 @@ import msgspec
 
 from fuzzytree.auditing.codes import CODES
 from fuzzytree.auditing.records import Settings
+from fuzzytree.naming import as_names
 from fuzzytree.rulebase import name_choice
 
 _RANGES: Mapping[str, tuple[float, float, str]] = {
@@ -43,6 +44,7 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
         >>> sorted(chosen_codes(["FT10"], ["FT102", "FT103"]))[:5]
         ['FT101', 'FT104', 'FT105', 'FT106', 'FT107']
     """
+    select, ignore = as_names(select), as_names(ignore)
     for text in (*select, *ignore):
         if not text or not any(code.startswith(text) for code in CODES):
             raise ValueError(
@@ -53,12 +55,12 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
             raise ValueError(
                 f"the code {text!r} cannot be left out: it tells what was not asked"
             )
-    taken = tuple(select) or ("FT",)
+    taken = select or ("FT",)
     found = {
         code
         for code in CODES
         if code.startswith("FTD")
-        or (code.startswith(taken) and not code.startswith(tuple(ignore)))
+        or (code.startswith(taken) and not code.startswith(ignore))
     }
     if all(code.startswith("FTD") for code in found):
         raise ValueError("select and ignore leave no code of which anything is asked")

@@ -227,6 +227,7 @@ class _Tally:
         self.tells_ties = tells_ties
         self.rows = self.cells = self.extras = 0
         self.is_numeric = False
+        self.remarks: list[tuple[str, str]] = []
         self.classes: dict[str, int] = {}
         self.spans: dict[str, tuple[float, float]] = {}
         self.statuses: dict[int, int] = {}
@@ -234,10 +235,12 @@ class _Tally:
     def add(self, batch: Batch, answers: Answers | Outputs) -> None:
         """Take the answers to a piece."""
         from fuzzytree.outputs import Outputs
+        from fuzzytree.tables import trimmed
 
         self.rows += len(answers)
         self.cells += batch.missing
         self.extras = batch.extras
+        self.remarks = trimmed(batch.piece)
         if isinstance(answers, Outputs):
             self.is_numeric = True
             for name, (low, high) in answers.spans().items():
@@ -268,6 +271,7 @@ class _Tally:
         say_rows(
             ("answered", counted(self.rows, "row"), ", ".join(counts)),
             ("of them", odd, ""),
+            *(("remark", name, f"has {text}") for name, text in self.remarks),
             *([("ignored", counted(self.extras, "column"), "")] if self.extras else []),
             *([("wrote", output, "")] if output != "-" else []),
             quiet=quiet,

@@ -27,6 +27,7 @@ from fuzzytree.criteria.roundtrips import roundtrips
 from fuzzytree.criteria.scaling import decades, scaling
 from fuzzytree.criteria.specials import specials
 from fuzzytree.criteria.stiffness import stiffness
+from fuzzytree.naming import as_names
 from fuzzytree.probing import probe_values
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.runtimes import is_installed
@@ -132,6 +133,7 @@ def examine(
 
 
 def _wanted(only: Sequence[str]) -> tuple[str, ...]:
+    only = as_names(only)
     asked = [code.upper().replace("B", "b") for code in only]
     known = ", ".join(TITLES)
     for given, code in zip(only, asked, strict=True):

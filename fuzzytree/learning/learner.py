@@ -19,6 +19,7 @@ from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import Settings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.validation import Choice, chosen_tree
+from fuzzytree.tables import numbers_only, unmasked
 from fuzzytree.tree import FuzzyTree
 
 Progress = Callable[[str, float], None]
@@ -124,6 +125,7 @@ class Learner:
             LearningError: If `missing` is `refuse` and a value is missing.
         """
         codes = _codes(labels, self.classes)
+        values = numbers_only(values, "the array")
         _check_shape(values, codes, len(self.columns))
         if progress is not None:
             progress("counting", 0.0)
@@ -262,7 +264,7 @@ def _codes(
     labels: Sequence[str] | npt.NDArray[np.generic], classes: Sequence[str]
 ) -> IntArray:
     """Return class positions; -1 where a label is missing."""
-    found = np.asarray(labels)
+    found = unmasked(np.asanyarray(labels))
     if found.dtype.kind in "iub":
         codes = found.astype(np.int64)
         if len(codes) and codes.max() >= len(classes):

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 from fuzzytree.contracts import Runtime
 from fuzzytree.errors import install_hint
+from fuzzytree.naming import as_names
 
 TABLE = (
     "fuzzytree.runtimes.reference",
@@ -54,7 +55,9 @@ def chosen_runtimes(names: Sequence[str] | None) -> tuple[Runtime, ...]:
     Raises:
         ValueError: If one is unknown; the message lists all of them.
     """
-    return all_runtimes() if names is None else tuple(map(find_runtime, names))
+    if names is None:
+        return all_runtimes()
+    return tuple(map(find_runtime, as_names(names)))
 
 
 def is_installed(runtime: Runtime) -> bool:

@@ -10,6 +10,7 @@ import msgspec
 
 from fuzzytree.contracts import Model
 from fuzzytree.interrupts import noticed
+from fuzzytree.naming import as_names
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.timing import trial
 from fuzzytree.timing.candidates import DEFAULT, questions, title
@@ -150,7 +151,7 @@ def bench(
         count = values.shape[1]
         text = _data_text(f"{data or 'a table'}, {_rows(count)}", count, plan)
     found, omitted = gather(model, values)
-    kept, left = chosen(found, only, skip)
+    kept, left = chosen(found, as_names(only), as_names(skip))
     return run_study(
         model,
         kept,

@@ -171,3 +171,18 @@ def test_main_takes_the_words_of_the_process(
     monkeypatch.setattr("sys.argv", ["fuzzytree", "--version"])
     assert main() == 0
     assert capsys.readouterr().out.startswith("fuzzytree ")
+
+
+def test_too_little_memory_is_one_sentence(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("fuzzytree.verbs.read", fail)
+    monkeypatch.setattr("fuzzytree.converting.read_bounded", fail)
+    assert call("show", "grip.yaml") == (
+        2,
+        "",
+        "cannot go on: there is not enough memory\n",
+    )

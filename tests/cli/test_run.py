@@ -217,3 +217,11 @@ def test_a_file_that_is_no_model_is_one_sentence(
 ) -> None:
     Path("broken.onnx").write_bytes(b"no onnx")
     assert call("run", name, "grasps.csv") == (2, "", message)
+
+
+def test_blanks_around_names_are_left_out_with_a_remark(call: Call) -> None:
+    Path("blanks.csv").write_text(" force, slip\n1.0,0\n")
+    code, _, said = call("run", "grip.yaml", "blanks.csv")
+    text = "blanks around its name, which are left out (and 1 more)"
+    assert code == 0
+    assert f"remark   ' force' has {text}" in said.splitlines()

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LearningError
-from fuzzytree.learning import Learnt, Settings, learn_arrays
+from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
 from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.combination import fisher_direction, node_view
 from fuzzytree.learning.patterns import Patterns, make_patterns
@@ -266,3 +266,14 @@ def exact_direction(patterns: Patterns, shrinkage: Fraction) -> list[Fraction]:
     u, v = means[1][0] - means[0][0], means[1][1] - means[0][1]
     determinant = a * d - b * b
     return [(d * u - b * v) / determinant, (a * v - b * u) / determinant]
+
+
+def test_masked_cells_and_labels_are_missing_to_the_learner() -> None:
+    rows = [[1.0], [2.0], [3.0], [7.0], [8.0], [9.0]]
+    values = np.ma.MaskedArray(rows, [[True], *[[False]] * 5])
+    labels = np.ma.MaskedArray([0, 0, 0, 1, 1, 1], [*[False] * 5, True])
+    learner = Learner(["a"], ["soft", "firm"])
+    learner.partial_fit(values, labels)
+    assert learner.finish().report.rows_dropped == 2
+    with pytest.raises(ValueError, match=r"^the array holds timedelta64\[s\], and no"):
+        learner.partial_fit(np.zeros((1, 1), "m8[s]"), np.array([0]))
