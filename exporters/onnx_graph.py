@@ -244,6 +244,16 @@ class Sheet:
             self._results[key] = self.node("Gather", source, chosen, axis=0)
         return self._results[key]
 
+    def split(self, source: str, count: int) -> list[str]:
+        """Return the rows of a block, of shape (1, columns) each."""
+        names = [self._fresh(f"{source}_row") for _ in range(count)]
+        node = helper.make_node("Split", [source], names, name=names[0])
+        node.attribute.append(helper.make_attribute("axis", 0))
+        if self.opset >= 18:
+            node.attribute.append(helper.make_attribute("num_outputs", count))
+        self.nodes.append(node)
+        return names
+
     def total(self, source: str, *, axis: int, keepdims: int) -> str:
         """Return the sum along an axis, in the form that the opset knows."""
         if self.opset >= 13:

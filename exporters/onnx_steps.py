@@ -7,7 +7,7 @@ Python's own library.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from fuzzytree.exporters.onnx_graph import Sheet, identifier
 from fuzzytree.programs.evaluate import Found, still_results
 from fuzzytree.programs.steps import Program, Step
 
-_NODES: Mapping[str, str] = {
+NODES: Mapping[str, str] = {
     "add": "Add",
     "subtract": "Sub",
     "multiply": "Mul",
@@ -44,7 +44,7 @@ _NODES: Mapping[str, str] = {
 }
 """Operations that are one operator, in double in onnxruntime too."""
 
-_CHAINS: Mapping[str, str] = {"minimum": "Min", "maximum": "Max", "add": "Sum"}
+CHAINS: Mapping[str, str] = {"minimum": "Min", "maximum": "Max", "add": "Sum"}
 """Operations of which an operator takes many arguments, and joins them in order."""
 
 _WORDS: Mapping[str, str] = {
@@ -96,12 +96,12 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
     source = sheet.node("Transpose", sheet.source, hint="columns", perm=[1, 0])
     still = still_results(program)
     names: dict[int, str] = {}
-    links = _links(program, still)
+    links = {one: list[str]() for one in chain_links(program, still, CHAINS)}
 
     def named(place: int) -> str:
         known = still[place]
         if known is not None and place not in names:  # only what a node takes
-            names[place] = _constant(sheet, known)
+            names[place] = number_constant(sheet, known)
         return names[place]
 
     for place, step in enumerate(program.steps):
@@ -120,20 +120,22 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
         given = links.get(first, []) + given
         if place in links:
             links[place] = given
-        elif len(given) > 2 and step.operation in _CHAINS:
-            chain = _CHAINS[step.operation]
+        elif len(given) > 2 and step.operation in CHAINS:
+            chain = CHAINS[step.operation]
             names[place] = sheet.node(chain, *given, hint=sheet.topic)
         else:
-            names[place] = _node(sheet, step, given, program)
+            names[place] = add_step(sheet, step, given, program)
     sheet.topic = ""
     places = [result.step for result in program.results]
     return [
-        named(place) if still[place] is None else _spread(sheet, source, named(place))
+        named(place) if still[place] is None else spread(sheet, source, named(place))
         for place in places
     ]
 
 
-def _links(program: Program, still: Sequence[Found | None]) -> dict[int, list[str]]:
+def chain_links(
+    program: Program, still: Sequence[Found | None], operations: Container[str]
+) -> set[int]:
     """Return the steps that are taken only as the beginning of a chain like them.
 
     Such a chain, `a + b + c + ...` from left to right, is one operator.
@@ -146,9 +148,9 @@ def _links(program: Program, still: Sequence[Found | None]) -> dict[int, list[st
         for argument in step.arguments:
             uses[argument] += 1
     return {
-        step.arguments[0]: []
+        step.arguments[0]
         for step in steps
-        if step.operation in _CHAINS
+        if step.operation in operations
         and steps[step.arguments[0]].operation == step.operation
         and steps[step.arguments[0]].samples == step.samples
         and uses[step.arguments[0]] == 1
@@ -156,7 +158,8 @@ def _links(program: Program, still: Sequence[Found | None]) -> dict[int, list[st
     }
 
 
-def _constant(sheet: Sheet, found: Found) -> str:
+def number_constant(sheet: Sheet, found: Found) -> str:
+    """Return the name of what no input enters: a number, a truth, or samples."""
     kind: npt.DTypeLike = np.float64
     first = found[0] if isinstance(found, list) else found
     if isinstance(first, bool):
@@ -167,8 +170,8 @@ def _constant(sheet: Sheet, found: Found) -> str:
     return sheet.constant(value, "number")
 
 
-def _spread(sheet: Sheet, source: str, name: str) -> str:
-    """Return a constant once for each row."""
+def spread(sheet: Sheet, source: str, name: str) -> str:
+    """Return a constant once for each row of a source of shape (columns, rows)."""
     shape = sheet.take(sheet.node("Shape", source), [1])
     return sheet.node("Expand", name, shape)
 
@@ -181,9 +184,10 @@ def _whole(sheet: Sheet, value: int) -> str:
     return sheet.constant(np.array(value, np.int64), "whole")
 
 
-def _node(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> str:
-    if step.operation in _NODES:
-        return sheet.node(_NODES[step.operation], *given, hint=sheet.topic)
+def add_step(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> str:
+    """Add the nodes of a step, given its arguments, and return the result's name."""
+    if step.operation in NODES:
+        return sheet.node(NODES[step.operation], *given, hint=sheet.topic)
     match step.operation:
         case "is_finite":
             size = sheet.node("Abs", *given)

@@ -105,7 +105,7 @@ def _model_proto(
         producer_version=facts["version"],
         doc_string=_in_words(system),
     )
-    for key, value in (facts | _facts(system, outputs)).items():
+    for key, value in (facts | _facts(system, program, outputs)).items():
         made.metadata_props.add(key=f"fuzzytree.{key}", value=value)
     return made
 
@@ -114,15 +114,41 @@ def _fill(
     sheet: Sheet, system: FuzzySystem, program: Program, outputs: Sequence[Output]
 ) -> None:
     from fuzzytree.exporters.onnx_steps import add_steps, np_to_onnx
+    from fuzzytree.exporters.onnx_wide import is_wide
 
-    names = add_steps(sheet, program, system.columns)
     count, rules = len(system.outputs), len(system.rules)
+    if is_wide(program):
+        _fill_wide(sheet, system, program, outputs)
+        return
+    names = add_steps(sheet, program, system.columns)
     if "outputs" in outputs:
         _columns(sheet, names[:count], "outputs")
     if "activations" in outputs:
         _columns(sheet, names[count : count + rules], "activations")
     if "status" in outputs:
         sheet.node("Cast", names[-1], named="status", to=np_to_onnx("int64"))
+
+
+def _fill_wide(
+    sheet: Sheet, system: FuzzySystem, program: Program, outputs: Sequence[Output]
+) -> None:
+    from fuzzytree.exporters.onnx_steps import np_to_onnx
+    from fuzzytree.exporters.onnx_wide import Blocks
+
+    blocks = Blocks(sheet, program, system.columns)
+    places = [result.step for result in program.results]
+    count, rules = len(system.outputs), len(system.rules)
+    wanted: dict[Output, list[int]] = {
+        "outputs": places[:count],
+        "activations": places[count : count + rules],
+    }
+    for name in outputs:
+        if name in wanted:
+            block = blocks.rows(wanted[name])
+            sheet.node("Transpose", block, perm=[1, 0], named=name)
+    if "status" in outputs:
+        status = blocks.single(places[-1])
+        sheet.node("Cast", status, named="status", to=np_to_onnx("int64"))
 
 
 def _columns(sheet: Sheet, names: Sequence[str], named: str) -> None:
@@ -139,7 +165,9 @@ def _columns(sheet: Sheet, names: Sequence[str], named: str) -> None:
     sheet.node("Transpose", block, perm=[1, 0], named=named)
 
 
-def _facts(system: FuzzySystem, outputs: Sequence[Output]) -> dict[str, str]:
+def _facts(
+    system: FuzzySystem, program: Program, outputs: Sequence[Output]
+) -> dict[str, str]:
     """Return the metadata: plain words where possible, JSON for lists."""
     units = {one.name: one.unit for one in system.inputs}
     texts = {
@@ -158,20 +186,24 @@ def _facts(system: FuzzySystem, outputs: Sequence[Output]) -> dict[str, str]:
         "outputs": list(outputs),
         "semantics": {},
         "names": [one.name for one in system.outputs],
-        "chunk": _rows_at_once(system),
+        "chunk": _rows_at_once(system, program),
     }
     return texts | {
         key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
     }
 
 
-def _rows_at_once(system: FuzzySystem) -> int:
+def _rows_at_once(system: FuzzySystem, program: Program) -> int:
     """Return how many rows are best run together, so that they stay in the cache."""
+    from fuzzytree.exporters.onnx_wide import is_wide
+
     samples = [
         one.defuzzifier.samples
         for one in system.outputs
         if not one.defuzzifier.is_weighted
     ]
+    if is_wide(program):
+        samples.append(len(system.rules))
     return max(2**17 // max(samples, default=8), 64)
 
 

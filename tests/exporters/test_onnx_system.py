@@ -1,5 +1,6 @@
 """Fuzzy systems as ONNX: what stands in the file, and what is refused."""
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -10,15 +11,20 @@ import pytest
 
 from fuzzytree.converting import read
 from fuzzytree.errors import DisagreementError, LossError, ReadError
-from fuzzytree.exporters import onnx_steps
-from fuzzytree.exporters.onnx import OPSETS, write
+from fuzzytree.exporters import onnx_steps, onnx_wide
+from fuzzytree.exporters.onnx import OPSETS, Output, write
 from fuzzytree.exporters.onnx_compare import differences
+from fuzzytree.exporters.onnx_contents import contents
+from fuzzytree.exporters.onnx_wide import is_wide
+from fuzzytree.programs.systems import from_system
 from fuzzytree.rulebase import fingerprint
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.systems import infer_rows
 from fuzzytree.system import (
+    And,
     Conclusion,
     Defuzzifier,
+    DefuzzifierMethod,
     FuzzySystem,
     Is,
     Label,
@@ -158,9 +164,7 @@ def test_a_graph_is_compared_with_a_fresh_one() -> None:
 def test_a_wrong_graph_is_not_returned(
     operation: str, operator: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        onnx_steps, "_NODES", {**onnx_steps._NODES, operation: operator}
-    )
+    monkeypatch.setattr(onnx_steps, "NODES", {**onnx_steps.NODES, operation: operator})
     with pytest.raises(DisagreementError, match=r"gives other .* than the model where"):
         write(SYSTEM, outputs=("outputs", "activations"))
 
@@ -192,3 +196,67 @@ def _run(content: bytes) -> None:
     opened = open_onnx(content, "s.onnx")
     assert opened.run_system is not None
     opened.run_system(np.zeros((3, 2)))
+
+
+def grid_system(
+    terms: int, *, method: DefuzzifierMethod = "weighted average"
+) -> FuzzySystem:
+    """Return the system of all pairs of the terms of two inputs, a rule each."""
+    peaks = [float(place) for place in range(terms)]
+    labels = tuple(
+        Label(f"t{place}", Points((peak - 1.0, peak, peak + 1.0), (0.0, 1.0, 0.0)))
+        for place, peak in enumerate(peaks)
+    )
+    inputs = SystemInput("a", labels), SystemInput("b", labels)
+    pairs = list(itertools.product(labels, labels))
+    numbers = tuple(
+        Label(f"o{place}", Singleton(place / 7.0)) for place in range(len(pairs))
+    )
+    rules = tuple(
+        SystemRule(
+            And((Is("a", one.name), Is("b", two.name))),
+            (Conclusion("y", number.name),),
+        )
+        for (one, two), number in zip(pairs, numbers, strict=True)
+    )
+    output = SystemOutput("y", numbers, None, None, Defuzzifier(method))
+    block = RuleBlock(rules, conjunction="product")
+    return FuzzySystem("grid", inputs, (output,), (block,))
+
+
+ALL: tuple[Output, ...] = ("outputs", "status", "activations")
+
+
+@pytest.mark.parametrize("method", ["weighted average", "weighted sum"])
+@pytest.mark.parametrize("opset", [12, 17, 18])
+def test_a_graph_of_many_rules_gives_the_bits_of_the_inference(
+    method: DefuzzifierMethod, opset: int
+) -> None:
+    system = grid_system(24, method=method)
+    assert is_wide(from_system(system))
+    opened = open_onnx(write(system, outputs=ALL, opset=opset).content, "g.onnx")
+    values = np.array([[0.0, -0.0, 3.25, 23.5, np.nan, 99.0], [7.5, 1.0, 3, 22, 1, 1]])
+    right = infer_rows(system, activations=True)(values)
+    assert opened.run_system is not None
+    found = opened.run_system(values)
+    np.testing.assert_array_equal(found.outputs, right.outputs)
+    np.testing.assert_array_equal(found.activations, right.activations)
+    assert found.status.tolist() == right.status.tolist()
+
+
+def test_four_times_as_many_rules_need_no_more_nodes() -> None:
+    counts = [
+        contents(write(grid_system(terms), outputs=ALL, verify=False).content).nodes
+        for terms in (30, 60)
+    ]
+    assert counts[1] <= counts[0]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_wide_nodes_give_the_answers_of_single_ones(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    system = random_system(seed, formulas="none")
+    monkeypatch.setattr(onnx_wide, "MOST_SINGLE", 0)
+    monkeypatch.setattr(onnx_wide, "_SHORTEST_CHAIN", 3)
+    write(system, outputs=ALL)  # it is verified
