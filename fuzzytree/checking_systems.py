@@ -46,6 +46,29 @@ Finding = Comparison | str
 """A comparison, or a sentence about what was skipped."""
 
 
+class _Bounds:
+    """How far runners may be apart in each row, computed once, where it is needed."""
+
+    def __init__(self, program: Program, values: FloatArray) -> None:
+        self._program, self._values = program, values
+        self._known = np.zeros(values.shape[1], np.bool_)
+        self._bounds = np.empty((len(program.results), 0))
+
+    def of(self, rows: IntArray) -> FloatArray:
+        """Return the bounds of some rows, of shape (results, rows)."""
+        missing = rows[~self._known[rows]]
+        if missing.size:
+            if not self._bounds.size:
+                shape = len(self._program.results), self._values.shape[1]
+                self._bounds = np.empty(shape)
+            found = error_bounds(self._program, self._values[:, missing])
+            self._bounds[:, missing] = found
+            self._known[missing] = True
+        if not rows.size:
+            return np.empty((len(self._program.results), 0))
+        return self._bounds[:, rows]
+
+
 class _Subject(msgspec.Struct, frozen=True):
     """What is checked, and on which rows.
 
@@ -54,12 +77,14 @@ class _Subject(msgspec.Struct, frozen=True):
         program: Its program, with activations.
         rows: The rows.
         native: The native runtime's numbers for all of them.
+        bounds: How far other runtimes' numbers may be from these.
     """
 
     system: FuzzySystem
     program: Program
     rows: Rows
     native: SystemOutcome
+    bounds: _Bounds
 
 
 def check_system(
@@ -99,7 +124,8 @@ def check_system(
     chosen = chosen_runtimes(runtimes)
     native = run_system(system, activations=True)(rows.values)
     program = from_system(system, activations=True)
-    subject = _Subject(system, program, rows, native)
+    bounds = _Bounds(program, rows.values)
+    subject = _Subject(system, program, rows, native, bounds)
     findings = [*_inference(subject)]
     for runtime in chosen:
         findings += _runtime(subject, runtime)
@@ -190,7 +216,7 @@ class _Gaps(msgspec.Struct, frozen=True):
 def _gaps(one: FloatArray, two: FloatArray, subject: _Subject, rows: Rows) -> _Gaps:
     is_same = same_bits(one, two)
     apart = np.flatnonzero(~is_same.all(axis=0))
-    allowed = error_bounds(subject.program, rows.values[:, apart])
+    allowed = subject.bounds.of(rows.numbers[apart])
     if len(one) < len(allowed):  # without activations
         allowed = allowed[[*range(len(one) - 1), len(allowed) - 1]]
     with np.errstate(invalid="ignore"):

@@ -804,3 +804,18 @@ def test_a_combination_is_of_values_within_their_ranges() -> None:
     asked = replace(asked, blocks=(block,))
     found = infer(asked, {"a": 9.0, "b": 0.125})
     assert found.activations == (2.0 * (0.5 - 0.25) + 0.125,)
+
+
+def test_a_degree_of_an_input_is_computed_once_for_a_row(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls: list[Curve] = []
+
+    def counted(curve: Curve, *rest: Any) -> float:
+        calls.append(curve)
+        return curve_degree(curve, *rest)
+
+    monkeypatch.setattr("fuzzytree.inference.curve_degree", counted)
+    rules = tuple(rule(And((Is("a", "up"), Is("b", "down")))) for _ in range(50))
+    infer(system(rules), {"a": 0.25, "b": 0.5})
+    assert calls == [UP.curve, DOWN.curve]

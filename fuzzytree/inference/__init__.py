@@ -189,6 +189,7 @@ class _Run:
             for variable in system.variables
             for label in variable.labels
         }
+        self.degrees: dict[tuple[str, str], float] = {}
         self.activations: list[float] = []
         self.concluded: dict[str, list[_Concluded]] = {
             name: [] for name in self.outputs
@@ -244,9 +245,11 @@ class _Run:
         elif asked.variable in self.outputs:
             degree = self._so_far(self.outputs[asked.variable], asked.label)
         else:
-            degree = self._label_degree(
-                asked.variable, asked.label, self.values[asked.variable]
-            )
+            key = asked.variable, asked.label  # an input keeps its value
+            if key not in self.degrees:
+                value = self.values[asked.variable]
+                self.degrees[key] = self._label_degree(*key, value)
+            degree = self.degrees[key]
         return hedges_applied(asked.hedges, degree)
 
     def _label_degree(self, variable: str, label: str, value: float) -> float:

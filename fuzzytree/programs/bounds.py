@@ -101,6 +101,8 @@ def error_bounds(
         [[0.0], [1.7763568394002505e-15]]
     """
     rows = values.shape[1]
+    if not rows:
+        return np.empty((len(program.results), 0))
     some = max(_WORKING_SET // max(program.size, 1), 1)
     found = np.empty((len(program.results), rows))
     with np.errstate(all="ignore"):

@@ -8,6 +8,7 @@ leave [0, 1], or be NaN, or a number be infinite, `where` leaves the rule out in
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -48,6 +49,7 @@ from fuzzytree.system import (
 )
 
 
+@functools.lru_cache(maxsize=4)
 def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
     """Return the program of a fuzzy system.
 

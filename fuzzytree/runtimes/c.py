@@ -43,7 +43,7 @@ COMPILERS = ("gcc", "cc", "clang")
 """The programs of which one is needed; the first that is found compiles."""
 
 _OPTIONS = ("-std=c99", "-ffp-contract=off", "-shared", "-fPIC", "-x", "c", "-")
-_LONG = 1 << 19  # bytes of straight code, on which more than -O1 takes minutes
+_LONG = 1 << 19  # bytes of straight code, on which more than -O0 takes minutes
 _LONGEST_WAIT = 600.0  # seconds
 
 _LOOP = """
@@ -184,7 +184,7 @@ def load_system(system: FuzzySystem, /, *, activations: bool = False) -> SystemR
         FuzzyTreeError: If the compiler fails.
     """
     made = write(system, name="model", activations=activations)
-    speed = "-O1" if len(made.content) > _LONG else "-O2"
+    speed = "-O0" if len(made.content) > _LONG else "-O2"
     infer = compiled(made.content, _INFER_LOOP, 2, speed)
     outputs = len(system.outputs)
     count = outputs + activations * len(system.rules)
