@@ -135,7 +135,7 @@ def write(
     lines = [*(_comment(one, words) for one in comments), *_text(system, names, words)]
     remarks += _remarks(system, names, words)
     text = "\n".join(lines) + "\n"
-    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks))
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
 
 
 def _check_scores(scores: Scores) -> None:
@@ -167,10 +167,11 @@ class _Names(msgspec.Struct, frozen=True):
 
     def changed(self) -> dict[str, str]:
         """Return the names that are others in the file."""
-        found = dict(self.variables.changed)
+        found: dict[str, str] = {}
         for names in self.labels.values():
             found.update(names.changed)
-        return found
+        variables = self.variables.changed
+        return {**variables, **found, **variables}
 
 
 def _naming(system: FuzzySystem, words: Words) -> _Names:
@@ -306,7 +307,8 @@ def _defuzzify(output: SystemOutput, names: _Names, words: Words) -> Iterator[st
 
 def _remarks(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
-    if text := changes_text(names.changed()):
+    inputs = [one.name for one in system.inputs]
+    if text := changes_text(names.changed(), inputs):
         yield text
     if any(one.unit for one in system.variables) or system.note:
         yield "units and the note of the system have no place"

@@ -135,7 +135,7 @@ def write(
     names = _Naming(system, terms)
     remarks += names.remarks
     text = _text(system, (terms, lines), (comments, names), dialect, remarks)
-    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks))
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed)
 
 
 class _Naming:
@@ -149,14 +149,16 @@ class _Naming:
             for name, labels in _all_labels(system, terms).items()
         }
         self.system = Names.of([system.name])[system.name]
-        changed = {
-            **Names.of([system.name]).changed,
+        self.changed = {
             **self.variables.changed,
+            **Names.of([system.name]).changed,
             **{
                 k: v for names in self.labels.values() for k, v in names.changed.items()
             },
+            **self.variables.changed,
         }
-        self.remarks = [text] if (text := changes_text(changed)) else []
+        text = changes_text(self.changed, [one.name for one in system.inputs])
+        self.remarks = [text] if text else []
 
 
 def _all_labels(system: FuzzySystem, terms: Terms) -> dict[str, Sequence[Label]]:

@@ -127,7 +127,7 @@ def write(
     comments = [f"# {one}" for one in (_TITLE, facts) if one]
     text = "\n".join([*comments, *_text(system, names)]) + "\n"
     remarks += [*_remarks(system, names), *differences(system)]
-    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks))
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
 
 
 class _Names(msgspec.Struct, frozen=True):
@@ -143,10 +143,11 @@ class _Names(msgspec.Struct, frozen=True):
 
     def changed(self) -> dict[str, str]:
         """Return the names that are others in the file."""
-        found = dict(self.variables.changed)
+        found: dict[str, str] = {}
         for names in self.labels.values():
             found.update(names.changed)
-        return found
+        variables = self.variables.changed
+        return {**variables, **found, **variables}
 
 
 def _naming(system: FuzzySystem) -> _Names:
@@ -315,7 +316,8 @@ def _line(text: str) -> str:
 
 def _remarks(system: FuzzySystem, names: _Names) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
-    if text := changes_text(names.changed()):
+    inputs = [one.name for one in system.inputs]
+    if text := changes_text(names.changed(), inputs):
         yield text
     texts = [system.name, system.note, *(block.name for block in system.blocks)]
     if any(_line(text) != text for text in texts):

@@ -109,7 +109,7 @@ def write(
     remarks += names.remarks
     lines = _lines(system, found, names, facts)
     content = ("\n".join(lines) + "\n").encode("utf-8")
-    return Written(content, tuple(losses), tuple(remarks))
+    return Written(content, tuple(losses), tuple(remarks), names.changed)
 
 
 class _Naming:
@@ -125,12 +125,14 @@ class _Naming:
             known = [label.name for label in one.labels]
             known += [made.name for made in rules.made.get(one.name, ())]
             self.labels[one.name] = _ids(known)
-        changed = {**self.variables.changed}
+        self.changed = {**self.variables.changed}
         if self.system != system.name:
-            changed[system.name] = self.system
+            self.changed[system.name] = self.system
         for names in self.labels.values():
-            changed |= names.changed
-        self.remarks = [text] if (text := changes_text(changed)) else []
+            self.changed |= names.changed
+        self.changed |= self.variables.changed
+        text = changes_text(self.changed, [one.name for one in system.inputs])
+        self.remarks = [text] if text else []
 
     def term(self, variable: str, label: str) -> str:
         """Return the ID of a term."""

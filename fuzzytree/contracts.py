@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import msgspec
@@ -63,11 +63,13 @@ class Written(msgspec.Struct, frozen=True):
         losses: What was lost on the way, and can change an answer.
         remarks: What else is worth knowing, a sentence each, such as facts that the
             file has no place for and no answer depends on.
+        names: The names that are others in the file, by those of the model.
     """
 
     content: bytes
     losses: tuple[Loss, ...] = ()
     remarks: tuple[str, ...] = ()
+    names: Mapping[str, str] = msgspec.field(default_factory=dict)
 
 
 class Reading(msgspec.Struct, frozen=True):

@@ -18,7 +18,7 @@ import msgspec
 LETTERS = string.ascii_letters
 DIGITS = string.digits
 
-_MOST_TOLD = 12  # names in a remark; the first are those of variables
+_MOST_SHOWN = 12  # names in a remark, unless more inputs were changed
 
 _SPELT = {
     "ß": "ss",
@@ -177,22 +177,26 @@ def numbered(name: str, taken: dict[str, int]) -> str:
     return found
 
 
-def changes_text(changed: Mapping[str, str]) -> str:
+def changes_text(changed: Mapping[str, str], inputs: Iterable[str]) -> str:
     """Return the names that are others in a file, in words; empty if there are none.
 
     Args:
-        changed: The names in the file, by those of the model; variables first, for
-            who runs the file has to give them.
+        changed: The names in the file, by those of the model.
+        inputs: The names of the inputs; they are all shown, as the caller of the file
+            uses them; of the others, a dozen at most with the inputs.
 
     Example:
-        >>> changes_text({"tip %": "tip"})
+        >>> changes_text({"tip %": "tip"}, [])
         "names were changed: 'tip %' is tip"
     """
-    pairs = [f"{name!r} is {found}" for name, found in changed.items()]
-    if not pairs:
+    if not changed:
         return ""
-    more = f", and {len(pairs) - _MOST_TOLD} more" if len(pairs) > _MOST_TOLD else ""
-    return f"names were changed: {', '.join(pairs[:_MOST_TOLD])}{more}"
+    first = [name for name in inputs if name in changed]
+    names = list(dict.fromkeys([*first, *changed]))
+    shown = names[: max(len(first), _MOST_SHOWN)]
+    pairs = ", ".join(f"{name!r} is {changed[name]}" for name in shown)
+    more = f", and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+    return f"names were changed: {pairs}{more}"
 
 
 class _Allowed(msgspec.Struct, frozen=True):

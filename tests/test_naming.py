@@ -114,8 +114,12 @@ def test_many_names_that_become_alike_are_told_apart_at_once() -> None:
     assert time.process_time() - start < 2.0
 
 
-def test_changed_names_are_told_and_the_rest_is_counted() -> None:
-    assert changes_text({}) == ""
-    told = changes_text({f"x {k}": f"x_{k}" for k in range(14)})
+def test_all_changed_inputs_are_shown_and_other_names_are_counted() -> None:
+    assert changes_text({}, []) == ""
+    changed = {f"x {k}": f"x_{k}" for k in range(14)}
+    told = changes_text(changed, ["x 13"])
+    assert told.startswith("names were changed: 'x 13' is x_13, 'x 0' is x_0, ")
+    assert told.endswith(", 'x 10' is x_10, and 2 more")
+    told = changes_text({**changed, "low %": "low"}, changed)
     assert told.startswith("names were changed: 'x 0' is x_0, 'x 1' is x_1, ")
-    assert told.endswith(", 'x 11' is x_11, and 2 more")
+    assert told.endswith(", 'x 13' is x_13, and 1 more")

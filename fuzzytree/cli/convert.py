@@ -246,6 +246,7 @@ def carry(
                 "sha256": digest,
                 "losses": written.losses,
                 "remarks": written.remarks,
+                "names": dict(written.names),
                 "proof": {"verdict": proof.verdict, "sentence": proof.sentence},
                 "certificate": _certificate_facts(proof.certificate),
                 "next": after or None,

@@ -79,6 +79,7 @@ def test_json_tells_the_same_facts(call: Call) -> None:
         "sha256": hashlib.sha256(content).hexdigest(),
         "losses": [],
         "remarks": [],
+        "names": {},
         "proof": {
             "verdict": "equal",
             "sentence": "read back from the file, "
@@ -87,6 +88,23 @@ def test_json_tells_the_same_facts(call: Call) -> None:
         "certificate": None,
         "next": "fuzzytree check tipper.fll t.yaml",
     }
+
+
+def test_json_has_every_changed_name_and_the_text_every_changed_input(
+    call: Call,
+) -> None:
+    tree = random_tree(3, leaves=20, combinations=0.5)
+    ft.save(tree, "mixed.yaml")
+    words = ("convert", "mixed.yaml", "mixed.fcl", "--allow-loss", "--json")
+    code, out, err = call(*words)
+    assert code == 0
+    names = json.loads(out)["names"]
+    mixes = [one.name for one in tree.variables if one.parts]
+    assert len(mixes) > 3
+    assert {name: name.replace(" ", "_") for name in mixes}.items() <= names.items()
+    (told,) = (line for line in err.splitlines() if "names were changed" in line)
+    assert all(f"{name!r} is {names[name]}" in told for name in mixes)
+    assert told.endswith(f", and {len(names) - max(12, len(mixes))} more")
 
 
 def test_a_tree_goes_through_a_format_of_others_and_back(call: Call) -> None:
