@@ -73,7 +73,9 @@ class _Parts(NamedTuple):
 def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
     """Return what a file says, what of, and the facts of a rule base if it is one."""
     notes = Notes([], [], [])
-    page = read_page(decoded(content, name, MOST_BYTES), notes)
+    text, remarks = decoded(content, name, MOST_BYTES)
+    notes.remarks.extend(remarks)
+    page = read_page(text, notes)
     parts = None
     if not notes.is_full:
         parts = _system(page.sections, PurePath(name).stem, notes)

@@ -288,7 +288,7 @@ def _output(
             notes.remarks.append(
                 f"output {name!r}: FML says nothing of samples; read with {how.samples}"
             )
-    elif element.attributes.get("combination", "WA") != "WA":
+    elif element.attributes.get("combination", "WA").upper() != "WA":
         notes.wrong(element, "the combination must be WA, the weighted average")
     return SystemOutput(
         name,
@@ -311,10 +311,10 @@ def _word(
     element: Element, key: str, known: Mapping[str, _T], default: str, notes: Notes
 ) -> _T | None:
     given = element.attributes.get(key, default)
-    if given not in known:
-        choice = name_choice(given[:40], known)
+    if given.upper() not in known:
+        choice = name_choice(given[:40].upper(), known)
         notes.wrong(element, f"no {key} {given[:40]!r}; {choice}")
-    return known.get(given)
+    return known.get(given.upper())
 
 
 def _tsk_term(term: Element, plain: str, inputs: int, notes: Notes) -> Label | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Final
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, NamedTuple, TypeVar
 
 import msgspec
 
@@ -26,6 +26,8 @@ from fuzzytree.system import (
     SystemRule,
     TNorm,
 )
+
+_Norm = TypeVar("_Norm")
 
 _RULES: Final = {
     "mamdaniRuleBase": ("rule", "consequent", "then", "else", "clause"),
@@ -63,6 +65,18 @@ class _Norms(msgspec.Struct, frozen=True):
     implication: TNorm | None
 
 
+class _Inner(NamedTuple):
+    """An <and> or <or> of a circular definition, and what it joins by."""
+
+    element: Element
+    t_norm: TNorm | None = None
+    s_norm: SNorm | None = None
+
+
+_About = tuple[Variables, list[_Inner]]
+"""What rules can ask, and the joints of the terms that one rule asks."""
+
+
 def blocks_of(
     bases: Sequence[Element], variables: Variables, notes: Notes
 ) -> tuple[RuleBlock, ...]:
@@ -83,13 +97,15 @@ def blocks_of(
             if element.name != rule_name:
                 notes.wrong(element, f"<{element.name[:40]}> is no <{rule_name}>")
                 continue
-            meant = _norms(base, element, notes)
-            if norms is not None and meant != norms and run:
+            made = _rule(base, element, variables, notes)
+            if made is None:
+                continue
+            rule, meant = made
+            if norms is not None and meant != norms:
                 blocks.append(_block(run, norms, name))
                 run = []
             norms = meant
-            rule = _rule(base, element, (variables, norms), notes)
-            run += [rule] if rule is not None else []
+            run.append(rule)
         if norms is not None and run:
             blocks.append(_block(run, norms, name))
     return tuple(blocks)
@@ -103,36 +119,34 @@ def _block(rules: Sequence[SystemRule], norms: _Norms, name: str) -> RuleBlock:
 def _norms(base: Element, rule: Element, notes: Notes) -> _Norms:
     """Return the norms of a rule: its own, or those of its base."""
 
-    def word(key: str, default: str) -> tuple[Element, str]:
-        for element in (rule, base):
-            if key in element.attributes:
-                return element, element.attributes[key]
-        return base, default
+    def norm(
+        key: str, known: Mapping[str, _Norm], default: str, own: Element
+    ) -> _Norm | None:
+        element = own if key in own.attributes else base
+        text = element.attributes.get(key, default)
+        if text.upper() not in known:
+            notes.wrong(element, _unknown(key, text, known))
+        return known.get(text.upper())
 
-    element, text = word("andMethod", "MIN")
-    conjunction = words.TNORMS.get(text)
-    if conjunction is None:
-        notes.wrong(element, _unknown("andMethod", text, words.TNORMS))
-    element, text = word("orMethod", "MAX")
-    disjunction = words.SNORMS.get(text)
-    if disjunction is None:
-        notes.wrong(element, _unknown("orMethod", text, words.SNORMS))
+    conjunction = norm("andMethod", words.TNORMS, "MIN", rule)
+    disjunction = norm("orMethod", words.SNORMS, "MAX", rule)
     implication: TNorm | None = None
     if base.name == "mamdaniRuleBase":
-        text = base.attributes.get("activationMethod", "MIN")
-        implication = words.TNORMS.get(text)
-        if implication is None:
-            notes.wrong(base, _unknown("activationMethod", text, words.TNORMS))
+        implication = norm("activationMethod", words.TNORMS, "MIN", base)
     return _Norms(conjunction or "minimum", disjunction or "maximum", implication)
 
 
 def _unknown(key: str, text: str, known: Iterable[str]) -> str:
-    return f"no {key} {text[:40]!r}; {name_choice(text[:40], known)}"
+    return f"no {key} {text[:40]!r}; {name_choice(text[:40].upper(), known)}"
 
 
 def _rule(
-    base: Element, element: Element, about: tuple[Variables, _Norms], notes: Notes
-) -> SystemRule | None:
+    base: Element, element: Element, variables: Variables, notes: Notes
+) -> tuple[SystemRule, _Norms] | None:
+    """Return a rule and its norms, with those that its terms are made with."""
+    norms = _norms(base, element, notes)
+    inner: list[_Inner] = []
+    about = variables, inner
     _, consequent, then, otherwise, clause = _RULES[base.name]
     before = len(notes.found)
     name = element.attributes.get("name", "")
@@ -168,7 +182,32 @@ def _rule(
         return None
     joined = (Or if connector == "or" else And)(tuple(parts))
     when: Condition = parts[0] if len(parts) == 1 else joined
-    return SystemRule(when, tuple(found), weight, name)
+    own = None if len(parts) == 1 else connector
+    norms = _with_inner(norms, own, inner, notes)
+    return SystemRule(when, tuple(found), weight, name), norms
+
+
+def _with_inner(
+    norms: _Norms, connector: str | None, inner: Iterable[_Inner], notes: Notes
+) -> _Norms:
+    """Return the norms of a rule, of which its terms may settle what it leaves open."""
+    t_norms = {norms.conjunction} if connector == "and" else set()
+    s_norms = {norms.disjunction} if connector == "or" else set()
+    for one in inner:
+        if one.t_norm is not None:
+            t_norms.add(one.t_norm)
+        if one.s_norm is not None:
+            s_norms.add(one.s_norm)
+        if max(len(t_norms), len(s_norms)) > 1:
+            both = sorted(t_norms if len(t_norms) > 1 else s_norms)
+            what = f"one rule cannot join by {both[0]} and by {both[1]}"
+            notes.wrong(one.element, what)
+            return norms
+    return msgspec.structs.replace(
+        norms,
+        conjunction=next(iter(t_norms), norms.conjunction),
+        disjunction=next(iter(s_norms), norms.disjunction),
+    )
 
 
 def _only(element: Element, name: str, notes: Notes) -> Element | None:
@@ -215,9 +254,7 @@ def _modifier(clause: Element, notes: Notes) -> tuple[Hedge, ...]:
     return ()
 
 
-def _question(
-    clause: Element, about: tuple[Variables, _Norms], notes: Notes
-) -> Condition | None:
+def _question(clause: Element, about: _About, notes: Notes) -> Condition | None:
     named = _named(clause, about[0], notes)
     if named is None:
         return None
@@ -241,7 +278,7 @@ def _question(
 
 
 def _asked(
-    named: tuple[str, str], about: tuple[Variables, _Norms], notes: Notes, level: int
+    named: tuple[str, str], about: _About, notes: Notes, level: int
 ) -> Condition | None:
     """Return what a term asks: itself, or what it is made of."""
     variables, _ = about
@@ -266,15 +303,28 @@ def _asked(
     return Not(parts[0]) if named in variables.negated else parts[0]
 
 
+def _inner(element: Element, notes: Notes) -> _Inner:
+    """Return what an <and> or an <or> joins its parts by."""
+    if element.name == "and":
+        word = element.attributes.get("t-norm", "MIN")
+        if word.upper() not in words.TNORMS:
+            notes.wrong(element, _unknown("t-norm", word, words.TNORMS))
+        return _Inner(element, t_norm=words.TNORMS.get(word.upper()))
+    word = element.attributes.get("t-conorm", "MAX")
+    if word.upper() not in words.SNORMS:
+        notes.wrong(element, _unknown("t-conorm", word, words.SNORMS))
+    return _Inner(element, s_norm=words.SNORMS.get(word.upper()))
+
+
 def _joined(
     element: Element,
     variable: str,
-    about: tuple[Variables, _Norms],
+    about: _About,
     notes: Notes,
     level: int,
 ) -> Condition | None:
     """Return an <and>, an <or> or a <termName> of a circular definition."""
-    variables, norms = about
+    variables, inner_norms = about
     if element.name == "termName":
         if element.text not in variables.labels[variable]:
             choice = name_choice(element.text[:40], variables.labels[variable])
@@ -286,18 +336,10 @@ def _joined(
         if is_not and isinstance(found, Is):
             return Is(variable, found.label, ("not", *found.hedges))
         return Not(found) if is_not and found is not None else found
-    key, known, meant = (
-        ("t-norm", words.TNORMS, norms.conjunction)
-        if element.name == "and"
-        else ("t-conorm", words.SNORMS, norms.disjunction)
-    )
     if element.name not in ("and", "or"):
         notes.wrong(element, f"<{element.name[:40]}> is no <and>, <or> or <termName>")
         return None
-    word = element.attributes.get(key, "MIN" if element.name == "and" else "MAX")
-    if known.get(word) != meant:
-        what = f"it is joined by {word[:20]}, and the rule by {meant}; both must agree"
-        notes.wrong(element, what)
+    inner_norms.append(_inner(element, notes))
     parts = [
         part
         for child in element.children

@@ -113,7 +113,7 @@ def curve_of(term: Element, where: str, notes: Notes) -> Curve | None:
 
 def _points(shape: Element, where: str, notes: Notes) -> Points:
     method = shape.attributes.get("interpolationMethod", "linear")
-    if method != "linear":
+    if method.lower() != "linear":
         what = f"points joined by {method} are joined by lines here"
         notes.losses.append(Loss(where, what))
     points = shape.all("point")

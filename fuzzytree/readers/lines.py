@@ -43,8 +43,10 @@ class Word(msgspec.Struct, frozen=True, gc=False):
         return self.line, self.column, sentence
 
 
-def decoded(content: bytes, name: str, most: int = MOST_BYTES) -> str:
-    """Return the text of a file.
+def decoded(
+    content: bytes, name: str, most: int = MOST_BYTES
+) -> tuple[str, tuple[str, ...]]:
+    """Return the text of a file, and a remark if it is not UTF-8.
 
     Args:
         content: The file.
@@ -52,7 +54,7 @@ def decoded(content: bytes, name: str, most: int = MOST_BYTES) -> str:
         most: How many bytes are read.
 
     Raises:
-        ReadError: If it is too large, no UTF-8, or has control characters.
+        ReadError: If it is too large, is UTF-16, or has control characters.
     """
     if len(content) > most:
         text = (
@@ -62,20 +64,17 @@ def decoded(content: bytes, name: str, most: int = MOST_BYTES) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         sentence = "a file of UTF-16; it must be saved as UTF-8"
         raise report(name, [(1, 1, sentence)])
+    remarks: tuple[str, ...] = ()
     try:
         text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = content[: error.start].decode("utf-8", "replace")
-        sentence = (
-            f"byte 0x{content[error.start]:02x} is not UTF-8; "
-            "the file must be saved as UTF-8"
-        )
-        raise report(name, [(*_place(before), sentence)]) from error
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+        remarks = ("the file is not UTF-8; read as Latin-1",)
     wrong = _CONTROL.search(text)
     if wrong:
         sentence = f"character U+{ord(wrong.group()):04X}; the file may be damaged"
         raise report(name, [(*_place(text[: wrong.start()]), sentence)])
-    return text
+    return text, remarks
 
 
 def _place(before: str) -> tuple[int, int]:

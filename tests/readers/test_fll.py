@@ -455,12 +455,18 @@ def test_of_two_terms_with_one_name_the_second_counts_and_the_first_is_a_loss() 
     assert [one.where for one in reading.losses] == ["line 4"]
 
 
+def test_a_file_of_latin_1_is_read_with_a_remark() -> None:
+    text = TIPPER.replace("service", "qualité")
+    found = read(text.encode("latin-1"), "tipper.fll")
+    assert found.model == read(text.encode(), "tipper.fll").model
+    assert found.remarks[0] == "the file is not UTF-8; read as Latin-1"
+
+
 @pytest.mark.parametrize(
     ("content", "told"),
     [
         (b"", "x.fll:1:1: there is no OutputVariable that is enabled"),
         (b"\0", "x.fll:1:1: character U+0000; the file may be damaged"),
-        (b"Engine: \xe9", "byte 0xe9 is not UTF-8; the file must be saved as UTF-8"),
         ("Engine: a".encode("utf-16"), "a file of UTF-16; it must be saved as UTF-8"),
         (b"a" * (33 * 2**20), "x.fll: 34,603,008 bytes are more than the 33,554,432"),
     ],

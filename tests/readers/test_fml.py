@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import re
 import time
 
 import pytest
 
 from fuzzytree.errors import ReadError
+from fuzzytree.exporters.fml import write
 from fuzzytree.inference import infer
 from fuzzytree.readers.fml import reading
 from fuzzytree.readers.fml_words import FAR, USUAL
+from fuzzytree.samples import samples
 from fuzzytree.system import (
     And,
     Condition,
@@ -201,6 +205,36 @@ def test_a_modifier_of_a_conclusion_and_an_else_are_losses() -> None:
     ]
 
 
+def test_operators_are_read_in_any_case() -> None:
+    text = TIPPER
+    for word in ("PROD", "MAX", "MIN", "WA"):
+        text = text.replace(f'"{word}"', f'"{word.lower()}"')
+    assert text != TIPPER
+    assert read(text) == read(TIPPER)
+    system = samples()["Mamdani, mean of maximum"]
+    assert isinstance(system, FuzzySystem)
+    written = write(system, allow_loss=True).content.decode()
+    keys = "(andMethod|orMethod|activationMethod|accumulation|defuzzifier)"
+    lower = re.sub(f'{keys}="[A-Z]+"', lambda found: _lowered(found[0]), written)
+    assert lower.count("mom") == 1
+    assert read(lower) == read(written)
+
+
+def _lowered(text: str) -> str:
+    key, _, word = text.partition("=")
+    return f"{key}={word.lower()}"
+
+
+def test_a_term_made_of_others_settles_the_norm_that_its_rule_leaves_open() -> None:
+    text = TIPPER.replace("<or><t", '<or t-conorm="probor"><t')
+    text = text.replace('connector="or" and', 'connector="and" and')
+    first, second = read(text).blocks
+    assert (first.disjunction, second.disjunction) == ("maximum", "algebraic sum")
+    row = {"food": 3.0, "service": 0.0}
+    (tip,) = infer(read(text.replace('"r1"', '"r1" andMethod="MIN"')), row).outputs
+    assert math.isfinite(tip)
+
+
 def test_a_complement_of_a_circular_term_is_a_not() -> None:
     text = TIPPER.replace('"either"', '"either" complement="true"')
     when = read(text).blocks[1].rules[0].when
@@ -225,7 +259,7 @@ MISTAKES = [
     (("<tskValue>1</tskValue>", ""), "17:7: 'fair' of order 1 needs 3 <tskValue>"),
     (('"very"', '"veri"'), "25:9: no modifier 'veri'; there is any, not, very"),
     (("<termName>bad", "<termName>either"), "8:32: the term 'either' is made of too"),
-    (('<or><t', '<or t-conorm="ESUM"><t'), "9:9: it is joined by ESUM, and the rule"),
+    (('<or><t', '<or t-conorm="ESUM"><t'), "9:9: one rule cannot join by einstein su"),
     (("<knowledgeBase>", "<knowledgeBase><anYaDataCloud/>"), "3:18: <anYaDataCloud>"),
     (("<term>small<", "<term>bad<"), "29:44: 'tip' has no term 'bad'"),
     (('domainleft="0"', 'domainleft="20"'), "4:5: the range of 'food' starts at 20.0"),
