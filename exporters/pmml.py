@@ -28,8 +28,6 @@ from fuzzytree.exporters.pmml_xml import (
     derived,
     element,
     joined,
-    legal,
-    legal_names,
     ref,
     text_of,
 )
@@ -104,22 +102,20 @@ def write(
     )
     target = element(
         "DataField",
-        *(element("Value", value=names.label[name]) for name in model.classes),
+        *(element("Value", value=name) for name in model.classes),
         name=names.target,
         optype="categorical",
         dataType="string",
     )
-    data = element("DataDictionary", *_columns(model.variables, names.field), target)
+    data = element("DataDictionary", *_columns(model.variables), target)
     content = _content(_header(model), data, dictionary, body)
-    remarks = [*_renamed("variable", names.field), *_renamed("class", names.label)]
-    return Written(content, losses, tuple(remarks))
+    return Written(content, losses)
 
 
 def _written_system(system: FuzzySystem) -> Written:
     """Return a system: its program, and a model that hands on the first output."""
-    names = legal_names(one.name for one in system.variables)
-    taken = set(names.values())
-    made = SystemFields(system, names, taken)
+    taken = {one.name for one in system.variables}
+    made = SystemFields(system, taken)
     first, *others = system.outputs
     result = unlike("result", taken)
     number = {"optype": "continuous", "dataType": "double"}
@@ -127,7 +123,7 @@ def _written_system(system: FuzzySystem) -> Written:
         element(
             "OutputField",
             value,
-            name=names[one.name],
+            name=one.name,
             feature="transformedValue",
             **number,
         )
@@ -138,10 +134,10 @@ def _written_system(system: FuzzySystem) -> Written:
         element(
             "MiningSchema",
             *(
-                element("MiningField", name=names[name], invalidValueTreatment="asIs")
+                element("MiningField", name=name, invalidValueTreatment="asIs")
                 for name in system.columns
             ),
-            element("MiningField", name=names[first.name], usageType="target"),
+            element("MiningField", name=first.name, usageType="target"),
         ),
         *([element("Output", *outputs)] if outputs else []),
         element(
@@ -149,25 +145,23 @@ def _written_system(system: FuzzySystem) -> Written:
             element("NumericPredictor", name=result, coefficient="1"),
             intercept="0",
         ),
-        modelName=legal(system.name),
+        modelName=system.name,
         functionName="regression",
     )
-    target = element("DataField", name=names[first.name], **number)
+    target = element("DataField", name=first.name, **number)
     dictionary = element(
         "TransformationDictionary",
         *made.functions.values(),
         *made.fields,
         derived(result, made.outputs[0]),
     )
-    data = element("DataDictionary", *_columns(system.inputs, names), target)
+    data = element("DataDictionary", *_columns(system.inputs), target)
     header = _heading(
         f"A fuzzy system, named {system.name}.", {"fingerprint": fingerprint(system)}
     )
     content = _content(header, data, dictionary, model)
-    remarks = [*_renamed("variable", names)]
-    if made.is_inexact:
-        remarks.append("exp, powers and the like are good to a few last digits")
-    return Written(content, (), tuple(remarks))
+    remark = "exp, powers and the like are good to a few last digits"
+    return Written(content, (), (remark,) if made.is_inexact else ())
 
 
 def _content(*parts: Element) -> bytes:
@@ -178,38 +172,27 @@ def _content(*parts: Element) -> bytes:
 
 
 class _Names(NamedTuple):
-    """What things are called in the file.
+    """Names that are made for the file, besides those of variables and classes.
 
     Attributes:
-        field: The field of each variable.
-        label: The text of each class.
         target: The field of the class.
         taken: Names of fields.
     """
 
-    field: dict[str, str]
-    label: dict[str, str]
     target: str
     taken: set[str]
 
     @staticmethod
     def of(model: Model) -> _Names:
-        field = legal_names(variable.name for variable in model.variables)
-        taken = set(field.values())
+        taken = {variable.name for variable in model.variables}
         target = unlike("class", taken)
-        return _Names(field, legal_names(model.classes), target, taken | {target})
+        return _Names(target, taken | {target})
 
     def new(self, name: str) -> str:
         """Return a name for one more field."""
-        found = unlike(legal(name), self.taken)
+        found = unlike(name, self.taken)
         self.taken.add(found)
         return found
-
-
-def _renamed(kind: str, names: Mapping[str, str]) -> Iterator[str]:
-    for name, plain in names.items():
-        if name != plain:
-            yield f"{kind} {name!r} is called {plain!r}: XML has no such characters"
 
 
 def _header(model: Model) -> Element:
@@ -228,7 +211,7 @@ def _heading(description: str, facts: Mapping[str, str]) -> Element:
         "Header",
         *(_extension(name, text) for name, text in facts.items()),
         element("Application", name="fuzzytree"),
-        description=legal(description),
+        description=description,
     )
 
 
@@ -237,12 +220,10 @@ def _answer(label: str | None) -> str:
 
 
 def _extension(name: str, value: str) -> Element:
-    return element("Extension", extender="fuzzytree", name=name, value=legal(value))
+    return element("Extension", extender="fuzzytree", name=name, value=value)
 
 
-def _columns(
-    variables: Iterable[Variable | SystemInput], names: Mapping[str, str]
-) -> Iterator[Element]:
+def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[Element]:
     for variable in variables:
         if variable.parts:
             continue
@@ -254,7 +235,7 @@ def _columns(
         yield element(
             "DataField",
             *(_extension(name, text) for name, text in known.items() if text),
-            name=names[variable.name],
+            name=variable.name,
             optype="continuous",
             dataType="double",
         )
@@ -270,24 +251,24 @@ def _axes(
                 apply(
                     "*",
                     constant(part.weight),
-                    apply("-", ref(names.field[part.input]), constant(part.centre)),
+                    apply("-", ref(part.input), constant(part.centre)),
                 )
                 for part in variable.parts
             ]
-            yield derived(names.field[variable.name], functions.total(summands))
+            yield derived(variable.name, functions.total(summands))
 
 
 def _usable(
     variables: Sequence[Variable], names: _Names, functions: Functions
 ) -> Element:
     """Return 1 where every value is there and finite, and 0 elsewhere."""
-    parts = [functions.finite(ref(names.field[v.name])) for v in variables]
+    parts = [functions.finite(ref(v.name)) for v in variables]
     return joined("min", parts) if parts else constant(1.0)
 
 
 def _schema(model: Model, names: _Names) -> Element:
     fields = [
-        element("MiningField", name=names.field[name], invalidValueTreatment="asIs")
+        element("MiningField", name=name, invalidValueTreatment="asIs")
         for name in model.inputs
     ]
     target = element("MiningField", name=names.target, usageType="target")
@@ -317,7 +298,7 @@ def _model(
         _schema(model, names),
         element("Output", predicted, number, *outputs),
         element("Node", element("True"), *nodes, id="0"),
-        modelName=legal(model.name),
+        modelName=model.name,
         functionName="classification",
         missingValueStrategy="nullPrediction",
         noTrueChildStrategy="returnNullPrediction",
@@ -335,7 +316,7 @@ def _rules(
         for term in variable.terms:
             name = names.new(f"{variable.name} is {term.name}")
             terms[variable.name, term.name] = name
-            field = names.field[variable.name]
+            field = variable.name
             degree = (
                 norm_continuous(term.shape, field)
                 if isinstance(term.shape, Points) and not is_exact
@@ -414,7 +395,7 @@ def _rule_nodes(rules: RuleBase, winner: str, names: _Names) -> Iterator[Element
             "Node",
             _predicate(winner, "equal", number),
             id=id_,
-            score=names.label[label],
+            score=label,
             recordCount=None if count is None else str(count),
         )
 
@@ -446,7 +427,7 @@ def _tree(
         node = tree.nodes[number - 1]
         children: list[Element] = []
         for owner, branch in enumerate(node.branches):
-            predicate = _owned(node, owner, names.field[node.variable])
+            predicate = _owned(node, owner, node.variable)
             if branch.node is not None:
                 children.append(_with_predicate(made.pop(branch.node), predicate))
             else:
@@ -459,7 +440,7 @@ def _tree(
     )
     nodes = [root]
     if tree.semantics.missing is not None:
-        label = names.label[tree.semantics.missing]
+        label = tree.semantics.missing
         is_missing = _predicate(usable, "equal", 0.0)
         nodes.append(element("Node", is_missing, id="missing", score=label))
     return fields, _model(tree, names, (), nodes)
@@ -475,7 +456,7 @@ def _leaf(tree: FuzzyTree, number: int, predicate: Element, names: _Names) -> El
         "Node",
         predicate,
         id=str(number),
-        score=names.label[leaf.label],
+        score=leaf.label,
         recordCount=None if leaf.support is None else str(leaf.support),
     )
 

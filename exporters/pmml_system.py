@@ -89,9 +89,7 @@ class SystemFields:
         is_inexact: Whether an operation's last digits are the engine's own.
     """
 
-    def __init__(
-        self, system: FuzzySystem, fields: Mapping[str, str], taken: set[str]
-    ) -> None:
+    def __init__(self, system: FuzzySystem, taken: set[str]) -> None:
         program = from_system(system)
         if program.size > MOST_FIELDS:
             raise LossError(
@@ -102,7 +100,6 @@ class SystemFields:
         self.is_inexact = any(step.operation in INEXACT for step in program.steps)
         self.functions: dict[str, Element] = {}
         self.fields: list[Element] = []
-        self._inputs = fields
         self._prefix = _prefix(taken)
         values: list[list[Value]] = []
         for place, step in enumerate(program.steps):
@@ -119,7 +116,7 @@ class SystemFields:
             case "constant":
                 return [step.number]
             case "input":
-                return [ref(self._inputs[step.name])]
+                return [ref(step.name)]
             case "index":
                 return [float(k) for k in range(step.samples)]
             case "total":

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
-from fuzzytree.naming import unlike
-
-_ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _ESCAPES = {
     "&": "&amp;",
     "<": "&lt;",
@@ -71,28 +67,6 @@ def _lines(root: Element) -> Iterator[str]:
 
 def _escaped(text: str) -> str:
     return "".join(_ESCAPES.get(character, character) for character in text)
-
-
-def legal_names(names: Iterable[str]) -> dict[str, str]:
-    r"""Return each name without characters that XML cannot hold, all of them unlike.
-
-    Example:
-        >>> legal_names(["a\x00", "a_", "b"])
-        {'a\x00': 'a_ 2', 'a_': 'a_', 'b': 'b'}
-    """
-    given = list(dict.fromkeys(names))
-    taken = {name for name in given if not _ILLEGAL.search(name)}
-    found: dict[str, str] = {}
-    for name in given:
-        plain = _ILLEGAL.sub("_", name)
-        found[name] = name if plain == name else unlike(plain, taken)
-        taken.add(found[name])
-    return found
-
-
-def legal(text: str) -> str:
-    """Return a text without characters that XML cannot hold."""
-    return _ILLEGAL.sub("_", text)
 
 
 def constant(value: float) -> Element:

@@ -9,6 +9,7 @@ names (`ß` is `ss`, `λ` is `lamda`), other letters and symbols their number (`
 
 from __future__ import annotations
 
+import json
 import string
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -54,6 +55,25 @@ def printable(text: str) -> str:
         return text
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
+
+
+def printable_lines(text: str) -> str:
+    """Return lines for a terminal; each is made printable, and keeps its end."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
+def printable_json(text: str) -> str:
+    r"""Return JSON that says the same, with an escape where a terminal might obey.
+
+    Example:
+        >>> print(printable_json('["' + chr(0x9B) + '2J"]'))
+        ["\u009b2J"]
+    """
+    if text.replace("\n", " ").isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text
     )
 
 

@@ -60,7 +60,7 @@ Formulas = Literal["none", "tame", "wild"]
 _PLAIN: Final = ("low", "medium", "high", "far", "near")
 _ODD: Final = (
     *("is", "very", "not low", "and", "it's", "(low)", "x", "Größe", '"', "a  b"),
-    *(" low", "low and high", "0.5", "then", ":", "any", "low,", "'", "\\", "\n#"),
+    *(" low", "low and high", "0.5", "then", ":", "any", "low,", "'", "\\", "#"),
 )
 
 _TAME: Final[Mapping[str, int]] = {

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Literal
 
@@ -21,6 +22,10 @@ _LARGEST_COEFFICIENT = 1e6  # keeps every polynomial finite, in float32 too
 MOST_POINTS = 4096
 
 _MOST_COMPARED = 1000  # names among which a similar one is sought
+
+_CONTROL = re.compile(
+    r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff]"
+)
 
 Path = tuple[str | int, ...]
 Mistake = tuple[Path, str]
@@ -355,8 +360,9 @@ def naming_mistakes(
     """Yield what is wrong with a model's name, classes and default answers."""
     if not name:
         yield ("name",), "a model needs a name"
-    if not _is_writable(name):
-        yield ("name",), f"the name {name!r} cannot be written as UTF-8"
+    fault = text_fault(name)
+    if fault:
+        yield ("name",), f"the name {name!r} {fault}"
     if not classes:
         yield ("classes",), "a model needs at least one class"
     yield from name_mistakes(("classes",), "class", classes)
@@ -394,6 +400,7 @@ def variable_mistakes(
                 f"input {variable.name!r} is not among the columns; "
                 f"{name_choice(variable.name, columns)}",
             )
+        yield from unit_mistakes(path, variable.name, variable.unit)
         yield from range_mistakes(path, variable.name, variable.low, variable.high)
         yield from part_mistakes(path, variable.name, variable.parts, known)
         names = [term.name for term in variable.terms]
@@ -408,6 +415,13 @@ def variable_mistakes(
             for text in shape_mistakes(term.shape):
                 yield (*path, "terms", index, "shape"), f"{where}: {text}"
         known[variable.name] = bool(variable.parts)
+
+
+def unit_mistakes(path: Path, name: str, unit: str) -> Iterator[Mistake]:
+    """Yield why the unit of a variable is none."""
+    fault = text_fault(unit)
+    if fault:
+        yield (*path, "unit"), f"the unit {unit!r} of {name!r} {fault}"
 
 
 def range_mistakes(
@@ -602,22 +616,34 @@ def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
 
 
 def name_mistakes(path: Path, what: str, names: Iterable[str]) -> Iterator[Mistake]:
-    """Yield which names stand twice or cannot be written."""
+    """Yield which names stand twice or hold what no name may hold."""
     seen: set[str] = set()
     for position, name in enumerate(names):
-        if not _is_writable(name):
-            yield (*path, position), f"{what} {name!r} cannot be written as UTF-8"
+        fault = text_fault(name)
+        if fault:
+            yield (*path, position), f"{what} {name!r} {fault}"
         if name in seen:
             yield (*path, position), f"{what} {name!r} stands twice"
         seen.add(name)
 
 
-def _is_writable(name: str) -> bool:
+def text_fault(text: str) -> str:
+    """Return why a text is no name or unit, empty if it may be one.
+
+    Terminals, editors and line-based formats obey control characters, line breaks and
+    marks that change the direction of writing, so that no name holds one.
+
+    Example:
+        >>> text_fault("petal length (µm)"), text_fault("petal" + chr(27) + "[2J")
+        ('', 'has a control character')
+    """
+    if _CONTROL.search(text):
+        return "has a control character"
     try:
-        name.encode()
+        text.encode()
     except UnicodeEncodeError:
-        return False
-    return True
+        return "cannot be written as UTF-8"
+    return ""
 
 
 def name_choice(wrong: str, names: Iterable[str]) -> str:

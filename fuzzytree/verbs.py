@@ -37,7 +37,7 @@ from fuzzytree.converting import (
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
 from fuzzytree.files import read_bounded, reason, write_atomically
-from fuzzytree.naming import as_names
+from fuzzytree.naming import as_names, printable
 from fuzzytree.options import Option
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase, name_choice
 from fuzzytree.runtimes import chosen_runtimes
@@ -230,7 +230,7 @@ def learn_table(
 
 def _name_of(table: object) -> str:
     if isinstance(table, str | os.PathLike):
-        return Path(table).stem or "tree"
+        return printable(Path(table).stem) or "tree"
     return "tree"
 
 

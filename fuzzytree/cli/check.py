@@ -9,6 +9,7 @@ import click
 from fuzzytree.cli.talk import (
     allow_loss_option,
     answer,
+    answer_json,
     data_option,
     delimiter_option,
     json_option,
@@ -78,7 +79,7 @@ def command(
             allow_loss=allow_loss,
         )
     if as_json:
-        answer(found.to_json())
+        answer_json(found.to_json())
     else:
         answer("\n".join(text.agreement_lines(found, is_full=is_full)))
     say(text.verdict_text(found), quiet=quiet and found.ok)

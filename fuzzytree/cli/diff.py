@@ -10,6 +10,7 @@ from fuzzytree.cli.audit_options import limits_of
 from fuzzytree.cli.talk import (
     allow_loss_option,
     answer,
+    answer_json,
     delimiter_option,
     json_option,
     progress_bar,
@@ -73,7 +74,7 @@ def command(
             progress=tell,
         )
     if as_json:
-        answer(found.to_json())
+        answer_json(found.to_json())
     else:
         answer("\n".join(diff_lines(found)))
     say(verdict_text(found), quiet=quiet and found.verdict == "equal" and found.ok)

@@ -32,6 +32,7 @@ from fuzzytree.cli.talk import (
 )
 from fuzzytree.contracts import Carrier, Document, Format
 from fuzzytree.files import check_place, read_bounded, write_atomically
+from fuzzytree.naming import printable
 from fuzzytree.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
@@ -183,7 +184,7 @@ def command(
     noticed = dict(remarks(found, lambda column: f"--ignore {shlex.quote(column)}"))
     tell_rows(*(("remark", column, f"has {text}") for column, text in noticed.items()))
     begin = time.perf_counter()
-    title = name or ("tree" if table == "-" else Path(table).stem)
+    title = name or ("tree" if table == "-" else printable(Path(table).stem))
     with wrong_options(), progress_bar(quiet=is_silent) as tell:
         learnt = learn_table(
             found, name=title, units=units_of, settings=settings, progress=tell

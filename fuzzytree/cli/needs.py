@@ -9,6 +9,7 @@ import click
 
 from fuzzytree.cli.talk import (
     answer,
+    answer_json,
     data_option,
     delimiter_option,
     json_option,
@@ -100,7 +101,10 @@ def command(
             seconds=seconds or 0.0,
             tell=tell,
         )
-    answer(told.to_json() if as_json else "\n".join(report_lines(told)))
+    if as_json:
+        answer_json(told.to_json())
+    else:
+        answer("\n".join(report_lines(told)))
     if not told.ok:
         wrong = sum(c.verdict == "DISAGREES" for c in told.proof.comparisons)
         say(f"the pruned model differs in {wrong} ways; nothing is written")

@@ -8,7 +8,7 @@ import io
 import itertools
 import json
 import sys
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 import click
@@ -24,6 +24,7 @@ from fuzzytree.cli.talk import (
 from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
 from fuzzytree.lowering import rules_from_tree
+from fuzzytree.naming import printable_json
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from fuzzytree.tables import Batch
 
 Columns = dict[str, Sequence[object]]
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a cell begins
 
 
 @click.command("run", short_help="Answer the rows of a table.")
@@ -63,6 +66,11 @@ Columns = dict[str, Sequence[object]]
     is_flag=True,
     help="Write JSON lines, not CSV; null for nothing.",
 )
+@click.option(
+    "--safe-csv",
+    is_flag=True,
+    help="Put an apostrophe before text that a spreadsheet takes for a formula.",
+)
 @allow_loss_option
 @quiet_option
 def command(
@@ -75,6 +83,7 @@ def command(
     runtime: str | None,
     delimiter: str | None,
     as_json: bool,
+    safe_csv: bool,
     allow_loss: bool,
     quiet: bool,
 ) -> None:
@@ -86,6 +95,8 @@ def command(
     """
     from fuzzytree import verbs
 
+    if as_json and safe_csv:
+        raise click.UsageError("--safe-csv is about CSV, and --json writes none")
     found = verbs.opened(model, allow_loss=allow_loss)
     reason = _reasons(model, found) if why else None
     if strengths and isinstance(found, FuzzyTree):
@@ -103,7 +114,7 @@ def command(
     tally = _Tally(_tells_ties(found))
     with _opened(output) as stream:
         batches = answer(source, delimiter=delimiter, name=name, with_others=keep)
-        write = _json_writer(stream) if as_json else _csv_writer(stream)
+        write = _json_writer(stream) if as_json else _csv_writer(stream, safe_csv)
         for batch, answers in batches:
             columns = _kept(batch) if keep else {}
             _add(columns, _answered(answers, strengths, model), name)
@@ -198,16 +209,40 @@ def _as_text(file: BinaryIO) -> Generator[TextIO]:
         text.detach()  # it would close a file that is not ours to close
 
 
-def _csv_writer(stream: TextIO) -> Callable[[Columns], None]:
+def _csv_writer(stream: TextIO, is_safe: bool) -> Callable[[Columns], None]:
     writer = csv.writer(stream, lineterminator="\n")
     headed = itertools.count()
 
     def write(columns: Columns) -> None:
+        rows: Iterator[Sequence[object]] = zip(*columns.values(), strict=True)
         if next(headed) == 0:
-            writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+            rows = itertools.chain([[*columns]], rows)
+        writer.writerows(map(_spreadsheet_row, rows) if is_safe else rows)
 
     return write
+
+
+def _spreadsheet_row(row: Sequence[object]) -> list[object]:
+    """Return cells none of which a spreadsheet takes for a formula.
+
+    Example:
+        >>> _spreadsheet_row(["=1+1", "-1.5", -1.5, "a=b"])
+        ["'=1+1", '-1.5', -1.5, 'a=b']
+    """
+    return [
+        f"'{cell}"
+        if isinstance(cell, str) and cell.startswith(_FORMULA) and not _is_number(cell)
+        else cell
+        for cell in row
+    ]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _json_writer(stream: TextIO) -> Callable[[Columns], None]:
@@ -215,7 +250,8 @@ def _json_writer(stream: TextIO) -> Callable[[Columns], None]:
         for row in zip(*columns.values(), strict=True):
             cells = (None if cell == "" else cell for cell in row)
             facts = dict(zip(columns, cells, strict=True))
-            stream.write(json.dumps(facts, ensure_ascii=False) + "\n")
+            line = printable_json(json.dumps(facts, ensure_ascii=False))
+            stream.write(f"{line}\n")
 
     return write
 

@@ -8,6 +8,7 @@ import click
 
 from fuzzytree.cli.talk import (
     answer,
+    answer_json,
     data_option,
     delimiter_option,
     json_option,
@@ -65,7 +66,7 @@ def command(
             progress=tell,
         )
     if as_json:
-        answer(found.to_json())
+        answer_json(found.to_json())
     else:
         answer("\n".join(stability_lines(found, is_full=is_full)))
     failed = [one.code for one in found.criteria if one.verdict == "FAILS"]

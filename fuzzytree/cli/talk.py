@@ -12,7 +12,7 @@ import click
 import msgspec
 
 from fuzzytree.errors import FuzzyTreeError
-from fuzzytree.naming import printable
+from fuzzytree.naming import printable, printable_json, printable_lines
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -58,7 +58,7 @@ runtimes_option = click.option(
 def say(text: str, *, quiet: bool = False) -> None:
     """Write lines to stderr; what a terminal might obey is written as an escape."""
     if not quiet:
-        click.echo("\n".join(map(printable, text.split("\n"))), err=True)
+        click.echo(printable_lines(text), err=True)
 
 
 def say_rows(*rows: tuple[str, str, str], width: int = 0, quiet: bool = False) -> None:
@@ -69,14 +69,24 @@ def say_rows(*rows: tuple[str, str, str], width: int = 0, quiet: bool = False) -
 
 
 def answer(text: str) -> None:
-    """Write a line to stdout."""
+    """Write lines to stdout; what a terminal might obey is written as an escape."""
+    click.echo(printable_lines(text))
+
+
+def answer_styled(text: str) -> None:
+    """Write a text to stdout with its colours; what it quotes is printable already."""
     click.echo(text)
 
 
 def answer_json(facts: object) -> None:
-    """Write facts to stdout as indented JSON."""
-    raw = msgspec.json.encode(facts)
-    click.echo(msgspec.json.format(raw, indent=2).decode())
+    """Write facts to stdout as indented JSON.
+
+    Args:
+        facts: Anything that JSON can hold; a text is JSON already.
+    """
+    if not isinstance(facts, str):
+        facts = msgspec.json.format(msgspec.json.encode(facts), indent=2).decode()
+    click.echo(printable_json(facts))
 
 
 def answer_bytes(content: bytes) -> None:

@@ -19,6 +19,7 @@ from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import Settings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.validation import Choice, chosen_tree
+from fuzzytree.rulebase import text_fault
 from fuzzytree.tables import numbers_only, unmasked
 from fuzzytree.tree import FuzzyTree
 
@@ -107,6 +108,9 @@ class Learner:
     def __post_init__(self) -> None:
         """Check the names and start with an empty table."""
         _check_names(self.columns, self.classes, self.settings)
+        for text in (self.name, *self.units.values()):
+            if fault := text_fault(text):
+                raise ValueError(f"the name or unit {text!r} {fault}")
         self._statistics = Statistics(
             len(self.classes), len(self.columns), self.settings.rows_per_class
         )
@@ -239,6 +243,8 @@ def _check_names(
         for name in found:
             if name in seen:
                 raise ValueError(f"the {kind} {name!r} is named twice")
+            if fault := text_fault(name):
+                raise ValueError(f"the {kind} {name!r} {fault}; rename it")
             seen.add(name)
     for name in settings.costs:
         if name not in columns:

@@ -17,7 +17,7 @@ import msgspec
 from fuzzytree.casting import as_written, joined_by_number
 from fuzzytree.contracts import Locate, Loss, Reading
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.naming import numbered
+from fuzzytree.naming import numbered, printable
 from fuzzytree.readers import fis_text as text
 from fuzzytree.readers import fis_words as words
 from fuzzytree.readers.engines import fuzzylite_losses
@@ -267,7 +267,7 @@ def _methods(section: Section, name: str, dialect: Dialect, notes: Notes) -> _Me
 
     title = word("Name")
     if not title:
-        title = PurePath(name).stem or "system"
+        title = printable(PurePath(name).stem) or "system"
         notes.remarks.append(f"the system has no name; {title!r} stands for it")
     method = norm("DefuzzMethod", words.METHODS)
     is_sugeno = word("Type").lower() == "sugeno"

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from fuzzytree.casting import as_written
 from fuzzytree.contracts import Locate, Reading
 from fuzzytree.errors import InvalidModelError
+from fuzzytree.naming import printable
 from fuzzytree.readers.fll_meaning import as_meant, differences, without_disabled
 from fuzzytree.readers.fll_variables import (
     Known,
@@ -78,7 +79,7 @@ def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
     page = read_page(text, notes)
     parts = None
     if not notes.is_full:
-        parts = _system(page.sections, PurePath(name).stem, notes)
+        parts = _system(page.sections, printable(PurePath(name).stem), notes)
     if notes.found or parts is None:
         raise report(name, notes.found)
     model, facts = as_written(parts.system, page.comments)

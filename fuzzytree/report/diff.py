@@ -8,6 +8,7 @@ from typing import Final
 
 from fuzzytree.auditing.difference_records import Change, Compared, Difference
 from fuzzytree.auditing.records import Answer, Place
+from fuzzytree.naming import printable
 from fuzzytree.proving.states import Bracket, Coordinate, Witness
 from fuzzytree.report.audit_states import state_text, state_word
 from fuzzytree.report.svg_regions import span_text
@@ -87,7 +88,7 @@ def _counts_text(changes: Sequence[Change]) -> str:
 
 def _model_text(title: str, model: Compared) -> str:
     of = f"{model.file.name}: " if model.file else ""
-    return _shown(f"{title:8} {of}{model.form} {model.name!r}")
+    return printable(f"{title:8} {of}{model.form} {model.name!r}")
 
 
 def _answer_lines(answer: Answer) -> Iterator[str]:
@@ -124,7 +125,7 @@ def _change_lines(change: Change) -> Iterator[str]:
     text = f"{change.sentence}{doubt}"
     yield from _lines(f"  {change.grade:12}", text, indent=" " * 15)
     if places:
-        yield _shown(f"{' ' * 15}{places}")
+        yield printable(f"{' ' * 15}{places}")
 
 
 def _place_text(place: Place) -> str:
@@ -133,17 +134,10 @@ def _place_text(place: Place) -> str:
 
 def _lines(lead: str, text: str, *, indent: str = _INDENT) -> Iterator[str]:
     yield from textwrap.wrap(
-        _shown(text),
+        printable(text),
         WIDTH,
         initial_indent=f"{lead} ",
         subsequent_indent=indent,
         break_on_hyphens=False,
         break_long_words=False,
-    )
-
-
-def _shown(text: str) -> str:
-    """Return a text without what a terminal might obey."""
-    return "".join(
-        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
     )

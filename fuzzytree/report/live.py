@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from rich.cells import cell_len, set_cell_size
 
+from fuzzytree.naming import printable
 from fuzzytree.recognition.live import SENTENCES, STATES, Answer, View
 from fuzzytree.recognition.recogniser import State
 from fuzzytree.tactile.interpolation import interpolated
@@ -326,8 +327,4 @@ def escaped(text: str) -> str:
         >>> print(escaped("a\tb" + chr(27)))
         a\tb\x1b
     """
-    signs = text.replace("\\", "\\\\")
-    return "".join(
-        sign if sign.isprintable() else sign.encode("unicode_escape").decode()
-        for sign in signs
-    )
+    return printable(text.replace("\\", "\\\\"))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
+from fuzzytree.naming import printable
+
 MOST_LETTERS = 400
 """Of one text on a page; a longer one is cut, and says how long it is."""
 
@@ -33,11 +35,7 @@ def text(words: str) -> Markup:
     """
     if len(words) > MOST_LETTERS:
         words = f"{words[:MOST_LETTERS]}… ({len(words)} characters)"
-    signs = (
-        sign if sign.isprintable() else sign.encode("unicode_escape").decode()
-        for sign in words
-    )
-    return Markup(html.escape("".join(signs)))
+    return Markup(html.escape(printable(words)))
 
 
 def joined(parts: Iterable[Content], between: str = "") -> Markup:

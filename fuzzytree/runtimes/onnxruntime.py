@@ -25,7 +25,7 @@ from fuzzytree.contracts import (
 )
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
 from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
-from fuzzytree.rulebase import Semantics
+from fuzzytree.rulebase import Semantics, text_fault
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
@@ -490,6 +490,10 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
     is_possible &= (facts.carrier == "system") == bool(facts.names)
     if not set(facts.inputs) <= set(facts.columns) or not is_possible:
         raise ReadError(f"{name}: the file's metadata contradicts itself")
+    names = (*facts.columns, *facts.units, *facts.classes, *facts.names)
+    for text in (facts.name, facts.kind, facts.fingerprint, facts.version, *names):
+        if fault := text_fault(text):
+            raise ReadError(f"{name}: the file's metadata: {text!r} {fault}")
     return facts
 
 

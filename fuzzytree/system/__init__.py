@@ -9,6 +9,7 @@ that could change an answer stands in the values below.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
@@ -25,6 +26,8 @@ from fuzzytree.rulebase import (
     name_mistakes,
     part_mistakes,
     range_mistakes,
+    text_fault,
+    unit_mistakes,
 )
 from fuzzytree.system.curves import (
     FUNCTIONS,
@@ -337,6 +340,9 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     if not system.name:
         yield ("name",), "a system needs a name"
     yield from name_mistakes(("name",), "name", [system.name])
+    fault = text_fault(re.sub(r"[\n\r\t]", " ", system.note))
+    if fault:
+        yield ("note",), f"the note {fault}"
     if not system.outputs:
         yield ("outputs",), "a system needs at least one output"
     if not system.rules:
@@ -347,6 +353,7 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     count = len(system.columns)
     for position, one in enumerate(system.inputs):
         path: Path = ("inputs", position)
+        yield from unit_mistakes(path, one.name, one.unit)
         yield from range_mistakes(path, one.name, one.low, one.high)
         yield from part_mistakes(path, one.name, one.parts, known)
         yield from _label_mistakes(path, one, count, nameable)
@@ -355,6 +362,7 @@ def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
         known[one.name] = bool(one.parts)
     for position, output in enumerate(system.outputs):
         path = ("outputs", position)
+        yield from unit_mistakes(path, output.name, output.unit)
         yield from range_mistakes(path, output.name, output.low, output.high)
         yield from _label_mistakes(path, output, count, nameable)
         nameable[output.name] = None
@@ -518,11 +526,13 @@ def _rule_mistakes(system: FuzzySystem) -> Iterator[Mistake]:
     concludable: Terms = {name: terms[name] for name in outputs}
     for position, block in enumerate(system.blocks):
         path: Path = ("blocks", position)
+        yield from name_mistakes((*path, "name"), "block", [block.name])
         yield from activation_mistakes((*path, "activation"), block.activation)
         of_block = f" of block {position + 1}" if len(system.blocks) > 1 else ""
         for index, rule in enumerate(block.rules):
             where = f"rule {index + 1}{of_block}"
             place = (*path, "rules", index)
+            yield from name_mistakes((*place, "name"), "rule", [rule.name])
             for text in condition_mistakes(rule.when, block, terms):
                 yield (*place, "when"), f"{where}: {text}"
             for text in _conclusion_mistakes(rule.then, block, outputs, concludable):

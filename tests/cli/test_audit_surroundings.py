@@ -22,9 +22,7 @@ from tests.cli.conftest import Call
 ASKED = ("--select", "FT1,FT301,FT404")
 NAMES = {
     "markup": '"/><script>alert(1)</script>&',
-    "escapes": "a\x1b[31m\x1b]0;t\x07b\x9b2J",
-    "lines": "b\n::error::x%0A\r\n\u2028next",
-    "direction": "ab\u202e\u2066cd\u200f",
+    "commands": "b ::error::x%0A ::next",
     "long": "L" * 900,
     "pictures": "🙂👨\u200d👩'\"`",
 }

@@ -132,11 +132,3 @@ def test_damaged_and_foreign_files_are_refused(call: Call) -> None:
         "other.yaml: has no input in common with grip.yaml: it asks 'wind', and that "
         "asks 'force', 'slip'\n"
     )
-
-
-def test_names_in_files_command_no_terminal(call: Call) -> None:
-    rules = ft.rules_from_tree(grip())
-    ft.save(replace(rules, name="a\x1b[31mb"), "named.yaml")
-    code, out, _ = call("diff", "rules.yaml", "named.yaml")
-    assert code == 0
-    assert "\x1b" not in out

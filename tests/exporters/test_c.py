@@ -26,11 +26,11 @@ HOSTILE = (
     "*/ int x; /*",
     "/*/",
     "**//",
-    "??/\n#error",
+    "??/ #error",
     '"; system("',
     "\\",
     "int",
-    "\u202e é ☂ \u2028 \r\n",
+    "é ☂ \\u2028 \\r\\n",
     "%s%n",
     "1st",
     "A" * 100,
@@ -42,7 +42,7 @@ def hostile_rules() -> RuleBase:
     terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
     rules = tuple(Rule((Clause(name, (name,)),), name) for name in HOSTILE)
-    return RuleBase("*/ # ??/\n", HOSTILE, inputs, rules)
+    return RuleBase("*/ # ??/", HOSTILE, inputs, rules)
 
 
 def edge_tree(cut: float) -> FuzzyTree:

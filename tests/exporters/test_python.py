@@ -32,7 +32,7 @@ from fuzzytree.testing import probes, random_tree
 from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 HOSTILE = (
-    "\nimport os; os.abort()\n#",
+    "import os; os.abort() #",
     '"""',
     "'; raise SystemExit #",
     "class",
@@ -40,7 +40,7 @@ HOSTILE = (
     "\\",
     "answer",
     "coding: utf-16",
-    "{0} %s \u2028 \r é ☂",
+    "{0} %s é ☂",
 )
 
 
@@ -53,13 +53,13 @@ def executed(content: bytes) -> dict[str, Any]:
 def hostile_rules() -> RuleBase:
     terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
-    mix = Variable("mix\n#", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
+    mix = Variable("mix #", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
-        Rule((Clause(name, (name,)), Clause("mix\n#", HOSTILE[:2], True)), name)
+        Rule((Clause(name, (name,)), Clause("mix #", HOSTILE[:2], True)), name)
         for name in HOSTILE
     )
     semantics = Semantics("product", HOSTILE[0], HOSTILE[1])
-    return RuleBase('coding: latin-1\n\'"""', HOSTILE, (*inputs, mix), rules, semantics)
+    return RuleBase('coding: latin-1 \'"""', HOSTILE, (*inputs, mix), rules, semantics)
 
 
 @pytest.mark.parametrize("kind", ["tree", "relative", "raw"])

@@ -114,10 +114,10 @@ def _one_cut(cut: float) -> RuleBase:
 
 
 def test_odd_names_are_quoted_and_comments_stay_comments() -> None:
-    name = 'a`b" -- ]\n; DROP TABLE data'
-    variable = Variable(name, (Term("t'\n1", Band(high=1.0)),))
+    name = 'a`b" -- ]; DROP TABLE data'
+    variable = Variable(name, (Term("t' 1", Band(high=1.0)),))
     rules = RuleBase(
-        "n\n;", ("c",), (variable,), (Rule((Clause(name, ("t'\n1",)),), "c"),)
+        "n */ ;", ("c",), (variable,), (Rule((Clause(name, ("t' 1",)),), "c"),)
     )
     text = write(rules).content.decode()
     connection = sqlite3.connect(":memory:")

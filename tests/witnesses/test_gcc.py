@@ -59,11 +59,11 @@ Dtype = Literal["float64", "float32"]
 def hostile_rules() -> RuleBase:
     names = (
         "*/ int x; /*",
-        "??/\n#error",
+        "??/ #error",
         '"; system("',
         "\\",
         "int",
-        "é ☂ \u2028",
+        "é ☂",
         "A",
     )
     terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in names)
@@ -74,7 +74,7 @@ def hostile_rules() -> RuleBase:
         for name in names
     )
     semantics = Semantics("product", names[0], names[1])
-    return RuleBase("*/ ??/\n\\", names, (*inputs, mix), rules, semantics)
+    return RuleBase("*/ ??/ \\", names, (*inputs, mix), rules, semantics)
 
 
 def one_rule() -> RuleBase:

@@ -46,9 +46,9 @@ if TYPE_CHECKING:
 
 WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
 HOSTILE = (
-    "\n*/ process.exit(3); /*",
+    "*/ process.exit(3); /*",
     '"]; throw 1; ["',
-    "</script><!-- --> \u2028",
+    "</script><!-- -->",
     "`${process.exit(3)}` \\",
     "__proto__",
     "constructor",
@@ -90,13 +90,13 @@ def same_bits(one: Array, other: Array) -> bool:
 def hostile_rules() -> RuleBase:
     terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
-    mix = Variable("mix */\n", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
+    mix = Variable("mix */", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
         Rule((Clause(name, (name,)), Clause(mix.name, HOSTILE[:2], True)), name)
         for name in HOSTILE
     )
     semantics = Semantics("product", HOSTILE[0], HOSTILE[1])
-    return RuleBase("*/ `\u2028\n", HOSTILE, (*inputs, mix), rules, semantics)
+    return RuleBase("*/ `", HOSTILE, (*inputs, mix), rules, semantics)
 
 
 def models() -> dict[str, Model]:

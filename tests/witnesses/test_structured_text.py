@@ -60,7 +60,7 @@ HOSTILE = (
     "a__b",
     "_a",
     "1st",
-    "é ☂ $ \n {attribute}",
+    "é ☂ $ {attribute}",
     "strengths",
     "x" * 80,
     "x" * 80 + "y",
@@ -70,7 +70,7 @@ HOSTILE = (
 def hostile_rules() -> RuleBase:
     terms = tuple(Term(name, Band(high=1.0, right=Flank(1.0, 2.0))) for name in HOSTILE)
     inputs = tuple(Variable(name, terms, unit=name) for name in HOSTILE)
-    mix = Variable("mix *)\n", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
+    mix = Variable("mix *)", terms, parts=tuple(Part(n, 0.5) for n in HOSTILE[:3]))
     rules = tuple(
         Rule((Clause(name, (name,)), Clause(mix.name, HOSTILE[:2], True)), name)
         for name in HOSTILE

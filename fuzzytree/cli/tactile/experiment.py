@@ -13,6 +13,7 @@ from click.core import ParameterSource
 
 from fuzzytree.cli.talk import (
     answer,
+    answer_json,
     json_option,
     progress_bar,
     quiet_option,
@@ -151,7 +152,10 @@ def command(
             progress=tell,
         )
     lines = [*experiment_lines(outcome.study, printed=_printed(task))]
-    answer(outcome.study.to_json() if as_json else "\n".join(lines))
+    if as_json:
+        answer_json(outcome.study.to_json())
+    else:
+        answer("\n".join(lines))
     if not (peers or no_peers):
         say(
             f"without other learners: they need {install_hint('sklearn')}",
