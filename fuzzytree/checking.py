@@ -33,7 +33,7 @@ from fuzzytree.comparing import (
     same_bits,
     without_status,
 )
-from fuzzytree.contracts import Dtype, Model, Outcome, Run, Runtime
+from fuzzytree.contracts import Dtype, Model, Outcome, Progress, Run, Runtime
 from fuzzytree.errors import FuzzyTreeError, LossError
 from fuzzytree.interrupts import checkpoint
 from fuzzytree.lowering import forms, rules_from_tree
@@ -90,6 +90,7 @@ def check(
     runtimes: Sequence[str] | None = None,
     limit: int = 20_000,
     rows_only: bool = False,
+    progress: Progress | None = None,
 ) -> Agreement:
     """Hold every carrier of a model against the model itself.
 
@@ -102,6 +103,7 @@ def check(
         runtimes: The names of the runtimes to run; all that are installed if None.
         limit: The most probes.
         rows_only: Whether files whose rows agree are accepted with other content.
+        progress: Called with what is compared next and the share that is done.
 
     Returns:
         What was compared, on what, and with which result.
@@ -116,11 +118,16 @@ def check(
     if isinstance(model, FuzzyTree):
         findings += _equivalence(model, carriers, rows)
     certificates: list[Certified] = []
-    for carrier in carriers:
+    parts = len(carriers) + len(others)
+    for number, carrier in enumerate(carriers):
+        if progress:
+            progress(f"comparing {carrier.title}", number / parts)
         findings += _runtimes(carrier, chosen, rows)
         certificates += _certificates(carrier, chosen, rows)
     for number, other in enumerate(others):
         title = names[number] if number < len(names) else f"file {number + 1}"
+        if progress:
+            progress(f"comparing {title}", (len(carriers) + number) / parts)
         findings += _shipped(title, other, model, rows)
     return Agreement(
         model.name,

@@ -19,7 +19,7 @@ from fuzzytree.agreement import Agreement, Comparison, Count
 from fuzzytree.checking import first_difference
 from fuzzytree.checking_programs import ProgramFile, check_program
 from fuzzytree.comparing import Rows, counted, judged, same_bits
-from fuzzytree.contracts import Runtime, SystemOutcome, SystemRun
+from fuzzytree.contracts import Progress, Runtime, SystemOutcome, SystemRun
 from fuzzytree.errors import FuzzyTreeError, LossError
 from fuzzytree.likeness import is_alike
 from fuzzytree.probing import system_probes
@@ -95,6 +95,7 @@ def check_system(
     runtimes: Sequence[str] | None = None,
     limit: int = 2_000,
     rows_only: bool = False,
+    progress: Progress | None = None,
 ) -> Agreement:
     """Hold every carrier of a fuzzy system against the system itself.
 
@@ -107,6 +108,7 @@ def check_system(
         runtimes: The names of the runtimes to run; all that are installed if None.
         limit: The most probes.
         rows_only: Whether files whose rows agree are accepted with other content.
+        progress: Called with what is compared next and the share that is done.
 
     Returns:
         What was compared, on what, and with which result. A row `flips` where its
@@ -127,10 +129,15 @@ def check_system(
     bounds = _Bounds(program, rows.values)
     subject = _Subject(system, program, rows, native, bounds)
     findings = [*_inference(subject)]
-    for runtime in chosen:
+    parts = len(chosen) + len(others)
+    for number, runtime in enumerate(chosen):
+        if progress:
+            progress(f"comparing {runtime.name}", number / parts)
         findings += _runtime(subject, runtime)
     for number, other in enumerate(others):
         title = names[number] if number < len(names) else f"file {number + 1}"
+        if progress:
+            progress(f"comparing {title}", (len(chosen) + number) / parts)
         findings += _shipped(title, other, subject)
     return Agreement(
         system.name,

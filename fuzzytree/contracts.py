@@ -151,6 +151,9 @@ class Outcome(msgspec.Struct, frozen=True):
         return Outcome(self.rule[rows], self.status[rows], strengths)
 
 
+Progress = Callable[[str, float], None]
+"""Called with what is done next and the share that is done, in [0, 1]."""
+
 Run = Callable[["FloatArray"], Outcome]
 """Answers to values of shape (inputs, rows), in the order of the model's inputs."""
 

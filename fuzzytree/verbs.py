@@ -7,7 +7,7 @@ import io
 import os
 import stat
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -19,7 +19,7 @@ from fuzzytree.agreement import Agreement
 from fuzzytree.answering import Answering, Carried, answering, opened, run
 from fuzzytree.casting import as_rules, as_system
 from fuzzytree.checking_programs import ProgramFile
-from fuzzytree.contracts import Document, Dtype, Model, ModelSource, Written
+from fuzzytree.contracts import Document, Dtype, Model, ModelSource, Progress, Written
 from fuzzytree.converting import (
     CALLED,
     Conversion,
@@ -86,8 +86,6 @@ __all__ = [
     "save",
     "stability",
 ]
-
-Progress = Callable[[str, float], None]
 
 
 def learn(
@@ -358,6 +356,7 @@ def check(
     rows_only: bool = False,
     run_code: bool = False,
     allow_loss: bool = False,
+    progress: Progress | None = None,
 ) -> Agreement:
     """Compare a model with everything that is made of it, in every runtime.
 
@@ -376,6 +375,7 @@ def check(
         run_code: Whether a program (C, Python, JavaScript, SQL, PMML) is run even if
             its text is not what this version writes of the model.
         allow_loss: As in `load`, for every file.
+        progress: Called with what is compared next and the share that is done.
 
     Raises:
         ReadError: If a file cannot be read, or holds another kind of model.
@@ -411,6 +411,7 @@ def check(
             runtimes=runtimes,
             limit=limit or 2_000,
             rows_only=rows_only,
+            progress=progress,
         )
     from fuzzytree import checking
 
@@ -422,6 +423,7 @@ def check(
         runtimes=runtimes,
         limit=limit or 20_000,
         rows_only=rows_only,
+        progress=progress,
     )
 
 

@@ -201,3 +201,16 @@ def test_rows_on_an_edge_are_told_apart_from_the_table() -> None:
     assert "in 1 of 3 rows last bits decide" in told
     rows = [c for c in found.comparisons if (c.carrier, c.basis) == ("file 1", "rows")]
     assert [c.allowed < 1e-12 for c in rows] == [True]
+
+
+def test_a_check_reports_what_it_compares_next_and_how_far_it_is() -> None:
+    system = random_system(2)
+    parts: list[tuple[str, float]] = []
+    check_system(
+        system,
+        system,
+        runtimes=["native"],
+        limit=20,
+        progress=lambda text, share: parts.append((text, share)),
+    )
+    assert parts == [("comparing native", 0.0), ("comparing file 1", 0.5)]

@@ -13,6 +13,7 @@ from fuzzytree.cli.talk import (
     data_option,
     delimiter_option,
     json_option,
+    progress_bar,
     quiet_option,
     rows_only_option,
     runtimes_option,
@@ -66,7 +67,7 @@ def command(
     from fuzzytree import verbs
     from fuzzytree.report import text
 
-    with wrong_options():
+    with wrong_options(), progress_bar(quiet=quiet) as show:
         found = verbs.check(
             model,
             *files,
@@ -77,6 +78,7 @@ def command(
             rows_only=rows_only,
             run_code=run_code,
             allow_loss=allow_loss,
+            progress=show,
         )
     if as_json:
         answer_json(found.to_json())

@@ -21,6 +21,7 @@ from fuzzytree.cli.talk import (
     answer_bytes,
     answer_json,
     json_option,
+    progress_bar,
     quiet_option,
     say,
     say_rows,
@@ -206,15 +207,20 @@ def carry(
     }
     for remark in found.remarks:
         say(f"remark   {remark}", quiet=quiet)
-    with wrong_options():
-        written, refusal = _written(model, form, options, allow_loss=allow_loss)
-    if refusal or (found.losses and not allow_loss):
+    with progress_bar(quiet=quiet) as show:
+        show(f"writing {form.name}", 0.0)
+        with wrong_options():
+            written, refusal = _written(model, form, options, allow_loss=allow_loss)
+        proof = None
+        if not refusal and (allow_loss or not found.losses):
+            show(f"comparing {form.name} with the model", 0.5)
+            proof = proved(model, form, written, dtype=options.get("dtype"))
+    if proof is None:
         _refuse(found, refusal)
         if as_json and output != "-":
             losses = export(model, form.name, allow_loss=True, **options).losses
             answer_json({**facts, "file": None, "losses": losses})
         return 1
-    proof = proved(model, form, written, dtype=options.get("dtype"))
     if output == "-":
         answer_bytes(written.content)
     else:
