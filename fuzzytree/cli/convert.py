@@ -314,11 +314,11 @@ def next_check(*files: tuple[str, str], more: Sequence[str] = ()) -> str:
         files: Each with the name of its format; the first holds the model.
         more: What the command says behind the files.
     """
-    from fuzzytree.exporters import find_format
+    from fuzzytree.exporters import TABLE, find_format
 
     for number, (path, form) in enumerate(files):
         found = find_format(form)
-        is_readable = found.read is not None or (number > 0 and form == "onnx")
+        is_readable = found.read is not None or (number > 0 and form in TABLE)
         suffix = Path(path).suffix.lower()
         if path == "-" or not is_readable or suffix not in found.suffixes:
             return ""

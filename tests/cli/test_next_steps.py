@@ -58,7 +58,8 @@ def test_a_program_has_its_model_beside_it(call: Call) -> None:
     assert code == 0
     assert err.endswith(
         "wrote    m.sql\n"
-        "wrote    m.yaml   the model; next: fuzzytree check m.yaml --data few.csv\n"
+        "wrote    m.yaml   the model; "
+        "next: fuzzytree check m.yaml m.sql --data few.csv\n"
     )
     again = call("export", "m.yaml", "-o", "again.sql", "--quiet")
     assert again == (0, "", "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
+from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -258,7 +259,7 @@ def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
         same = [
             (a + 1, b + 1)
             for a, b in itertools.combinations(range(len(rules)), 2)
-            if {*rules[a].when} == {*rules[b].when}
+            if Counter(rules[a].when) == Counter(rules[b].when)
         ]
         return all(pair in told for pair in same)
     if answer.code == "FT107" and answer.terms:
