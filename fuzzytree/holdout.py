@@ -35,6 +35,9 @@ CHOOSING_CELLS = 1 << 15
 _CLASSES = 5000
 """The most classes times folds that are learnt; at least one fold is tried."""
 
+_COLUMNS = 200_000
+"""The most columns times folds that are learnt; at least one fold is tried."""
+
 _FEWEST = 2 * FOLDS  # rows
 
 
@@ -140,7 +143,8 @@ def accuracy(
     codes = table.codes[rows]
     fold = folds_of(codes, folds, seed)
     shares: list[float] = []
-    tried = max(1, min(folds, _CLASSES // len(table.classes)))
+    most = min(_CLASSES // len(table.classes), _COLUMNS // width)
+    tried = max(1, min(folds, most))
     for number in range(tried):
         if progress:
             progress(f"testing fold {number + 1} of {tried}", number / tried)

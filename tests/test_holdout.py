@@ -133,3 +133,18 @@ def test_with_many_classes_fewer_folds_are_tried(
     found = _accuracy(_table(60))
     assert found is not None
     assert len(found.folds) == 2
+
+
+def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
+    values = np.zeros((100_000, 20))
+    values[0, 10:] = 1.0
+    columns = tuple(f"x{number}" for number in range(100_000))
+    codes = np.repeat([0, 1], 10)
+    table = Table("wide", columns, values, ("a", "b"), codes)
+    settings = Settings()
+    report = learn_arrays(
+        values.T, codes, columns=columns, classes=["a", "b"], settings=settings
+    ).report
+    found = accuracy(table, settings, report)
+    assert found is not None
+    assert found.folds == (1.0, 1.0)
