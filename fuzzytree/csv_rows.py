@@ -198,19 +198,19 @@ def blocks(
     Raises:
         TableError: If a row is longer than `LONGEST`, or a quote is not closed.
     """
-    wide = min(_ROWS * (head.find(b"\n") + 1), LONGEST)
-    rest, line = head, 1
+    size = max(BLOCK, min(_ROWS * len(head.split(b"\n", 1)[0]), LONGEST))
+    rest, line = head + read(max(size - len(head), 0)), 1
     while True:
-        size = _whole(Rows(name, rest, line, mark))
-        if size and not _is_blank(rest[:size]):
-            yield Rows(name, rest[:size], line, mark)
-        if size:
-            line += count_breaks(rest[:size])
-            rest = rest[size:]
+        whole = _whole(Rows(name, rest, line, mark))
+        if whole and not _is_blank(rest[:whole]):
+            yield Rows(name, rest[:whole], line, mark)
+        if whole:
+            line += count_breaks(rest[:whole])
+            rest = rest[whole:]
         elif len(rest) > LONGEST:
             text = f"a row is longer than {LONGEST} bytes; is a quote not closed?"
             raise TableError(f"{name}:{line}: {text}")
-        more = read(max(BLOCK, wide, len(rest)))
+        more = read(max(size, len(rest)))
         if not more:
             break
         rest += more
