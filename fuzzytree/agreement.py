@@ -118,6 +118,40 @@ class Count(msgspec.Struct, frozen=True):
     missing: int
 
 
+class Coverage(msgspec.Struct, frozen=True):
+    """How far probes reach the rules of a fuzzy system, and rules its ranges.
+
+    Attributes:
+        rules: How many rules the system has.
+        unfired: The numbers, from 1, of the rules that fire in no probe, though probes
+            were aimed at each.
+        rows: How many rows were drawn evenly from the ranges of the inputs.
+        uncovered: In how many of them an output has no number of its own.
+    """
+
+    rules: int
+    unfired: tuple[int, ...]
+    rows: int
+    uncovered: int
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What a user should know of it; empty if all rules fire and cover enough."""
+        found: list[str] = []
+        if self.unfired:
+            shown = ", ".join(map(str, self.unfired[:20]))
+            more = len(self.unfired) - 20
+            shown += f" and {more} more" if more > 0 else ""
+            noun = "rule" if len(self.unfired) == 1 else "rules"
+            found.append(f"no probe fires {noun} {shown} of {self.rules}")
+        if 2 * self.uncovered > self.rows:
+            found.append(
+                f"in {self.uncovered} of {self.rows} rows drawn evenly from the ranges "
+                "of the inputs an output has no number, and its default answers"
+            )
+        return tuple(found)
+
+
 class Agreement(msgspec.Struct, frozen=True):
     """The result of a check.
 
@@ -131,6 +165,7 @@ class Agreement(msgspec.Struct, frozen=True):
         probes: How many of the rows are probes; the others are data.
         certificates: What each number type that was run can change, and did.
         rows_only: Whether the verdict `rows only` is accepted.
+        coverage: Of a fuzzy system: which rules probes fire, and what is uncovered.
     """
 
     FORMAT: ClassVar[str] = "fuzzytree-check/1"
@@ -144,6 +179,7 @@ class Agreement(msgspec.Struct, frozen=True):
     probes: int = 0
     certificates: tuple[Certified, ...] = ()
     rows_only: bool = False
+    coverage: Coverage | None = None
 
     @property
     def ok(self) -> bool:

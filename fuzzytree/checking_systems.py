@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.agreement import Agreement, Comparison, Count
+from fuzzytree.agreement import Agreement, Comparison, Count, Coverage
 from fuzzytree.checking import first_difference
 from fuzzytree.checking_programs import ProgramFile, check_program
 from fuzzytree.comparing import Rows, counted, judged, same_bits
 from fuzzytree.contracts import Progress, Runtime, SystemOutcome, SystemRun
 from fuzzytree.errors import FuzzyTreeError, LossError
 from fuzzytree.likeness import is_alike
-from fuzzytree.probing import system_probes
+from fuzzytree.probing import Aim, Row, range_rows, system_probes
 from fuzzytree.programs.bounds import ORIGIN, error_bounds
 from fuzzytree.programs.systems import from_system
 from fuzzytree.reference import Status
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 _SLOW_STEPS = 2_000_000  # operations that a slow runtime is asked for
 _EDGE = 1e-6  # share of a range; a wider bound says little
+_FEW = 200  # probes of a coverage alone
+_AT_ONCE = 256  # rules that probes are aimed at, before it is seen which others fire
+_DRAWN = 1_000  # rows drawn from the ranges
 _TOLD = 5  # differing rows told for each comparison
 
 Finding = Comparison | str
@@ -122,9 +125,11 @@ def check_system(
         >>> check_system(random_system(2), runtimes=["native"], limit=50).ok
         True
     """
-    rows = _rows(system, data, limit)
+    run = run_system(system, activations=True)
+    probes, coverage = _probes(system, run, limit)
+    rows = _rows(system, probes, data)
     chosen = chosen_runtimes(runtimes)
-    native = run_system(system, activations=True)(rows.values)
+    native = run(rows.values)
     program = from_system(system, activations=True)
     bounds = _Bounds(program, rows.values)
     subject = _Subject(system, program, rows, native, bounds)
@@ -148,14 +153,64 @@ def check_system(
         None,
         rows.probes,
         rows_only=rows_only,
+        coverage=coverage,
     )
 
 
-def _rows(system: FuzzySystem, data: FloatArray | None, limit: int) -> Rows:
+def coverage_of(system: FuzzySystem) -> Coverage:
+    """Return which rules of a system fire in probes, and how much is uncovered.
+
+    Example:
+        >>> from fuzzytree.samples import samples
+        >>> coverage_of(samples()["Mamdani, singletons"]).unfired
+        ()
+    """
+    return _probes(system, run_system(system, activations=True), _FEW)[1]
+
+
+def _probes(
+    system: FuzzySystem, run: SystemRun, limit: int
+) -> tuple[FloatArray, Coverage]:
+    """Return probes, with more of them aimed at the rules that do not fire in these."""
+    tables = [_values(system, system_probes(system, limit=limit))]
+    fired = np.asarray(_fired(run, tables[0]).any(axis=1))
+    aim = Aim(system)
+    missed = np.flatnonzero(~fired).tolist()
+    for start in range(0, len(missed), _AT_ONCE):
+        numbers = [one for one in missed[start : start + _AT_ONCE] if not fired[one]]
+        if not numbers:
+            continue
+        table = _values(system, [aim.row(system.rules[one]) for one in numbers])
+        fires = _fired(run, table)
+        tables.append(table[:, fires[~fired].any(axis=0)])
+        fired |= fires.any(axis=1)
+    drawn = run(_values(system, range_rows(system, _DRAWN)))
+    coverage = Coverage(
+        len(system.rules),
+        tuple(one + 1 for one in np.flatnonzero(~fired).tolist()),
+        _DRAWN,
+        int((drawn.status == Status.UNCOVERED).sum()),
+    )
+    return np.concatenate(tables, axis=1), coverage
+
+
+def _fired(run: SystemRun, values: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which rules fire in which rows, of shape (rules, rows)."""
+    degrees = run(values).activations
+    assert degrees is not None  # it was prepared with activations
+    fires: npt.NDArray[np.bool_] = degrees > 0.0
+    return fires
+
+
+def _values(system: FuzzySystem, rows: Sequence[Row]) -> FloatArray:
+    """Return rows as an array of shape (columns, rows)."""
     names = system.columns
-    probes = system_probes(system, limit=limit)
-    table = np.array([[row[name] for row in probes] for name in names], np.float64)
-    values = table.reshape(len(names), len(probes))
+    table = np.array([[row[name] for row in rows] for name in names], np.float64)
+    return table.reshape(len(names), len(rows))
+
+
+def _rows(system: FuzzySystem, probes: FloatArray, data: FloatArray | None) -> Rows:
+    names, values = system.columns, probes
     if data is not None:
         if data.ndim != 2 or data.shape[0] != len(names):
             raise ValueError(
@@ -163,7 +218,7 @@ def _rows(system: FuzzySystem, data: FloatArray | None, limit: int) -> Rows:
             )
         values = np.concatenate([values, data], axis=1)
     values = np.ascontiguousarray(values)
-    return Rows(names, values, np.arange(values.shape[1]), len(probes))
+    return Rows(names, values, np.arange(values.shape[1]), probes.shape[1])
 
 
 def _inference(subject: _Subject) -> Iterator[Finding]:

@@ -39,6 +39,7 @@ from fuzzytree.system import FuzzySystem, sampled_values
 from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
+    from fuzzytree.agreement import Coverage
     from fuzzytree.numerics.bounds import Certificate
 
 _FEW = 200  # probes of a file that is run
@@ -66,11 +67,13 @@ class Proof(msgspec.Struct, frozen=True):
             `unproved`: the file is not read back.
         sentence: The same for people.
         certificate: What a number type can change, if the file computes.
+        coverage: Of a fuzzy system: which rules probes fire, and what is uncovered.
     """
 
     verdict: Literal["equal", "alike", "certified", "as listed", "unproved"]
     sentence: str
     certificate: Certificate | None = None
+    coverage: Coverage | None = None
 
 
 class Conversion(msgspec.Struct, frozen=True):
@@ -482,9 +485,20 @@ def proved(
         DisagreementError: If the file is read back as another model, though the writer
             and the reader told of nothing.
     """
+    if not isinstance(model, FuzzySystem):
+        return _proved(model, form, written, dtype=dtype)
+    if form.read is None and form.name == "onnx" and not written.losses:
+        return _run(model, written)
+    from fuzzytree.checking_systems import coverage_of
+
+    proof = _proved(model, form, written, dtype=dtype)
+    return msgspec.structs.replace(proof, coverage=coverage_of(model))
+
+
+def _proved(model: Document, form: Format, written: Written, *, dtype: object) -> Proof:
     if form.read is None:
         if isinstance(model, FuzzySystem):
-            return _run(model, form, written)
+            return Proof("unproved", _NOT_READ)
         if form.dtype is not None:
             return _certified(model, form, dtype)
         return Proof("unproved", _NOT_READ)
@@ -543,14 +557,12 @@ def _certified(model: Model, form: Format, dtype: object) -> Proof:
     return Proof("certified", certificate.sentence, certificate)
 
 
-def _run(system: FuzzySystem, form: Format, written: Written) -> Proof:
-    """Run the file of a system where that can be done, and compare its numbers.
+def _run(system: FuzzySystem, written: Written) -> Proof:
+    """Run the ONNX file of a system, and compare its numbers.
 
     Raises:
         DisagreementError: If it answers other numbers, though no loss was told.
     """
-    if form.name != "onnx" or written.losses:
-        return Proof("unproved", _NOT_READ)
     from fuzzytree.checking_systems import check_system
     from fuzzytree.runtimes.onnxruntime import open_onnx
 
@@ -558,7 +570,12 @@ def _run(system: FuzzySystem, form: Format, written: Written) -> Proof:
     found = check_system(system, model, runtimes=[], limit=_FEW)
     found.raise_if_not_ok()
     text = f"run by onnxruntime, it answers {found.probes} probes like the system"
-    return Proof("alike", text)
+    if found.coverage is not None and found.coverage.unfired:
+        count = found.coverage.rules
+        text += (
+            f", in which {count - len(found.coverage.unfired)} of {count} rules fire"
+        )
+    return Proof("alike", text, coverage=found.coverage)
 
 
 def _exact(model: Document, origin: str) -> Certificate | None:

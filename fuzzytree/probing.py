@@ -15,6 +15,8 @@ import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from fuzzytree.inference import curve_degree
+from fuzzytree.inference.norms import hedges_applied
 from fuzzytree.lowering import rules_from_tree
 from fuzzytree.reference import axis_values
 from fuzzytree.rulebase import (
@@ -29,18 +31,25 @@ from fuzzytree.rulebase import (
     shapes_of,
 )
 from fuzzytree.system import (
+    And,
     Bell,
     Binary,
+    Condition,
     Cosine,
     Curve,
     Formula,
     FuzzySystem,
     Gaussian,
+    Hedge,
+    Is,
     Linear,
+    Not,
+    Or,
     Sigmoid,
     SigmoidDifference,
     SigmoidProduct,
     Spike,
+    SystemRule,
     TwoGaussians,
 )
 from fuzzytree.tree import FuzzyTree
@@ -189,6 +198,126 @@ def system_probes(
     while len(rows) < room:
         rows.append({n: chance.choice(points[n]) for n in points} if points else {})
     return [*rows, *tail][:limit]
+
+
+def range_rows(system: FuzzySystem, count: int, *, seed: int = 0) -> list[Row]:
+    """Return rows drawn evenly from the range of each column.
+
+    Where a range is not known, that of the landmarks stands for it.
+    """
+    chance = random.Random(seed)
+    ranges = {name: _hull(values) for name, values in _system_points(system).items()}
+    for one in system.inputs:
+        if not one.parts and one.low is not None and one.high is not None:
+            ranges[one.name] = one.low, one.high
+    return [
+        {name: chance.uniform(*ends) for name, ends in ranges.items()}
+        for _ in range(count)
+    ]
+
+
+class Aim:
+    """Makes rows in which rules of a system are likely to fire.
+
+    Each variable that a rule tests gets the landmark at which its propositions are
+    truest together, or a value beside it that is at least half as true, so that rules
+    next to it fire as well. Propositions on outputs are left out.
+    """
+
+    def __init__(self, system: FuzzySystem, *, seed: int = 0) -> None:
+        self._chance = random.Random(seed)
+        self._points = _system_points(system)
+        self._inputs = {one.name: one for one in system.inputs}
+        self._curves = {
+            (one.name, label.name): label.curve
+            for one in system.inputs
+            for label in one.labels
+        }
+        self._known: dict[tuple[str, frozenset[_Wish]], tuple[float, float]] = {}
+
+    def row(self, rule: SystemRule) -> Row:
+        """Return a row for a rule; what it does not test is drawn at random."""
+        chance = self._chance
+        row = {name: chance.uniform(*_hull(at)) for name, at in self._points.items()}
+        wishes: dict[str, set[_Wish]] = {}
+        for variable, wish in _wishes(rule.when, is_true=True):
+            if variable in self._inputs:
+                wishes.setdefault(variable, set()).add(wish)
+        for variable, asked in wishes.items():
+            value = self._value(variable, frozenset(asked), row)
+            one = self._inputs[variable]
+            if not one.parts:
+                row[variable] = value
+                continue
+            *others, last = one.parts
+            rest = sum(p.weight * (row[p.input] - p.centre) for p in others)
+            row[last.input] = last.centre + (value - rest) / last.weight
+        return row
+
+    def _value(self, variable: str, asked: frozenset[_Wish], row: Row) -> float:
+        key = variable, asked
+        if key not in self._known:
+            self._known[key] = self._best(variable, asked, row)
+        best, degree = self._known[key]
+        low, high = self._ends(variable)
+        near = best + 0.05 * (high - low) * self._chance.uniform(-1.0, 1.0)
+        is_near = self._degree(variable, asked, near, row) >= 0.5 * degree
+        return near if is_near and low <= near <= high else best
+
+    def _best(
+        self, variable: str, asked: frozenset[_Wish], row: Row
+    ) -> tuple[float, float]:
+        """Return the landmark at which some propositions are truest, and how true."""
+        points = sorted(dict.fromkeys(self._landmarks(variable)))
+        middles = [a + 0.5 * (b - a) for a, b in itertools.pairwise(points)]
+        found = [(self._degree(variable, asked, x, row), x) for x in points + middles]
+        degree, best = max(found, key=lambda pair: pair[0])
+        return best, degree
+
+    def _landmarks(self, variable: str) -> list[float]:
+        one = self._inputs[variable]
+        if not one.parts:
+            return self._points[variable]
+        numbers = [x for label in one.labels for x in numbers_of(label.curve)]
+        return numbers or [0.0, 1.0]
+
+    def _ends(self, variable: str) -> Interval:
+        one = self._inputs[variable]
+        if one.low is not None and one.high is not None:
+            return one.low, one.high
+        return _hull(self._landmarks(variable))
+
+    def _degree(
+        self, variable: str, asked: frozenset[_Wish], value: float, row: Row
+    ) -> float:
+        names = {**row, variable: value}
+        degrees = []
+        for label, hedges, is_true in asked:
+            curve = self._curves[variable, label]
+            degree = hedges_applied(hedges, curve_degree(curve, value, names))
+            degrees.append(degree if is_true else 1.0 - degree)
+        return min((one for one in degrees if not math.isnan(one)), default=0.0)
+
+
+_Wish = tuple[str, tuple[Hedge, ...], bool]
+"""A term, the hedges before it, and whether the proposition shall be true."""
+
+
+def _wishes(
+    condition: Condition | None, *, is_true: bool
+) -> Iterator[tuple[str, _Wish]]:
+    """Yield propositions that make a condition true, or untrue, as far as they are."""
+    match condition:
+        case Is(variable=variable, label=str(label), hedges=hedges):
+            yield variable, (label, hedges, is_true)
+        case Not(part=part):
+            yield from _wishes(part, is_true=not is_true)
+        case And(parts=parts) | Or(parts=parts):
+            needs_all = isinstance(condition, And) == is_true
+            for part in parts if needs_all else parts[:1]:
+                yield from _wishes(part, is_true=is_true)
+        case _:
+            return
 
 
 def _system_points(system: FuzzySystem) -> dict[str, list[float]]:

@@ -229,6 +229,8 @@ def carry(
         say(f"lost     {loss_text(loss)}", quiet=quiet)
     for remark in written.remarks:
         say(f"remark   {remark}", quiet=quiet)
+    for sentence in proof.coverage.sentences if proof.coverage else ():
+        say(f"remark   {sentence}", quiet=quiet)
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
     after = next_check((source, read_as), (output, form.name))
@@ -255,6 +257,7 @@ def carry(
                 "names": dict(written.names),
                 "proof": {"verdict": proof.verdict, "sentence": proof.sentence},
                 "certificate": _certificate_facts(proof.certificate),
+                "coverage": proof.coverage,
                 "next": after or None,
             }
         )

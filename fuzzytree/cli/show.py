@@ -17,6 +17,7 @@ from fuzzytree.cli.talk import (
 from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
+    from fuzzytree.agreement import Coverage
     from fuzzytree.contracts import Document, Reading
 
 
@@ -51,22 +52,31 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
             answer("\n".join(text.fact_lines(facts)))
         return
     found = verbs.read(model)
-    _tell(found, quiet=quiet)
+    coverage = _coverage(found.model)
+    _tell(found, coverage, quiet=quiet)
     if picture is not None:
         _draw(found.model, picture, quiet=quiet)
     if as_json:
-        answer_json(_facts(found))
+        answer_json({**_facts(found), "coverage": coverage})
     else:
         answer("\n".join(_lines(found.model)))
 
 
-def _tell(found: Reading, *, quiet: bool) -> None:
+def _coverage(model: Document) -> Coverage | None:
+    """Return which rules of a fuzzy system fire in probes; None for other models."""
+    from fuzzytree.checking_systems import coverage_of
+    from fuzzytree.system import FuzzySystem
+
+    return coverage_of(model) if isinstance(model, FuzzySystem) else None
+
+
+def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
     """Say on stderr what is not shown."""
     from fuzzytree.losses import loss_text
 
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")
-    for remark in found.remarks:
+    for remark in (*found.remarks, *(coverage.sentences if coverage else ())):
         say(f"remark   {remark}", quiet=quiet)
 
 

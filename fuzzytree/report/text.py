@@ -314,6 +314,8 @@ def agreement_lines(found: Agreement, *, is_full: bool = False) -> Iterator[str]
             f"{count.carrier}: of {counted(count.rows, 'row')} {count.ties} tied, "
             f"{count.uncovered} uncovered, {count.missing} with missing values"
         )
+    if found.coverage is not None:
+        yield from found.coverage.sentences
     yield from (f"not examined: {text}" for text in found.skipped)
     if found.certificates:
         yield from aligned([_CERTIFIED, *map(_certified_row, found.certificates)])

@@ -86,6 +86,7 @@ def test_json_tells_the_same_facts(call: Call) -> None:
             "the fuzzy system is equal in every number",
         },
         "certificate": None,
+        "coverage": {"rules": 3, "unfired": [], "rows": 1000, "uncovered": 0},
         "next": "fuzzytree check tipper.fll t.yaml",
     }
 

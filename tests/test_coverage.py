@@ -1,0 +1,139 @@
+"""Which rules of a fuzzy system fire in probes, and how much they cover."""
+
+from __future__ import annotations
+
+import itertools
+import time
+
+import pytest
+from msgspec.structs import replace
+
+import fuzzytree as ft
+from fuzzytree.agreement import Coverage
+from fuzzytree.checking_systems import check_system, coverage_of
+from fuzzytree.inference import infer
+from fuzzytree.probing import Aim, range_rows
+from fuzzytree.rulebase import Part
+from fuzzytree.samples import samples
+from fuzzytree.system import (
+    And,
+    Conclusion,
+    Condition,
+    Defuzzifier,
+    FuzzySystem,
+    Is,
+    Label,
+    Not,
+    Or,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    Trapezoid,
+)
+
+LOW = Label("low", Trapezoid(0.0, 0.1, 0.1, 0.2))
+THIN = Label("thin", Trapezoid(0.5, 0.5, 0.5, 0.5))
+NEVER = Label("never", Trapezoid(0.7, 0.8, 0.8, 0.9))
+INPUTS = tuple(SystemInput(n, (LOW, THIN, NEVER), 0.0, 1.0) for n in "ab")
+OUTPUT = SystemOutput(
+    "y", (Label("one", Singleton(1.0)),), None, None, Defuzzifier("weighted average")
+)
+THEN = (Conclusion("y", "one"),)
+
+
+def system_of(*conditions: Condition) -> FuzzySystem:
+    rules = tuple(SystemRule(one, THEN) for one in conditions)
+    return FuzzySystem(
+        "s", INPUTS, (OUTPUT,), (RuleBlock(rules, "minimum", "maximum"),)
+    )
+
+
+CONDITIONS: list[Condition] = [
+    And((Is("a", "thin"), Is("b", "thin"))),
+    And((Is("a", "low"), Is("b", "never"))),
+    And((Not(Is("a", "low")), Not(Or((Is("b", "low"), Is("b", "thin")))))),
+    Or((And((Is("a", "thin"), Is("b", "low"))), Is("a", "never"))),
+    And((Is("a", "low", ("very",)), Is("b", "never", ("not",)))),
+]
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_row_aimed_at_a_rule_fires_it(condition: Condition) -> None:
+    system = system_of(condition)
+    aim = Aim(system)
+    for _ in range(20):
+        row = aim.row(system.rules[0])
+        assert infer(system, row).activations[0] > 0.0
+
+
+def test_a_row_is_aimed_at_a_rule_on_a_combination() -> None:
+    mix = SystemInput("mix", (NEVER,), parts=(Part("a", 2.0, 0.5), Part("b", -3.0)))
+    rule = SystemRule(Is("mix", "never"), THEN)
+    system = FuzzySystem("s", (*INPUTS, mix), (OUTPUT,), (RuleBlock((rule,)),))
+    assert infer(system, Aim(system).row(rule)).activations[0] > 0.0
+
+
+def test_every_rule_that_can_fire_fires_in_a_probe_of_a_check() -> None:
+    found = check_system(system_of(*CONDITIONS), limit=10, runtimes=["native"])
+    assert found.ok
+    assert found.coverage is not None
+    assert found.coverage.unfired == ()
+    assert found.probes > 10
+
+
+IMPOSSIBLE = And((Is("a", "low"), Is("a", "never")))
+
+
+def test_a_rule_that_cannot_fire_is_named() -> None:
+    system = system_of(CONDITIONS[0], IMPOSSIBLE)
+    proof = ft.convert(system, "onnx").proof
+    assert proof.verdict == "alike"
+    assert proof.sentence.endswith("probes like the system, in which 1 of 2 rules fire")
+    assert proof.coverage is not None
+    assert proof.coverage.unfired == (2,)
+    assert proof.coverage.sentences[0] == "no probe fires rule 2 of 2"
+
+
+def test_a_system_that_mostly_answers_its_default_is_reported() -> None:
+    found = coverage_of(system_of(CONDITIONS[1]))
+    assert found.uncovered > 900
+    assert found.sentences == (
+        f"in {found.uncovered} of 1000 rows drawn evenly from the ranges of the inputs "
+        "an output has no number, and its default answers",
+    )
+
+
+def test_a_system_that_covers_its_ranges_has_nothing_to_report() -> None:
+    system = samples()["Mamdani, singletons"]
+    assert isinstance(system, FuzzySystem)
+    assert coverage_of(system).sentences == ()
+
+
+def test_many_rules_that_do_not_fire_are_named_in_a_line() -> None:
+    shown = ", ".join(map(str, range(1, 21)))
+    found = Coverage(30, tuple(range(1, 24)), 10, 0)
+    assert found.sentences == (f"no probe fires rules {shown} and 3 more of 30",)
+
+
+def test_rows_are_drawn_from_the_ranges_themselves() -> None:
+    wide = replace(LOW, curve=Trapezoid(-100.0, 0.0, 1.0, 100.0))
+    system = system_of(Is("a", "low"))
+    inputs = tuple(replace(one, labels=(wide, THIN, NEVER)) for one in INPUTS)
+    rows = range_rows(replace(system, inputs=inputs), 50)
+    assert all(0.0 <= value <= 1.0 for row in rows for value in row.values())
+
+
+def test_thousands_of_rules_are_probed_in_seconds() -> None:
+    labels = tuple(Label(f"t{k}", Trapezoid(k - 1.0, k, k, k + 1.0)) for k in range(7))
+    inputs = tuple(SystemInput(f"x{k}", labels, 0.0, 6.0) for k in range(4))
+    rules = tuple(
+        SystemRule(And(tuple(Is(f"x{k}", f"t{t}") for k, t in enumerate(terms))), THEN)
+        for terms in itertools.product(range(7), repeat=4)
+    )
+    block = RuleBlock(rules, "minimum")
+    start = time.process_time()
+    found = coverage_of(FuzzySystem("grid", inputs, (OUTPUT,), (block,)))
+    assert (found.rules, found.unfired, found.uncovered) == (2401, (), 0)
+    assert time.process_time() - start < 10.0  # 0.4 s where nothing else runs
