@@ -15,6 +15,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from fuzzytree.errors import ReadError
 from fuzzytree.inference import (
     curve_degree,
     hedged,
@@ -24,6 +25,7 @@ from fuzzytree.inference import (
     value_at,
     value_of,
 )
+from fuzzytree.readers.fll import read
 from fuzzytree.reference import Status
 from fuzzytree.rulebase import Points
 from fuzzytree.system import (
@@ -63,6 +65,7 @@ from fuzzytree.system import (
     sampled_values,
 )
 from fuzzytree.testing import random_rows, random_system
+from tests.test_singletons import FLL
 from tests.witnesses import pyfuzzylite_engine as witness
 
 EPSILON = 2.0**-52
@@ -372,3 +375,32 @@ def test_conclusions_are_hedged_one_behind_the_other_in_both() -> None:
     system = one_rule(weighted(*labels), *then)
     assert infer(system, {"a": 0.5}).outputs[0] == 0.25 + 2.5
     assert pyfuzzylites(system, 0.5) == 2.75
+
+
+@pytest.mark.parametrize(
+    ("term", "expected"),
+    [
+        ("Triangle 0.335 0.335 0.335", 0.335),
+        ("Rectangle 0.335 0.335", 0.335),
+        ("Triangle 0.333 0.333 0.333", math.nan),
+        ("Triangle 0.331 0.333 0.334", math.nan),
+    ],
+)
+def test_a_term_that_no_sample_meets_concludes_nothing(
+    term: str, expected: float
+) -> None:
+    text = FLL.replace("Triangle 0.333 0.333 0.333", term)
+    import fuzzylite as fl
+
+    engine = fl.FllImporter().from_string(text)
+    engine.input_variables[0].value = 0.5
+    engine.process()
+    found = float(np.ravel(engine.output_variables[0].value)[0])
+    assert found == pytest.approx(expected, nan_ok=True)
+    if math.isnan(expected) and term.endswith("0.333"):
+        with pytest.raises(ReadError, match="has no width"):
+            read(text.encode(), "y.fll")
+        return
+    model = read(text.encode(), "y.fll").model
+    assert isinstance(model, FuzzySystem)
+    assert infer(model, {"x": 0.5}).outputs == pytest.approx((expected,), nan_ok=True)
