@@ -51,6 +51,7 @@ def test_json_tells_the_same_facts(call: Call) -> None:
         "sha256": hashlib.sha256(content).hexdigest(),
         "losses": [],
         "remarks": [],
+        "names": {},
         "proof": {
             "verdict": "certified",
             "sentence": "no path can differ: no value is rounded before it meets a cut",
