@@ -445,7 +445,7 @@ def test_terms_of_one_number_are_a_loss_where_octave_joins_their_rules() -> None
         for term, then in (("low", "small"), ("high", "tiny"))
     ]
     system = replace(
-        _sugeno(), outputs=(output,), blocks=(RuleBlock(tuple(rules), "minimum"),)
+        _sugeno(*rules), outputs=(output,), blocks=(RuleBlock(tuple(rules), "minimum"),)
     )
     with pytest.raises(LossError) as caught:
         write(system)
