@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import ClassVar, Literal
 
 import msgspec
@@ -192,6 +193,18 @@ class Agreement(msgspec.Struct, frozen=True):
         bad = ("DISAGREES",) if self.rows_only else ("DISAGREES", "rows only")
         every: list[Comparison | Certified] = [*self.comparisons, *self.certificates]
         return tuple(one for one in every if one.verdict in bad)
+
+    def __repr__(self) -> str:
+        """Show how many comparisons there are, and how they end."""
+        count = len(self.comparisons)
+        verdict = "agrees" if self.ok else "DISAGREES"
+        return f"Agreement({count} comparison{'s' * (count != 1)}, {verdict})"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.agreement_html(self)
+        return shown
 
     def to_json(self) -> str:
         """Return the same facts for programs, as indented JSON."""

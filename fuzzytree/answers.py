@@ -21,9 +21,14 @@ from fuzzytree.rulebase import (
     clause_text,
     label_of,
     shapes_of,
+    summary,
 )
+from fuzzytree.tables import arrow_table, pandas_frame
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
     from fuzzytree.contracts import FloatArray, IntArray, Outcome
 
 By = Literal["class", "rule"]
@@ -137,6 +142,28 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
             shown = ["" if math.isnan(value) else value for value in row]
             found[f"strength of {strengths} {name}"] = shown
         return found
+
+    def to_arrow(self, strengths: By | None = None) -> pa.Table:
+        """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
+
+        What would be an empty cell is null there.
+
+        Raises:
+            ValueError: If strengths are asked for that are not there.
+        """
+        return arrow_table(self.columns(strengths))
+
+    def to_pandas(self, strengths: By | None = None) -> pd.DataFrame:
+        """Return the columns of `to_csv` as a frame of pandas; needs pandas.
+
+        Raises:
+            ValueError: If strengths are asked for that are not there.
+        """
+        return pandas_frame(self.columns(strengths))
+
+    def __repr__(self) -> str:
+        """Show how many rows there are; `str` shows how many rows got which class."""
+        return summary("Answers", rows=len(self), classes=len(self.choices))
 
     def __str__(self) -> str:
         """Show how many rows got which class, and what was out of the ordinary."""

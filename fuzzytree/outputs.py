@@ -12,8 +12,13 @@ import msgspec
 import numpy as np
 
 from fuzzytree.reference import Status
+from fuzzytree.rulebase import summary
+from fuzzytree.tables import arrow_table, pandas_frame
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
     from fuzzytree.contracts import FloatArray, IntArray
 
 
@@ -97,6 +102,26 @@ class Outputs(msgspec.Struct, frozen=True, eq=False):
         writer.writerow(columns)
         writer.writerows(zip(*columns.values(), strict=True))
         return text.getvalue()
+
+    def to_arrow(self, *, with_activations: bool = False) -> pa.Table:
+        """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
+
+        Raises:
+            ValueError: If activations are asked for that are not there.
+        """
+        return arrow_table(self.columns(with_activations=with_activations))
+
+    def to_pandas(self, *, with_activations: bool = False) -> pd.DataFrame:
+        """Return the columns of `to_csv` as a frame of pandas; needs pandas.
+
+        Raises:
+            ValueError: If activations are asked for that are not there.
+        """
+        return pandas_frame(self.columns(with_activations=with_activations))
+
+    def __repr__(self) -> str:
+        """Show how many rows there are; `str` shows the range of each output."""
+        return summary("Outputs", rows=len(self), outputs=len(self.names))
 
     def __str__(self) -> str:
         """Show the range of each output, and what was out of the ordinary."""

@@ -7,6 +7,7 @@ everything that could change an answer stands in the values below.
 from __future__ import annotations
 
 import hashlib
+import importlib
 import itertools
 import math
 import re
@@ -33,6 +34,23 @@ Mistake = tuple[Path, str]
 
 class Value(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A frozen, comparable, hashable record."""
+
+
+_ONE = {"leaves": "leaf", "classes": "class"}
+
+
+def summary(name: str, **counts: int) -> str:
+    """Return what `repr` shows of something large: its name and how much it holds.
+
+    Example:
+        >>> summary("RuleBase", rules=3, classes=1)
+        'RuleBase(3 rules, 1 class)'
+    """
+    shown = (
+        f"{count} {noun if count != 1 else _ONE.get(noun, noun.removesuffix('s'))}"
+        for noun, count in counts.items()
+    )
+    return f"{name}({', '.join(shown)})"
 
 
 class Flank(Value, frozen=True):
@@ -267,6 +285,19 @@ class RuleBase(Value, frozen=True):
     def inputs(self) -> tuple[str, ...]:
         """The names of the columns that the rules need, in order."""
         return tuple(v.name for v in self.variables if not v.parts)
+
+    def __repr__(self) -> str:
+        """Show how much it holds; `str` shows the rules."""
+        rules, inputs = len(self.rules), len(self.inputs)
+        return summary(
+            "RuleBase", rules=rules, inputs=inputs, classes=len(self.classes)
+        )
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.model_html(self)
+        return shown
 
     def __str__(self) -> str:
         """Show the rules as numbered sentences."""

@@ -15,12 +15,12 @@ from msgspec.structs import replace
 
 from fuzzytree.agreement import Agreement
 from fuzzytree.contracts import Dtype, Model
+from fuzzytree.dependencies import DTYPES, Needs, needs, prove
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_contents import contents
 from fuzzytree.lowering import forms
-from fuzzytree.needs import DTYPES, Needs, needs, prove
 from fuzzytree.probing import probe_values
 from fuzzytree.pruning import Pruned, Removed
 from fuzzytree.rulebase import Variable

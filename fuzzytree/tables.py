@@ -16,7 +16,7 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, TypeAlias, cast
 
@@ -31,6 +31,7 @@ from fuzzytree.naming import as_names
 from fuzzytree.rulebase import LabelType, is_label, label_type_of
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
     from narwhals.typing import IntoDataFrame, IntoLazyFrame
 
@@ -872,3 +873,23 @@ def _frame_piece(
 
 def _row_names(name: str, first: int = 0) -> Callable[[int], str]:
     return lambda row: f"{name}, row {first + row + 1}"
+
+
+def arrow_table(columns: Mapping[str, Sequence[object]]) -> pa.Table:
+    """Return columns as a table of pyarrow, empty cells as null."""
+    import pyarrow as pa
+
+    cells = {name: [_or_none(one) for one in row] for name, row in columns.items()}
+    return pa.table(cells)
+
+
+def pandas_frame(columns: Mapping[str, Sequence[object]]) -> pd.DataFrame:
+    """Return columns as a frame of pandas, empty cells as what pandas has for them."""
+    import pandas as pd
+
+    cells = {name: [_or_none(one) for one in row] for name, row in columns.items()}
+    return pd.DataFrame(cells)
+
+
+def _or_none(cell: object) -> object:
+    return None if cell == "" else cell

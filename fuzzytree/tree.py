@@ -8,6 +8,7 @@ open below and closed above, so a value equal to a cut goes to the left of it.
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -29,6 +30,7 @@ from fuzzytree.rulebase import (
     clause_mistakes,
     naming_mistakes,
     shapes_of,
+    summary,
     term_names,
     variable_mistakes,
 )
@@ -142,6 +144,22 @@ class FuzzyTree(Value, frozen=True):
     def inputs(self) -> tuple[str, ...]:
         """The names of the columns that the tree needs, in order."""
         return tuple(v.name for v in self.variables if not v.parts)
+
+    def __repr__(self) -> str:
+        """Show how much it holds; `str` shows the outline."""
+        return summary(
+            "FuzzyTree",
+            nodes=len(self.nodes),
+            leaves=len(self.leaves),
+            inputs=len(self.inputs),
+            classes=len(self.classes),
+        )
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.model_html(self)
+        return shown
 
     def __str__(self) -> str:
         """Show the tree as an indented outline."""

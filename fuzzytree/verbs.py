@@ -49,7 +49,9 @@ from fuzzytree.tree import FuzzyTree, with_label_type
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+    from matplotlib.figure import Figure
 
+    from fuzzytree.auditing.codes import Code
     from fuzzytree.auditing.difference_records import Difference
     from fuzzytree.auditing.domains import Within
     from fuzzytree.auditing.records import Audit, Source
@@ -59,7 +61,10 @@ if TYPE_CHECKING:
     from fuzzytree.criteria.results import Stability
     from fuzzytree.learning import Learnt, Settings
     from fuzzytree.numerics.bounds import Certificate
+    from fuzzytree.rechecking import Report as RecheckReport
+    from fuzzytree.savings import Report
     from fuzzytree.timing.records import Study
+    from fuzzytree.tree import Use
 
 __all__ = [
     "Answering",
@@ -73,13 +78,17 @@ __all__ = [
     "check",
     "convert",
     "diff",
+    "draw",
+    "explain",
     "export",
     "learn",
     "learn_table",
     "load",
     "material",
+    "needs",
     "opened",
     "read",
+    "recheck",
     "rows_of",
     "rules_from_tree",
     "run",
@@ -253,12 +262,7 @@ def rules_from_tree(
         TypeError: If it is no tree.
         InvalidModelError: If `kind` is `raw` and the tree carries no sets.
     """
-    found = as_model(tree)
-    if not isinstance(found, FuzzyTree):
-        raise TypeError(
-            f"rules_from_tree takes a tree, and {found.name} is a "
-            f"{CALLED[carrier_of(found)]}"
-        )
+    found = _tree_of(tree, "rules_from_tree")
     return lowering.rules_from_tree(found, kind, conjunction=conjunction)
 
 
@@ -571,6 +575,14 @@ def bench(
 
 def _model_of(model: ModelSource, verb: str) -> Model:
     return deciding(as_model(model), verb)
+
+
+def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
+    found = as_model(model)
+    if not isinstance(found, FuzzyTree):
+        kind = CALLED[carrier_of(found)]
+        raise TypeError(f"{verb} takes a tree, and {found.name} is a {kind}")
+    return found
 
 
 def _data_name(data: object) -> str:
@@ -914,6 +926,114 @@ def diff(
         files=(files[0], files[1]),
         data=source,
     )
+
+
+def needs(
+    model: ModelSource,
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    uses: Sequence[Use] = ("tree", "relative"),
+    drop: Collection[Literal["inputs", "rules"]] = (),
+    seconds: float = 0.0,
+    progress: Progress | None = None,
+) -> Report:
+    """Return what a model needs, and what leaving out the rest saves.
+
+    Args:
+        model: A tree or a rule base; see `as_model`.
+        data: A table with rows of one's own, for the proof.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        uses: What a tree serves: its path, its `relative` rules, its `raw` rules.
+        drop: Leave out `inputs` that nothing uses, or `rules` that never fire, too.
+        seconds: How long to measure run times; 0 measures none.
+        progress: Called with what is done and which share of it.
+
+    Raises:
+        ReadError: If the file cannot be read.
+        TableError: If a column is absent or holds text, or the table has no row.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> needs(random_tree(1)).ok
+        True
+    """
+    from fuzzytree import savings
+    from fuzzytree.pruning import pruned
+
+    first = _model_of(model, "needs")
+    return savings.report(
+        first,
+        pruned(first, uses=uses, inputs="inputs" in drop, rules="rules" in drop),
+        uses=uses,
+        data=rows_of(data, first, columns=columns, delimiter=delimiter),
+        table=os.fspath(data) if isinstance(data, str | os.PathLike) else None,
+        delimiter=delimiter,
+        seconds=seconds,
+        tell=progress,
+    )
+
+
+def explain(code: str) -> Code:
+    """Return what a code of an audit means, why it matters, and what to do about it.
+
+    Args:
+        code: Such as `FT101`, or the id of a finding, such as `FT101-1a2b3c4d`.
+
+    Raises:
+        ValueError: If there is no such code.
+
+    Example:
+        >>> explain("FT101").title
+        'dead rule'
+    """
+    from fuzzytree.auditing.codes import CODES
+
+    name = code.upper().partition("-")[0]
+    if name not in CODES:
+        choice = name_choice(name[:40], [*CODES])
+        raise ValueError(f"no code {code[:40]!r}; {choice}")
+    return CODES[name]
+
+
+def recheck(
+    audit: str | os.PathLike[str], model: str | os.PathLike[str]
+) -> RecheckReport:
+    """Check the JSON file of an audit against the YAML file of its model, on its own.
+
+    The report's `wrong` lists what does not hold; `lines()` is what the command prints.
+
+    Raises:
+        ReadError: If one of the files cannot be read.
+    """
+    from fuzzytree.rechecking import CannotRunError, recheck_files
+
+    try:
+        return recheck_files(os.fspath(audit), os.fspath(model))
+    except CannotRunError as error:
+        raise ReadError(str(error)) from error
+
+
+def draw(tree: ModelSource, *, title: str | None = None) -> Figure:
+    """Draw a tree with matplotlib: its nodes, the terms of its branches, its classes.
+
+    Args:
+        tree: A tree, a fitted classifier, or the path of a file that holds a tree.
+        title: Above the picture; the name and size of the tree unless given.
+
+    Returns:
+        A figure; `figure.savefig(path)` writes it.
+
+    Raises:
+        TypeError: If it is no tree.
+        ValueError: If the tree is too large for a picture.
+        MissingExtraError: If matplotlib is not installed.
+    """
+    from fuzzytree import plots
+
+    return plots.draw_tree(_tree_of(tree, "draw"), title=title)
 
 
 def stability(

@@ -119,3 +119,20 @@ def test_a_rule_without_clauses_always_holds() -> None:
     rules = RuleBase("grip", ("soft",), (), (Rule((), "soft"),))
     answers = ft.run(rules, np.zeros((1, 1)), columns=["force"])
     assert reasons(rules, np.zeros((0, 1)), answers) == ["ALWAYS soft"]
+
+
+def test_answers_become_frames_with_nothing_where_nothing_is_known() -> None:
+    found = ft.run(RULES, VALUES, columns=["force"])
+    frame = found.to_pandas("class")
+    assert frame.columns.tolist() == [*found.columns("class")]
+    assert frame["class"].isna().tolist() == [False, False, True]
+    assert frame["strength of class soft"].dtype == np.float64
+    assert frame["strength of class soft"].isna().tolist() == [False, False, True]
+    assert found.to_arrow("class").to_pydict() == {
+        "class": ["soft", "hard", None],
+        "rule": [1, 0, 0],
+        "status": ["tie", "uncovered", "missing"],
+        "strength of class soft": [0.5, 0.0, None],
+        "strength of class firm": [0.5, 0.0, None],
+        "strength of class hard": [0.0, 0.0, None],
+    }

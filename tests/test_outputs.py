@@ -38,6 +38,17 @@ def test_no_number_is_an_empty_cell() -> None:
     )
 
 
+def test_outputs_become_frames_with_nothing_where_there_is_no_number() -> None:
+    frame = FOUND.to_pandas(with_activations=True)
+    assert frame["fan"].isna().tolist() == [False, True, False]
+    assert frame["strength of rule 1"].dtype == np.float64
+    assert FOUND.to_arrow().to_pydict() == {
+        "fan": [1.0, None, 2.5],
+        "status": [0.0, 0.0, None],
+        "status_": ["decided", "uncovered", "missing"],
+    }
+
+
 def test_an_output_is_found_by_its_name() -> None:
     assert FOUND["fan"][2] == 2.5
     with pytest.raises(ValueError, match="not in tuple"):

@@ -26,7 +26,7 @@ from fuzzytree.learning import Settings
 from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.tables import FloatArray
-from fuzzytree.testing import random_tree
+from fuzzytree.testing import random_system, random_tree
 from fuzzytree.tree import FuzzyTree
 
 WINE = Path(__file__).resolve().parent.parent / "examples" / "wine" / "wine.csv"
@@ -81,7 +81,9 @@ VERBS: dict[str, Callable[[Any], object]] = {
     ),
     "convert": lambda model: ft.convert(model, "fcl", allow_loss=True).written,
     "diff": lambda model: ft.diff(model, model).verdict,
+    "draw": lambda model: ft.draw(model).axes[0].get_title(),
     "export": lambda model: ft.export(model, "onnx").content,
+    "needs": lambda model: ft.needs(model).needs,
     "rules_from_tree": ft.rules_from_tree,
     "run": lambda model: ft.run(model, FEW).classes,
     "save": lambda model: ft.save(model, os.devnull, to="yaml").content,
@@ -127,13 +129,64 @@ def test_export_takes_the_path_of_a_file(tmp_path: Path) -> None:
     assert ft.export(tmp_path / "tree.yaml", "onnx") == ft.export(TREE, "onnx")
 
 
-def test_rules_are_refused_where_a_tree_is_needed() -> None:
+@pytest.mark.parametrize("verb", ["rules_from_tree", "draw"])
+def test_rules_are_refused_where_a_tree_is_needed(verb: str) -> None:
     rules = ft.rules_from_tree(TREE)
     with pytest.raises(TypeError) as caught:
-        ft.rules_from_tree(rules)
-    assert str(caught.value) == (
-        f"rules_from_tree takes a tree, and {rules.name} is a rule base"
-    )
+        getattr(ft, verb)(rules)
+    assert str(caught.value) == f"{verb} takes a tree, and {rules.name} is a rule base"
+
+
+def test_needs_leaves_out_what_it_is_told_to_and_proves_it() -> None:
+    found = ft.needs(TREE, data=ROWS, uses=["tree"])
+    assert found.ok
+    assert found.needs.inputs == TREE.inputs
+
+
+def test_explain_knows_a_code_and_the_id_of_a_finding() -> None:
+    assert ft.explain("ft101-1a2b3c4d") == ft.explain("FT101")
+    with pytest.raises(ValueError, match=r"^no code 'FT1O1'; "):
+        ft.explain("FT1O1")
+
+
+def test_recheck_takes_an_audit_and_its_model(tmp_path: Path) -> None:
+    model, audit = tmp_path / "tree.yaml", tmp_path / "audit.json"
+    ft.save(TREE, model)
+    audit.write_text(ft.audit(model, select=["FT1"]).to_json(), "utf-8")
+    assert not ft.recheck(audit, model).wrong
+    other = tmp_path / "other.yaml"
+    ft.save(random_tree(4, inputs=3), other)
+    assert ft.recheck(audit, other).wrong
+    with pytest.raises(ReadError) as caught:
+        ft.recheck(tmp_path / "no.json", model)
+    assert str(caught.value).endswith("no.json: No such file or directory")
+
+
+def test_what_python_shows_of_a_value_is_one_short_line() -> None:
+    rules = ft.rules_from_tree(TREE)
+    system = random_system(3)
+    found = ft.check(TREE, rules, runtimes=["native"], limit=99)
+    shown = [
+        repr(one)
+        for one in (
+            TREE,
+            rules,
+            system,
+            ft.run(rules, ROWS),
+            ft.run(system, np.zeros((4, len(system.columns)))),
+            found,
+            ft.audit(TREE, select=["FT501"]),
+        )
+    ]
+    assert shown == [
+        "FuzzyTree(5 nodes, 7 leaves, 3 inputs, 3 classes)",
+        "RuleBase(7 rules, 3 inputs, 3 classes)",
+        "FuzzySystem(8 rules, 3 inputs, 2 outputs)",
+        "Answers(20 rows, 3 classes)",
+        "Outputs(4 rows, 2 outputs)",
+        f"Agreement({len(found.comparisons)} comparisons, agrees)",
+        "Audit(1 answer, 0 findings)",
+    ]
 
 
 def test_learn_offers_every_setting_with_its_default() -> None:

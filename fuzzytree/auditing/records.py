@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Final, Literal
+
+import msgspec
 
 from fuzzytree.proving.domain import Domain
 from fuzzytree.proving.states import Span, State
-from fuzzytree.rulebase import Value
+from fuzzytree.rulebase import Value, summary
 
 FORMAT: Final = "fuzzytree-audit/1"
 INTERRUPTED: Final = "interrupted"
@@ -203,6 +206,21 @@ class Audit(Value, frozen=True):
         """The findings that no baseline accepts."""
         known = set(self.accepted)
         return tuple(answer for answer in self.findings if answer.id not in known)
+
+    def __repr__(self) -> str:
+        """Show how many answers there are, and how many of them are findings."""
+        findings = len(self.open_findings)
+        return summary("Audit", answers=len(self.answers), findings=findings)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.audit_html(self)
+        return shown
+
+    def to_json(self) -> str:
+        """Return the audit for programs, and for `recheck`, as indented JSON."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=2).decode()
 
     @property
     def was_interrupted(self) -> bool:

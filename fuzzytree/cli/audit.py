@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import click
-import msgspec
 
 from fuzzytree.cli.audit_options import (
     Options,
@@ -215,8 +214,7 @@ def _told(
 
     match form:
         case "json":
-            raw = msgspec.json.encode(found)
-            return printable_json(msgspec.json.format(raw, indent=2).decode())
+            return printable_json(found.to_json())
         case "sarif":
             return printable_json(sarif(found, baseline))
         case "github":

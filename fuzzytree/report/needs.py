@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.agreement import Agreement
-from fuzzytree.needs import Because, Graph, Needs
+from fuzzytree.dependencies import Because, Graph, Needs
 from fuzzytree.pruning import Removed
 from fuzzytree.report.text import agreement_lines, aligned, counted, duration
 from fuzzytree.savings import Cost, File, Report, Size

@@ -8,6 +8,7 @@ that could change an answer stands in the values below.
 
 from __future__ import annotations
 
+import importlib
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -26,6 +27,7 @@ from fuzzytree.rulebase import (
     name_mistakes,
     part_mistakes,
     range_mistakes,
+    summary,
     text_fault,
     unit_mistakes,
 )
@@ -334,6 +336,21 @@ class FuzzySystem(Value, frozen=True):
     def rules(self) -> tuple[SystemRule, ...]:
         """The rules of all blocks, in order."""
         return tuple(rule for block in self.blocks for rule in block.rules)
+
+    def __repr__(self) -> str:
+        """Show how much it holds."""
+        return summary(
+            "FuzzySystem",
+            rules=len(self.rules),
+            inputs=len(self.columns),
+            outputs=len(self.outputs),
+        )
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.model_html(self)
+        return shown
 
 
 def _system_mistakes(system: FuzzySystem) -> Iterator[Mistake]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree import needs
+from fuzzytree import dependencies
 from fuzzytree.exporters import TABLE
 from fuzzytree.pruning import Pruned, pruned
 from fuzzytree.rulebase import Band, Term, Variable
@@ -170,7 +170,7 @@ def test_without_onnx_the_rest_is_told(
     def missing(*_model: object, **_options: object) -> object:
         raise MissingExtraError("writing onnx needs the extra 'onnx'")
 
-    monkeypatch.setattr(needs, "write_onnx", missing)
+    monkeypatch.setattr(dependencies, "write_onnx", missing)
     monkeypatch.setattr("fuzzytree.savings.write_onnx", missing)
     code, out, _ = call("needs", "grip.yaml")
     assert code == 0

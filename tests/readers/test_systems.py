@@ -6,6 +6,7 @@ import random
 import time
 from pathlib import Path
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -49,6 +50,10 @@ def error_of(text: str) -> str:
     return str(caught.value)
 
 
+def all_of(system: object) -> str:
+    return repr(msgspec.to_builtins(system))
+
+
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.parametrize("has_odd_names", [False, True], ids=["plain", "odd names"])
 def test_what_was_written_is_read_as_the_equal_system(
@@ -58,7 +63,7 @@ def test_what_was_written_is_read_as_the_equal_system(
     written = write(system)
     again = read(written.content, "x.yaml")
     assert again == system
-    assert repr(again) == repr(system)  # 0.0 and -0.0 differ
+    assert all_of(again) == all_of(system)  # 0.0 and -0.0 differ
     assert not written.losses
     assert not written.remarks
     assert write(again) == written
@@ -67,7 +72,7 @@ def test_what_was_written_is_read_as_the_equal_system(
 def test_numbers_keep_all_their_digits_and_the_sign_of_zero() -> None:
     text = TIPPER.replace("[0, 5, 10]", "[-0.0, 5e-324, 1.7976931348623157e+308]")
     system = system_of(text.replace("default: 15", "default: 0.1"))
-    assert repr(read(write(system).content, "x.yaml")) == repr(system)
+    assert all_of(read(write(system).content, "x.yaml")) == all_of(system)
     assert "-0.0" in repr(system.outputs[0].labels[0].curve)
 
 

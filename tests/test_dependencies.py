@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from fuzzytree import savings
+from fuzzytree.dependencies import COMBINATIONS, Graph, needs, prove
 from fuzzytree.lowering import forms, rules_from_tree
-from fuzzytree.needs import COMBINATIONS, Graph, needs, prove
 from fuzzytree.pruning import USES, Pruned, pruned
 from fuzzytree.report.needs import report_lines
 from fuzzytree.rulebase import Clause, Part, Rule, RuleBase, Semantics, Variable

@@ -1,0 +1,64 @@
+"""Models and results as HTML for a notebook, by the renderers of text and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fuzzytree.agreement import Agreement
+from fuzzytree.auditing.records import Audit
+from fuzzytree.report.audit import audit_lines, verdict_text
+from fuzzytree.report.audit_checks import agreement_section
+from fuzzytree.report.audit_model import sentence_of
+from fuzzytree.report.markup import Markup, folded, joined, table, tag, text
+from fuzzytree.report.systems import system_lines
+from fuzzytree.report.text import head_lines, model_lines, term_lines
+from fuzzytree.rulebase import RuleBase
+from fuzzytree.system import FuzzySystem
+from fuzzytree.tree import FuzzyTree
+
+
+def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:
+    """Return a model: rules as a table, a tree or a system as `show` prints it.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> model_html(random_tree(1)).startswith("<pre>")
+        True
+    """
+    match model:
+        case FuzzySystem():
+            return _lines(system_lines(model))
+        case FuzzyTree():
+            return _lines(model_lines(model))
+        case RuleBase():
+            rows = [
+                (
+                    str(number),
+                    sentence_of(rule, model),
+                    "" if rule.support is None else str(rule.support),
+                )
+                for number, rule in enumerate(model.rules, 1)
+            ]
+            names = ("", "rule", "rows")
+            return joined(
+                [
+                    _lines(head_lines(model)),
+                    table(names, rows, caption=f"Rules of {model.name}", right=(2,)),
+                    folded("Terms", _lines(term_lines(model.variables))),
+                ]
+            )
+
+
+def agreement_html(found: Agreement) -> Markup:
+    """Return the result of a check as a table."""
+    return agreement_section(found)
+
+
+def audit_html(found: Audit) -> Markup:
+    """Return an audit: its verdict, and all else as it is printed."""
+    said = tag("p", verdict_text(found))
+    return joined([said, _lines(audit_lines(found))])
+
+
+def _lines(lines: Iterable[str]) -> Markup:
+    return tag("pre", joined(map(text, lines), "\n"))

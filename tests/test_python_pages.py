@@ -1,0 +1,31 @@
+"""The examples of pages about Python run and print what the page shows."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+NEEDED = {
+    "fuzzy-libraries.md": ("skfuzzy", "simpful"),
+    "notebook.md": ("matplotlib", "pandas"),
+}
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:skfuzzy")
+@pytest.mark.parametrize("page", NEEDED)
+def test_each_example_prints_what_stands_below_it(
+    page: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in NEEDED[page]:
+        pytest.importorskip(module)
+    monkeypatch.chdir(ROOT)
+    text = (ROOT / "docs" / page).read_text("utf-8")
+    blocks = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, re.DOTALL)
+    names: dict[str, object] = {}
+    for code, shown in blocks:
+        exec(code, names)  # the page's own examples
+        assert capsys.readouterr().out == shown
+    assert len(blocks) == text.count("```python")
