@@ -146,20 +146,22 @@ class Answers(msgspec.Struct, frozen=True, eq=False):
     def to_arrow(self, strengths: By | None = None) -> pa.Table:
         """Return the columns of `to_csv` as a table of pyarrow; needs pyarrow.
 
-        What would be an empty cell is null there.
+        Classes are of the type of `classes`; what would be an empty cell is null.
 
         Raises:
             ValueError: If strengths are asked for that are not there.
         """
-        return arrow_table(self.columns(strengths))
+        return arrow_table({**self.columns(strengths), "class": self.classes})
 
     def to_pandas(self, strengths: By | None = None) -> pd.DataFrame:
         """Return the columns of `to_csv` as a frame of pandas; needs pandas.
 
+        Classes are of the type of `classes`.
+
         Raises:
             ValueError: If strengths are asked for that are not there.
         """
-        return pandas_frame(self.columns(strengths))
+        return pandas_frame({**self.columns(strengths), "class": self.classes})
 
     def __repr__(self) -> str:
         """Show how many rows there are; `str` shows how many rows got which class."""

@@ -367,7 +367,7 @@ def test_a_users_settings_change_nothing() -> None:
         assert [drawn(one, ".svg") for one in pictures()] == plain
 
 
-def test_drawing_without_matplotlib_names_the_extra(
+def test_drawing_without_matplotlib_says_what_installs_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tree = learnt(2)
@@ -382,7 +382,7 @@ def test_drawing_without_matplotlib_names_the_extra(
         lambda: plots.draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
     ]
     for draw in draws:
-        with pytest.raises(MissingExtraError, match="extra 'plots'"):
+        with pytest.raises(MissingExtraError, match="pip install 'matplotlib"):
             draw()
 
 
