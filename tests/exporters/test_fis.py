@@ -445,7 +445,9 @@ def test_terms_of_one_number_are_a_loss_where_octave_joins_their_rules() -> None
         for term, then in (("low", "small"), ("high", "tiny"))
     ]
     system = replace(
-        _sugeno(*rules), outputs=(output,), blocks=(RuleBlock(tuple(rules), "minimum"),)
+        _sugeno(SystemRule(Is("a", "low"), (_small(),))),
+        outputs=(output,),
+        blocks=(RuleBlock(tuple(rules), "minimum"),),
     )
     with pytest.raises(LossError) as caught:
         write(system)
