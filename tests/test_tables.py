@@ -487,7 +487,7 @@ def test_a_table_of_100_000_columns_is_read_in_seconds() -> None:
     begin = time.process_time()
     assert len(_read(text).columns) == 100_000
     assert len(_values(_csv(text), ["c99999", "c3"])) == 2
-    assert time.process_time() - begin < 40  # 10 on a machine with nothing else to do
+    assert time.process_time() - begin < 40
 
 
 def test_of_many_columns_with_text_the_first_are_named() -> None:
