@@ -297,7 +297,10 @@ def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "no" / "a.ftr"
     with pytest.raises(WriteError) as caught:
         Recorder(path, BOARD)
-    message = f"{path}: cannot be written: no such file or directory"
+    message = (
+        f"{path}: cannot be written: there is no folder '{path.parent}'; "
+        f"mkdir -p {path.parent} makes it"
+    )
     assert str(caught.value) == message
 
 
