@@ -247,7 +247,9 @@ REFUSED: list[tuple[Callable[[], Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("build", "reason"), REFUSED, ids=lambda one: str(one)[:30])
+@pytest.mark.parametrize(
+    ("build", "reason"), REFUSED, ids=[reason for _, reason in REFUSED]
+)
 def test_what_a_system_of_ours_cannot_hold_is_refused_with_its_reason(
     build: Callable[[], Any], reason: str
 ) -> None:
