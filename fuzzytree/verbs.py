@@ -18,7 +18,6 @@ from fuzzytree import lowering
 from fuzzytree.agreement import Agreement
 from fuzzytree.answering import Answering, Carried, answering, opened, run
 from fuzzytree.casting import as_rules, as_system
-from fuzzytree.checking_programs import ProgramFile
 from fuzzytree.contracts import Document, Dtype, Model, ModelSource, Progress, Written
 from fuzzytree.converting import (
     CALLED,
@@ -57,6 +56,7 @@ if TYPE_CHECKING:
     from fuzzytree.auditing.records import Audit, Source
     from fuzzytree.auditing.records import Settings as AuditSettings
     from fuzzytree.auditing.subject import Material, Rows
+    from fuzzytree.checking_programs import ProgramFile
     from fuzzytree.contracts import FloatArray
     from fuzzytree.criteria.results import Stability
     from fuzzytree.learning import Learnt, Settings
@@ -438,6 +438,8 @@ def _program(source: Carried, may_run: bool) -> ProgramFile | None:
     form = format_of(source)
     if form.read is not None or form.name == "onnx":
         return None
+    from fuzzytree.checking_programs import ProgramFile
+
     return ProgramFile(form.name, read_bounded(source), may_run)
 
 

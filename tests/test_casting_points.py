@@ -21,15 +21,18 @@ from fuzzytree.system import (
     Arc,
     Bell,
     Concave,
+    Conclusion,
     Cosine,
     Curve,
     Defuzzifier,
     Formula,
     FuzzySystem,
     Gaussian,
+    Is,
     Label,
     Name,
     PiCurve,
+    RuleBlock,
     SCurve,
     SemiEllipse,
     Sigmoid,
@@ -39,6 +42,7 @@ from fuzzytree.system import (
     Spike,
     SystemInput,
     SystemOutput,
+    SystemRule,
     Trapezoid,
     TwoGaussians,
 )
@@ -175,11 +179,12 @@ def test_extreme_curves_become_points_or_are_refused(curve: Curve) -> None:
 
 def washer(curve: Curve, output: Curve, method: str) -> FuzzySystem:
     how = Defuzzifier(method)  # type: ignore[arg-type]
+    rule = SystemRule(Is("dirt", "high"), (Conclusion("time", "long"),))
     return FuzzySystem(
         "washer",
         (SystemInput("dirt", (Label("high", curve, 0.5),)),),
         (SystemOutput("time", (Label("long", output),), 0.0, 1.0, how, "maximum"),),
-        (),
+        (RuleBlock((rule,), implication="minimum"),),
     )
 
 

@@ -64,10 +64,13 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
 
 def _coverage(model: Document) -> Coverage | None:
     """Return which rules of a fuzzy system fire in probes; None for other models."""
-    from fuzzytree.checking_systems import coverage_of
     from fuzzytree.system import FuzzySystem
 
-    return coverage_of(model) if isinstance(model, FuzzySystem) else None
+    if not isinstance(model, FuzzySystem):
+        return None
+    from fuzzytree.checking_systems import coverage_of
+
+    return coverage_of(model)
 
 
 def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:

@@ -56,6 +56,7 @@ def test_json_tells_the_same_facts(call: Call) -> None:
             "verdict": "certified",
             "sentence": "no path can differ: no value is rounded before it meets a cut",
         },
+        "coverage": None,
         "next": "fuzzytree check grip.yaml new.onnx",
         "certificate": {
             "sentence": "no path can differ: no value is rounded before it meets a cut",
