@@ -35,7 +35,7 @@ from fuzzytree.converting import (
 )
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.exporters import all_formats
-from fuzzytree.files import read_bounded, reason, write_atomically
+from fuzzytree.files import check_stream, read_bounded, reason, write_atomically
 from fuzzytree.naming import as_names, printable
 from fuzzytree.options import Option
 from fuzzytree.rulebase import Conjunction, Kind, RuleBase, name_choice
@@ -736,9 +736,7 @@ def material(
     else:
         model = as_model(model)
     given = read_results(results, model)
-    name = os.fspath(data) if isinstance(data, str | os.PathLike) else None
-    if name is not None and stat.S_ISFIFO(_mode(name)):
-        data = io.BytesIO(read_bounded(name))  # nobody can read it twice
+    data, name = _readable_twice(data)
     source = _source_of(data, name)
     rows = audited_rows(
         data, model, target=target, columns=columns, delimiter=delimiter, name=name
@@ -748,11 +746,22 @@ def material(
     return Material(model, file, rows, source, given)
 
 
-def _mode(path: str) -> int:
+def _readable_twice(data: object) -> tuple[object, str | None]:
+    """Return a table that can be hashed and then read, and its path if it has one.
+
+    Raises:
+        TableError: If it is a path that is not there, or of a folder or a device.
+        ReadError: If it is a pipe of more bytes than fit.
+    """
+    if not isinstance(data, str | os.PathLike):
+        return data, None
+    name = os.fspath(data)
     try:
-        return Path(path).stat().st_mode
-    except (OSError, ValueError):  # which is told where it is read
-        return 0
+        check_stream(name)
+        is_pipe = stat.S_ISFIFO(Path(name).stat().st_mode)
+    except (OSError, ValueError) as error:
+        raise TableError(f"{name}: cannot be read: {reason(error)}") from error
+    return (io.BytesIO(read_bounded(name)) if is_pipe else name), name
 
 
 def _bytes_of(path: str | os.PathLike[str]) -> bytes:
@@ -907,12 +916,17 @@ def diff(
     first, second = models
     titles = [f.name if f else m.name for f, m in zip(files, models, strict=True)]
     refuse_strangers(first, second, (titles[0], titles[1]))
-    source = _source_of(data)
+    data, name = _readable_twice(data)
+    source = _source_of(data, name)
     rows = None
     if data is not None:
         found = [
             *batches(
-                data, all_inputs(first, second), columns=columns, delimiter=delimiter
+                data,
+                all_inputs(first, second),
+                columns=columns,
+                delimiter=delimiter,
+                name=name,
             )
         ]
         rows = Rows(found[0].piece.name, np.hstack([batch.values for batch in found]))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import threading
 from pathlib import Path
 
 import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
@@ -132,3 +134,24 @@ def test_damaged_and_foreign_files_are_refused(call: Call) -> None:
         "other.yaml: has no input in common with grip.yaml: it asks 'wind', and that "
         "asks 'force', 'slip'\n"
     )
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_rows_may_come_from_a_pipe(call: Call) -> None:
+    os.mkfifo("pipe.csv")
+    content = Path("grasps.csv").read_bytes()
+    feed = Path("pipe.csv").write_bytes
+    threading.Thread(target=feed, args=(content,), daemon=True).start()
+    code, out, _ = call("diff", "grip.yaml", "rules.yaml", "--data", "pipe.csv")
+    assert code == 0
+    assert "rows     4 of pipe.csv" in out
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no such device")
+@pytest.mark.parametrize("verb", ["audit", "diff"])
+def test_a_device_is_refused_before_any_of_it_is_read(verb: str, call: Call) -> None:
+    Path("endless.csv").symlink_to("/dev/zero")
+    models = ("grip.yaml", "rules.yaml")[: 1 if verb == "audit" else 2]
+    code, out, err = call(verb, *models, "--data", "endless.csv")
+    assert (code, out) == (2, "")
+    assert err == "endless.csv: cannot be read: it is neither a file nor a pipe\n"
