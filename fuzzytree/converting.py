@@ -119,9 +119,11 @@ def format_of(path: str | os.PathLike[str]) -> Format:
     try:
         return find_format(suffix or "no suffix")
     except ValueError as error:
-        shown = f"the suffix {suffix!r}" if suffix else "no suffix"
         known = str(error).rpartition("; ")[2]
-        raise ReadError(f"{os.fspath(path)}: has {shown}; {known}") from error
+        shown = f"no format of a model has the suffix {suffix!r}"
+        shown = shown if suffix else "has no suffix that names its format"
+        name = os.fspath(path) or "''"
+        raise ReadError(f"{name}: {shown}; {known}") from error
 
 
 def read(path: str | os.PathLike[str], *, format: str | None = None) -> Reading:

@@ -285,7 +285,8 @@ def test_a_file_without_a_known_suffix_is_no_model(tmp_path: Path) -> None:
     with pytest.raises(ReadError) as caught:
         ft.load("model.txt")
     assert str(caught.value) == (
-        f"model.txt: has the suffix '.txt'; there is {', '.join(TABLE)}"
+        "model.txt: no format of a model has the suffix '.txt'; "
+        f"there is {', '.join(TABLE)}"
     )
 
 

@@ -142,7 +142,7 @@ def test_streams_name_their_formats(call: Call) -> None:
         ),
         (
             ("grip.yalm", "a.yaml"),
-            "grip.yalm: has the suffix '.yalm'; "
+            "grip.yalm: no format of a model has the suffix '.yalm'; "
             f"there is {', '.join(TABLE)} (did you mean '.yaml'?)\n",
         ),
         (("folder.yaml", "a.yaml"), "folder.yaml: cannot be read: is a directory\n"),

@@ -199,10 +199,14 @@ def test_a_missing_column_is_named(call: Call) -> None:
     [
         ("absent.yaml", "absent.yaml: cannot be read: no such file or directory\n"),
         ("absent.onnx", "absent.onnx: cannot be read: no such file or directory\n"),
-        ("grip", f"grip: has no suffix; there is {', '.join(TABLE)}\n"),
+        (
+            "grip",
+            f"grip: has no suffix that names its format; there is {', '.join(TABLE)}\n",
+        ),
         (
             "grasps.csv",
-            f"grasps.csv: has the suffix '.csv'; there is {', '.join(TABLE)}\n",
+            "grasps.csv: no format of a model has the suffix '.csv'; "
+            f"there is {', '.join(TABLE)}\n",
         ),
         (
             "grip.py",
