@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.csv_rows import BLOCK, Rows, blocks
-from fuzzytree.errors import TableError
+from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
 from fuzzytree.naming import as_names
 from fuzzytree.rulebase import LabelType, is_label, label_type_of
@@ -166,6 +166,12 @@ def read_table(
         >>> table.columns, table.values.tolist(), table.classes, table.codes.tolist()
         (('x1',), [[1.5, 2.5]], ('firm', 'soft'), [1, 0])
     """
+    shape = (0,) if isinstance(target, str) else getattr(target, "shape", (0,))
+    if len(shape) != 1:
+        raise TableError(
+            f"the target has the shape {tuple(shape)}, and it needs one class for each "
+            "row: pass the name of a column, or an array of shape (rows,)"
+        )
     found = pieces(source, columns=columns, delimiter=delimiter, name=name)
     first = next(found)
     target = target.strip() if isinstance(target, str) else target
@@ -885,7 +891,10 @@ def arrow_table(columns: Mapping[str, Sequence[object]]) -> pa.Table:
 
 def pandas_frame(columns: Mapping[str, Sequence[object]]) -> pd.DataFrame:
     """Return columns as a frame of pandas, empty cells as what pandas has for them."""
-    import pandas as pd
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise MissingExtraError("to_pandas needs pandas: pip install pandas") from error
 
     cells = {name: [_or_none(one) for one in row] for name, row in columns.items()}
     return pd.DataFrame(cells)

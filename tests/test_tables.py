@@ -7,6 +7,7 @@ import math
 import os
 import random
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -414,6 +415,16 @@ def test_classes_beside_the_table_must_be_as_many_as_its_rows() -> None:
         read_table(np.zeros((3, 1)), target=[1, 2])
     message = "the array has 3 rows, and there are 2 classes for them"
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("kind", [np.asarray, pd.DataFrame, pl.DataFrame])
+def test_a_target_has_one_class_for_each_row(kind: Callable[[object], object]) -> None:
+    with pytest.raises(TableError) as caught:
+        read_table(np.zeros((2, 1)), target=kind([[1, 2], [3, 4]]))  # type: ignore[arg-type]  # what is refused
+    assert str(caught.value) == (
+        "the target has the shape (2, 2), and it needs one class for each row: "
+        "pass the name of a column, or an array of shape (rows,)"
+    )
 
 
 def test_an_ignored_column_must_be_there() -> None:
