@@ -1000,6 +1000,7 @@ def explain(code: str) -> Code:
 
     Raises:
         ValueError: If there is no such code.
+        TypeError: If it is no text.
 
     Example:
         >>> explain("FT101").title
@@ -1007,6 +1008,10 @@ def explain(code: str) -> Code:
     """
     from fuzzytree.auditing.codes import CODES
 
+    if not isinstance(code, str):
+        raise TypeError(
+            f"explain takes a code such as 'FT101', and not a {type(code).__name__}"
+        )
     name = code.upper().partition("-")[0]
     if name not in CODES:
         choice = name_choice(name[:40], [*CODES])

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
 
 import fuzzytree as ft
 from fuzzytree.answers import Answers, joined, reasons
+from fuzzytree.errors import MissingExtraError
 from fuzzytree.reference import Status, evaluate
 from fuzzytree.rulebase import (
     Band,
@@ -119,6 +121,15 @@ def test_a_rule_without_clauses_always_holds() -> None:
     rules = RuleBase("grip", ("soft",), (), (Rule((), "soft"),))
     answers = ft.run(rules, np.zeros((1, 1)), columns=["force"])
     assert reasons(rules, np.zeros((0, 1)), answers) == ["ALWAYS soft"]
+
+
+def test_a_frame_of_pandas_without_pandas_says_how_to_get_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingExtraError) as caught:
+        ft.run(RULES, VALUES, columns=["force"]).to_pandas()
+    assert str(caught.value) == "to_pandas needs pandas: pip install pandas"
 
 
 def test_answers_become_frames_with_nothing_where_nothing_is_known() -> None:

@@ -147,6 +147,10 @@ def test_explain_knows_a_code_and_the_id_of_a_finding() -> None:
     assert ft.explain("ft101-1a2b3c4d") == ft.explain("FT101")
     with pytest.raises(ValueError, match=r"^no code 'FT1O1'; "):
         ft.explain("FT1O1")
+    with pytest.raises(TypeError) as caught:
+        ft.explain(TREE)  # type: ignore[arg-type]  # what is refused
+    message = "explain takes a code such as 'FT101', and not a FuzzyTree"
+    assert str(caught.value) == message
 
 
 def test_recheck_takes_an_audit_and_its_model(tmp_path: Path) -> None:
