@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import msgspec
 
-from fuzzytree.rulebase import Path, RuleBase
+from fuzzytree.rulebase import Path, RuleBase, summary
 from fuzzytree.system import FuzzySystem
 from fuzzytree.tree import FuzzyTree
 
@@ -70,6 +70,15 @@ class Written(msgspec.Struct, frozen=True):
     losses: tuple[Loss, ...] = ()
     remarks: tuple[str, ...] = ()
     names: Mapping[str, str] = msgspec.field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Show how large the file is, and how many losses and remarks there are."""
+        return summary(
+            "Written",
+            bytes=len(self.content),
+            losses=len(self.losses),
+            remarks=len(self.remarks),
+        )
 
 
 class Reading(msgspec.Struct, frozen=True):

@@ -36,7 +36,7 @@ class Value(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A frozen, comparable, hashable record."""
 
 
-_ONE = {"leaves": "leaf", "classes": "class"}
+_ONE = {"leaves": "leaf", "classes": "class", "losses": "loss"}
 
 
 def summary(name: str, **counts: int) -> str:

@@ -23,7 +23,7 @@ from fuzzytree.exporters.onnx_contents import contents
 from fuzzytree.lowering import forms
 from fuzzytree.probing import probe_values
 from fuzzytree.pruning import Pruned, Removed
-from fuzzytree.rulebase import Variable
+from fuzzytree.rulebase import Variable, summary
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.tables import batches
@@ -119,6 +119,12 @@ class Report(msgspec.Struct, frozen=True):
     costs: tuple[Cost, ...]
     proof: Agreement
     omissions: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Show how many inputs are needed, and how many things were left out."""
+        return summary(
+            "Report", inputs=len(self.needs.inputs), removed=len(self.removed)
+        )
 
     @property
     def ok(self) -> bool:

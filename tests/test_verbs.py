@@ -170,6 +170,7 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
     rules = ft.rules_from_tree(TREE)
     system = random_system(3)
     found = ft.check(TREE, rules, runtimes=["native"], limit=99)
+    written = ft.export(TREE, "yaml")
     shown = [
         repr(one)
         for one in (
@@ -180,6 +181,9 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
             ft.run(system, np.zeros((4, len(system.columns)))),
             found,
             ft.audit(TREE, select=["FT501"]),
+            written,
+            ft.needs(TREE, uses=["tree"]),
+            ft.diff(TREE, TREE),
         )
     ]
     assert shown == [
@@ -190,6 +194,9 @@ def test_what_python_shows_of_a_value_is_one_short_line() -> None:
         "Outputs(4 rows, 2 outputs)",
         f"Agreement({len(found.comparisons)} comparisons, agrees)",
         "Audit(1 answer, 0 findings)",
+        f"Written({len(written.content)} bytes, 0 losses, 0 remarks)",
+        "Report(3 inputs, 16 removed)",
+        "Difference(0 changes, decisions equal)",
     ]
 
 

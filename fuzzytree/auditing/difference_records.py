@@ -93,6 +93,12 @@ class Difference(Value, frozen=True):
     answers: tuple[Answer, ...]
     format: Literal["fuzzytree-diff/1"] = FORMAT
 
+    def __repr__(self) -> str:
+        """Show how many changes there are, and what is known of the decisions."""
+        count = len(self.changes)
+        noun = "change" if count == 1 else "changes"
+        return f"Difference({count} {noun}, decisions {self.verdict})"
+
     @property
     def verdict(self) -> Verdict:
         """Whether decisions are proved equal, known to change, or neither."""
