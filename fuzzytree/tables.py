@@ -339,7 +339,7 @@ def class_names(cells: Sequence[Cells]) -> list[str | None]:
 
 def _class_name(value: object, *, is_whole: bool) -> str | None:
     if isinstance(value, str):
-        return value if value.strip() else None
+        return str(value) if value.strip() else None  # numpy has its own texts
     if _is_missing(value):
         return None
     if isinstance(value, float):

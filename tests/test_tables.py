@@ -417,6 +417,12 @@ def test_classes_beside_the_table_must_be_as_many_as_its_rows() -> None:
     assert str(caught.value) == message
 
 
+def test_texts_of_numpy_become_names_of_classes() -> None:
+    names = class_names([[np.str_("soft"), np.str_(" "), "firm"]])
+    assert [type(name) for name in names] == [str, type(None), str]
+    assert names == ["soft", None, "firm"]
+
+
 @pytest.mark.parametrize("kind", [np.asarray, pd.DataFrame, pl.DataFrame])
 def test_a_target_has_one_class_for_each_row(kind: Callable[[object], object]) -> None:
     with pytest.raises(TableError) as caught:
