@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fuzzytree.contracts import Loss
-from fuzzytree.system import Arc, Concave, SCurve, SystemOutput
+from fuzzytree.system import Arc, Concave, Formula, Number, SCurve, SystemOutput
 
 
 def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
@@ -36,3 +36,30 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
             "where a term has a degree is computed exactly; fuzzylite 6 finds other "
             "values for SShape, ZShape and Concave",
         )
+
+
+def constant_degrees(output: SystemOutput) -> Iterator[str]:
+    """Yield a remark on each number that is a degree because a curve is sampled.
+
+    Args:
+        output: As it is read from FLL, or from FCL in fuzzylite's dialect.
+
+    Example:
+        >>> from fuzzytree.system import Defuzzifier, Label
+        >>> low = Label("low", Formula(Number(0.3)))
+        >>> how = Defuzzifier("centroid")
+        >>> len([*constant_degrees(SystemOutput("tip", (low,), 0.0, 1.0, how))])
+        1
+    """
+    if output.defuzzifier.is_weighted:
+        return
+    for label in output.labels:
+        match label.curve:
+            case Formula(Number(value)):
+                yield (
+                    f"term {label.name!r} of {output.name!r} has the degree {value!r} "
+                    "everywhere, as in fuzzylite; to answer numbers, choose a weighted "
+                    "defuzzifier"
+                )
+            case _:
+                pass

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from fuzzytree.contracts import Loss
 from fuzzytree.readers import fcl_terms
-from fuzzytree.readers.engines import fuzzylite_losses
+from fuzzytree.readers.engines import constant_degrees, fuzzylite_losses
 from fuzzytree.readers.fcl_blocks import Block
 from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS, METHOD_WORDS, Dialect
 from fuzzytree.readers.fcl_statements import Declaration, Range, TermText, place
@@ -195,6 +195,8 @@ def read_output(name: str, known: Known) -> SystemOutput:
     )
     if known.dialect == "fuzzylite":
         known.notes.losses.extend(fuzzylite_losses(found))
+        for text in constant_degrees(found):
+            known.remark(text)
     return found
 
 

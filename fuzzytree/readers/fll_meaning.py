@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from fuzzytree.contracts import Loss
 from fuzzytree.inference import value_at
+from fuzzytree.readers.engines import constant_degrees
 from fuzzytree.readers.fll_terms import as_degree
 from fuzzytree.readers.fll_variables import Known, ReadBlock
 from fuzzytree.readers.fll_words import Entry, Notes
@@ -130,6 +131,7 @@ def differences(system: FuzzySystem) -> Iterator[str]:
         (one.output, one.label) for rule in system.rules for one in rule.then
     )
     for output in system.outputs:
+        yield from constant_degrees(output)
         if output.defuzzifier.is_weighted:
             concluded = [
                 label for label in output.labels if counts[output.name, label.name]

@@ -570,3 +570,31 @@ def test_a_word_that_is_longer_than_any_name_is_a_mistake() -> None:
     text = f"FUNCTION_BLOCK {'n' * 1001}\nEND_FUNCTION_BLOCK\n".encode()
     with pytest.raises(ReadError, match=r"fcl:1:16: a word of more than 1000"):
         read(text, "x.fcl")
+
+
+def test_a_number_that_fuzzylite_takes_for_a_degree_is_a_remark() -> None:
+    text = """FUNCTION_BLOCK tip
+VAR_INPUT food : REAL; END_VAR
+VAR_OUTPUT tip : REAL; END_VAR
+FUZZIFY food
+    TERM good := (0,0) (1,1);
+END_FUZZIFY
+DEFUZZIFY tip
+    RANGE := (0 .. 1);
+    TERM much := 0.9;
+    METHOD : COG;
+    ACCU : MAX;
+    DEFAULT := 0;
+END_DEFUZZIFY
+RULEBLOCK rules
+    AND : MIN;
+    ACT : MIN;
+    RULE 1 : IF food IS good THEN tip IS much;
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+    remark = (
+        "term 'much' of 'tip' has the degree 0.9 everywhere, as in fuzzylite; to "
+        "answer numbers, choose a weighted defuzzifier"
+    )
+    assert remark in _read(text).remarks

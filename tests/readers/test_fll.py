@@ -527,3 +527,27 @@ def test_a_damaged_file_is_refused_or_read_and_never_crashes() -> None:
         except ReadError as error:
             told = str(error)
             assert all(line.startswith("d.fll:") for line in told.splitlines())
+
+
+def test_a_constant_under_a_centroid_is_a_degree_and_a_remark_says_so() -> None:
+    text = """Engine: tip
+InputVariable: food
+  range: 0 1
+  term: good Ramp 0 1
+OutputVariable: tip
+  range: 0 1
+  aggregation: Maximum
+  defuzzifier: Centroid
+  term: much Constant 0.9
+RuleBlock: rules
+  conjunction: Minimum
+  disjunction: Maximum
+  implication: Minimum
+  activation: General
+  rule: if food is good then tip is much
+"""
+    remark = (
+        "term 'much' of 'tip' has the degree 0.9 everywhere, as in fuzzylite; to "
+        "answer numbers, choose a weighted defuzzifier"
+    )
+    assert remark in read(text.encode(), "tip.fll").remarks
