@@ -29,7 +29,8 @@ from fuzzytree.tables import FloatArray
 from fuzzytree.testing import random_system, random_tree
 from fuzzytree.tree import FuzzyTree
 
-WINE = Path(__file__).resolve().parent.parent / "examples" / "wine" / "wine.csv"
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+WINE = EXAMPLES / "wine" / "wine.csv"
 TREE = random_tree(3, inputs=3)
 ROWS = np.random.default_rng(0).normal(size=(20, 3))
 FEW = np.array([[1.0], [1.5], [2.0], [7.0], [7.5], [8.0]])
@@ -154,13 +155,13 @@ def test_explain_knows_a_code_and_the_id_of_a_finding() -> None:
 
 
 def test_recheck_takes_an_audit_and_its_model(tmp_path: Path) -> None:
-    model, audit = tmp_path / "tree.yaml", tmp_path / "audit.json"
-    ft.save(TREE, model)
-    audit.write_text(ft.audit(model, select=["FT1"]).to_json(), "utf-8")
+    model, audit = EXAMPLES / "grip.yaml", tmp_path / "audit.json"
+    audit.write_text(ft.audit(model, select=["FT101"]).to_json(), "utf-8")
     assert not ft.recheck(audit, model).wrong
     other = tmp_path / "other.yaml"
     ft.save(random_tree(4, inputs=3), other)
-    assert ft.recheck(audit, other).wrong
+    wrong = ft.recheck(audit, other).wrong
+    assert wrong[-1] == "the domain has no side 'x2', which 'mix 1' needs"
     with pytest.raises(ReadError) as caught:
         ft.recheck(tmp_path / "no.json", model)
     assert str(caught.value).endswith("no.json: No such file or directory")

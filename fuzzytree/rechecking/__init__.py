@@ -54,14 +54,13 @@ def recheck(audit: bytes, model: bytes, names: tuple[str, str]) -> Report:
     report = Report()
     try:
         case = Case(found, whole, places)
+        check_files(case, report, facts, model, names[1])
+        check_head(case, report)
+        for number, answer in enumerate(case.audit.answers, 1):
+            where = f"answer {number} ({answer.code}, {answer.subject:.60})"
+            check_answer(case, report, answer, where)
     except DoesNotHoldError as error:
         report.wrong.append(str(error))
-        return report
-    check_files(case, report, facts, model, names[1])
-    check_head(case, report)
-    for number, answer in enumerate(case.audit.answers, 1):
-        where = f"answer {number} ({answer.code}, {answer.subject:.60})"
-        check_answer(case, report, answer, where)
     return report
 
 

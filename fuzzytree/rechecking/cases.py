@@ -14,7 +14,7 @@ from fuzzytree.rechecking.enclosing import Between
 from fuzzytree.rechecking.grid import Asked, Grid
 from fuzzytree.rechecking.meaning import Point, strengths
 from fuzzytree.rechecking.model_records import Model, Rules, System, Tree, Variable
-from fuzzytree.rechecking.outcomes import UndecidedError, require
+from fuzzytree.rechecking.outcomes import DoesNotHoldError, UndecidedError, require
 from fuzzytree.rechecking.places import Place, Places
 from fuzzytree.rechecking.polynomials import ONE, ZERO
 from fuzzytree.rechecking.ties import Ties
@@ -168,7 +168,10 @@ class Case:
             weights[part.input] += weight
             low, high = (end - weight * Fraction(part.centre) for end in (low, high))
         for name, weight in weights.items():
-            one = self.sides[name]
+            one = self.sides.get(name)
+            if one is None:
+                text = f"the domain has no side {name!r}, which {variable.name!r} needs"
+                raise DoesNotHoldError(text)
             ends = [weight * Fraction(end) for end in (one.low, one.high)]
             low, high = low + min(ends), high + max(ends)
         if side is not None:
