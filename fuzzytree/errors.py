@@ -57,8 +57,8 @@ def install_hint(extra: str) -> str:
     whether fuzzytree came from an index, a wheel or a checkout.
 
     Example:
-        >>> install_hint("parquet")
-        "pyarrow: pip install 'pyarrow>=15'"
+        >>> install_hint("serial")
+        "pyserial: pip install 'pyserial>=3.5'"
     """
     import importlib.metadata
     import re

@@ -174,4 +174,5 @@ def test_diff_says_that_labels_became_text() -> None:
     one = ft.learn(VALUES, target=LABELS["integers"])
     two = ft.learn(VALUES, target=LABELS["digits as text"])
     found = ft.diff(one, two)
-    assert "the label type is text, and was number" in str(found)
+    (change,) = found.changes
+    assert "the label type is text, and was number" in change.sentence
