@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -231,7 +232,7 @@ def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
         return load(source, allow_loss=allow_loss)
     if hasattr(source, "__fuzzytree__") and not isinstance(source, type):
         return source.__fuzzytree__()
-    for parent in type(source).__mro__:
+    for parent in inspect.getmro(type(source)):
         reader = _OBJECT_READERS.get((parent.__module__, parent.__name__))
         if reader is not None:
             return reader(source)

@@ -38,11 +38,12 @@ Choice = Literal["alpha", "l_max", "shrinkage", "entry"]
 
 def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
     """Return what scikit-learn's check makes of X and y, where masked is missing."""
+    table: Any = X
     if isinstance(X, np.ndarray):
-        X = numbers_only(X, "X")
+        table = numbers_only(X, "X")
     elif hasattr(X, "__array__"):
         numbers_only(np.asarray(X), "X")  # a frame of times would become numbers
-    return validate_data(estimator, X, *map(_unmasked_labels, y), **options)
+    return validate_data(estimator, table, *map(_unmasked_labels, y), **options)
 
 
 def _unmasked_labels(y: Any) -> Any:

@@ -358,7 +358,9 @@ def _label_type(
     known = {name for name in names if name is not None}
     if is_csv:
         kinds: tuple[LabelType, ...] = ("boolean", "number")
-        fitting = [kind for kind in kinds if all(is_label(k, kind) for k in known)]
+        fitting: list[LabelType] = [
+            kind for kind in kinds if all(is_label(name, kind) for name in known)
+        ]
         return fitting[0] if fitting else msgspec.UNSET
     values = itertools.chain.from_iterable(map(plain, cells))
     return label_type_of(
@@ -522,9 +524,12 @@ def _parsed(columns: Sequence[pa.ChunkedArray]) -> FloatArray | None:
     for has_missing in (False, True):
         missing = 0
         if has_missing:
-            cells = pc.ascii_trim_whitespace(cells)
-            cells = pc.replace_substring_regex(cells, _MISSING, "nan")
-            missing = pc.sum(pc.match_substring_regex(cells, "^nan$")).as_py()
+            cells = pc.call_function("ascii_trim_whitespace", [cells])
+            how = pc.ReplaceSubstringOptions(_MISSING, "nan")
+            cells = pc.call_function("replace_substring_regex", [cells], how)
+            nan = pc.MatchSubstringOptions("^nan$")
+            found = pc.call_function("match_substring_regex", [cells], nan)
+            missing = pc.call_function("sum", [found]).as_py()
         try:
             values = np.from_dlpack(pc.cast(cells, pa.float64()))
         except pa.ArrowInvalid:

@@ -1008,7 +1008,7 @@ def explain(code: str) -> Code:
     """
     from fuzzytree.auditing.codes import CODES
 
-    if not isinstance(code, str):
+    if not isinstance(code, str):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise TypeError(
             f"explain takes a code such as 'FT101', and not a {type(code).__name__}"
         )

@@ -40,7 +40,7 @@ from __future__ import annotations
 import contextlib
 import math
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from typing import Literal
 
 from fuzzytree.programs.operations import (
@@ -196,7 +196,7 @@ class Maker:
         return self._added(Step(operation, arguments, samples=samples))
 
     @contextlib.contextmanager
-    def topic(self, title: str) -> Iterator[None]:
+    def topic(self, title: str) -> Generator[None]:
         """Title the steps that are added within after what they are part of.
 
         Example:

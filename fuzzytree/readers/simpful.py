@@ -234,6 +234,8 @@ def _linear(node: ast.expr) -> tuple[dict[str, float], float]:
             if not two[0]:
                 scale = two[1] if isinstance(sign, ast.Mult) else 1.0 / two[1]
                 return _scaled(one, scale)
+        case _:
+            pass
     raise ValueError("not linear")
 
 
