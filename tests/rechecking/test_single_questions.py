@@ -293,8 +293,8 @@ def test_every_audit_of_one_question_is_accepted_unedited(seed: int) -> None:
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(6, 300))
-def test_hundreds_of_audits_of_one_question_are_accepted_unedited(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(6, 60))
+def test_more_audits_of_one_question_are_accepted_unedited(seed: int) -> None:
     assert refused(random_rules(seed)) == []
     assert refused(random_numeric_system(seed)) == []
 
@@ -307,8 +307,8 @@ def test_no_point_of_a_grid_contradicts_what_is_proved(seed: int) -> None:
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(12, 500))
-def test_no_point_of_many_grids_contradicts_what_is_proved(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(12, 80))
+def test_no_point_of_more_grids_contradicts_what_is_proved(seed: int) -> None:
     rules = random_rules(seed)
     grid = Grid(rules)
     assert [t for code in CODES for t in disproved(grid, audited(rules, code)[0])] == []
