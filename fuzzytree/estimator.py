@@ -39,9 +39,9 @@ Choice = Literal["alpha", "l_max", "shrinkage", "entry"]
 def _validated(estimator: object, X: Any, *y: Any, **options: Any) -> Any:
     """Return what scikit-learn's check makes of X and y, where masked is missing."""
     table: Any = X
-    if isinstance(X, np.ndarray):
+    if isinstance(X, np.ndarray) and X.dtype.kind != "c":  # which scikit-learn refuses
         table = numbers_only(X, "X")
-    elif hasattr(X, "__array__"):
+    elif hasattr(X, "__array__") and not isinstance(X, np.ndarray):
         numbers_only(np.asarray(X), "X")  # a frame of times would become numbers
     return validate_data(estimator, table, *map(_unmasked_labels, y), **options)
 

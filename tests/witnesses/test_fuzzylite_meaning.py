@@ -7,8 +7,9 @@ that weak are left out. `docs/systems.md` lists where else it differs.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +19,7 @@ from msgspec.structs import replace
 from fuzzytree.exporters.fll import write
 from fuzzytree.inference import infer
 from fuzzytree.system import (
+    Activation,
     Arc,
     Curve,
     Defuzzifier,
@@ -95,6 +97,19 @@ def _block(block: RuleBlock) -> RuleBlock:
     )
 
 
+def _has_ties(system: FuzzySystem, row: Mapping[str, float]) -> bool:
+    """Return whether rules of one degree compete, which a heap there orders."""
+    every = tuple(replace(one, activation=Activation()) for one in system.blocks)
+    degrees = iter(infer(replace(system, blocks=every), row).activations)
+    for block in system.blocks:
+        own = itertools.islice(degrees, len(block.rules))
+        fired = [degree for degree in own if degree > 0.0]
+        is_few = block.activation.method in ("highest", "lowest")
+        if is_few and len(set(fired)) < len(fired):
+            return True
+    return False
+
+
 @pytest.mark.heavy
 def test_random_systems_answer_as_fuzzylite_6(
     program: Callable[[str], str], tmp_path: Path
@@ -117,6 +132,8 @@ def test_random_systems_answer_as_fuzzylite_6(
         for row, expected in zip(rows, answers.outputs, strict=True):
             found = infer(system, row)
             if any(0.0 < degree < _WEAK for degree in found.activations):
+                continue
+            if _has_ties(system, row):
                 continue
             for output, ours, theirs in zip(
                 system.outputs, found.outputs, expected, strict=True
