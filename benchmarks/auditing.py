@@ -31,16 +31,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # for tests.*
 
-from fuzzytree.auditing.audit import audit
-from fuzzytree.auditing.records import Settings
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.oracle import decide
-from fuzzytree.proving import ground as grounds
-from fuzzytree.proving.clock import Clock
-from fuzzytree.proving.ground import ground, rule_strengths
-from fuzzytree.proving.states import State
-from fuzzytree.proving.wins import wins
-from fuzzytree.rulebase import (
+from fuzzytree.auditing.engine import ground as grounds
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.ground import ground, rule_strengths
+from fuzzytree.auditing.engine.states import State
+from fuzzytree.auditing.engine.wins import wins
+from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.records import Settings
+from fuzzytree.model.rulebase import (
     Clause,
     Conjunction,
     Points,
@@ -50,8 +48,10 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.numerics.oracle import decide
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from tests.proving.bases import random_base, unit_domain, with_hidden_rule
+from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
 
 BUDGET_S = 2.0  # for one question under the product
 

@@ -23,8 +23,8 @@ from paper.page import page
 from paper.records import Claims, Comparison, Size, from_json
 from paper.speed import ROUNDS, SIZES, Bench
 
+from fuzzytree.benchmarking.machine import after, machine
 from fuzzytree.files import write_atomically
-from fuzzytree.timing.machine import after, machine
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("matplotlib", "onnx", "onnxruntime", "scikit-fuzzy", "scikit-learn")

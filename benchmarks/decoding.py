@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 
 from fuzzytree.tactile.boards import Board, Marker, Protocol, Request, Sentinel, Text
-from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.link.decoding import decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulation.encoding import encoded
 
 PIECE: Final = 4096
 FRAMES: Final = 500

@@ -31,11 +31,10 @@ import numpy.typing as npt
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.inference import curve_degree, infer
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Band, Flank, RuleBase, Term
-from fuzzytree.runtimes import find_runtime
-from fuzzytree.system import (
+from fuzzytree.benchmarking.clock import measure
+from fuzzytree.benchmarking.machine import load_averages, machine
+from fuzzytree.model.rulebase import Band, Flank, RuleBase, Term
+from fuzzytree.model.system import (
     And,
     Conclusion,
     Condition,
@@ -53,9 +52,10 @@ from fuzzytree.system import (
     SystemRule,
     Trapezoid,
 )
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.inference import curve_degree, infer
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from fuzzytree.timing.clock import measure
-from fuzzytree.timing.machine import load_averages, machine
 
 ROOT = Path(__file__).resolve().parents[1]
 ROWS = 10_000

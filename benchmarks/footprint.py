@@ -21,11 +21,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import fuzzytree as ft
-from fuzzytree.lowering import forms
-from fuzzytree.pruning import pruned
-from fuzzytree.savings import ALL_COLUMNS, PRUNED, Cost, File, costs, sizes, stages
-from fuzzytree.timing.clock import times_faster
-from fuzzytree.tree import FuzzyTree, Use
+from fuzzytree.benchmarking.clock import times_faster
+from fuzzytree.benchmarking.savings import (
+    ALL_COLUMNS,
+    PRUNED,
+    Cost,
+    File,
+    costs,
+    sizes,
+    stages,
+)
+from fuzzytree.model.tree import FuzzyTree, Use
+from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics.simplification import pruned
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "needs.md"

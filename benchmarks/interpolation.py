@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.plots import draw_frames, save
-from fuzzytree.plots.frames import colours
-from fuzzytree.plots.labels import SIZE
-from fuzzytree.plots.saving import style
+from fuzzytree.report.plots import save
+from fuzzytree.report.plots.labels import SIZE
+from fuzzytree.report.plots.saving import style
 from fuzzytree.tactile.given import given_frames
 from fuzzytree.tactile.interpolation import interpolated
+from fuzzytree.tactile.plots import colours, draw_frames
 from fuzzytree.tactile.sensor import pressed
 
 if TYPE_CHECKING:

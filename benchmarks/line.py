@@ -18,10 +18,10 @@ import tty
 from multiprocessing.connection import Connection
 
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.line import open_line
+from fuzzytree.tactile.link import open_line
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulated.device import blob
-from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulation.device import blob
+from fuzzytree.tactile.simulation.encoding import encoded
 
 BOARD = Board("mat", Sensor(16, 16), Marker("AA 55", checksum="crc16"))
 

@@ -25,20 +25,20 @@ from pathlib import Path
 
 import numpy as np
 
-from fuzzytree.cli.tactile.live import MOST_WAITING, SWITCH_S
-from fuzzytree.cli.tactile.screen import Screen
-from fuzzytree.recognition.live import Live
-from fuzzytree.recognition.recogniser import Recogniser
-from fuzzytree.recognition.sources import PAPER_BOARD, FromLine, simulated
-from fuzzytree.runtimes.frames import features_of
+from fuzzytree.api.verbs import learn
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.boards import Board, Marker, Port
-from fuzzytree.tactile.line import open_line
-from fuzzytree.tactile.simulated.encoding import encoded
-from fuzzytree.tactile.simulated.objects import OBJECTS
-from fuzzytree.tactile.simulated.physics import press
-from fuzzytree.tactile.simulated.wire import Wire
-from fuzzytree.tree import FuzzyTree
-from fuzzytree.verbs import learn
+from fuzzytree.tactile.cli.live import MOST_WAITING, SWITCH_S
+from fuzzytree.tactile.cli.screen import Screen
+from fuzzytree.tactile.link import open_line
+from fuzzytree.tactile.recognition.live import Live
+from fuzzytree.tactile.recognition.recogniser import Recogniser
+from fuzzytree.tactile.recognition.sources import PAPER_BOARD, FromLine, simulated
+from fuzzytree.tactile.runtimes.frames import features_of
+from fuzzytree.tactile.simulation.encoding import encoded
+from fuzzytree.tactile.simulation.objects import OBJECTS
+from fuzzytree.tactile.simulation.physics import press
+from fuzzytree.tactile.simulation.wire import Wire
 
 FEATURES = (
     *("S1", "S2", "S7", "S8", "S9", "S11"),

@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.runtimes.frames import FramePlan, features_of
-from fuzzytree.runtimes.images import features_of_images
 from fuzzytree.tactile.features import costs
 from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.names import FEATURES, PAPER
+from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
+from fuzzytree.tactile.runtimes.images import features_of_images
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "moments.md"
 SENSOR = Sensor(32, 32)

@@ -16,15 +16,15 @@ import numpy as np
 import numpy.typing as npt
 from onnx import TensorProto, helper
 
-from fuzzytree.contracts import Dtype
+from fuzzytree.benchmarking.clock import measure
+from fuzzytree.benchmarking.machine import machine
 from fuzzytree.exporters.onnx import write
 from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.exporters.onnx_session import open_session
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Band, Flank, Term, Variable
-from fuzzytree.timing.clock import measure
-from fuzzytree.timing.machine import machine
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.model.contracts import Dtype
+from fuzzytree.model.rulebase import Band, Flank, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.semantics.lowering import rules_from_tree
 
 COLUMNS = tuple(f"x{number}" for number in range(1, 12))
 TARGETS = {7: (12.1, 38.5), 100: (22.0, 708.0), 1000: (118.0, 10_700.0)}

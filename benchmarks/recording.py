@@ -15,8 +15,8 @@ import numpy as np
 
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.line.recording import Recorder, read_recording
-from fuzzytree.tactile.line.records import layout_of
+from fuzzytree.tactile.link.recording import Recorder, read_recording
+from fuzzytree.tactile.link.records import layout_of
 from fuzzytree.tactile.sensor import Sensor
 
 SIDES = (16, 64)

@@ -38,11 +38,11 @@ from fuzzytree.tactile.boards import (
     Sentinel,
     Text,
 )
-from fuzzytree.tactile.line.decoding import Decoder, decoder_of
+from fuzzytree.tactile.link.decoding import Decoder, decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulated.device import bounds
-from fuzzytree.tactile.simulated.encoding import banner, encoded
-from fuzzytree.tactile.simulated.faults import Faults, damaged, noise, with_marker
+from fuzzytree.tactile.simulation.device import bounds
+from fuzzytree.tactile.simulation.encoding import banner, encoded
+from fuzzytree.tactile.simulation.faults import Faults, damaged, noise, with_marker
 
 FAULTS = Faults(flip=1e-4, lose=5e-5, double=5e-5, noise=0.01, marker=0.1)
 CUT_EVERY = 5000  # frames after which the plug is pulled in the middle of one

@@ -21,10 +21,10 @@ from soak import CASES, FAULTS, Pool, frame_key, pool_of
 
 from fuzzytree.tactile.boards import Board, Request
 from fuzzytree.tactile.frames import Counters
-from fuzzytree.tactile.line import Line, open_line
+from fuzzytree.tactile.link import Line, open_line
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.simulated.device import Device, Truth
-from fuzzytree.tactile.simulated.faults import Faults, Pause
+from fuzzytree.tactile.simulation.device import Device, Truth
+from fuzzytree.tactile.simulation.faults import Faults, Pause
 
 # The cells of some frames hold the marker anyway.
 LINE_FAULTS = replace(FAULTS, marker=0.0, unplug=Pause(0.2, every=20_000))

@@ -11,7 +11,7 @@ from typing import Literal, assert_never
 
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.simulated.encoding import checksum
+from fuzzytree.tactile.simulation.encoding import checksum
 
 Verdict = Literal["untold", "late", "unexplained"]
 """As the columns of the table of `soak.py`."""

@@ -22,14 +22,14 @@ import numpy.typing as npt
 from sklearn.tree import DecisionTreeClassifier
 from trees import COLUMNS, grow, tree_of, walk
 
-from fuzzytree.contracts import Run
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.benchmarking.clock import measure
+from fuzzytree.benchmarking.machine import load_averages, machine
+from fuzzytree.model.contracts import Run
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load, load_best_first
-from fuzzytree.timing.clock import measure
-from fuzzytree.timing.machine import load_averages, machine
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.semantics.lowering import rules_from_tree
 
 Singles = npt.NDArray[np.float32]
 Floats = npt.NDArray[np.float64]

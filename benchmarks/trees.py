@@ -13,8 +13,8 @@ from statistics import NormalDist
 import numpy as np
 from sklearn.tree import DecisionTreeClassifier
 
-from fuzzytree.rulebase import LR, Band, Flank, Side, Term, Variable
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets, intervals
+from fuzzytree.model.rulebase import LR, Band, Flank, Side, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets, intervals
 
 FEATURES = 11
 COLUMNS = tuple(f"x{number}" for number in range(FEATURES))

@@ -13,9 +13,9 @@ from html import escape
 from pathlib import Path
 
 import fuzzytree as ft
-from fuzzytree.reference import degree
-from fuzzytree.rulebase import Band, RuleBase, Variable, sentence
-from fuzzytree.tree import Branch, FuzzyTree
+from fuzzytree.model.rulebase import Band, RuleBase, Variable, sentence
+from fuzzytree.model.tree import Branch, FuzzyTree
+from fuzzytree.semantics.reference import degree
 
 HERE = Path(__file__).resolve().parent
 WIDTH = 960

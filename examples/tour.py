@@ -27,7 +27,7 @@ from fuzzytree.runtimes import find_runtime
 from fuzzytree.tables import batches, read_table
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray, Model, Run
+    from fuzzytree.model.contracts import FloatArray, Model, Run
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "examples" / "wine" / "wine.csv"

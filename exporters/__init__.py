@@ -1,9 +1,10 @@
 """Writers of models, one module per format, and the table of formats.
 
-A format is a module here with a constant `FORMAT` (see `fuzzytree.contracts.Format`)
-and a line in `TABLE`; `docs/add-a-format.md` shows how to add one. Packages of others
-offer theirs by the entry point group `fuzzytree.formats`. A module is imported when its
-format is asked for, and a package of others only for a format that is not ours.
+A format is a module here with a constant `FORMAT` (see
+`fuzzytree.model.contracts.Format`) and a line in `TABLE`; `docs/add-a-format.md` shows
+how to add one. Packages of others offer theirs by the entry point group
+`fuzzytree.formats`. A module is imported when its format is asked for, and a package of
+others only for a format that is not ours.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import importlib
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from fuzzytree.contracts import Format
+from fuzzytree.model.contracts import Format
 
 TABLE: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
-from fuzzytree.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.c_axes import axes_code, lines_of, taking
 from fuzzytree.exporters.c_examples import examples_of, number_of, selftest_code
@@ -32,10 +31,11 @@ from fuzzytree.exporters.c_text import (
     remark,
 )
 from fuzzytree.exporters.c_tree import Question, questions_of, tree_code
+from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
+from fuzzytree.model.rulebase import RuleBase, fingerprint, sentence
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree, outline
 from fuzzytree.numerics.narrowing import losses
-from fuzzytree.rulebase import RuleBase, fingerprint, sentence
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree, outline
 
 _NUMBERS = {"float64": DOUBLE, "float32": SINGLE}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.exporters.c_text import Numbers, fill, real_table, whole_table
-from fuzzytree.rulebase import Variable
+from fuzzytree.model.rulebase import Variable
 
 _FINITE = """
 /* Look at the exponent, without a library: it is full in infinities and no numbers. */

@@ -8,14 +8,14 @@ from collections.abc import Iterator, Mapping, Sequence
 import msgspec
 import numpy as np
 
-from fuzzytree.contracts import Model
 from fuzzytree.exporters.c_expected import axis_values, leaf, strengths
 from fuzzytree.exporters.c_tables import Tables
 from fuzzytree.exporters.c_text import Numbers, fill
 from fuzzytree.exporters.c_tree import Question
-from fuzzytree.probing import Row, few_probes
-from fuzzytree.reference import Answer, Status, descend, evaluate
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.probing import Row, few_probes
+from fuzzytree.semantics.reference import Answer, Status, descend, evaluate
 
 _MOST_ROWS = 160
 _FEWEST_ROWS = 8
@@ -29,7 +29,7 @@ class Example(msgspec.Struct, frozen=True):
         row: The inputs, in order.
         label: The class, or None.
         rule: The number of the rule or leaf, or 0.
-        status: A `fuzzytree.reference.Status`.
+        status: A `fuzzytree.semantics.reference.Status`.
         digest: That of all strengths; 0 for a tree.
     """
 

@@ -18,7 +18,7 @@ from fuzzytree.exporters.c_tables import (
 )
 from fuzzytree.exporters.c_text import Numbers
 from fuzzytree.exporters.c_tree import Question
-from fuzzytree.rulebase import Variable
+from fuzzytree.model.rulebase import Variable
 
 Real = np.float64 | np.float32
 

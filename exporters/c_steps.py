@@ -7,8 +7,8 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.exporters.c_text import DOUBLE, fill, real_lines
-from fuzzytree.programs.evaluate import still_results
-from fuzzytree.programs.steps import Program, Step
+from fuzzytree.semantics.programs.evaluate import still_results
+from fuzzytree.semantics.programs.steps import Program, Step
 
 _SIGNS = {
     "add": "+",

@@ -10,13 +10,13 @@ import numpy as np
 
 from fuzzytree.exporters.c_steps import Steps
 from fuzzytree.exporters.c_text import fill, remark
-from fuzzytree.inference import infer
-from fuzzytree.probing import Row, system_probes
-from fuzzytree.programs.bounds import error_bounds
-from fuzzytree.programs.steps import Program
-from fuzzytree.programs.systems import from_system
-from fuzzytree.rulebase import fingerprint
-from fuzzytree.system import FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.system import FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.probing import Row, system_probes
+from fuzzytree.semantics.programs.bounds import error_bounds
+from fuzzytree.semantics.programs.steps import Program
+from fuzzytree.semantics.programs.systems import from_system
 
 _ROWS = 100
 _PROBES = 400

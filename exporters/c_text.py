@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.naming import DIGITS, LETTERS, Names
+from fuzzytree.model.naming import DIGITS, LETTERS, Names
 from fuzzytree.numerics.narrowing import rounded
 
 _WIDTH = 88

@@ -11,18 +11,6 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from fuzzytree.casting import (
-    Scores,
-    as_system,
-    cast_losses,
-    cast_remarks,
-    facts_of,
-    flattened,
-    pointed,
-    refuse_singletons,
-)
-from fuzzytree.casting.scores import Always
-from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_checklist import check_list
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect, Words
@@ -42,17 +30,24 @@ from fuzzytree.exporters.fcl_terms import (
     unspeakable,
 )
 from fuzzytree.exporters.fll_rules import speakable
-from fuzzytree.losses import refusal
-from fuzzytree.naming import Names, changes_text
-from fuzzytree.readers.fcl import FACTS, places, read
-from fuzzytree.readers.fcl_dialects import MARK
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.system import (
-    FuzzySystem,
-    Or,
-    SystemInput,
-    SystemOutput,
+from fuzzytree.formats.fcl.fcl import FACTS, places, read
+from fuzzytree.formats.fcl.fcl_dialects import MARK
+from fuzzytree.model.contracts import Format, Loss, Written
+from fuzzytree.model.losses import refusal
+from fuzzytree.model.naming import Names, changes_text
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem, Or, SystemInput, SystemOutput
+from fuzzytree.semantics.conversion import (
+    Scores,
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    flattened,
+    pointed,
+    refuse_singletons,
 )
+from fuzzytree.semantics.conversion.scores import Always
 
 __all__ = ["FORMAT", "check_list", "write"]
 
@@ -76,7 +71,7 @@ def write(
         allow_loss: Whether to write what the dialect cannot hold as near as it can.
         dialect: `portable` is read alike by fuzzylite 6, jFuzzyLogic and JFML.
         scores: What the outputs say of a rule base: a score for each rule (`rule`) or
-            class (`class`); see `fuzzytree.casting.scores`.
+            class (`class`); see `fuzzytree.semantics.conversion.scores`.
         tolerance: The largest error of a degree where points stand for a curve.
         checklist: Whether the standard's data check list is added as comments.
 
@@ -86,7 +81,7 @@ def write(
         ValueError: If scores are asked for, and the model is a system.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
         >>> text = write(rules, allow_loss=True).content.decode()

@@ -8,10 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fuzzytree.casting import as_system
 from fuzzytree.exporters.fcl_rules import uses
-from fuzzytree.rulebase import Points, RuleBase
-from fuzzytree.system import And, Condition, FuzzySystem, Label, Not, Or, SystemOutput
+from fuzzytree.model.rulebase import Points, RuleBase
+from fuzzytree.model.system import (
+    And,
+    Condition,
+    FuzzySystem,
+    Label,
+    Not,
+    Or,
+    SystemOutput,
+)
+from fuzzytree.semantics.conversion import as_system
 
 _MOST_BASIC, _MOST_EXTENDED = 3, 4  # points of a term
 
@@ -23,7 +31,7 @@ def check_list(document: RuleBase | FuzzySystem) -> str:
     for it.
 
     Example:
-        >>> from fuzzytree.samples import samples
+        >>> from fuzzytree.semantics.samples import samples
         >>> system = samples()["Sugeno, numbers"]
         >>> print(check_list(system).splitlines()[0])
         data check list (IEC 61131-7)

@@ -9,7 +9,7 @@ from typing import Final, Literal
 import msgspec
 
 from fuzzytree.exporters.fll_terms import KNOWN
-from fuzzytree.system import (
+from fuzzytree.model.system import (
     FUNCTIONS,
     Arc,
     Bell,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from fuzzytree.casting import number_losses
-from fuzzytree.contracts import Loss
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fcl_rules import rule_losses, uses
-from fuzzytree.readers.engines import fuzzylite_losses
-from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, PAIRS
-from fuzzytree.system import And, FuzzySystem, Or, SNorm, SystemOutput, questions
+from fuzzytree.formats.engines import fuzzylite_losses
+from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, PAIRS
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.system import And, FuzzySystem, Or, SNorm, SystemOutput, questions
+from fuzzytree.semantics.conversion import number_losses
 
 
 def losses_of(system: FuzzySystem, words: Words) -> Iterator[Loss]:

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 
 from msgspec.structs import replace
 
-from fuzzytree.contracts import Loss
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fll_rules import Speak, hedge_losses, rule_text
-from fuzzytree.naming import unlike
-from fuzzytree.readers.fcl_rules import ALWAYS
-from fuzzytree.system import (
+from fuzzytree.formats.fcl.fcl_rules import ALWAYS
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.naming import unlike
+from fuzzytree.model.system import (
     And,
     Condition,
     FuzzySystem,

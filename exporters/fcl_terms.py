@@ -6,13 +6,12 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
-from fuzzytree.casting.points import EXACT, points_for
-from fuzzytree.contracts import Loss
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fll_terms import degree_text, number_text, weighted_type
-from fuzzytree.rulebase import Points
-from fuzzytree.system import (
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
     Bell,
     Call,
     Cosine,
@@ -33,6 +32,7 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.semantics.conversion.points import EXACT, points_for
 
 Names = Mapping[str, str]
 

@@ -13,7 +13,43 @@ from typing import Final, Literal
 
 from msgspec.structs import replace
 
-from fuzzytree.casting import (
+from fuzzytree.errors import LossError
+from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
+from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
+from fuzzytree.formats.engines import fuzzylite_losses
+from fuzzytree.formats.fis.fis import (
+    DEFAULTS,
+    DIALECT,
+    always_concluded,
+    middle,
+    places,
+    reading,
+)
+from fuzzytree.formats.fis.fis_words import (
+    DIALECTS,
+    FAR,
+    METHODS,
+    PRIVATE,
+    SNORMS,
+    TNORMS,
+    Dialect,
+)
+from fuzzytree.model.contracts import Format, Loss, Written
+from fuzzytree.model.losses import refusal
+from fuzzytree.model.naming import Names, changes_text
+from fuzzytree.model.rulebase import Points, RuleBase
+from fuzzytree.model.system import (
+    Activation,
+    FuzzySystem,
+    Label,
+    Linear,
+    Singleton,
+    SNorm,
+    SystemInput,
+    SystemOutput,
+    TNorm,
+)
+from fuzzytree.semantics.conversion import (
     FACTS,
     as_system,
     cast_losses,
@@ -24,42 +60,6 @@ from fuzzytree.casting import (
     number_losses,
     pointed,
     refuse_singletons,
-)
-from fuzzytree.contracts import Format, Loss, Written
-from fuzzytree.errors import LossError
-from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
-from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
-from fuzzytree.losses import refusal
-from fuzzytree.naming import Names, changes_text
-from fuzzytree.readers.engines import fuzzylite_losses
-from fuzzytree.readers.fis import (
-    DEFAULTS,
-    DIALECT,
-    always_concluded,
-    middle,
-    places,
-    reading,
-)
-from fuzzytree.readers.fis_words import (
-    DIALECTS,
-    FAR,
-    METHODS,
-    PRIVATE,
-    SNORMS,
-    TNORMS,
-    Dialect,
-)
-from fuzzytree.rulebase import Points, RuleBase
-from fuzzytree.system import (
-    Activation,
-    FuzzySystem,
-    Label,
-    Linear,
-    Singleton,
-    SNorm,
-    SystemInput,
-    SystemOutput,
-    TNorm,
 )
 
 _RESERVED: Final = (
@@ -86,7 +86,7 @@ def write(
 
     Args:
         model: The model. Of a rule base each rule has a score, see
-            `fuzzytree.casting.scores`.
+            `fuzzytree.semantics.conversion.scores`.
         allow_loss: Whether to write what FIS cannot hold as near as it can.
         dialect: For whom the file is: `matlab`, `octave` or `fuzzylite`.
         tolerance: The largest error of a degree where points stand for a curve.
@@ -98,7 +98,7 @@ def write(
             have no place in FIS.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
         >>> text = write(rules, allow_loss=True).content.decode()

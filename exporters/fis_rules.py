@@ -12,16 +12,12 @@ from typing import Final
 
 import msgspec
 
-from fuzzytree.casting.shapes import shape_of
-from fuzzytree.casting.splitting import split
-from fuzzytree.contracts import Loss
 from fuzzytree.errors import LossError
-from fuzzytree.naming import unlike
-from fuzzytree.numerics import pointwise
-from fuzzytree.numerics.pointwise import Lines
-from fuzzytree.readers.fis_words import CONCLUDING_HEDGES, HEDGES, Dialect
-from fuzzytree.rulebase import Points
-from fuzzytree.system import (
+from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, HEDGES, Dialect
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.naming import unlike
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
     And,
     Condition,
     FuzzySystem,
@@ -35,6 +31,10 @@ from fuzzytree.system import (
     SystemRule,
     questions,
 )
+from fuzzytree.numerics import pointwise
+from fuzzytree.numerics.pointwise import Lines
+from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.conversion.splitting import split
 
 EVERYWHERE: Final = Points((0.0,), (1.0,))
 

@@ -7,13 +7,11 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from fuzzytree.casting import pointed
-from fuzzytree.casting.shapes import shape_of
-from fuzzytree.contracts import Loss
-from fuzzytree.readers.fis_words import FAR, Dialect, curve_of
-from fuzzytree.readers.formulas import fuzzylite_text_of
-from fuzzytree.rulebase import Points
-from fuzzytree.system import (
+from fuzzytree.formats.fis.fis_words import FAR, Dialect, curve_of
+from fuzzytree.formats.formulas import fuzzylite_text_of
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
     Bell,
     Binary,
     Concave,
@@ -33,6 +31,8 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.semantics.conversion import pointed
+from fuzzytree.semantics.conversion.shapes import shape_of
 
 Term = tuple[str, str]
 """A kind such as `trimf`, and its numbers as text."""

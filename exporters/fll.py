@@ -14,18 +14,6 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from fuzzytree.casting import (
-    FACTS,
-    Scores,
-    as_system,
-    cast_losses,
-    cast_remarks,
-    facts_of,
-    flattened,
-    pointed,
-    refuse_singletons,
-)
-from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll_rules import has_not, hedge_losses, rule_text, speakable
 from fuzzytree.exporters.fll_terms import (
@@ -34,15 +22,16 @@ from fuzzytree.exporters.fll_terms import (
     number_text,
     weighted_type,
 )
-from fuzzytree.losses import refusal
-from fuzzytree.naming import Names, changes_text
-from fuzzytree.readers.fll import places, read
-from fuzzytree.readers.fll_meaning import differences
-from fuzzytree.readers.fll_rules import RULE_WORDS
-from fuzzytree.readers.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
-from fuzzytree.readers.lines import LONGEST_WORD
-from fuzzytree.rulebase import LR, Band, Points, RuleBase
-from fuzzytree.system import (
+from fuzzytree.formats.fll.fll import places, read
+from fuzzytree.formats.fll.fll_meaning import differences
+from fuzzytree.formats.fll.fll_rules import RULE_WORDS
+from fuzzytree.formats.fll.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
+from fuzzytree.formats.lines import LONGEST_WORD
+from fuzzytree.model.contracts import Format, Loss, Written
+from fuzzytree.model.losses import refusal
+from fuzzytree.model.naming import Names, changes_text
+from fuzzytree.model.rulebase import LR, Band, Points, RuleBase
+from fuzzytree.model.system import (
     FUNCTIONS,
     Activation,
     Conclusion,
@@ -55,6 +44,17 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
     Trapezoid,
+)
+from fuzzytree.semantics.conversion import (
+    FACTS,
+    Scores,
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    flattened,
+    pointed,
+    refuse_singletons,
 )
 
 _RESERVED: Final = (*RULE_WORDS, *FUNCTIONS, "fabs", "pow", "pi", "inf", "nan", "x")
@@ -81,7 +81,7 @@ def write(
         allow_loss: Whether to write what FLL cannot hold as near as it can.
         scores: What the outputs say of a rule base: the number of the class that wins
             (`winner`), or a score for each rule (`rule`) or class (`class`); see
-            `fuzzytree.casting.scores`.
+            `fuzzytree.semantics.conversion.scores`.
         tolerance: The largest error of a degree where points stand for a curve.
 
     Raises:
@@ -90,7 +90,7 @@ def write(
         ValueError: If scores are asked for, and the model is a system.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
         >>> text = write(rules, allow_loss=True).content.decode()

@@ -7,10 +7,10 @@ from types import MappingProxyType
 
 from msgspec.structs import replace
 
-from fuzzytree.contracts import Loss
 from fuzzytree.errors import LossError
-from fuzzytree.readers.fll_rules import HEDGES
-from fuzzytree.system import (
+from fuzzytree.formats.fll.fll_rules import HEDGES
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.system import (
     And,
     Condition,
     Hedge,

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from fuzzytree.inference import value_at
-from fuzzytree.readers.formulas import fuzzylite_text_of, parse
-from fuzzytree.rulebase import LR, Band, Points
-from fuzzytree.system import (
+from fuzzytree.formats.formulas import fuzzylite_text_of, parse
+from fuzzytree.model.rulebase import LR, Band, Points
+from fuzzytree.model.system import (
     Arc,
     Bell,
     Binary,
@@ -35,6 +34,7 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.semantics.inference import value_at
 
 KNOWN: tuple[type, ...] = (
     *(Trapezoid, Gaussian, TwoGaussians, Bell, Sigmoid, SigmoidDifference),

@@ -14,27 +14,22 @@ from xml.sax.saxutils import escape, quoteattr
 
 from msgspec.structs import replace
 
-from fuzzytree.casting import (
-    FACTS,
-    as_system,
-    cast_losses,
-    cast_remarks,
-    facts_of,
-    flattened,
-    joined_outputs,
-    pointed,
-    refuse_singletons,
-)
-from fuzzytree.casting.shapes import shape_of
-from fuzzytree.contracts import Format, Loss, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
-from fuzzytree.losses import refusal
-from fuzzytree.naming import DIGITS, LETTERS, Names, changes_text
-from fuzzytree.readers.fml import places, reading
-from fuzzytree.readers.fml_words import FAR, METHODS, NAMESPACE, SNORMS, TNORMS, USUAL
-from fuzzytree.rulebase import Points, RuleBase
-from fuzzytree.system import (
+from fuzzytree.formats.fml.fml import places, reading
+from fuzzytree.formats.fml.fml_words import (
+    FAR,
+    METHODS,
+    NAMESPACE,
+    SNORMS,
+    TNORMS,
+    USUAL,
+)
+from fuzzytree.model.contracts import Format, Loss, Written
+from fuzzytree.model.losses import refusal
+from fuzzytree.model.naming import DIGITS, LETTERS, Names, changes_text
+from fuzzytree.model.rulebase import Points, RuleBase
+from fuzzytree.model.system import (
     Activation,
     Curve,
     FuzzySystem,
@@ -49,6 +44,18 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.semantics.conversion import (
+    FACTS,
+    as_system,
+    cast_losses,
+    cast_remarks,
+    facts_of,
+    flattened,
+    joined_outputs,
+    pointed,
+    refuse_singletons,
+)
+from fuzzytree.semantics.conversion.shapes import shape_of
 
 _ALLOWED: Final = (Trapezoid, Gaussian, SCurve, Singleton)
 _FLOAT32: Final = (
@@ -70,7 +77,7 @@ def write(
 
     Args:
         model: The model. Of a rule base each rule has a score, see
-            `fuzzytree.casting.scores`.
+            `fuzzytree.semantics.conversion.scores`.
         allow_loss: Whether to write what FML cannot hold as near as it can.
         tolerance: The largest error of a degree where points stand for a curve.
 
@@ -79,7 +86,7 @@ def write(
             have no place in FML.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1, leaves=2, combinations=0.0))
         >>> text = write(rules, allow_loss=True).content.decode()

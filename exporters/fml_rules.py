@@ -11,13 +11,12 @@ from typing import Final
 
 import msgspec
 
-from fuzzytree.casting.splitting import split
-from fuzzytree.contracts import Loss
 from fuzzytree.errors import LossError
-from fuzzytree.naming import unlike
-from fuzzytree.readers.fml_words import MODIFIERS, SNORMS, TNORMS
-from fuzzytree.rulebase import Points
-from fuzzytree.system import (
+from fuzzytree.formats.fml.fml_words import MODIFIERS, SNORMS, TNORMS
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.naming import unlike
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
     And,
     Condition,
     FuzzySystem,
@@ -33,6 +32,7 @@ from fuzzytree.system import (
     SystemRule,
     questions,
 )
+from fuzzytree.semantics.conversion.splitting import split
 
 Clause = tuple[str, str, str]
 """A variable, a term, and a modifier, which may be empty."""

@@ -15,7 +15,6 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Literal, assert_never
 
-from fuzzytree.contracts import Document, Format, Model, Written
 from fuzzytree.exporters.js_functions import (
     AS_MODULE,
     AS_SCRIPT,
@@ -30,9 +29,8 @@ from fuzzytree.exporters.js_functions import (
 )
 from fuzzytree.exporters.js_system import system_parts
 from fuzzytree.exporters.js_text import filled, literal, table, text_of
-from fuzzytree.probing import few_probes
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Document, Format, Model, Written
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -46,8 +44,10 @@ from fuzzytree.rulebase import (
     sentence,
     shapes_of,
 )
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree, Node, intervals
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree, Node, intervals
+from fuzzytree.semantics.probing import few_probes
+from fuzzytree.semantics.reference import descend, evaluate
 
 _MOST_EXAMPLES = 64
 _FEWEST_EXAMPLES = 8

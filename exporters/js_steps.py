@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from fuzzytree.exporters.js_text import literal, number_text
-from fuzzytree.programs.evaluate import still_results
-from fuzzytree.programs.operations import OVER_SAMPLES
-from fuzzytree.programs.steps import Program, Step
+from fuzzytree.semantics.programs.evaluate import still_results
+from fuzzytree.semantics.programs.operations import OVER_SAMPLES
+from fuzzytree.semantics.programs.steps import Program, Step
 
 _SIGNS: Mapping[str, str] = {
     "add": "+",

@@ -8,11 +8,11 @@ import numpy as np
 
 from fuzzytree.exporters.js_steps import Steps
 from fuzzytree.exporters.js_text import literal, table, text_of
-from fuzzytree.inference import infer
-from fuzzytree.probing import Row, system_probes
-from fuzzytree.programs.bounds import error_bounds
-from fuzzytree.programs.systems import from_system
-from fuzzytree.system import FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.model.system import FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.probing import Row, system_probes
+from fuzzytree.semantics.programs.bounds import error_bounds
+from fuzzytree.semantics.programs.systems import from_system
 
 _EXAMPLES = 64
 

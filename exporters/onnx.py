@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import msgspec
 
-from fuzzytree.contracts import Dtype, Format, Loss, Model, Written
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
-from fuzzytree.rulebase import fingerprint
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.contracts import Dtype, Format, Loss, Model, Written
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import onnx
@@ -78,10 +78,10 @@ def write(
     The input is `inputs`, of shape (rows, columns), double (float32 for `float32`).
     The outputs, each with one entry per row: `label`, the class or "" for none;
     `rule`, the number of the winning rule or leaf from 1, or 0; `status`, a
-    `fuzzytree.reference.Status`; `strengths`, of shape (rows, rules), NaN where a
-    value is missing. Of a fuzzy system: `outputs`, of shape (rows, outputs), NaN
-    without a number; `status`; `activations`, of shape (rows, rules). The same model
-    and options give the same bytes.
+    `fuzzytree.semantics.reference.Status`; `strengths`, of shape (rows, rules), NaN
+    where a value is missing. Of a fuzzy system: `outputs`, of shape (rows, outputs),
+    NaN without a number; `status`; `activations`, of shape (rows, rules). The same
+    model and options give the same bytes.
 
     Args:
         model: A tree, a rule base or a fuzzy system.

@@ -8,11 +8,11 @@ import msgspec
 import numpy as np
 from onnx import numpy_helper
 
-from fuzzytree.contracts import Model
 from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import Part, RuleBase, Variable
 from fuzzytree.numerics.narrowing import Real, RealArray, rounded
-from fuzzytree.rulebase import Part, RuleBase, Variable
 
 
 class Axes(msgspec.Struct, frozen=True):

@@ -12,12 +12,12 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
-from fuzzytree.contracts import Model
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write
 from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
-from fuzzytree.rulebase import fingerprint
-from fuzzytree.system import FuzzySystem
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.system import FuzzySystem
 
 if TYPE_CHECKING:
     import onnx

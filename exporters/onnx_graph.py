@@ -14,7 +14,7 @@ import numpy.typing as npt
 import onnx
 from onnx import helper, numpy_helper
 
-from fuzzytree.naming import Names
+from fuzzytree.model.naming import Names
 
 DOMAIN = "fuzzytree"
 """The domain of our own functions, in readable files."""

@@ -19,8 +19,8 @@ from onnx import helper
 
 from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers
+from fuzzytree.model.rulebase import Points
 from fuzzytree.numerics.segments import Segments, segments
-from fuzzytree.rulebase import Points
 
 if TYPE_CHECKING:
     from fuzzytree.numerics.segments import Real, Reals

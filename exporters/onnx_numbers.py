@@ -10,9 +10,9 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from fuzzytree.contracts import Dtype
+from fuzzytree.model.contracts import Dtype
 from fuzzytree.numerics.narrowing import Real
-from fuzzytree.reference import BELOW_ONE
+from fuzzytree.semantics.reference import BELOW_ONE
 
 
 class Numbers(msgspec.Struct, frozen=True):

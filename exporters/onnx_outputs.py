@@ -9,9 +9,9 @@ import numpy as np
 from fuzzytree.exporters.onnx_axes import Axes, is_known, scalar
 from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers
-from fuzzytree.reference import Status
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.reference import Status
 
 
 def add_tree_outputs(

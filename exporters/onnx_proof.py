@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import onnxruntime
 
-from fuzzytree.contracts import Model
 from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line, open_session
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import LR, Band, Points, RuleBase, Term
 from fuzzytree.numerics.narrowing import Real
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import LR, Band, Points, RuleBase, Term
+from fuzzytree.semantics.reference import descend, evaluate
 
 _MOST_CLAUSES = 50_000  # what the reference does in well under a second
 

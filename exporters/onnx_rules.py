@@ -1,7 +1,8 @@
 """A rule base as a graph of wide operations, features first.
 
-The operations on a number are those of `fuzzytree.reference`, in the same order, so
-that strengths have the same bits as its own. What is rearranged changes no bit:
+The operations on a number are those of `fuzzytree.semantics.reference`, in the same
+order, so that strengths have the same bits as its own. What is rearranged changes no
+bit:
 
 - A band is one or two *edges*. `x <= low` is `x < next(low)`, and a right edge is a
   left edge of `-x`: negated operands give negated differences, and equal quotients.
@@ -25,8 +26,7 @@ from fuzzytree.exporters.onnx_axes import Axes, axes, column, is_known, scalar
 from fuzzytree.exporters.onnx_graph import Sheet, Table
 from fuzzytree.exporters.onnx_lines import Polyline, is_chained, polylines
 from fuzzytree.exporters.onnx_numbers import Numbers
-from fuzzytree.numerics.narrowing import RealArray, rounded
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     LR,
     Clause,
     Flank,
@@ -36,6 +36,7 @@ from fuzzytree.rulebase import (
     Side,
     shapes_of,
 )
+from fuzzytree.numerics.narrowing import RealArray, rounded
 
 Key = tuple[str, str]  # variable and term
 Curve = tuple[float, ...]

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fuzzytree.exporters.onnx_graph import Sheet, identifier
-from fuzzytree.programs.evaluate import Found, still_results
-from fuzzytree.programs.steps import Program, Step
+from fuzzytree.semantics.programs.evaluate import Found, still_results
+from fuzzytree.semantics.programs.steps import Program, Step
 
 NODES: Mapping[str, str] = {
     "add": "Add",
@@ -68,7 +68,7 @@ def missing_functions(program: Program) -> tuple[str, ...]:
     """Return the functions of a program that no operator computes in double.
 
     Example:
-        >>> from fuzzytree.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, Result
         >>> make = Maker()
         >>> angle = Result("output", "y", make("arc_tangent", make.input("x")))
         >>> missing_functions(make.program("angle", ("x",), (angle,)))

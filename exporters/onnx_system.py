@@ -1,7 +1,8 @@
 """ONNX: a fuzzy system as a graph of plain operators, in double.
 
-The graph is the system's program, step by step (`fuzzytree.programs`), so it gives the
-numbers of the inference, up to the last digits of `exp`, `pow`, `sin` and the like.
+The graph is the system's program, step by step (`fuzzytree.semantics.programs`), so it
+gives the numbers of the inference, up to the last digits of `exp`, `pow`, `sin` and the
+like.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.contracts import Written
 from fuzzytree.errors import DisagreementError, LossError
-from fuzzytree.programs.systems import from_system
-from fuzzytree.rulebase import fingerprint
-from fuzzytree.system import FuzzySystem
+from fuzzytree.model.contracts import Written
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.semantics.programs.systems import from_system
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from fuzzytree.exporters.onnx import Output
     from fuzzytree.exporters.onnx_graph import Sheet
-    from fuzzytree.programs.steps import Program
+    from fuzzytree.semantics.programs.steps import Program
 
 _MOST_ROWS_TO_VERIFY = 24
 _MOST_STEPS_TO_VERIFY = 300_000
@@ -225,7 +226,7 @@ def _prove(content: bytes, system: FuzzySystem, outputs: Sequence[Output]) -> No
         first_line,
         open_session,
     )
-    from fuzzytree.probing import system_probes
+    from fuzzytree.semantics.probing import system_probes
 
     program = from_system(system, activations=True)
     limit = max(1, min(_MOST_ROWS_TO_VERIFY, _MOST_STEPS_TO_VERIFY // program.size))
@@ -253,8 +254,8 @@ def _differences(
     """Yield where a file's numbers are further from the inference's than they may."""
     import numpy as np
 
-    from fuzzytree.inference import infer
-    from fuzzytree.programs.bounds import error_bounds
+    from fuzzytree.semantics.inference import infer
+    from fuzzytree.semantics.programs.bounds import error_bounds
 
     right = [infer(system, row) for row in rows]
     expected = {

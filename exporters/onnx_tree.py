@@ -17,8 +17,8 @@ from onnx import numpy_helper
 from fuzzytree.exporters.onnx_axes import Axes, axes, flat_guard, is_known
 from fuzzytree.exporters.onnx_graph import TREES, Constant, Sheet
 from fuzzytree.exporters.onnx_numbers import Numbers
+from fuzzytree.model.tree import FuzzyTree, Node
 from fuzzytree.numerics.narrowing import rounded
-from fuzzytree.tree import FuzzyTree, Node
 
 _MOST_QUESTIONS = 1_000_000
 _MOST_LEAVES = 2**24  # as float32 counts

@@ -24,8 +24,8 @@ from fuzzytree.exporters.onnx_steps import (
     reduced,
     spread,
 )
-from fuzzytree.programs.evaluate import still_results
-from fuzzytree.programs.steps import Program
+from fuzzytree.semantics.programs.evaluate import still_results
+from fuzzytree.semantics.programs.steps import Program
 
 MOST_SINGLE = 2_000
 """Steps up to which each is a node of its own, with a name of its own."""

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from fuzzytree.contracts import Format
+from fuzzytree.model.contracts import Format
 
 GROUP = "fuzzytree.formats"
 
@@ -80,7 +80,7 @@ def _loaded(entry: importlib.metadata.EntryPoint) -> Plugin:
         fault = f"{package}: {entry.value} raises {type(error).__name__}: {text}"
         return Plugin(entry.name, package, fault=fault)
     if not isinstance(form, Format):
-        fault = f"{package}: {entry.value} is no fuzzytree.contracts.Format"
+        fault = f"{package}: {entry.value} is no fuzzytree.model.contracts.Format"
         return Plugin(entry.name, package, fault=fault)
     if form.name != entry.name:
         fault = f"{package}: {entry.value} calls itself {form.name!r}"

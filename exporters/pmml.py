@@ -17,8 +17,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from fuzzytree.casting import pointed
-from fuzzytree.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.exporters.pmml_shapes import Functions, norm_continuous
 from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
 from fuzzytree.exporters.pmml_xml import (
@@ -31,9 +29,10 @@ from fuzzytree.exporters.pmml_xml import (
     ref,
     text_of,
 )
-from fuzzytree.losses import refusal
-from fuzzytree.naming import unlike
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
+from fuzzytree.model.losses import refusal
+from fuzzytree.model.naming import unlike
+from fuzzytree.model.rulebase import (
     Clause,
     Points,
     RuleBase,
@@ -41,8 +40,9 @@ from fuzzytree.rulebase import (
     fingerprint,
     sentence,
 )
-from fuzzytree.system import FuzzySystem, SystemInput
-from fuzzytree.tree import FuzzyTree, Node, intervals
+from fuzzytree.model.system import FuzzySystem, SystemInput
+from fuzzytree.model.tree import FuzzyTree, Node, intervals
+from fuzzytree.semantics.conversion import pointed
 
 _MISSING, _UNCOVERED = -1.0, 0.0  # numbers in the place of a rule's
 

@@ -17,8 +17,8 @@ from fuzzytree.exporters.pmml_xml import (
     joined,
     ref,
 )
-from fuzzytree.reference import BELOW_ONE
-from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.semantics.reference import BELOW_ONE
 
 
 class Functions:

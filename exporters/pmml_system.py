@@ -16,11 +16,16 @@ from collections.abc import Mapping
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml_xml import Element, apply, constant, element, ref
-from fuzzytree.naming import unlike
-from fuzzytree.programs.operations import INEXACT, LOGICAL, NUMERIC, OPERATIONS
-from fuzzytree.programs.steps import Program, Step
-from fuzzytree.programs.systems import from_system
-from fuzzytree.system import FuzzySystem
+from fuzzytree.model.naming import unlike
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.semantics.programs.operations import (
+    INEXACT,
+    LOGICAL,
+    NUMERIC,
+    OPERATIONS,
+)
+from fuzzytree.semantics.programs.steps import Program, Step
+from fuzzytree.semantics.programs.systems import from_system
 
 MOST_FIELDS = 20_000
 """The most derived fields of a file: engines look each other's values up one by one."""
@@ -175,7 +180,7 @@ class SystemFields:
         return ref(full)
 
     def _total(self, place: int, samples: list[Value]) -> Value:
-        """Return the sum by halves, as `fuzzytree.inference.tree_sum` has it."""
+        """Return the sum by halves, as `inference.tree_sum` has it."""
         size = 1 << (len(samples) - 1).bit_length()
         level = [*samples, *([0.0] * (size - len(samples)))]
         count = 0

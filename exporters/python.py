@@ -13,10 +13,8 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from fuzzytree.contracts import Format, Model, Written
-from fuzzytree.probing import probes
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Format, Model, Written
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -30,7 +28,9 @@ from fuzzytree.rulebase import (
     sentence,
     shapes_of,
 )
-from fuzzytree.tree import FuzzyTree, Node, intervals
+from fuzzytree.model.tree import FuzzyTree, Node, intervals
+from fuzzytree.semantics.probing import probes
+from fuzzytree.semantics.reference import descend, evaluate
 
 _EXAMPLES = 6
 

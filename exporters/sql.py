@@ -10,18 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, get_args
 
-from fuzzytree.contracts import Format, Model, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.sql_degrees import Degrees
 from fuzzytree.exporters.sql_dialects import Query
-from fuzzytree.rulebase import (
-    Clause,
-    RuleBase,
-    fingerprint,
-    sentence,
-    shapes_of,
-)
-from fuzzytree.tree import FuzzyTree, Node
+from fuzzytree.model.contracts import Format, Model, Written
+from fuzzytree.model.rulebase import Clause, RuleBase, fingerprint, sentence, shapes_of
+from fuzzytree.model.tree import FuzzyTree, Node
 
 Dialect = Literal["sqlite", "duckdb", "postgresql", "spark"]
 

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Sequence
 
 from fuzzytree.exporters.sql_dialects import Query
-from fuzzytree.reference import BELOW_ONE
-from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.semantics.reference import BELOW_ONE
 
 
 class Degrees:

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 from msgspec.structs import replace
 
 from fuzzytree.exporters.st_text import Numbers, remark, table
-from fuzzytree.programs.evaluate import still_results
-from fuzzytree.programs.rules import from_rules
-from fuzzytree.programs.shapes import BELOW_ONE
-from fuzzytree.programs.steps import Step
-from fuzzytree.rulebase import RuleBase, sentence
+from fuzzytree.model.rulebase import RuleBase, sentence
+from fuzzytree.semantics.programs.evaluate import still_results
+from fuzzytree.semantics.programs.rules import from_rules
+from fuzzytree.semantics.programs.shapes import BELOW_ONE
+from fuzzytree.semantics.programs.steps import Step
 
 _SIGNS: Mapping[str, str] = {
     "add": "+",

@@ -10,8 +10,8 @@ import math
 from collections.abc import Iterator, Mapping
 
 from fuzzytree.exporters.st_text import Numbers, table
-from fuzzytree.programs.evaluate import still_results
-from fuzzytree.programs.steps import Program, Step
+from fuzzytree.semantics.programs.evaluate import still_results
+from fuzzytree.semantics.programs.steps import Program, Step
 
 _SIGNS: Mapping[str, str] = {
     "add": "+",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.contracts import Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.st_steps import SystemSteps
 from fuzzytree.exporters.st_text import (
@@ -15,11 +14,12 @@ from fuzzytree.exporters.st_text import (
     known_inputs,
     remark,
 )
-from fuzzytree.naming import Names
-from fuzzytree.programs.systems import from_system
-from fuzzytree.readers.formulas import text_of
-from fuzzytree.rulebase import fingerprint
-from fuzzytree.system import Formula, FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.formats.formulas import text_of
+from fuzzytree.model.contracts import Written
+from fuzzytree.model.naming import Names
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.system import Formula, FuzzySystem, SystemInput, SystemOutput
+from fuzzytree.semantics.programs.systems import from_system
 
 _FIXED = ("is_number", "status", "is_known", "k", "halves")
 

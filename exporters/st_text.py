@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fuzzytree.naming import Names
+from fuzzytree.model.naming import Names
 from fuzzytree.numerics.narrowing import rounded
 
 _WIDTH = 88

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
-from fuzzytree.contracts import Document, Format, Model, Written
 from fuzzytree.exporters.st_rules import RuleSteps, decision
 from fuzzytree.exporters.st_system import written_system
 from fuzzytree.exporters.st_text import (
@@ -25,10 +24,11 @@ from fuzzytree.exporters.st_text import (
     remark,
     table,
 )
-from fuzzytree.naming import Names
-from fuzzytree.rulebase import RuleBase, Variable, fingerprint
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.contracts import Document, Format, Model, Written
+from fuzzytree.model.naming import Names
+from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
 
 _OUTPUTS = ("class_number", "rule", "status", "strengths")
 _LOCALS = (

@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from fuzzytree.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.yaml_parts import named_shape, numbers, range_ends, summand
 from fuzzytree.exporters.yaml_system import entries_of, losses_of
 from fuzzytree.exporters.yaml_text import Entry, Noted, Short, joined
-from fuzzytree.readers import layout
-from fuzzytree.readers.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
-from fuzzytree.readers.sentences import Vocabulary, readings, vocabulary_of
-from fuzzytree.readers.yaml import places, reading
-from fuzzytree.rulebase import (
+from fuzzytree.formats.yaml import layout
+from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
+from fuzzytree.formats.yaml.sentences import Vocabulary, readings, vocabulary_of
+from fuzzytree.formats.yaml.yaml import places, reading
+from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
+from fuzzytree.model.rulebase import (
     Clause,
     RuleBase,
     Semantics,
@@ -27,8 +27,8 @@ from fuzzytree.rulebase import (
     Variable,
     clause_text,
 )
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import Branch, FuzzyTree, Node
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import Branch, FuzzyTree, Node
 
 _TITLES: Final = {
     "rule base": "# A fuzzy rule base of fuzzytree: IF clauses THEN class.",

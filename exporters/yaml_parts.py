@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fuzzytree.exporters.yaml_text import Entry, Short
-from fuzzytree.rulebase import LR, Band, Flank, Part, Points, Shape, Side
+from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, Shape, Side
 
 
 def range_ends(low: float | None, high: float | None) -> dict[str, Entry]:

@@ -6,16 +6,16 @@ import math
 from collections.abc import Iterator
 from typing import assert_never
 
-from fuzzytree.contracts import Loss
 from fuzzytree.exporters.yaml_parts import named_shape, numbers, range_ends, summand
 from fuzzytree.exporters.yaml_text import Entry, Noted, Short
-from fuzzytree.readers import layout
-from fuzzytree.readers.conditions import conclusions_text, condition_text
-from fuzzytree.readers.formulas import FormulaError, parse, text_of
-from fuzzytree.readers.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
-from fuzzytree.readers.system_layout import LONGEST_NOTE
-from fuzzytree.rulebase import LR, Band, Points
-from fuzzytree.system import (
+from fuzzytree.formats.formulas import FormulaError, parse, text_of
+from fuzzytree.formats.yaml import layout
+from fuzzytree.formats.yaml.conditions import conclusions_text, condition_text
+from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
+from fuzzytree.formats.yaml.system_layout import LONGEST_NOTE
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import LR, Band, Points
+from fuzzytree.model.system import (
     Activation,
     Arc,
     Bell,

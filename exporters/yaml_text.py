@@ -13,7 +13,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import LossError
-from fuzzytree.readers.nodes import MOST_BYTES, MOST_NODES
+from fuzzytree.formats.yaml.nodes import MOST_BYTES, MOST_NODES
 
 _WIDTH: Final = 88
 

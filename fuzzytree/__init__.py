@@ -10,18 +10,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fuzzytree.agreement import Agreement
-    from fuzzytree.answers import Answers
-    from fuzzytree.errors import FuzzyTreeError
-    from fuzzytree.estimator import FuzzyTreeClassifier
-    from fuzzytree.outputs import Outputs
-    from fuzzytree.readers.simpful import from_simpful
-    from fuzzytree.readers.skfuzzy import from_skfuzzy
-    from fuzzytree.readers.sklearn import from_sklearn
-    from fuzzytree.rulebase import RuleBase
-    from fuzzytree.system import FuzzySystem
-    from fuzzytree.tree import FuzzyTree
-    from fuzzytree.verbs import (
+    from fuzzytree.api.verbs import (
         audit,
         bench,
         certify,
@@ -41,6 +30,17 @@ if TYPE_CHECKING:
         save,
         stability,
     )
+    from fuzzytree.errors import FuzzyTreeError
+    from fuzzytree.estimator import FuzzyTreeClassifier
+    from fuzzytree.formats.simpful import from_simpful
+    from fuzzytree.formats.skfuzzy import from_skfuzzy
+    from fuzzytree.formats.sklearn import from_sklearn
+    from fuzzytree.model.agreement import Agreement
+    from fuzzytree.model.rulebase import RuleBase
+    from fuzzytree.model.system import FuzzySystem
+    from fuzzytree.model.tree import FuzzyTree
+    from fuzzytree.runtimes.answers import Answers
+    from fuzzytree.runtimes.outputs import Outputs
 
     __version__: str
 
@@ -78,35 +78,35 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Agreement": "fuzzytree.agreement",
-    "Answers": "fuzzytree.answers",
-    "FuzzySystem": "fuzzytree.system",
-    "FuzzyTree": "fuzzytree.tree",
+    "Agreement": "fuzzytree.model.agreement",
+    "Answers": "fuzzytree.runtimes.answers",
+    "FuzzySystem": "fuzzytree.model.system",
+    "FuzzyTree": "fuzzytree.model.tree",
     "FuzzyTreeClassifier": "fuzzytree.estimator",
     "FuzzyTreeError": "fuzzytree.errors",
-    "Outputs": "fuzzytree.outputs",
-    "RuleBase": "fuzzytree.rulebase",
-    "audit": "fuzzytree.verbs",
-    "bench": "fuzzytree.verbs",
-    "certify": "fuzzytree.verbs",
-    "check": "fuzzytree.verbs",
-    "convert": "fuzzytree.verbs",
-    "diff": "fuzzytree.verbs",
-    "draw": "fuzzytree.verbs",
-    "explain": "fuzzytree.verbs",
-    "export": "fuzzytree.verbs",
-    "from_simpful": "fuzzytree.readers.simpful",
-    "from_skfuzzy": "fuzzytree.readers.skfuzzy",
-    "from_sklearn": "fuzzytree.readers.sklearn",
-    "learn": "fuzzytree.verbs",
-    "load": "fuzzytree.verbs",
-    "needs": "fuzzytree.verbs",
-    "read": "fuzzytree.verbs",
-    "recheck": "fuzzytree.verbs",
-    "rules_from_tree": "fuzzytree.verbs",
-    "run": "fuzzytree.verbs",
-    "save": "fuzzytree.verbs",
-    "stability": "fuzzytree.verbs",
+    "Outputs": "fuzzytree.runtimes.outputs",
+    "RuleBase": "fuzzytree.model.rulebase",
+    "audit": "fuzzytree.api.verbs",
+    "bench": "fuzzytree.api.verbs",
+    "certify": "fuzzytree.api.verbs",
+    "check": "fuzzytree.api.verbs",
+    "convert": "fuzzytree.api.verbs",
+    "diff": "fuzzytree.api.verbs",
+    "draw": "fuzzytree.api.verbs",
+    "explain": "fuzzytree.api.verbs",
+    "export": "fuzzytree.api.verbs",
+    "from_simpful": "fuzzytree.formats.simpful",
+    "from_skfuzzy": "fuzzytree.formats.skfuzzy",
+    "from_sklearn": "fuzzytree.formats.sklearn",
+    "learn": "fuzzytree.api.verbs",
+    "load": "fuzzytree.api.verbs",
+    "needs": "fuzzytree.api.verbs",
+    "read": "fuzzytree.api.verbs",
+    "recheck": "fuzzytree.api.verbs",
+    "rules_from_tree": "fuzzytree.api.verbs",
+    "run": "fuzzytree.api.verbs",
+    "save": "fuzzytree.api.verbs",
+    "stability": "fuzzytree.api.verbs",
 }
 
 

@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import Learner, LearningReport, Settings
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import Status
-from fuzzytree.rulebase import label_type_of
+from fuzzytree.model.rulebase import label_type_of
+from fuzzytree.model.tree import FuzzyTree, with_label_type
 from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import Status
 from fuzzytree.tables import numbers_only
-from fuzzytree.tree import FuzzyTree, with_label_type
 
 try:
     from sklearn.base import BaseEstimator, ClassifierMixin
@@ -28,7 +28,7 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import Carrier, FloatArray, IntArray, Outcome, Run
+    from fuzzytree.model.contracts import Carrier, FloatArray, IntArray, Outcome, Run
 
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]

@@ -27,8 +27,8 @@ import numpy.typing as npt
 from fuzzytree.csv_rows import BLOCK, Rows, blocks
 from fuzzytree.errors import MissingExtraError, TableError
 from fuzzytree.files import LIMIT, check_stream, reason
-from fuzzytree.naming import as_names
-from fuzzytree.rulebase import LabelType, is_label, label_type_of
+from fuzzytree.model.naming import as_names
+from fuzzytree.model.rulebase import LabelType, is_label, label_type_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,9 +1,9 @@
 """Models to test with, for us and for people who write formats and runtimes.
 
 `random_tree` makes valid trees of any size from a seed; `probes` (from
-`fuzzytree.probing`) the rows that matter for a model, `probe_values` as an array.
-`random_system` makes fuzzy systems with numeric outputs, `random_rows` rows for them.
-`check_exporter` tries everything that a format must do, in one call:
+`fuzzytree.semantics.probing`) the rows that matter for a model, `probe_values` as an
+array. `random_system` makes fuzzy systems with numeric outputs, `random_rows` rows for
+them. `check_exporter` tries everything that a format must do, in one call:
 
     def test_the_turtle_format_keeps_its_promises() -> None:
         check_exporter(turtle.FORMAT)
@@ -17,14 +17,11 @@ from collections.abc import Iterator, Sequence
 
 from msgspec.structs import replace
 
-from fuzzytree.conformance import failures
-from fuzzytree.contracts import Document, Format
+from fuzzytree.checking.conformance import failures
 from fuzzytree.errors import DisagreementError
 from fuzzytree.exporters import find_format
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.probing import SPECIAL, landmarks, probe_values, probes
-from fuzzytree.random_systems import random_rows, random_system
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Document, Format
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -39,8 +36,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.samples import samples
-from fuzzytree.system import (
+from fuzzytree.model.system import (
     Conclusion,
     Defuzzifier,
     FuzzySystem,
@@ -52,7 +48,7 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
 )
-from fuzzytree.tree import (
+from fuzzytree.model.tree import (
     Branch,
     FuzzyTree,
     Leaf,
@@ -61,6 +57,10 @@ from fuzzytree.tree import (
     interval_names,
     intervals,
 )
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import SPECIAL, landmarks, probe_values, probes
+from fuzzytree.semantics.random_systems import random_rows, random_system
+from fuzzytree.semantics.samples import samples
 
 __all__ = [
     "SPECIAL",

@@ -7,6 +7,7 @@ Those of what `--json` prints are made by `of_result`: see `fuzzytree.report.sch
 
 from __future__ import annotations
 
+import importlib
 import inspect as python
 import json
 from collections.abc import Mapping
@@ -18,19 +19,17 @@ from typing import Final
 import msgspec
 from msgspec import inspect
 
-from fuzzytree.readers.board_layout import BoardFile
-from fuzzytree.readers.layout import Record, RuleBaseFile, TreeFile
-from fuzzytree.readers.system_layout import SystemFile
+from fuzzytree.formats.yaml.layout import Record
 
-FILES: Final[Mapping[str, type[Record]]] = MappingProxyType(
+FILES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "rulebase.schema.json": RuleBaseFile,
-        "tree.schema.json": TreeFile,
-        "system.schema.json": SystemFile,
-        "board.schema.json": BoardFile,
+        "rulebase.schema.json": "fuzzytree.formats.yaml.layout:RuleBaseFile",
+        "tree.schema.json": "fuzzytree.formats.yaml.layout:TreeFile",
+        "system.schema.json": "fuzzytree.formats.yaml.system_layout:SystemFile",
+        "board.schema.json": "fuzzytree.tactile.board_files.layout:BoardFile",
     }
 )
-"""Each file's name and the record that it describes."""
+"""Each file's name and the record that it describes, as MODULE:CLASS."""
 
 Json = dict[str, "Json"] | list["Json"] | str | float | int | bool | None
 Definitions = dict[str, Json]
@@ -43,7 +42,9 @@ def generate(name: str) -> bytes:
         >>> json.loads(generate("tree.schema.json"))["title"]
         'A fuzzy decision tree of fuzzytree.'
     """
-    kind = FILES[name]
+    kind = record(FILES[name])
+    if not issubclass(kind, Record):
+        raise TypeError(f"{FILES[name]} is no record of a YAML file")
     definitions: Definitions = {}
     _define(kind, definitions)
     whole = definitions.pop(kind.__name__)
@@ -56,6 +57,18 @@ def generate(name: str) -> bytes:
         head |= whole
     head["$defs"] = {key: definitions[key] for key in sorted(definitions)}
     return (json.dumps(head, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def record(name: str) -> type[msgspec.Struct]:
+    """Return the record that MODULE:CLASS names.
+
+    Example:
+        >>> record("fuzzytree.formats.yaml.layout:TreeFile").__name__
+        'TreeFile'
+    """
+    module, _, kind = name.partition(":")
+    found: type[msgspec.Struct] = getattr(importlib.import_module(module), kind)
+    return found
 
 
 def of_result(kind: type[msgspec.Struct], **added: Json) -> bytes:

@@ -138,7 +138,7 @@ def test_a_package_is_not_imported_for_formats_of_ours(package: Path) -> None:
         (
             "turtle",
             "FORMAT = 7\n",
-            "turtle_rules:FORMAT is no fuzzytree.contracts.Format",
+            "turtle_rules:FORMAT is no fuzzytree.model.contracts.Format",
         ),
     ],
 )

@@ -26,11 +26,11 @@ from paper.records import Claims, Comparison, Price, Size, Times, from_json
 from paper.text import three
 from trees import multiway_tree
 
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import LR, Band, Flank, Side, Term, Variable
+from fuzzytree.benchmarking.records import Machine
+from fuzzytree.model.rulebase import LR, Band, Flank, Side, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
 from fuzzytree.runtimes.native import load
-from fuzzytree.timing.records import Machine
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node, Sets
+from fuzzytree.semantics.lowering import rules_from_tree
 
 pytestmark = pytest.mark.usefixtures("few_objects")
 

@@ -9,15 +9,11 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.agreement import Coverage
-from fuzzytree.checking_systems import check_system, coverage_of
-from fuzzytree.contracts import SystemOutcome, SystemRun
-from fuzzytree.inference import infer
-from fuzzytree.probing import Aim, range_rows
-from fuzzytree.rulebase import Part
-from fuzzytree.runtimes.systems import run_system
-from fuzzytree.samples import samples
-from fuzzytree.system import (
+from fuzzytree.checking.systems import check_system, coverage_of
+from fuzzytree.model.agreement import Coverage
+from fuzzytree.model.contracts import SystemOutcome, SystemRun
+from fuzzytree.model.rulebase import Part
+from fuzzytree.model.system import (
     And,
     Conclusion,
     Condition,
@@ -34,9 +30,13 @@ from fuzzytree.system import (
     SystemRule,
     Trapezoid,
 )
+from fuzzytree.runtimes.systems import run_system
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.probing import Aim, range_rows
+from fuzzytree.semantics.samples import samples
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 LOW = Label("low", Trapezoid(0.0, 0.1, 0.1, 0.2))
 THIN = Label("thin", Trapezoid(0.5, 0.5, 0.5, 0.5))
@@ -151,7 +151,7 @@ def test_probing_thousands_of_rules_runs_fewer_rows_than_rules(
 
         return answer
 
-    monkeypatch.setattr("fuzzytree.checking_systems.run_system", counted)
+    monkeypatch.setattr("fuzzytree.checking.systems.run_system", counted)
     found = coverage_of(FuzzySystem("grid", inputs, (OUTPUT,), (block,)))
     assert (found.rules, found.unfired, found.uncovered) == (2401, (), 0)
     assert sum(widths) - found.rows < found.rules

@@ -24,13 +24,13 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from fuzzytree.errors import MissingExtraError
 from fuzzytree.estimator import FuzzyTreeClassifier, Mode
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import Band, Flank, Part, Term, Variable
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.model.rulebase import Band, Flank, Part, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import descend, evaluate
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
 IRIS, SPECIES = load_iris(return_X_y=True)
 WINE = load_wine(as_frame=True)

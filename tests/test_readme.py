@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import Runtime
+    from fuzzytree.model.contracts import Runtime
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"

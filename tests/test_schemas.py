@@ -10,12 +10,12 @@ import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import pytest
 import yaml
 
-from fuzzytree.contracts import Document
 from fuzzytree.exporters.yaml import write
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.report import schemas as results
-from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.schemas.generation import FILES, generate, write_all
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
 
 ROOT = Path(__file__).resolve().parent.parent

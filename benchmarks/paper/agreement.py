@@ -12,11 +12,11 @@ from sklearn import datasets
 from sklearn.model_selection import StratifiedKFold
 
 from fuzzytree.learning import Settings, learn_arrays
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import Status
-from fuzzytree.rulebase import Conjunction
+from fuzzytree.model.rulebase import Conjunction
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.native import load
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import Status
 from paper.records import Comparison, Mode
 
 Floats = npt.NDArray[np.float64]

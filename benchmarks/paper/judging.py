@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from fuzzytree.rulebase import Kind
+from fuzzytree.model.rulebase import Kind
 from paper.inference import Power, holm, mcnemar, overhead, power
 from paper.records import Claims, Comparison, Family, Price, Size, Times, What
 

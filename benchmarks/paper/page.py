@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.rulebase import Kind
-from fuzzytree.timing.machine import noise
+from fuzzytree.benchmarking.machine import noise
+from fuzzytree.model.rulebase import Kind
 from paper.inference import wilson
 from paper.judging import (
     LARGE,

@@ -6,8 +6,8 @@ from typing import Literal
 
 import msgspec
 
-from fuzzytree.rulebase import Conjunction, Kind
-from fuzzytree.timing.records import Machine
+from fuzzytree.benchmarking.records import Machine
+from fuzzytree.model.rulebase import Conjunction, Kind
 
 Family = Literal["multiway", "grown"]
 Mode = Literal["default", "paper"]

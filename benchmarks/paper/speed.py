@@ -11,13 +11,19 @@ import numpy as np
 import numpy.typing as npt
 from trees import COLUMNS, grow, multiway_tree, tree_of
 
-from fuzzytree.contracts import Run
+from fuzzytree.benchmarking.clock import (
+    Clock,
+    Interval,
+    Timed,
+    time_calls,
+    times_faster,
+)
 from fuzzytree.errors import LossError
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Kind, RuleBase
+from fuzzytree.model.contracts import Run
+from fuzzytree.model.rulebase import Kind, RuleBase
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes import find_runtime, is_installed
-from fuzzytree.timing.clock import Clock, Interval, Timed, time_calls, times_faster
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.semantics.lowering import rules_from_tree
 from paper.records import Family, Price, Size, Times, What
 
 Floats = npt.NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
-from fuzzytree.rulebase import Kind
+from fuzzytree.model.rulebase import Kind
 from paper.judging import ABOUT, PRIMARY, Line, Verdict, counted, growth, verdicts
 from paper.records import Claims, Size
 from paper.text import bullet, listed, place, short_name, spanned, three, told_half

@@ -19,7 +19,7 @@ import click
 from fuzzytree.cli.talk import say
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
-from fuzzytree.interrupts import noticed
+from fuzzytree.model.interrupts import noticed
 
 VERBS = (
     "learn",
@@ -39,7 +39,9 @@ VERBS = (
     "formats",
     "doctor",
 )
-"""Each verb is the `command` of the module `fuzzytree.cli.VERB`."""
+"""Each verb is the `command` of the module `fuzzytree.cli.VERB`, or of its room."""
+
+_ROOMS = {"tactile": "fuzzytree.tactile.cli"}
 
 
 class Verbs(click.Group):
@@ -53,7 +55,9 @@ class Verbs(click.Group):
         """Return a verb, or None if there is none of that name."""
         if cmd_name not in VERBS:
             return None
-        module = importlib.import_module(f"fuzzytree.cli.{cmd_name}")
+        module = importlib.import_module(
+            _ROOMS.get(cmd_name, f"fuzzytree.cli.{cmd_name}")
+        )
         command: click.Command = module.command
         return command
 

@@ -31,12 +31,12 @@ from fuzzytree.cli.talk import (
     wrong_options,
 )
 from fuzzytree.files import check_places, write_atomically
-from fuzzytree.naming import printable, printable_json
+from fuzzytree.model.naming import printable, printable_json
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.configuration import FailOn
-    from fuzzytree.auditing.records import Audit
-    from fuzzytree.auditing.subject import Material
+    from fuzzytree.auditing.findings.configuration import FailOn
+    from fuzzytree.auditing.findings.records import Audit
+    from fuzzytree.auditing.findings.subject import Material
 
 Form = Literal["text", "json", "sarif", "github"]
 
@@ -128,8 +128,8 @@ def command(
     Exit 0 if nothing fails, 1 if something is found that is not accepted, 2 if it could
     not run, 130 if interrupted.
     """
-    from fuzzytree import verbs
-    from fuzzytree.auditing.baselines import baseline_of, gone, read_baseline
+    from fuzzytree.api import verbs
+    from fuzzytree.auditing.findings.baselines import baseline_of, gone, read_baseline
 
     if target is not None and data is None:
         raise click.UsageError(
@@ -231,7 +231,7 @@ def _told(
 
 def _lines_of(material: Material) -> list[str]:
     """Return the lines of a model's file, for people."""
-    from fuzzytree.readers.lines import split_lines
+    from fuzzytree.formats.lines import split_lines
 
     content = material.file.content if material.file else b""
     is_wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")
@@ -262,8 +262,8 @@ def _tell_domain(found: Audit, *, quiet: bool) -> None:
 
 
 def _write_page(found: Audit, material: Material, page: str) -> None:
-    from fuzzytree.agreement import Agreement
-    from fuzzytree.criteria.results import Stability
+    from fuzzytree.checking.stability.results import Stability
+    from fuzzytree.model.agreement import Agreement
     from fuzzytree.report import audit_page
 
     given = [one.found for one in material.given]

@@ -14,8 +14,8 @@ import msgspec
 from fuzzytree.cli.talk import say, setting, standard_input
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.configuration import Configuration
-    from fuzzytree.auditing.records import Settings
+    from fuzzytree.auditing.findings.configuration import Configuration
+    from fuzzytree.auditing.findings.records import Settings
 
 
 class Options(msgspec.Struct, frozen=True):
@@ -102,7 +102,7 @@ def with_options(function: Callable[..., int]) -> Callable[..., int]:
 
 def configured(path: str | None, *, quiet: bool) -> Configuration:
     """Return the configuration of a file: the named one, or one that is here."""
-    from fuzzytree.auditing.configuration import (
+    from fuzzytree.auditing.findings.configuration import (
         FILE,
         Configuration,
         read_configuration,
@@ -169,7 +169,7 @@ def settings_of(asked: Options, known: Configuration) -> Settings:
     Raises:
         ValueError: If one is out of its range.
     """
-    from fuzzytree.auditing.selecting import changed, check_settings
+    from fuzzytree.auditing.findings.selecting import changed, check_settings
 
     found = changed(known.settings, dict(map(setting, asked.settings)))
     if asked.budget is not None:

@@ -26,7 +26,7 @@ from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.files import check_place, write_atomically
 
 if TYPE_CHECKING:
-    from fuzzytree.timing.records import Study
+    from fuzzytree.benchmarking.records import Study
 
 INTERRUPTED = 130
 
@@ -120,7 +120,7 @@ def command(
     cannot be run is listed with its reason. Ctrl-C ends it early, keeps what was
     measured, and exits with 130; exit 1 if an error is larger than certified.
     """
-    from fuzzytree import verbs
+    from fuzzytree.api import verbs
     from fuzzytree.report.bench import study_lines
 
     _check_places(output, plots)
@@ -160,7 +160,7 @@ def command(
 
 def _ending(found: Study, *, quiet: bool) -> int:
     """Say how it ended, and return the exit code."""
-    from fuzzytree.timing.study import faults
+    from fuzzytree.benchmarking.study import faults
 
     if found.is_interrupted:
         known = "what was measured by then is told"
@@ -180,7 +180,7 @@ def _ending(found: Study, *, quiet: bool) -> int:
 
 def _check_places(output: str | None, plots: Sequence[str]) -> None:
     """Refuse what cannot be written, before minutes of work."""
-    from fuzzytree.plots import SUFFIXES
+    from fuzzytree.report.plots import SUFFIXES
 
     for place in (output, *plots):
         if place:
@@ -197,7 +197,7 @@ def _draw(found: Study, places: Sequence[str]) -> Sequence[str]:
     """Draw the study for most rows; return which files were written."""
     if not places:
         return ()
-    from fuzzytree import plots
+    from fuzzytree.report import plots
 
     timings = [timing for point in found.points for timing in point.timings]
     rows = max(timing.rows for timing in timings)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from fuzzytree.contracts import Carrier, Document, Format
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters import find_format
-from fuzzytree.rulebase import Conjunction, Kind
+from fuzzytree.model.contracts import Carrier, Document, Format
+from fuzzytree.model.rulebase import Conjunction, Kind
 
 as_option = click.option(
     "--as",
@@ -62,7 +62,7 @@ def carried(
         click.UsageError: If the model cannot be had in that form.
         LossError: If the format does not carry it in any form.
     """
-    from fuzzytree.converting import formed
+    from fuzzytree.checking.converting import formed
 
     if carrier == "tree" and (kind is not None or conjunction is not None):
         raise click.UsageError("--terms and --conjunction are for --as rules")

@@ -64,7 +64,7 @@ def command(
     system, each runtime and each file. Exit 1 if two of them disagree. A program (C,
     Python, JavaScript, SQL, PMML) runs if its text is what is written now.
     """
-    from fuzzytree import verbs
+    from fuzzytree.api import verbs
     from fuzzytree.report import text
 
     with wrong_options(), progress_bar(quiet=quiet) as show:

@@ -29,15 +29,15 @@ from fuzzytree.cli.talk import (
     standard_input,
     wrong_options,
 )
-from fuzzytree.contracts import Carrier, Document, Format, Reading, Written
 from fuzzytree.errors import LossError
 from fuzzytree.files import LIMIT, write_atomically
-from fuzzytree.rulebase import Conjunction, Kind
+from fuzzytree.model.contracts import Carrier, Document, Format, Reading, Written
+from fuzzytree.model.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
-    from fuzzytree.converting import Proof
+    from fuzzytree.checking.converting import Proof
+    from fuzzytree.model.options import Option
     from fuzzytree.numerics.bounds import Certificate
-    from fuzzytree.options import Option
 
 
 @click.command("convert", short_help="Bring a model from one format to another.")
@@ -114,7 +114,7 @@ def command(
 def _options(
     form: Format, given: Sequence[tuple[str, str | None]]
 ) -> dict[str, Option]:
-    from fuzzytree.options import option_value
+    from fuzzytree.model.options import option_value
 
     options: dict[str, Option] = {}
     for name, text in given:
@@ -128,7 +128,7 @@ def _options(
 
 def read_source(source: str, read_as: str | None) -> tuple[Reading, str]:
     """Return what a file or standard input holds, and the name of its format."""
-    from fuzzytree import converting
+    from fuzzytree.checking import converting
     from fuzzytree.errors import ReadError
     from fuzzytree.exporters import find_format
 
@@ -182,9 +182,9 @@ def carry(
         as_json: Whether the facts are told as JSON.
         quiet: Whether nothing is told but errors.
     """
+    from fuzzytree.checking.converting import carrier_of, export, proved
     from fuzzytree.cli.carriers import carried
-    from fuzzytree.converting import carrier_of, export, proved
-    from fuzzytree.losses import loss_text
+    from fuzzytree.model.losses import loss_text
     from fuzzytree.report import systems
 
     model = carried(
@@ -272,7 +272,7 @@ def _written(
     Raises:
         LossError: If it cannot be written at all.
     """
-    from fuzzytree.converting import export
+    from fuzzytree.checking.converting import export
 
     try:
         return export(model, form.name, allow_loss=allow_loss, **options), ""
@@ -284,7 +284,7 @@ def _written(
 
 def _refuse(found: Reading, refusal: str) -> None:
     """Say what would be lost, and that nothing is written."""
-    from fuzzytree.losses import loss_text
+    from fuzzytree.model.losses import loss_text
 
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")

@@ -59,7 +59,7 @@ def command(
     are proved equal, or a point is shown at which they differ. Exit 1 if a decision
     changes, or another change breaks who calls the model.
     """
-    from fuzzytree import verbs
+    from fuzzytree.api import verbs
     from fuzzytree.report.diff import diff_lines, verdict_text
 
     with wrong_options(), progress_bar(quiet=quiet) as tell:

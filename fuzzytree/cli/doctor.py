@@ -99,9 +99,9 @@ def self_test(has_onnx: bool) -> list[str]:
     """Take a small table through learning, YAML, native and, if there, ONNX."""
     import numpy as np
 
-    from fuzzytree import verbs
-    from fuzzytree.answers import Answers
-    from fuzzytree.readers.yaml import read
+    from fuzzytree.api import verbs
+    from fuzzytree.formats.yaml.yaml import read
+    from fuzzytree.runtimes.answers import Answers
 
     table = np.array([[k, k % 3] for k in range(12)], np.float64)
     classes = ["low"] * 6 + ["high"] * 6

@@ -16,9 +16,9 @@ def command(code: str | None, as_json: bool) -> None:
     CODE is a code such as FT101, the id of a finding such as FT101-1a2b3c4d, or how
     codes begin, such as FT1: those are listed.
     """
-    from fuzzytree.auditing.codes import CODES
+    from fuzzytree.auditing.findings.codes import CODES
+    from fuzzytree.model.rulebase import name_choice
     from fuzzytree.report.explanations import code_lines, explanation_lines
-    from fuzzytree.rulebase import name_choice
 
     name = (code or "FT").upper().partition("-")[0]
     if name in CODES:

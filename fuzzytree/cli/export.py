@@ -12,8 +12,8 @@ from fuzzytree.cli.carriers import (
 )
 from fuzzytree.cli.convert import Choice, carry, read_source
 from fuzzytree.cli.talk import json_option, quiet_option, wrong_options
-from fuzzytree.contracts import Carrier
-from fuzzytree.rulebase import Conjunction, Kind
+from fuzzytree.model.contracts import Carrier
+from fuzzytree.model.rulebase import Conjunction, Kind
 
 
 @click.command("export", short_help="Write a model in another format.")
@@ -70,7 +70,7 @@ def command(
     It is `convert` with the options of onnx by name. What the format cannot hold is
     listed, and nothing is written unless allowed: exit 1.
     """
-    from fuzzytree.options import check_names
+    from fuzzytree.model.options import check_names
 
     given = {
         "dtype": dtype,

@@ -11,9 +11,9 @@ from fuzzytree.cli.talk import answer, answer_json, json_option, wrong_options
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from fuzzytree.abilities import Ability
-    from fuzzytree.contracts import Format
+    from fuzzytree.checking.abilities import Ability
     from fuzzytree.exporters.plugins import Plugin
+    from fuzzytree.model.contracts import Format
 
 
 @click.command("formats", short_help="List formats and runtimes.")
@@ -66,7 +66,7 @@ def _abilities(
     form: Format, missing: set[str], dialect: str | None = None
 ) -> tuple[Ability, ...] | str:
     """Return what a format can carry, or why that cannot be tried."""
-    from fuzzytree.abilities import abilities
+    from fuzzytree.checking.abilities import abilities
     from fuzzytree.errors import FuzzyTreeError, install_hint
     from fuzzytree.exporters import TABLE
 
@@ -84,8 +84,8 @@ def _abilities(
 
 
 def _tell_one(form: Format, missing: set[str], *, as_json: bool) -> None:
-    from fuzzytree.abilities import dialects_of
-    from fuzzytree.options import options_of
+    from fuzzytree.checking.abilities import dialects_of
+    from fuzzytree.model.options import options_of
     from fuzzytree.report import formats as shown
 
     found = _abilities(form, missing)
@@ -100,7 +100,7 @@ def _tell_one(form: Format, missing: set[str], *, as_json: bool) -> None:
 def _facts(
     form: Format, found: Sequence[Ability] | str, missing: set[str]
 ) -> dict[str, object]:
-    from fuzzytree.options import options_of
+    from fuzzytree.model.options import options_of
     from fuzzytree.report import text
 
     is_known = not isinstance(found, str)

@@ -30,13 +30,13 @@ from fuzzytree.cli.talk import (
     table_source,
     wrong_options,
 )
-from fuzzytree.contracts import Carrier, Document, Format
 from fuzzytree.files import check_place, read_bounded, write_atomically
-from fuzzytree.naming import printable
-from fuzzytree.rulebase import Conjunction, Kind
+from fuzzytree.model.contracts import Carrier, Document, Format
+from fuzzytree.model.naming import printable
+from fuzzytree.model.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
-    from fuzzytree.holdout import Accuracy, Summary
+    from fuzzytree.api.holdout import Accuracy, Summary
     from fuzzytree.learning import Learnt, Settings
     from fuzzytree.tables import Table
 
@@ -159,10 +159,10 @@ def command(
     that each fold chooses anew. In a table of more than 32,768 numbers the folds take
     the settings chosen from all rows, and are made of 20,000 rows at most.
     """
-    from fuzzytree.holdout import accuracy
-    from fuzzytree.suitability import remarks
+    from fuzzytree.api.holdout import accuracy
+    from fuzzytree.api.verbs import export, learn_table
+    from fuzzytree.learning.suitability import remarks
     from fuzzytree.tables import read_table
-    from fuzzytree.verbs import export, learn_table
 
     form = wanted_format(output, None)
     if output != "-":
@@ -229,7 +229,7 @@ def _written_rows(
         form: The format of that file.
         rest: What the next step says behind the files.
     """
-    from fuzzytree.verbs import export
+    from fuzzytree.api.verbs import export
 
     files = [(_model_file(output, form), "yaml"), (output, form.name)]
     if form.read:
@@ -289,8 +289,8 @@ def _summary(
     seed: int,
     output: str,
 ) -> Summary:
-    from fuzzytree.holdout import Summary, majority
-    from fuzzytree.rulebase import fingerprint
+    from fuzzytree.api.holdout import Summary, majority
+    from fuzzytree.model.rulebase import fingerprint
 
     return Summary(
         file=output,
@@ -331,7 +331,7 @@ def _read_text(table: Table) -> str:
 
 
 def _tested_text(tested: Accuracy | None, table: Table) -> str:
-    from fuzzytree.holdout import majority
+    from fuzzytree.api.holdout import majority
     from fuzzytree.report.text import counted
 
     baseline = f"majority class {majority(table):.3f}"

@@ -23,7 +23,7 @@ from fuzzytree.cli.talk import (
 from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
-    from fuzzytree.tree import Use
+    from fuzzytree.model.tree import Use
 
 
 @click.command("needs", short_help="Tell what a model needs, and leave out the rest.")
@@ -73,12 +73,13 @@ def command(
     """
     from pathlib import Path
 
-    from fuzzytree import savings, verbs
+    from fuzzytree.api import verbs
+    from fuzzytree.benchmarking import savings
+    from fuzzytree.checking.converting import deciding
     from fuzzytree.cli.convert import next_check
-    from fuzzytree.converting import deciding
     from fuzzytree.exporters import find_format
-    from fuzzytree.pruning import pruned
     from fuzzytree.report.needs import report_lines
+    from fuzzytree.semantics.simplification import pruned
 
     first = deciding(verbs.load(model), "needs")
     wanted = tuple(uses) or ("tree", "relative")

@@ -14,11 +14,11 @@ def command(audit: str, model: str) -> int:
     """Check AUDIT, the JSON of an audit, against MODEL, the YAML file that it is of.
 
     Everything is read, evaluated and decided again by code that imports nothing else
-    of fuzzytree and runs alone; `python -m fuzzytree.rechecking` is the same. Exit 1 if
-    something does not hold.
+    of fuzzytree and runs alone; `python -m fuzzytree.auditing.recheck` is the same.
+    Exit 1 if something does not hold.
     """
+    from fuzzytree.auditing.recheck import CannotRunError, recheck_files
     from fuzzytree.errors import ReadError
-    from fuzzytree.rechecking import CannotRunError, recheck_files
 
     try:
         report = recheck_files(audit, model)

@@ -23,17 +23,17 @@ from fuzzytree.cli.talk import (
 )
 from fuzzytree.errors import TableError
 from fuzzytree.files import open_atomically
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.naming import printable_json
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.naming import printable_json
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.lowering import rules_from_tree
 
 if TYPE_CHECKING:
-    from fuzzytree.answers import Answers, By
-    from fuzzytree.contracts import Document
-    from fuzzytree.outputs import Outputs
+    from fuzzytree.model.contracts import Document
+    from fuzzytree.runtimes.answers import Answers, By
     from fuzzytree.runtimes.onnxruntime import OnnxModel
+    from fuzzytree.runtimes.outputs import Outputs
     from fuzzytree.tables import Batch
 
 Columns = dict[str, Sequence[object]]
@@ -93,7 +93,7 @@ def command(
     any format that can be read, or ONNX; TABLE is CSV or Parquet, or `-` for standard
     input. Columns are found by name. Rule numbers count from 1; 0 is no rule.
     """
-    from fuzzytree import verbs
+    from fuzzytree.api import verbs
 
     if as_json and safe_csv:
         raise click.UsageError("--safe-csv is about CSV, and --json writes none")
@@ -126,7 +126,7 @@ def command(
 
 
 def _answered(answers: Answers | Outputs, strengths: By | None, model: str) -> Columns:
-    from fuzzytree.outputs import Outputs
+    from fuzzytree.runtimes.outputs import Outputs
 
     if isinstance(answers, Outputs):
         return answers.columns(with_activations=strengths is not None)
@@ -166,10 +166,10 @@ def _tells_ties(model: Document | OnnxModel) -> bool:
 def _reasons(
     path: str, model: Document | OnnxModel
 ) -> Callable[[Batch, Answers | Outputs], list[str]]:
-    from fuzzytree.answers import Answers, reasons
-    from fuzzytree.outputs import Outputs
     from fuzzytree.report.systems import system_reasons
+    from fuzzytree.runtimes.answers import Answers, reasons
     from fuzzytree.runtimes.onnxruntime import OnnxModel
+    from fuzzytree.runtimes.outputs import Outputs
 
     if isinstance(model, OnnxModel):
         raise click.UsageError(
@@ -270,7 +270,7 @@ class _Tally:
 
     def add(self, batch: Batch, answers: Answers | Outputs) -> None:
         """Take the answers to a piece."""
-        from fuzzytree.outputs import Outputs
+        from fuzzytree.runtimes.outputs import Outputs
         from fuzzytree.tables import trimmed
 
         self.rows += len(answers)

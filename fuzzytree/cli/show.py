@@ -17,8 +17,8 @@ from fuzzytree.cli.talk import (
 from fuzzytree.files import check_place
 
 if TYPE_CHECKING:
-    from fuzzytree.agreement import Coverage
-    from fuzzytree.contracts import Document, Reading
+    from fuzzytree.model.agreement import Coverage
+    from fuzzytree.model.contracts import Document, Reading
 
 
 @click.command("show", short_help="Show a model and its rules.")
@@ -34,7 +34,7 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
     """
     from pathlib import Path
 
-    from fuzzytree import verbs
+    from fuzzytree.api import verbs
     from fuzzytree.report import text
     from fuzzytree.runtimes.onnxruntime import OnnxModel
 
@@ -64,18 +64,18 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
 
 def _coverage(model: Document) -> Coverage | None:
     """Return which rules of a fuzzy system fire in probes; None for other models."""
-    from fuzzytree.system import FuzzySystem
+    from fuzzytree.model.system import FuzzySystem
 
     if not isinstance(model, FuzzySystem):
         return None
-    from fuzzytree.checking_systems import coverage_of
+    from fuzzytree.checking.systems import coverage_of
 
     return coverage_of(model)
 
 
 def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
     """Say on stderr what is not shown."""
-    from fuzzytree.losses import loss_text
+    from fuzzytree.model.losses import loss_text
 
     for loss in found.losses:
         say(f"lost     {loss_text(loss)}")
@@ -84,8 +84,8 @@ def _tell(found: Reading, coverage: Coverage | None, *, quiet: bool) -> None:
 
 
 def _draw(model: Document, picture: str, *, quiet: bool) -> None:
-    from fuzzytree import plots
-    from fuzzytree.tree import FuzzyTree
+    from fuzzytree.model.tree import FuzzyTree
+    from fuzzytree.report import plots
 
     if not isinstance(model, FuzzyTree):
         raise click.UsageError(
@@ -97,9 +97,9 @@ def _draw(model: Document, picture: str, *, quiet: bool) -> None:
 
 
 def _lines(model: Document) -> list[str]:
+    from fuzzytree.model.system import FuzzySystem
     from fuzzytree.report.systems import system_lines
     from fuzzytree.report.text import model_lines
-    from fuzzytree.system import FuzzySystem
 
     if isinstance(model, FuzzySystem):
         return [*system_lines(model)]
@@ -109,10 +109,10 @@ def _lines(model: Document) -> list[str]:
 def _facts(found: Reading) -> dict[str, object]:
     import msgspec
 
-    from fuzzytree.converting import carrier_of
+    from fuzzytree.checking.converting import carrier_of
+    from fuzzytree.model.rulebase import fingerprint
+    from fuzzytree.model.system import FuzzySystem
     from fuzzytree.report import systems, text
-    from fuzzytree.rulebase import fingerprint
-    from fuzzytree.system import FuzzySystem
 
     model = found.model
     facts: dict[str, object] = {

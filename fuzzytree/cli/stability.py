@@ -53,7 +53,7 @@ def command(
     errors within the certified bounds, and for curves that can be evaluated. Each
     input is told with what float32 would cost it. Exit 1 if a criterion fails.
     """
-    from fuzzytree import verbs
+    from fuzzytree.api import verbs
     from fuzzytree.report.stability import stability_lines
 
     with wrong_options(), progress_bar(quiet=quiet) as tell:

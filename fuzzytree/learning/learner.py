@@ -19,9 +19,9 @@ from fuzzytree.learning.sampling import Sample
 from fuzzytree.learning.settings import Settings
 from fuzzytree.learning.statistics import Moments, Statistics
 from fuzzytree.learning.validation import Choice, chosen_tree
-from fuzzytree.rulebase import text_fault
+from fuzzytree.model.rulebase import text_fault
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tables import numbers_only, unmasked
-from fuzzytree.tree import FuzzyTree
 
 Progress = Callable[[str, float], None]
 

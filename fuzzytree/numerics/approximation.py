@@ -2,12 +2,13 @@
 
 `by_points` and `by_degree` give another model and certify how far each of its degrees
 can be from the original's, at any real value of the axis and without rounding: the
-formulas of `fuzzytree.rulebase` over the stored doubles.
+formulas of `fuzzytree.model.rulebase` over the stored doubles.
 
 **Decisions of relative rules stay.** In a relative rule base every term is a band, and
-a rule wins where all its clauses have degree exactly 1 (`fuzzytree.lowering`). Both
-functions keep, for every band, the set of values at which the degree is 1. `by_degree`
-keeps the plateau itself. `by_points` ends it with two points at one value, which are a
+a rule wins where all its clauses have degree exactly 1
+(`fuzzytree.semantics.lowering`). Both functions keep, for every band, the set of values
+at which the degree is 1. `by_degree` keeps the plateau itself. `by_points` ends it with
+two points at one value, which are a
 step: `(low, p), (low, 1)` and `(high, 1), (high, r)` with p and r below 1. So at `low`
 itself the degree is p, on the line from `(low, 1)` to `(high, 1)` it is 1, and beyond
 `high` it is r or less than 1: all other points are below 1, and a line is held between
@@ -25,10 +26,19 @@ import numpy as np
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Term,
+)
 from fuzzytree.numerics.curves import BELOW_ONE, body_coefficients, flank_stretch
 from fuzzytree.numerics.fitting import curve_error, lower_curve
 from fuzzytree.numerics.placing import points_of
-from fuzzytree.rulebase import LR, Band, Flank, Points, RuleBase, Shape, Side, Term
 
 _ROUNDING = 1.0 + 2.0**-40
 
@@ -87,7 +97,7 @@ def by_points(model: RuleBase, tolerance: float) -> Approximated:
             are too far apart.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> found = by_points(rules_from_tree(random_tree(0), "raw"), 1e-3)
         >>> 0.0 < found.bound <= 1e-3
@@ -120,7 +130,7 @@ def by_degree(model: RuleBase, degree: int) -> Approximated:
         ValueError: If the degree is not from 1 to 8.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> found = by_degree(rules_from_tree(random_tree(0)), 1)
         >>> {term.degree for term in found.terms}

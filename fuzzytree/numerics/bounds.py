@@ -23,7 +23,9 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.contracts import Carrier, Dtype, Model
+from fuzzytree.model.contracts import Carrier, Dtype, Model
+from fuzzytree.model.rulebase import Clause, RuleBase, Variable
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.enclosures import axis_value
 from fuzzytree.numerics.rounding import (
     FLOAT32_MAX,
@@ -36,13 +38,11 @@ from fuzzytree.numerics.rounding import (
     degree_errors,
     value_error,
 )
-from fuzzytree.rulebase import Clause, RuleBase, Variable
-from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
     from fuzzytree.numerics.rounding import Reals
 
     BoolArray = npt.NDArray[np.bool_]
@@ -269,7 +269,7 @@ def certify(
             no combination needs may go without a range.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(0, combinations=0))
         >>> certify(rules, "mixed").sentence

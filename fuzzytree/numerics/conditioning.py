@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple, assert_never
 
-from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side
 
 Curve = tuple[Fraction, ...]
 """Coefficients of powers of the position, the lowest first."""
@@ -79,7 +79,7 @@ def conduct(shape: Shape) -> tuple[Conduct, ...]:
     leaves no room for any of this.
 
     Example:
-        >>> from fuzzytree.rulebase import Side
+        >>> from fuzzytree.model.rulebase import Side
         >>> bulge = Side(1.0, (0.25, 0.75))  # 1 - t (0.25 + 0.75 (2 t - 1))
         >>> left, right = conduct(LR(0.0, bulge, bulge))
         >>> round(right.above.high, 6)

@@ -12,7 +12,8 @@ each is within half a unit of the last digit. Everything else is done in fractio
 - `cos` of an angle below pi / 2 is its series, whose terms fall and alternate in sign
   from the second on: two neighbouring sums hold it between them.
 
-This module shares no line with `fuzzytree.inference`, of which it says the truth.
+This module shares no line with `fuzzytree.semantics.inference`, of which it says the
+truth.
 """
 
 from __future__ import annotations
@@ -21,9 +22,8 @@ from decimal import MAX_EMAX, MIN_EMIN, ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 from typing import Final, NamedTuple
 
-from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.rulebase import LR, Band, Points
-from fuzzytree.system import (
+from fuzzytree.model.rulebase import LR, Band, Points
+from fuzzytree.model.system import (
     Arc,
     Bell,
     Binary,
@@ -44,6 +44,7 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.numerics.exact import exact_degree
 
 _DIGITS: Final = Context(
     prec=50, rounding=ROUND_HALF_EVEN, Emin=MIN_EMIN, Emax=MAX_EMAX, traps=[]

@@ -39,11 +39,20 @@ from typing import TYPE_CHECKING, NamedTuple, assert_never
 
 import numpy as np
 
-from fuzzytree.interrupts import checkpoint
-from fuzzytree.rulebase import LR, Band, Clause, Flank, Points, Shape, Side, Variable
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    Shape,
+    Side,
+    Variable,
+)
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 U = 2.0**-53
 """The unit roundoff of doubles."""

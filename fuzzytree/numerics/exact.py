@@ -1,8 +1,8 @@
 """The meaning of a model in rational numbers: nothing is rounded anywhere.
 
-The formulas of `fuzzytree.rulebase` are taken over the real numbers, at the doubles
-that a model and a row hold. Every such double is a fraction, and the formulas need
-nothing but `+ - * /`, comparisons, minima and maxima: so every degree is one, too.
+The formulas of `fuzzytree.model.rulebase` are taken over the real numbers, at the
+doubles that a model and a row hold. Every such double is a fraction, and the formulas
+need nothing but `+ - * /`, comparisons, minima and maxima: so every degree is one, too.
 What a float changes about a formula stays out, with two exceptions that are part of the
 definition and not of its rounding:
 
@@ -26,9 +26,9 @@ from typing import assert_never
 
 import msgspec
 
-from fuzzytree.contracts import Model
-from fuzzytree.interrupts import checkpoint
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -39,10 +39,10 @@ from fuzzytree.rulebase import (
     Side,
     Variable,
 )
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.tree import FuzzyTree
 
 DECIDED, TIE, UNCOVERED, MISSING = range(4)
-"""How an answer came about, numbered as in `fuzzytree.contracts.Outcome`."""
+"""How an answer came about, numbered as in `fuzzytree.model.contracts.Outcome`."""
 
 CAP = 1 - Fraction(1, 2**53)
 """The largest degree off a plateau."""
@@ -77,7 +77,7 @@ def exact_answer(model: Model, row: Mapping[str, float]) -> Exact:
         KeyError: If an input has no value.
 
     Example:
-        >>> from fuzzytree.rulebase import Rule, Term
+        >>> from fuzzytree.model.rulebase import Rule, Term
         >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 4.0)))
         >>> rules = RuleBase(
         ...     "grip", ("soft",), (Variable("force", (low,)),),
@@ -112,7 +112,7 @@ def exact_axis(variable: Variable, row: Mapping[str, float]) -> Fraction:
         ValueError: If a value is not finite.
 
     Example:
-        >>> from fuzzytree.rulebase import Part
+        >>> from fuzzytree.model.rulebase import Part
         >>> mix = Variable("mix", parts=(Part("a", 1e16), Part("b", 1.0)))
         >>> exact_axis(mix, {"a": 1.0, "b": 1.0}) - 10**16
         Fraction(1, 1)

@@ -11,7 +11,7 @@ import numpy as np
 from fuzzytree.numerics.curves import derivative, distance, lowest, values_at
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
 _GRID = 512  # places at which a fit is looked at
 _EXCHANGES = 200  # of places in a fit, at most

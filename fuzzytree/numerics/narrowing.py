@@ -13,9 +13,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.contracts import Dtype, Loss, Model
-from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Variable
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.contracts import Dtype, Loss, Model
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Variable
+from fuzzytree.model.tree import FuzzyTree
 
 Real = np.float64 | np.float32
 RealArray = npt.NDArray[np.float64] | npt.NDArray[np.float32]

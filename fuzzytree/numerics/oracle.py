@@ -23,7 +23,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.contracts import Model
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import Clause, RuleBase
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.enclosures import (
     Enclosure,
     U,
@@ -45,13 +47,11 @@ from fuzzytree.numerics.exact import (
     exact_degree,
     outwards,
 )
-from fuzzytree.rulebase import Clause, RuleBase
-from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
     BoolArray = npt.NDArray[np.bool_]
 
@@ -115,7 +115,7 @@ def decide(model: Model, values: FloatArray, *, with_strengths: bool = True) -> 
         ValueError: If the values have another shape.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> found = decide(rules_from_tree(random_tree(0)), np.zeros((4, 2)))
         >>> found.rule.tolist(), found.by_fractions
@@ -435,7 +435,7 @@ def strength_errors(
         ValueError: If the values or the strengths have another shape.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules, values = rules_from_tree(random_tree(0)), np.zeros((4, 1))
         >>> given = decide(rules, values).strengths + 2.0**-30
@@ -534,7 +534,7 @@ def error_against_exact(
         exact: The exact answers to the same rows, if they are known already.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules, values = rules_from_tree(random_tree(0)), np.zeros((4, 2))
         >>> labels = decide(rules, values).label

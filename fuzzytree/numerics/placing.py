@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from fuzzytree.errors import LossError
+from fuzzytree.model.rulebase import LR, MOST_POINTS, Band, Flank, Points
 from fuzzytree.numerics.curves import (
     BELOW_ONE,
     Stretch,
@@ -28,10 +29,9 @@ from fuzzytree.numerics.curves import (
     side_stretches,
     values_at,
 )
-from fuzzytree.rulebase import LR, MOST_POINTS, Band, Flank, Points
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 _GRID = 512  # places on a curve at which its bend is looked at
 _TRIES = 12  # of placing points before the bound counts as out of reach

@@ -3,9 +3,9 @@
 Every bound is a priori: it follows from the coefficients, the widths and the values, by
 the standard model of rounding, fl(a op b) = (a op b)(1 + e) with |e| <= u, and u is
 2**-53 for double and 2**-24 for float32. It holds for the stated sequence of operations
-(`fuzzytree.rulebase`) in each of three number types: `float64`; `float32`, where every
-number of the model and every value is rounded first; and `mixed`, which finds the place
-on a curve in double, casts it, and goes on in float32.
+(`fuzzytree.model.rulebase`) in each of three number types: `float64`; `float32`, where
+every number of the model and every value is rounded first; and `mixed`, which finds the
+place on a curve in double, casts it, and goes on in float32.
 
 A degree is off by at most `fixed + per_unit * s` where its value is off by s, and where
 s reaches across a step also by the step's height:
@@ -35,22 +35,14 @@ from typing import TYPE_CHECKING, NamedTuple, assert_never
 
 import numpy as np
 
-from fuzzytree.contracts import Dtype
-from fuzzytree.interrupts import checkpoint
+from fuzzytree.model.contracts import Dtype
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side, Variable
 from fuzzytree.numerics.enclosures import U
 from fuzzytree.numerics.exact import exact_flank, outwards
-from fuzzytree.rulebase import (
-    LR,
-    Band,
-    Flank,
-    Points,
-    Shape,
-    Side,
-    Variable,
-)
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
     Reals = FloatArray
 

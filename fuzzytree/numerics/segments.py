@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.interrupts import checkpoint
-from fuzzytree.rulebase import Points
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import Points
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import IntArray
+    from fuzzytree.model.contracts import IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
     Real = np.dtype[np.floating[Any]]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Audit, Severity
-from fuzzytree.naming import printable
-from fuzzytree.proving.states import Declined
+from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.records import Answer, Audit, Severity
+from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import state_word
 
 _COMMANDS: Mapping[Severity, str] = {

@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Final
 
-from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Audit, Measure, Place, Severity
-from fuzzytree.naming import printable
-from fuzzytree.proving.states import Bracket, Coordinate, Declined, Witness
+from fuzzytree.auditing.engine.states import Bracket, Coordinate, Declined, Witness
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.records import Answer, Audit, Measure, Place, Severity
+from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import (
     as_in_file,
     result_text,

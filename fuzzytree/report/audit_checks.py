@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fuzzytree.agreement import Agreement, Comparison
+from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.report.markup import Content, Markup, folded, joined, listed, table, tag
 from fuzzytree.report.stability import advice
 from fuzzytree.report.text import counted, verdict_text
 
 if TYPE_CHECKING:
-    from fuzzytree.criteria.results import Stability
+    from fuzzytree.checking.stability.results import Stability
 
 _MOST_CALM = 12  # comparisons that agree and are not folded
 _MOST_TOLD = 200  # sentences

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Measure, Place, Severity
-from fuzzytree.auditing.views import View
-from fuzzytree.proving.states import Span
+from fuzzytree.auditing.engine.states import Span
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.records import Answer, Measure, Place, Severity
+from fuzzytree.auditing.findings.views import View
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report.audit_model import MOST_RULES, sentence_of
 from fuzzytree.report.audit_pictures import Drawn, Scene, pictures
 from fuzzytree.report.audit_states import (
@@ -23,7 +24,6 @@ from fuzzytree.report.svg_regions import (
     span_text,
 )
 from fuzzytree.report.text import counted, number
-from fuzzytree.rulebase import RuleBase
 
 MOST_FINDINGS = 300
 """That are told one by one."""

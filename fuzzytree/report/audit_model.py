@@ -5,9 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.auditing.records import Answer
-from fuzzytree.auditing.views import View
-from fuzzytree.proving.states import Sampled
+from fuzzytree.auditing.engine.states import Sampled
+from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.views import View
+from fuzzytree.model.rulebase import Rule, RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.audit_rows import Data, Passing
 from fuzzytree.report.audit_states import percent
 from fuzzytree.report.drawing import Axis
@@ -25,9 +28,6 @@ from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, class_mark, tree_picture
 from fuzzytree.report.systems import curve_text, rule_text
 from fuzzytree.report.text import counted, number, shape_text, tree_lines
-from fuzzytree.rulebase import Rule, RuleBase
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
 
 Audited = FuzzyTree | RuleBase | FuzzySystem
 

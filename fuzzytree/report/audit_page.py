@@ -15,12 +15,15 @@ from importlib import resources
 from string import Template
 from typing import TYPE_CHECKING
 
-from fuzzytree.agreement import Agreement
-from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Audit
-from fuzzytree.auditing.subject import Rows
-from fuzzytree.auditing.views import view
-from fuzzytree.proving.states import Declined
+from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.records import Answer, Audit
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.views import view
+from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.audit import gathered
 from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
@@ -59,12 +62,9 @@ from fuzzytree.report.markup import (
     text,
 )
 from fuzzytree.report.text import counted, number
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
-    from fuzzytree.criteria.results import Stability
+    from fuzzytree.checking.stability.results import Stability
 
 MOST_QUESTIONS = 1000
 """That are listed one by one."""
@@ -103,8 +103,8 @@ def page(
         stability: The result of a study of the same model.
 
     Example:
-        >>> from fuzzytree.auditing.records import Policy, Settings
-        >>> from fuzzytree.proving.domain import Domain
+        >>> from fuzzytree.auditing.findings.records import Policy, Settings
+        >>> from fuzzytree.auditing.engine.domain import Domain
         >>> from fuzzytree.testing import random_tree
         >>> tree, nothing = random_tree(1), Domain(())
         >>> audit = Audit("0.1", tree.name, "tree", "", None, None, 0,

@@ -6,15 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Literal, NamedTuple
 
-from fuzzytree.auditing.records import Answer
-from fuzzytree.auditing.views import View
-from fuzzytree.proving.states import Bracket, Span, Witness, point_of
+from fuzzytree.auditing.engine.states import Bracket, Span, Witness, point_of
+from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.views import View
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report.decision_map import exact_axes
 from fuzzytree.report.drawing import Axis
 from fuzzytree.report.markup import Markup, tag
 from fuzzytree.report.svg_regions import bar_picture, map_picture, windows
 from fuzzytree.report.text import counted
-from fuzzytree.rulebase import RuleBase
 
 _MOST_BARS = 6  # of one finding
 _MOST_MAP_RULES = 200

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.subject import Rows
-from fuzzytree.rulebase import RuleBase, Variable
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.model.rulebase import RuleBase, Variable
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.axes import axis_lines, plan_axes
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
 Counts = tuple[int, ...]
 """Rows of each class, in the order of the classes; rows of no class come last."""

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.records import Answer, Audit, Result, Severity
-from fuzzytree.proving.states import (
+from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
     Coordinate,
@@ -18,6 +16,8 @@ from fuzzytree.proving.states import (
     State,
     Witness,
 )
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.records import Answer, Audit, Result, Severity
 from fuzzytree.report.markup import Markup, folded, joined, table, tag
 from fuzzytree.report.text import counted, number
 
@@ -301,7 +301,7 @@ def result_text(result: Result) -> str:
     """Return what another verb found, in words.
 
     Example:
-        >>> from fuzzytree.auditing.records import Source
+        >>> from fuzzytree.auditing.findings.records import Source
         >>> result_text(Result("stability", Source("s.json", ""), 10, 1))
         '1 of 10 criteria fails'
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from fuzzytree.auditing.records import Answer, Audit
+from fuzzytree.auditing.findings.records import Answer, Audit
 from fuzzytree.report.audit_findings import anchors, gravest_first
 from fuzzytree.report.audit_states import (
     SEVERITIES,

@@ -6,11 +6,10 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import get_args
 
-from fuzzytree.report.text import aligned, counted, digits, duration
-from fuzzytree.timing.candidates import DEFAULT, title
-from fuzzytree.timing.clock import CONFIDENCE, times_faster
-from fuzzytree.timing.floors import READING
-from fuzzytree.timing.records import (
+from fuzzytree.benchmarking.candidates import DEFAULT, title
+from fuzzytree.benchmarking.clock import CONFIDENCE, times_faster
+from fuzzytree.benchmarking.floors import READING
+from fuzzytree.benchmarking.records import (
     Machine,
     Omission,
     Point,
@@ -18,6 +17,7 @@ from fuzzytree.timing.records import (
     Study,
     Timing,
 )
+from fuzzytree.report.text import aligned, counted, digits, duration
 
 _HEAD = (
     *("time a row", "+-", "speed", "floor x"),

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fuzzytree.model.rulebase import Clause, RuleBase, Shape, shapes_of
 from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.rulebase import Clause, RuleBase, Shape, shapes_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
 Degrees = list[Fraction]
 
@@ -29,7 +29,7 @@ def exact_axes(
     """Return the value of every variable at a point; None if an input has no value.
 
     Example:
-        >>> from fuzzytree.rulebase import Part, Rule, Variable
+        >>> from fuzzytree.model.rulebase import Part, Rule, Variable
         >>> sums = Variable("sum", parts=(Part("a", 2.0, 1.0),))
         >>> rules = RuleBase("r", ("k",), (Variable("a"), sums), (Rule((), "k"),))
         >>> exact_axes(rules, {"a": Fraction(1, 3)})["sum"]
@@ -68,7 +68,7 @@ def decisions(
         Shape (values down, values across).
 
     Example:
-        >>> from fuzzytree.rulebase import Band, Rule, Term, Variable
+        >>> from fuzzytree.model.rulebase import Band, Rule, Term, Variable
         >>> low = Term("low", Band(high=0.0))
         >>> axes = Variable("a", (low,)), Variable("b", (low,))
         >>> both = Rule((Clause("a", ("low",)), Clause("b", ("low",))), "k")

@@ -6,10 +6,10 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from fuzzytree.auditing.difference_records import Change, Compared, Difference
-from fuzzytree.auditing.records import Answer, Place
-from fuzzytree.naming import printable
-from fuzzytree.proving.states import Bracket, Coordinate, Witness
+from fuzzytree.auditing.diff.difference_records import Change, Compared, Difference
+from fuzzytree.auditing.engine.states import Bracket, Coordinate, Witness
+from fuzzytree.auditing.findings.records import Answer, Place
+from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import state_text, state_word
 from fuzzytree.report.svg_regions import span_text
 from fuzzytree.report.text import counted

@@ -8,15 +8,15 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
-from fuzzytree.inference.curves import curve_degree
-from fuzzytree.naming import printable
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.model.naming import printable
+from fuzzytree.model.rulebase import LR, Band, Part, Points, RuleBase, Shape, Variable
+from fuzzytree.model.system import Curve as SystemCurve
+from fuzzytree.model.system import Formula, FuzzySystem, Label, Linear, SystemInput
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.proving.domain import Domain
 from fuzzytree.report.markup import Attribute, Content, Markup, tag, trimmed
-from fuzzytree.rulebase import LR, Band, Part, Points, RuleBase, Shape, Variable
-from fuzzytree.system import Curve as SystemCurve
-from fuzzytree.system import Formula, FuzzySystem, Label, Linear, SystemInput
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.semantics.inference.curves import curve_degree
 
 LETTER = 0.58
 """How wide a letter of a picture is on average, in sizes of its font."""

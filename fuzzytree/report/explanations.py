@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
-from fuzzytree.auditing.codes import CODES, Code
+from fuzzytree.auditing.findings.codes import CODES, Code
 from fuzzytree.files import write_atomically
 from fuzzytree.report.audit import WIDTH
 from fuzzytree.report.text import aligned

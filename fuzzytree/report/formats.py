@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.abilities import MEANINGS, Ability
-from fuzzytree.contracts import Format
-from fuzzytree.options import OptionFacts
+from fuzzytree.checking.abilities import MEANINGS, Ability
+from fuzzytree.model.contracts import Format
+from fuzzytree.model.options import OptionFacts
 from fuzzytree.report.text import aligned
 
 Found = Mapping[str, tuple[Ability, ...] | str]

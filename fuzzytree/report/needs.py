@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from fuzzytree.agreement import Agreement
-from fuzzytree.dependencies import Because, Graph, Needs
-from fuzzytree.pruning import Removed
+from fuzzytree.benchmarking.clock import times_faster
+from fuzzytree.benchmarking.savings import Cost, File, Report, Size
+from fuzzytree.checking.dependencies import Because, Graph, Needs
+from fuzzytree.model.agreement import Agreement
 from fuzzytree.report.text import agreement_lines, aligned, counted, duration
-from fuzzytree.savings import Cost, File, Report, Size
-from fuzzytree.timing.clock import times_faster
+from fuzzytree.semantics.simplification import Removed
 
 _MOST = 12  # things told one by one; --json tells all
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fuzzytree.agreement import Agreement
-from fuzzytree.auditing.records import Audit
+from fuzzytree.auditing.findings.records import Audit
+from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.audit import audit_lines, verdict_text
 from fuzzytree.report.audit_checks import agreement_section
 from fuzzytree.report.audit_model import sentence_of
 from fuzzytree.report.markup import Markup, folded, joined, table, tag, text
 from fuzzytree.report.systems import system_lines
 from fuzzytree.report.text import head_lines, model_lines, term_lines
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
 
 
 def model_html(model: FuzzyTree | RuleBase | FuzzySystem) -> Markup:

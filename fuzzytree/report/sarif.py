@@ -9,9 +9,9 @@ from urllib.parse import quote
 
 import msgspec
 
-from fuzzytree.auditing.baselines import gone
-from fuzzytree.auditing.codes import CODES, Code
-from fuzzytree.auditing.records import Answer, Audit, Place, Severity
+from fuzzytree.auditing.findings.baselines import gone
+from fuzzytree.auditing.findings.codes import CODES, Code
+from fuzzytree.auditing.findings.records import Answer, Audit, Place, Severity
 from fuzzytree.report.audit_states import as_in_file, state_text, state_word
 
 SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"

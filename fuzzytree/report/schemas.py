@@ -11,33 +11,25 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, get_args
 
-import msgspec
+from fuzzytree.auditing.diff.difference_records import Difference, Verdict
+from fuzzytree.checking.stability.results import Stability
+from fuzzytree.model.agreement import Agreement
+from fuzzytree.schemas.generation import Json, of_result, record
 
-from fuzzytree.agreement import Agreement
-from fuzzytree.auditing.difference_records import Difference, Verdict
-from fuzzytree.auditing.records import Audit
-from fuzzytree.criteria.results import Stability
-from fuzzytree.holdout import Summary
-from fuzzytree.recognition.experiment import Study as Experiment
-from fuzzytree.recognition.timing import FramesStudy
-from fuzzytree.savings import Report
-from fuzzytree.schemas.generation import Json, of_result
-from fuzzytree.timing.records import Study
-
-FILES: Final[Mapping[str, type[msgspec.Struct]]] = MappingProxyType(
+FILES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "audit.schema.json": Audit,
-        "bench.schema.json": Study,
-        "check.schema.json": Agreement,
-        "diff.schema.json": Difference,
-        "experiment.schema.json": Experiment,
-        "learn.schema.json": Summary,
-        "needs.schema.json": Report,
-        "stability.schema.json": Stability,
-        "tactile-bench.schema.json": FramesStudy,
+        "audit.schema.json": "fuzzytree.auditing.findings.records:Audit",
+        "bench.schema.json": "fuzzytree.benchmarking.records:Study",
+        "check.schema.json": "fuzzytree.model.agreement:Agreement",
+        "diff.schema.json": "fuzzytree.auditing.diff.difference_records:Difference",
+        "experiment.schema.json": "fuzzytree.tactile.recognition.experiment:Study",
+        "learn.schema.json": "fuzzytree.api.holdout:Summary",
+        "needs.schema.json": "fuzzytree.benchmarking.savings:Report",
+        "stability.schema.json": "fuzzytree.checking.stability.results:Stability",
+        "tactile-bench.schema.json": "fuzzytree.tactile.recognition.timing:FramesStudy",
     }
 )
-"""Each file's name and the record that it describes."""
+"""Each file's name and the record that it describes, as MODULE:CLASS."""
 
 _OK: Mapping[str, Json] = {"ok": {"type": "boolean"}}
 """What `to_json` writes before the fields of a record that has a verdict."""
@@ -50,7 +42,7 @@ def generate(name: str) -> bytes:
         >>> b'"title": "Error against run time' in generate("bench.schema.json")
         True
     """
-    kind = FILES[name]
+    kind = record(FILES[name])
     added: dict[str, Json] = {}
     if issubclass(kind, Agreement | Stability):
         added |= {"format": {"const": kind.FORMAT}, "version": {"type": "string"}}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fuzzytree.criteria.results import (
+from fuzzytree.checking.stability.results import (
     Criterion,
     CurveFault,
     OffsetCost,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.proving.states import Span
+from fuzzytree.auditing.engine.states import Span
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report.decision_map import decisions
 from fuzzytree.report.drawing import (
     LETTER,
@@ -26,10 +27,9 @@ from fuzzytree.report.drawing import (
 from fuzzytree.report.markup import Markup, tag, trimmed
 from fuzzytree.report.svg_terms import DASHES, MOST_CURVES, outside, scale_of
 from fuzzytree.report.svg_tree import class_mark
-from fuzzytree.rulebase import RuleBase
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import IntArray
+    from fuzzytree.model.contracts import IntArray
 
 _WIDE, _HIGH = 340.0, 92.0
 _LEFT, _RIGHT, _TOP, _BASE = 8.0, 332.0, 22.0, 70.0

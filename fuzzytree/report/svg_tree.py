@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
+from fuzzytree.model.tree import FuzzyTree, Node, intervals
 from fuzzytree.report.audit_rows import Counts, Passing
 from fuzzytree.report.drawing import LETTER, cut, svg, words
 from fuzzytree.report.markup import Markup, tag
 from fuzzytree.report.text import counted, number
-from fuzzytree.tree import FuzzyTree, Node, intervals
 
 MOST_LEAVES = 120
 """Of a tree that is drawn; a larger one is told as an outline."""

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.contracts import Document
-from fuzzytree.outputs import Outputs
-from fuzzytree.readers.formulas import text_of
-from fuzzytree.reference import Status
-from fuzzytree.report.text import aligned, counted, depth, number, shape_text
-from fuzzytree.rulebase import LR, Band, Part, Points, RuleBase
-from fuzzytree.system import (
+from fuzzytree.formats.formulas import text_of
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import LR, Band, Part, Points, RuleBase
+from fuzzytree.model.system import (
     Activation,
     And,
     Binary,
@@ -33,7 +30,10 @@ from fuzzytree.system import (
     SystemRule,
     Trapezoid,
 )
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.report.text import aligned, counted, depth, number, shape_text
+from fuzzytree.runtimes.outputs import Outputs
+from fuzzytree.semantics.reference import Status
 
 
 def document_text(model: Document) -> str:
@@ -289,7 +289,7 @@ def curve_text(curve: Curve, columns: Sequence[str] = ()) -> str:
     Example:
         >>> curve_text(Trapezoid(0.0, 1.0, 1.0, 3.0))
         '1 at 1, rises from 0 at 0, falls to 0 at 3'
-        >>> from fuzzytree.system import Gaussian
+        >>> from fuzzytree.model.system import Gaussian
         >>> curve_text(Gaussian(mean=2.0, deviation=0.5))
         'gaussian: mean 2, deviation 0.5'
     """

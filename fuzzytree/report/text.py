@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from fuzzytree.agreement import Agreement, Certified, Comparison
-from fuzzytree.contracts import Format, Runtime
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.proving.wording import counted as counted  # for other reports too
-from fuzzytree.proving.wording import number_text
-from fuzzytree.rulebase import (
+from fuzzytree.auditing.engine.wording import (  # for other reports too
+    counted as counted,
+)
+from fuzzytree.auditing.engine.wording import number_text
+from fuzzytree.model.agreement import Agreement, Certified, Comparison
+from fuzzytree.model.contracts import Format, Runtime
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Flank,
@@ -22,8 +23,9 @@ from fuzzytree.rulebase import (
     Variable,
     sentence,
 )
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.runtimes.onnxruntime import Facts, OnnxModel
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.semantics.lowering import rules_from_tree
 
 _MOST_PAIRS = 6  # points that a line of text shows one by one
 _UNITS = ((1e9, "s"), (1e6, "ms"), (1e3, "µs"))

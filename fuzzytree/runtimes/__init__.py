@@ -1,8 +1,8 @@
 """What can execute a model, one module per runtime family, and their table.
 
 A runtime is a value in the tuple `RUNTIMES` of its module (see
-`fuzzytree.contracts.Runtime`), and the module a line in `TABLE`. These modules import
-what they run on only inside `load`, so the table can be read without it.
+`fuzzytree.model.contracts.Runtime`), and the module a line in `TABLE`. These modules
+import what they run on only inside `load`, so the table can be read without it.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import importlib.util
 import shutil
 from collections.abc import Sequence
 
-from fuzzytree.contracts import Runtime
 from fuzzytree.errors import install_hint
-from fuzzytree.naming import as_names
+from fuzzytree.model.contracts import Runtime
+from fuzzytree.model.naming import as_names
 
 TABLE = (
     "fuzzytree.runtimes.reference",

@@ -28,8 +28,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.contracts import Outcome, Run
-from fuzzytree.rulebase import LR, Band, Clause, Points, RuleBase, Shape, shapes_of
+from fuzzytree.model.contracts import Outcome, Run
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Points,
+    RuleBase,
+    Shape,
+    shapes_of,
+)
 from fuzzytree.runtimes.axes import axis_lines, missing_rows, plan_axes
 from fuzzytree.runtimes.descent import Split, plan_descent
 from fuzzytree.runtimes.envelope import (
@@ -46,7 +54,7 @@ from fuzzytree.runtimes.rows import checked
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
 _CHUNK = 1 << 13  # rows: their cells shall stay in the cache
 _PAIRS = 1 << 11  # rows and rules whose strengths are computed together
@@ -156,7 +164,7 @@ def search(rules: RuleBase) -> Run:
         the status that firing gives, to the bit, and without strengths.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(0), "raw")
         >>> search(rules)(np.zeros((len(rules.inputs), 2))).rule.shape

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from fuzzytree.contracts import (
+from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
+from fuzzytree.exporters.c import write
+from fuzzytree.model.contracts import (
     Model,
     Outcome,
     Run,
@@ -24,16 +26,14 @@ from fuzzytree.contracts import (
     SystemOutcome,
     SystemRun,
 )
-from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
-from fuzzytree.exporters.c import write
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
 from fuzzytree.runtimes.rows import checked
-from fuzzytree.system import FuzzySystem
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
     Decide = Callable[..., None]
 

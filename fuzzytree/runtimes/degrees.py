@@ -1,7 +1,7 @@
 """Degrees of terms for many rows: few wide operations on blocks that fit the cache.
 
-The operations on one number, and their order, are those of `fuzzytree.reference`.
-What is rearranged changes no bit:
+The operations on one number, and their order, are those of
+`fuzzytree.semantics.reference`. What is rearranged changes no bit:
 
 - A band is one or two *edges*; at any value at most one of them is below 1, so the
   smaller is the band's degree. An LR set is two *slopes* in the same way, or one
@@ -20,16 +20,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.contracts import Dtype
-from fuzzytree.interrupts import checkpoint
+from fuzzytree.model.contracts import Dtype
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import LR, Flank, Points, Shape, Side
 from fuzzytree.numerics.segments import segments
-from fuzzytree.rulebase import LR, Flank, Points, Shape, Side
 from fuzzytree.runtimes.polylines import counted, halved, join
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import IntArray
+    from fuzzytree.model.contracts import IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
     Real = np.dtype[np.floating[Any]]
@@ -321,7 +321,7 @@ def shape_degrees(shape: Shape, values: Reals) -> Reals:
     """Return the degree of each of some finite doubles, bit-equal to the reference.
 
     Example:
-        >>> from fuzzytree.rulebase import Band
+        >>> from fuzzytree.model.rulebase import Band
         >>> band = Band(0.0, 1.0, right=Flank(1.0, 2.0))
         >>> shape_degrees(band, np.array([0.0, 1.0, 1.25])).tolist()
         [0.0, 1.0, 0.75]

@@ -21,7 +21,7 @@ import numpy as np
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import IntArray
+    from fuzzytree.model.contracts import IntArray
 
     Real = np.dtype[np.floating[Any]]
     Reals = npt.NDArray[np.floating[Any]]

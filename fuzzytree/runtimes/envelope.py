@@ -33,8 +33,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.numerics.segments import Segments, segments
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -45,13 +44,14 @@ from fuzzytree.rulebase import (
     Side,
     shapes_of,
 )
+from fuzzytree.numerics.segments import Segments, segments
 from fuzzytree.runtimes.degrees import DOUBLE, NUMBERS
 from fuzzytree.runtimes.polylines import halved, join
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
     Singles = npt.NDArray[np.float32]
     Bools = npt.NDArray[np.bool_]

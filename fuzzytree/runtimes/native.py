@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from fuzzytree.contracts import Dtype, Model, Run, Runtime
 from fuzzytree.errors import LossError
+from fuzzytree.model.contracts import Dtype, Model, Run, Runtime
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.numerics.narrowing import losses
-from fuzzytree.rulebase import RuleBase
 from fuzzytree.runtimes.best_first import search
 from fuzzytree.runtimes.native_rules import fire
 from fuzzytree.runtimes.native_tree import follow

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.contracts import Dtype, Outcome, Run
-from fuzzytree.rulebase import Clause, RuleBase, shapes_of
+from fuzzytree.model.contracts import Dtype, Outcome, Run
+from fuzzytree.model.rulebase import Clause, RuleBase, shapes_of
 from fuzzytree.runtimes.axes import Axes, axis_lines, missing_rows, plan_axes
 from fuzzytree.runtimes.degrees import (
     NUMBERS,
@@ -29,7 +29,7 @@ from fuzzytree.runtimes.rows import checked, winners
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
     Reals = npt.NDArray[np.floating[Any]]
 
@@ -107,13 +107,13 @@ def fire(rules: RuleBase, dtype: Dtype = "float64") -> Run:
 
     Args:
         rules: The rule base.
-        dtype: The number type, as in `fuzzytree.contracts`.
+        dtype: The number type, as in `fuzzytree.model.contracts`.
 
     Returns:
         A function from values of shape (inputs, rows) to an outcome with strengths.
 
     Example:
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(0))
         >>> fire(rules)(np.zeros((len(rules.inputs), 2))).strengths.shape

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.contracts import Dtype, Outcome, Run
+from fuzzytree.model.contracts import Dtype, Outcome, Run
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes.axes import (
     Axes,
     axis_lines,
@@ -26,10 +27,9 @@ from fuzzytree.runtimes.descent import (
     plan_descent,
 )
 from fuzzytree.runtimes.rows import checked
-from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 
 def follow(tree: FuzzyTree, dtype: Dtype = "float64") -> Run:

@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fuzzytree.contracts import Model, Outcome, Run
-from fuzzytree.programs.evaluate import still_results
-from fuzzytree.programs.operations import INEXACT, LOGICAL, NUMERIC
-from fuzzytree.programs.steps import Program
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.model.contracts import Model, Outcome, Run
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes import native, reference
+from fuzzytree.semantics.programs.evaluate import still_results
+from fuzzytree.semantics.programs.operations import INEXACT, LOGICAL, NUMERIC
+from fuzzytree.semantics.programs.steps import Program
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 _FEW_RULES = 16  # from about twice as many on, numpy is faster on one row too
 
@@ -34,7 +34,7 @@ def row_runner(program: Program) -> RunRow | None:
         library's own.
 
     Example:
-        >>> from fuzzytree.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, Result
         >>> make = Maker()
         >>> x = make.input("x")
         >>> twice = Result("output", "y", make("add", x, x))
@@ -78,7 +78,7 @@ def load(model: Model) -> Run:
 
     Example:
         >>> import numpy as np
-        >>> from fuzzytree.lowering import rules_from_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(0))
         >>> load(rules)(np.zeros((len(rules.inputs), 1))).strengths.shape

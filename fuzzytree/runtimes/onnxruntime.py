@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fuzzytree.contracts import (
+from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
+from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
+from fuzzytree.model.contracts import (
     Carrier,
     Dtype,
     Model,
@@ -23,19 +25,17 @@ from fuzzytree.contracts import (
     SystemOutcome,
     SystemRun,
 )
-from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
-from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
-from fuzzytree.rulebase import Semantics, text_fault
-from fuzzytree.system import FuzzySystem
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.rulebase import Semantics, text_fault
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
     import onnx
 
-    from fuzzytree.contracts import FloatArray
     from fuzzytree.exporters.onnx_session import Bare, Session
+    from fuzzytree.model.contracts import FloatArray
 
     Outputs = dict[str, npt.NDArray[np.generic]]
 
@@ -54,7 +54,8 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
         carrier: Whether its graph follows a tree's path or fires rules.
         kind: `descent`, `relative`, `raw`, or `rules` for rules from no tree.
         dtype: The number type.
-        fingerprint: Of the model that was written (`fuzzytree.rulebase.fingerprint`).
+        fingerprint: Of the model that was written
+            (`fuzzytree.model.rulebase.fingerprint`).
         version: Of the fuzzytree that wrote it.
         columns: The columns of the graph's input.
         inputs: Those of them that matter.

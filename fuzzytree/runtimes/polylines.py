@@ -4,7 +4,7 @@ First the line of each value is found: `counted` compares it with every point, w
 best for few points; `halved` moves on from the shape's first line, by half of the room
 that is left, wherever the value is above the point there. Then `join` computes the
 degree; the operations on one number, and their order, are those of
-`fuzzytree.reference`.
+`fuzzytree.semantics.reference`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import IntArray
+    from fuzzytree.model.contracts import IntArray
     from fuzzytree.numerics.segments import Reals, Segments
 
 

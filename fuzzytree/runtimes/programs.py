@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fuzzytree.interrupts import checkpoint
-from fuzzytree.programs.evaluate import Found, still_results
-from fuzzytree.programs.steps import Program, Step
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.semantics.programs.evaluate import Found, still_results
+from fuzzytree.semantics.programs.steps import Program, Step
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
     Values = npt.NDArray[Any]
     Function = Callable[..., Values]
@@ -214,7 +214,7 @@ def run_program(plan: Plan, values: FloatArray) -> FloatArray:
         values: Of shape (inputs, rows), in the order of the program's inputs.
 
     Example:
-        >>> from fuzzytree.programs.steps import Maker, Result
+        >>> from fuzzytree.semantics.programs.steps import Maker, Result
         >>> make = Maker()
         >>> x = make.input("x")
         >>> twice = Result("output", "y", make("add", x, x))

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fuzzytree.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.exporters.python import write
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.model.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.model.rulebase import RuleBase
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
     Given = tuple[str | None, int, int] | tuple[str | None, int, int, list[float]]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fuzzytree.contracts import Model, Outcome, Run, Runtime
-from fuzzytree.reference import Answer, descend, evaluate
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.model.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.semantics.reference import Answer, descend, evaluate
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 
 def load(model: Model) -> Run:

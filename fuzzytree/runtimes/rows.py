@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray, IntArray
+    from fuzzytree.model.contracts import FloatArray, IntArray
 
 
 def checked(values: npt.ArrayLike, inputs: Sequence[str]) -> FloatArray:

@@ -17,9 +17,18 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.probing import landmarks
-from fuzzytree.rulebase import LR, Band, Flank, Points, RuleBase, Shape, Side, shapes_of
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    shapes_of,
+)
 from fuzzytree.runtimes.degrees import shape_degrees
+from fuzzytree.semantics.probing import landmarks
 
 FloatArray = npt.NDArray[np.float64]
 

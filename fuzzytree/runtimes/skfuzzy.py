@@ -16,12 +16,12 @@ import operator
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from fuzzytree.contracts import Model, Outcome, Run, Runtime
 from fuzzytree.errors import LossError, MissingExtraError, install_hint
-from fuzzytree.rulebase import Clause, RuleBase, Shape
+from fuzzytree.model.contracts import Model, Outcome, Run, Runtime
+from fuzzytree.model.rulebase import Clause, RuleBase, Shape
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 _MOST_POINTS = 128  # on each curved piece of a shape
 _MOST_NUMBERS = 1 << 20  # samples of one variable, over all of its terms

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fuzzytree.contracts import SystemOutcome, SystemRun
-from fuzzytree.inference import infer
-from fuzzytree.programs.systems import from_system
-from fuzzytree.system import FuzzySystem
+from fuzzytree.model.contracts import SystemOutcome, SystemRun
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.programs.systems import from_system
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 
 def infer_rows(system: FuzzySystem, /, *, activations: bool = False) -> SystemRun:

@@ -1,6 +1,6 @@
 """Written programs, each run by an engine of its language.
 
-A file runs as it is. `fuzzytree.checking_programs` compares its text first.
+A file runs as it is. `fuzzytree.checking.programs` compares its text first.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from fuzzytree.contracts import Model, Outcome
 from fuzzytree.errors import FuzzyTreeError, MissingExtraError
 from fuzzytree.exporters.c import beginning
-from fuzzytree.reference import Status
-from fuzzytree.rulebase import RuleBase
+from fuzzytree.model.contracts import Model, Outcome
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes import c
+from fuzzytree.semantics.reference import Status
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
-    from fuzzytree.options import Option
+    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model.options import Option
 
 Options = Mapping[str, "Option"]
 _LONGEST_WAIT = 600.0  # seconds

@@ -10,8 +10,8 @@ import numpy as np
 
 from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.files import PathLike, reason
-from fuzzytree.tactile.line.recording import read_recording
-from fuzzytree.tactile.line.records import MAGIC
+from fuzzytree.tactile.link.recording import read_recording
+from fuzzytree.tactile.link.records import MAGIC
 from fuzzytree.tactile.presses import Presses, read_presses
 from fuzzytree.tactile.sensor import Sensor
 

@@ -12,8 +12,8 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.cli import main
-from fuzzytree.rulebase import Band, Flank, Term, Variable
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.model.rulebase import Band, Flank, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 
 GRASPS = "slip,force,note,grip\n0,1.5,a,soft\n1,2.5,b,firm\n0,3,c,loose\n1,,d,firm\n"
 

@@ -11,11 +11,11 @@ import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.agreement import Agreement, Comparison
-from fuzzytree.auditing.limits import digest_of
-from fuzzytree.auditing.results import read_results
-from fuzzytree.criteria.results import Stability, judged
-from fuzzytree.rulebase import fingerprint
+from fuzzytree.auditing.findings.limits import digest_of
+from fuzzytree.auditing.findings.results import read_results
+from fuzzytree.checking.stability.results import Stability, judged
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.rulebase import fingerprint
 from tests.cli.conftest import Call, grip
 
 ROOT = Path(__file__).resolve().parents[2]

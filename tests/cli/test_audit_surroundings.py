@@ -14,9 +14,9 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree import verbs
+from fuzzytree.api import verbs
+from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.report.audit_page import page
-from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from tests.cli.conftest import Call
 
 ASKED = ("--select", "FT1,FT301,FT404")

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree import verbs
+from fuzzytree.api import verbs
+from fuzzytree.benchmarking.records import Study
 from fuzzytree.report.bench import study_lines
 from fuzzytree.report.text import duration
-from fuzzytree.timing.records import Study
+from tests.benchmarking.studies import error, point, study, timing
 from tests.cli.conftest import Call
-from tests.timing.studies import error, point, study, timing
 
 pytestmark = pytest.mark.usefixtures("few_objects")
 

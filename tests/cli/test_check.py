@@ -13,8 +13,8 @@ from msgspec.structs import replace
 from onnx import numpy_helper
 
 import fuzzytree as ft
-from fuzzytree.agreement import Agreement, Certified, Comparison
 from fuzzytree.errors import DisagreementError
+from fuzzytree.model.agreement import Agreement, Certified, Comparison
 from fuzzytree.report.text import agreement_lines
 from tests.cli.conftest import Call, grip
 

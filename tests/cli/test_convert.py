@@ -12,14 +12,14 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.cli import main
-from fuzzytree.contracts import Document, Loss, Reading, Written
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, yaml
-from fuzzytree.random_systems import random_system
-from fuzzytree.readers.yaml import reading
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.samples import samples
-from fuzzytree.system import FuzzySystem
+from fuzzytree.formats.yaml.yaml import reading
+from fuzzytree.model.contracts import Document, Loss, Reading, Written
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.semantics.random_systems import random_system
+from fuzzytree.semantics.samples import samples
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 

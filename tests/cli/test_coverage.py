@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from tests.test_singletons import FLL
+from tests.semantics.test_singletons import FLL
 
 IDLE = """  rule: if x is low and x is high then y is third
 """

@@ -49,7 +49,7 @@ def test_the_delimiter_can_be_told_where_a_message_asks_for_it(
 def test_needs_refuses_a_place_without_a_folder_before_any_work(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fuzzytree.savings.report", None)
+    monkeypatch.setattr("fuzzytree.benchmarking.savings.report", None)
     message = (
         "no/left.yaml: cannot be written: "
         "there is no folder 'no'; mkdir -p no makes it\n"

@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.rulebase import Rule
+from fuzzytree.model.rulebase import Rule
 from tests.cli.conftest import Call, grip
 
 SCHEMA = Path(__file__).resolve().parents[2] / "schemas" / "diff.schema.json"

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.abilities import abilities
-from fuzzytree.answers import Answers
+from fuzzytree.checking.abilities import abilities
 from fuzzytree.cli.doctor import CORE, EXTRAS
 from fuzzytree.exporters import TABLE, all_formats
 from fuzzytree.runtimes import all_runtimes
+from fuzzytree.runtimes.answers import Answers
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -25,7 +25,7 @@ TRIED = functools.cache(abilities)
 
 @pytest.fixture(autouse=True)
 def _each_format_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fuzzytree.abilities.abilities", TRIED)
+    monkeypatch.setattr("fuzzytree.checking.abilities.abilities", TRIED)
 
 
 def _without(monkeypatch: pytest.MonkeyPatch, module: str) -> None:

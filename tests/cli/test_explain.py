@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from fuzzytree.auditing.codes import CODES
+from fuzzytree.auditing.findings.codes import CODES
 from tests.cli.conftest import Call
 
 

@@ -10,10 +10,10 @@ import pytest
 from msgspec.structs import replace
 
 import fuzzytree as ft
-from fuzzytree.contracts import Model, Written
 from fuzzytree.exporters import TABLE, yaml
-from fuzzytree.rulebase import Band, RuleBase, Term, Variable
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.model.contracts import Model, Written
+from fuzzytree.model.rulebase import Band, RuleBase, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from tests.cli.conftest import Call, grip
 
 HELP = "\n  fuzzytree export --help tells more\n"

@@ -14,8 +14,8 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.cli.learn import command
 from fuzzytree.learning import Settings
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent

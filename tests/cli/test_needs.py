@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree import dependencies
+from fuzzytree.checking import dependencies
 from fuzzytree.exporters import TABLE
-from fuzzytree.pruning import Pruned, pruned
-from fuzzytree.rulebase import Band, Term, Variable
+from fuzzytree.model.rulebase import Band, Term, Variable
+from fuzzytree.semantics.simplification import Pruned, pruned
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip
 
@@ -118,7 +118,7 @@ def test_a_pruned_model_that_differs_is_not_written(
             (),
         )
 
-    monkeypatch.setattr("fuzzytree.pruning.pruned", planted)
+    monkeypatch.setattr("fuzzytree.semantics.simplification.pruned", planted)
     code, out, err = call("needs", "grip.yaml", "-o", "left.yaml")
     assert code == 1
     assert "node 1 is another node" in out
@@ -171,7 +171,7 @@ def test_without_onnx_the_rest_is_told(
         raise MissingExtraError("writing onnx needs the extra 'onnx'")
 
     monkeypatch.setattr(dependencies, "write_onnx", missing)
-    monkeypatch.setattr("fuzzytree.savings.write_onnx", missing)
+    monkeypatch.setattr("fuzzytree.benchmarking.savings.write_onnx", missing)
     code, out, _ = call("needs", "grip.yaml")
     assert code == 0
     assert "not told: tree in float64: writing onnx needs the extra 'onnx'" in out

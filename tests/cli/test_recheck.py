@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.rechecking.fixed import LIMITS
+from fuzzytree.auditing.recheck.fixed import LIMITS
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -68,7 +68,7 @@ def test_a_file_that_is_not_there_is_one_sentence(call: Call) -> None:
 
 def test_the_module_is_the_same_program(call: Call, audit: dict[str, object]) -> None:
     ran = subprocess.run(
-        [sys.executable, "-m", "fuzzytree.rechecking", "audit.json", "grip.yaml"],
+        [sys.executable, "-m", "fuzzytree.auditing.recheck", "audit.json", "grip.yaml"],
         capture_output=True,
         text=True,
         check=False,

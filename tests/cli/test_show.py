@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Shape, Side, fingerprint
+from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.report.text import model_lines, shape_text
-from fuzzytree.rulebase import LR, Band, Flank, Points, Shape, Side, fingerprint
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
-from fuzzytree.tree import FuzzyTree, Leaf
 from tests.cli.conftest import Call, grip
 
 RULES = """\

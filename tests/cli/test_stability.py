@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.rulebase import LR, Side, Term
+from fuzzytree.model.rulebase import LR, Side, Term
+from tests.checking.stability.defects import one_rule
 from tests.cli.conftest import Call
-from tests.criteria.defects import one_rule
 
 NATIVE = ("--runtime", "native", "--runtime", "native float32")
 

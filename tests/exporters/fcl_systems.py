@@ -5,9 +5,9 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
-from fuzzytree.readers.fcl_dialects import DEFUZZIFIERS
-from fuzzytree.rulebase import Points
-from fuzzytree.system import (
+from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
     Activation,
     And,
     Arc,

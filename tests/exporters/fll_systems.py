@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from fuzzytree.rulebase import LR, Band
-from fuzzytree.system import (
+from fuzzytree.model.rulebase import LR, Band
+from fuzzytree.model.system import (
     And,
     Condition,
     Defuzzifier,

@@ -16,11 +16,11 @@ from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
 from fuzzytree.exporters.c_tree import questions_of
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import Status, descend, evaluate
-from fuzzytree.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import Status, descend, evaluate
 from fuzzytree.testing import probes, random_system, random_tree, with_points
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 HOSTILE = (
     "*/ int x; /*",

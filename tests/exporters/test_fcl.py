@@ -13,18 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fuzzytree.casting import as_system, flattened, winner
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import check_list, write
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
-from fuzzytree.inference import infer, input_values
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.random_systems import random_rows, random_system
-from fuzzytree.readers.fcl import read
-from fuzzytree.reference import evaluate
-from fuzzytree.rulebase import Points, RuleBase
-from fuzzytree.samples import samples
-from fuzzytree.system import (
+from fuzzytree.formats.fcl.fcl import read
+from fuzzytree.model.rulebase import Points, RuleBase
+from fuzzytree.model.system import (
     And,
     Condition,
     Defuzzifier,
@@ -34,6 +28,12 @@ from fuzzytree.system import (
     Or,
     RuleBlock,
 )
+from fuzzytree.semantics.conversion import as_system, flattened, winner
+from fuzzytree.semantics.inference import infer, input_values
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.random_systems import random_rows, random_system
+from fuzzytree.semantics.reference import evaluate
+from fuzzytree.semantics.samples import samples
 from fuzzytree.testing import random_tree, with_points
 from tests.exporters.fcl_systems import tamed
 

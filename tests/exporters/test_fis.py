@@ -10,20 +10,16 @@ from typing import get_args
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.anonymous import anonymous
-from fuzzytree.casting import as_system, flattened, pointed
-from fuzzytree.contracts import Written
+from fuzzytree.checking.anonymous import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fis import write
 from fuzzytree.exporters.fis_terms import term_of
-from fuzzytree.inference import infer
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.readers.fis import DEFAULTS, always_concluded, reading
-from fuzzytree.readers.fis_words import CONCLUDING_HEDGES, DIALECTS, HEDGES, Dialect
-from fuzzytree.reference import evaluate
-from fuzzytree.rulebase import Points, RuleBase
-from fuzzytree.system import (
+from fuzzytree.formats.fis.fis import DEFAULTS, always_concluded, reading
+from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, DIALECTS, HEDGES, Dialect
+from fuzzytree.model.contracts import Written
+from fuzzytree.model.rulebase import Points, RuleBase
+from fuzzytree.model.system import (
     And,
     Bell,
     Binary,
@@ -52,6 +48,10 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.semantics.conversion import as_system, flattened, pointed
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import evaluate
 from fuzzytree.testing import probes, random_tree
 from tests.seeds import seeds
 

@@ -10,15 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from fuzzytree.anonymous import anonymous
-from fuzzytree.casting import FACTS, Scores, as_system, pointed
+from fuzzytree.checking.anonymous import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
-from fuzzytree.inference import infer
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.readers.fll import read
-from fuzzytree.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
-from fuzzytree.system import (
+from fuzzytree.formats.fll.fll import read
+from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
+from fuzzytree.model.system import (
     Activation,
     And,
     Arc,
@@ -48,6 +45,9 @@ from fuzzytree.system import (
     TNorm,
     Trapezoid,
 )
+from fuzzytree.semantics.conversion import FACTS, Scores, as_system, pointed
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_rows, random_tree
 from tests.exporters.fll_systems import plain_system
 

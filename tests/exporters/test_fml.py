@@ -8,16 +8,14 @@ from collections.abc import Sequence
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.anonymous import anonymous
-from fuzzytree.casting import pointed
+from fuzzytree.checking.anonymous import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fml import write
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.readers.fml import reading
-from fuzzytree.readers.fml_words import FAR, MODIFIERS, USUAL
-from fuzzytree.rulebase import Clause, Kind, Points, Rule
-from fuzzytree.system import (
+from fuzzytree.formats.fml.fml import reading
+from fuzzytree.formats.fml.fml_words import FAR, MODIFIERS, USUAL
+from fuzzytree.model.rulebase import Clause, Kind, Points, Rule
+from fuzzytree.model.system import (
     And,
     Conclusion,
     Condition,
@@ -41,6 +39,8 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.semantics.conversion import pointed
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 
 

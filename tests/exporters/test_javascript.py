@@ -1,4 +1,4 @@
-"""Generated JavaScript as text; `tests/witnesses/test_node.py` runs it."""
+"""Generated JavaScript as text; `tests/interop/test_node.py` runs it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import pytest
 
 from fuzzytree.exporters.javascript import FORMAT, digest_of, write
 from fuzzytree.exporters.js_text import literal, number_text, text_of
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Flank,
@@ -21,6 +20,7 @@ from fuzzytree.rulebase import (
     Variable,
     fingerprint,
 )
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
 
 HOSTILE = (

@@ -16,15 +16,12 @@ import onnx
 import onnxruntime
 import pytest
 
-from fuzzytree.contracts import Dtype, Model
 from fuzzytree.errors import DisagreementError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format, onnx_outputs
 from fuzzytree.exporters.onnx import FORMAT, IRS, OPSETS, Output, write
 from fuzzytree.exporters.onnx_graph import Sheet
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.narrowing import rounded
-from fuzzytree.reference import evaluate
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -38,8 +35,11 @@ from fuzzytree.rulebase import (
     Variable,
     fingerprint,
 )
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.numerics.narrowing import rounded
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import evaluate
 from fuzzytree.testing import random_tree
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "onnx"
 EVERY: tuple[Output, ...] = ("label", "rule", "status", "strengths")
@@ -121,7 +121,7 @@ def test_the_text_form_of_a_small_model_is_the_golden_one(case: str) -> None:
 def test_equal_models_give_equal_bytes_in_another_process() -> None:
     code = (
         "import hashlib; from fuzzytree.testing import random_tree; "
-        "from fuzzytree.lowering import rules_from_tree; "
+        "from fuzzytree.semantics.lowering import rules_from_tree; "
         "from fuzzytree.exporters.onnx import write; "
         "tree = random_tree(5, leaves=12); "
         "made = [write(m, readable=r).content for m, r in "

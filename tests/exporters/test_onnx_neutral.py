@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fuzzytree.criteria.carriers import unequal
-from fuzzytree.probing import probe_values
-from fuzzytree.rulebase import (
+from fuzzytree.checking.stability.carriers import unequal
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -21,8 +20,9 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.runtimes import find_runtime
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.semantics.probing import probe_values
 
 pytest.importorskip("onnxruntime")
 

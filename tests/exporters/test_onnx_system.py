@@ -9,18 +9,15 @@ import numpy as np
 import onnx
 import pytest
 
-from fuzzytree.converting import read
+from fuzzytree.checking.converting import read
 from fuzzytree.errors import DisagreementError, LossError, ReadError
 from fuzzytree.exporters import onnx_steps, onnx_wide
 from fuzzytree.exporters.onnx import OPSETS, Output, write
 from fuzzytree.exporters.onnx_compare import differences
 from fuzzytree.exporters.onnx_contents import contents
 from fuzzytree.exporters.onnx_wide import is_wide
-from fuzzytree.programs.systems import from_system
-from fuzzytree.rulebase import fingerprint
-from fuzzytree.runtimes.onnxruntime import open_onnx
-from fuzzytree.runtimes.systems import infer_rows
-from fuzzytree.system import (
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.system import (
     And,
     Conclusion,
     Defuzzifier,
@@ -35,6 +32,9 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
 )
+from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.semantics.programs.systems import from_system
 from fuzzytree.testing import random_rows, random_system
 
 SYSTEM = random_system(3, formulas="none")

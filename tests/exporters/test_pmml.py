@@ -14,12 +14,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.pmml import write
-from fuzzytree.inference import infer
-from fuzzytree.inference.formulas import exponential, logarithm, power, quotient
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.probing import probes
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     Clause,
     Kind,
     Points,
@@ -29,7 +24,7 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
-from fuzzytree.system import (
+from fuzzytree.model.system import (
     Call,
     Conclusion,
     Defuzzifier,
@@ -46,8 +41,18 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
 )
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.inference.formulas import (
+    exponential,
+    logarithm,
+    power,
+    quotient,
+)
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import probes
+from fuzzytree.semantics.reference import descend, evaluate
 from fuzzytree.testing import random_rows, random_system, random_tree, with_points
-from fuzzytree.tree import FuzzyTree
 
 SPACE = "{http://www.dmg.org/PMML-4_4}"
 Fields = dict[str, float | None]

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.exporters.python import FORMAT, parameters, write
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Flank,
@@ -27,9 +25,11 @@ from fuzzytree.rulebase import (
     Variable,
     fingerprint,
 )
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import descend, evaluate
 from fuzzytree.testing import probes, random_tree
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 HOSTILE = (
     "import os; os.abort() #",

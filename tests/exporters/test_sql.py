@@ -9,16 +9,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from fuzzytree.contracts import Model, Outcome
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.sql import MOST_RULES, write
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Band, Clause, Rule, RuleBase, Semantics, Term, Variable
+from fuzzytree.model.contracts import Model, Outcome
+from fuzzytree.model.rulebase import (
+    Band,
+    Clause,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
 from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree, with_points
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 
 def answered(model: Model, values: FloatArray) -> tuple[list[tuple[object, ...]], int]:

@@ -1,4 +1,4 @@
-"""Structured Text as text; `tests/witnesses/test_structured_text.py` runs it."""
+"""Structured Text as text; `tests/interop/test_structured_text.py` runs it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import pytest
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.st_text import LONG, RESERVED, SINGLE, identifiers, remark
 from fuzzytree.exporters.structured_text import write
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Flank,
@@ -23,9 +22,10 @@ from fuzzytree.rulebase import (
     Variable,
     fingerprint,
 )
-from fuzzytree.samples import samples
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.samples import samples
 from fuzzytree.testing import random_tree
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 
 def grip() -> RuleBase:

@@ -11,14 +11,13 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzytree.contracts import Model, Reading
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.yaml import FORMAT, write
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.readers import layout, nodes
-from fuzzytree.readers.nodes import Scalar, compose
-from fuzzytree.readers.yaml import read
-from fuzzytree.rulebase import (
+from fuzzytree.formats.yaml import layout, nodes
+from fuzzytree.formats.yaml.nodes import Scalar, compose
+from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.model.contracts import Model, Reading
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -32,8 +31,9 @@ from fuzzytree.rulebase import (
     Variable,
     text_fault,
 )
+from fuzzytree.model.tree import FuzzyTree, Leaf
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
-from fuzzytree.tree import FuzzyTree, Leaf
 from tests.seeds import seeds
 
 POSITIVE = Path(__file__).parents[1] / "example-files" / "positive"
@@ -310,7 +310,7 @@ def test_the_writer_counts_the_nodes_that_the_reader_counts(
         root, _ = compose(content, "x.yaml")
         count = _size(root)
         monkeypatch.setattr("fuzzytree.exporters.yaml_text.MOST_NODES", count)
-        monkeypatch.setattr("fuzzytree.readers.nodes.MOST_NODES", count)
+        monkeypatch.setattr("fuzzytree.formats.yaml.nodes.MOST_NODES", count)
         assert read(write(model).content, "x.yaml") == model
         monkeypatch.setattr("fuzzytree.exporters.yaml_text.MOST_NODES", count - 1)
         with pytest.raises(LossError):

@@ -19,9 +19,9 @@ from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.learning.combination import fisher_direction, node_view
 from fuzzytree.learning.patterns import Patterns, make_patterns
 from fuzzytree.learning.statistics import Statistics
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import degree, descend, evaluate
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import degree, descend, evaluate
 
 Mode = Literal["default", "paper"]
 MODES: tuple[Mode, ...] = ("default", "paper")

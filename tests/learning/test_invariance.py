@@ -16,8 +16,8 @@ from sklearn import datasets
 from fuzzytree.exporters import yaml
 from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
 from fuzzytree.learning.arrays import FloatArray, IntArray
-from fuzzytree.reference import descend
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.reference import descend
 
 Mode = Literal["default", "paper"]
 MODES: tuple[Mode, ...] = ("default", "paper")

@@ -12,13 +12,13 @@ import pytest
 from sklearn import datasets
 from sklearn.model_selection import StratifiedKFold
 
-from fuzzytree.cells import grid
 from fuzzytree.errors import LearningError
 from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
 from fuzzytree.learning.arrays import FloatArray, IntArray
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.tree import FuzzyTree
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.cells import grid
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import descend, evaluate
 
 Mode = Literal["default", "paper"]
 MODES: tuple[Mode, ...] = ("default", "paper")

@@ -17,8 +17,8 @@ from fuzzytree.learning.shapes import (
     fitted_flanks,
     fitted_sets,
 )
-from fuzzytree.reference import degree
-from fuzzytree.rulebase import LR, Side
+from fuzzytree.model.rulebase import LR, Side
+from fuzzytree.semantics.reference import degree
 
 ONE = np.array([0.0]), np.array([1.0])
 FIRST: IntArray = np.array([0])

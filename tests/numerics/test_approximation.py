@@ -10,16 +10,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.cells import free_axes, grid, grid_size
-from fuzzytree.contracts import Dtype
 from fuzzytree.errors import LossError
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.approximation import by_degree, by_points
-from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.numerics.fitting import lower_curve
-from fuzzytree.numerics.placing import points_of
-from fuzzytree.reference import degree, evaluate
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Dtype
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -34,8 +27,15 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.numerics.approximation import by_degree, by_points
+from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.numerics.fitting import lower_curve
+from fuzzytree.numerics.placing import points_of
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load
+from fuzzytree.semantics.cells import free_axes, grid, grid_size
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import degree, evaluate
 from fuzzytree.testing import probe_values, probes, random_tree, with_points
 
 SMOOTH = (0.0, 3.0, -2.0)  # q**2 (3 - 2 q): level at both ends

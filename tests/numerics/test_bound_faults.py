@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics import bounds, rounding
-from fuzzytree.numerics.bounds import strength_bounds
-from fuzzytree.numerics.oracle import strength_errors
-from fuzzytree.numerics.rounding import TYPES, Type
-from fuzzytree.probing import probe_values
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -29,13 +23,19 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.numerics import bounds, rounding
+from fuzzytree.numerics.bounds import strength_bounds
+from fuzzytree.numerics.oracle import strength_errors
+from fuzzytree.numerics.rounding import TYPES, Type
 from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree, with_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from fuzzytree.contracts import Dtype, FloatArray
+    from fuzzytree.model.contracts import Dtype, FloatArray
 
 
 @pytest.fixture(autouse=True)

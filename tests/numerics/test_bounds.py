@@ -7,12 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from fuzzytree.contracts import Dtype, Model
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
-from fuzzytree.numerics.oracle import decide, strength_errors
-from fuzzytree.probing import probes
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.model.rulebase import (
     Band,
     Clause,
     Conjunction,
@@ -25,11 +21,15 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
+from fuzzytree.numerics.oracle import decide, strength_errors
 from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import probes
 from fuzzytree.testing import random_tree, with_points
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 NATIVE = {"float64": "native", "mixed": "native mixed", "float32": "native float32"}
 LOW = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))

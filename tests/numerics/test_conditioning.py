@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from fuzzytree.model.rulebase import LR, Band, Flank, Points, Side
 from fuzzytree.numerics.conditioning import bernstein, conduct, halves, maximum
-from fuzzytree.rulebase import LR, Band, Flank, Points, Side
 
 UNIT_SIDE = Side(1.0, (1.0,))
 

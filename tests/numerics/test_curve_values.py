@@ -8,10 +8,8 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.inference import curve_degree
-from fuzzytree.numerics.curve_values import degree_between, powered, root
-from fuzzytree.rulebase import Points
-from fuzzytree.system import (
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
     Arc,
     Bell,
     Binary,
@@ -33,6 +31,8 @@ from fuzzytree.system import (
     Trapezoid,
     TwoGaussians,
 )
+from fuzzytree.numerics.curve_values import degree_between, powered, root
+from fuzzytree.semantics.inference import curve_degree
 
 LONG = Context(prec=120)
 ONE = Decimal(1)

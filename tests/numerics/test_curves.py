@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fuzzytree.model.rulebase import LR, Band, Flank, Shape, Side
 from fuzzytree.numerics.curves import (
     Stretch,
     body_coefficients,
@@ -22,7 +23,6 @@ from fuzzytree.numerics.curves import (
     side_stretches,
 )
 from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.rulebase import LR, Band, Flank, Shape, Side
 
 PAGE = Path(__file__).parents[2] / "docs" / "approximation.md"
 CURVES = st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=8)

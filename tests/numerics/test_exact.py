@@ -6,21 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.exact import (
-    CAP,
-    DECIDED,
-    MISSING,
-    TIE,
-    UNCOVERED,
-    exact_answer,
-    exact_axis,
-    exact_degree,
-    outwards,
-)
-from fuzzytree.probing import probes
-from fuzzytree.reference import axis_values, descend
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -36,8 +22,22 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.numerics.exact import (
+    CAP,
+    DECIDED,
+    MISSING,
+    TIE,
+    UNCOVERED,
+    exact_answer,
+    exact_axis,
+    exact_degree,
+    outwards,
+)
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import probes
+from fuzzytree.semantics.reference import axis_values, descend
 from fuzzytree.testing import random_tree
-from fuzzytree.tree import Branch, FuzzyTree, Leaf, Node
 
 RAMP = Band(high=1.0, right=Flank(1.0, 4.0))
 CUBE = Band(high=1.0, right=Flank(1.0, 4.0, (3.0, -3.0, 1.0)))  # 1 - (1 - q)**3

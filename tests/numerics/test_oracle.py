@@ -10,24 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from fuzzytree.contracts import Model
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics import enclosures
-from fuzzytree.numerics.enclosures import LEAST, Value, degree_enclosure
-from fuzzytree.numerics.exact import exact_degree
-from fuzzytree.numerics.oracle import (
-    DECIDED,
-    MISSING,
-    TIE,
-    UNCOVERED,
-    Decided,
-    decide,
-    error_against_exact,
-    exact_answer,
-    strength_errors,
-)
-from fuzzytree.probing import landmarks, neighbours, probes
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -44,12 +28,28 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.numerics import enclosures
+from fuzzytree.numerics.enclosures import LEAST, Value, degree_enclosure
+from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.numerics.oracle import (
+    DECIDED,
+    MISSING,
+    TIE,
+    UNCOVERED,
+    Decided,
+    decide,
+    error_against_exact,
+    exact_answer,
+    strength_errors,
+)
 from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import landmarks, neighbours, probes
 from fuzzytree.testing import random_tree, with_points
 from tests.seeds import seeds
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 LOW = Term("low", Band(high=1.0, right=Flank(1.0, 4.0)))
 

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.inference.curves import curve_degree
+from fuzzytree.model.rulebase import Points
 from fuzzytree.numerics.pointwise import (
     greatest,
     least,
@@ -16,7 +16,7 @@ from fuzzytree.numerics.pointwise import (
     product,
     rounded,
 )
-from fuzzytree.rulebase import Points
+from fuzzytree.semantics.inference.curves import curve_degree
 
 
 def random_points(chance: random.Random) -> Points:

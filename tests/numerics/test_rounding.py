@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, Side, Variable
 from fuzzytree.numerics.rounding import (
     UNIT,
     axis_errors,
@@ -11,7 +12,6 @@ from fuzzytree.numerics.rounding import (
     steepest,
     value_error,
 )
-from fuzzytree.rulebase import LR, Band, Flank, Part, Points, Side, Variable
 
 RAMP = Band(high=1.0, right=Flank(1.0, 3.0))
 MIX = Variable("mix", parts=(Part("a", 2.0, 1.0), Part("b", -1.0)))

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from fuzzytree.contracts import Runtime
 from fuzzytree.errors import LossError
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.model.contracts import Runtime
+from fuzzytree.model.rulebase import Conjunction, Kind
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide, strength_errors
-from fuzzytree.probing import probe_values
-from fuzzytree.rulebase import Conjunction, Kind
 from fuzzytree.runtimes import all_runtimes, is_installed
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import probe_values
 from fuzzytree.testing import random_tree
 
 RUNTIMES = [runtime for runtime in all_runtimes() if is_installed(runtime)]

@@ -6,19 +6,8 @@ from fractions import Fraction
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.limits import LIMITS, digest_of
-from fuzzytree.auditing.records import (
-    Answer,
-    Audit,
-    Label,
-    Measure,
-    Place,
-    Policy,
-    Settings,
-    Source,
-)
-from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.states import (
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
     Declined,
@@ -27,6 +16,17 @@ from fuzzytree.proving.states import (
     Span,
     Witness,
     coordinates,
+)
+from fuzzytree.auditing.findings.limits import LIMITS, digest_of
+from fuzzytree.auditing.findings.records import (
+    Answer,
+    Audit,
+    Label,
+    Measure,
+    Place,
+    Policy,
+    Settings,
+    Source,
 )
 
 LINES = (

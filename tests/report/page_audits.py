@@ -8,20 +8,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.limits import LIMITS, digest_of
-from fuzzytree.auditing.records import (
-    Answer,
-    Audit,
-    Label,
-    Measure,
-    Place,
-    Policy,
-    Settings,
-    Source,
-)
-from fuzzytree.auditing.subject import Rows
-from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.states import (
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
     Declined,
@@ -31,7 +19,19 @@ from fuzzytree.proving.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.rulebase import (
+from fuzzytree.auditing.findings.limits import LIMITS, digest_of
+from fuzzytree.auditing.findings.records import (
+    Answer,
+    Audit,
+    Label,
+    Measure,
+    Place,
+    Policy,
+    Settings,
+    Source,
+)
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.model.rulebase import (
     Clause,
     Points,
     Rule,

@@ -6,10 +6,10 @@ import re
 
 from msgspec.structs import replace
 
-from fuzzytree.auditing.limits import LIMITS
-from fuzzytree.auditing.records import Source
-from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.states import Declined
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.findings.limits import LIMITS
+from fuzzytree.auditing.findings.records import Source
 from fuzzytree.report.audit import (
     MOST_FINDINGS,
     WIDTH,

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.agreement import Agreement, Comparison
-from fuzzytree.auditing.records import Answer, Measure
-from fuzzytree.auditing.subject import Rows
-from fuzzytree.criteria.results import Stability, judged
-from fuzzytree.proving.states import Declined, Proved
+from fuzzytree.auditing.engine.states import Declined, Proved
+from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.checking.stability.results import Stability, judged
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report import audit_findings, audit_page
 from fuzzytree.report.audit_page import page
-from fuzzytree.rulebase import RuleBase
 from fuzzytree.testing import random_system, random_tree
 from tests.report.page_audits import EVIL, answers, audit_of, rows_of, rule_base
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fuzzytree.auditing.codes import CODES
-from fuzzytree.auditing.limits import LIMITS
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.limits import LIMITS
 from fuzzytree.report.audit import WIDTH
 from fuzzytree.report.explanations import (
     MARK,

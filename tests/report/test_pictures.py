@@ -10,12 +10,20 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.subject import Rows
-from fuzzytree.lowering import rules_from_tree
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import Span
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.model.rulebase import (
+    Band,
+    Flank,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Variable,
+)
 from fuzzytree.numerics.exact import exact_answer, exact_axis, exact_degree
-from fuzzytree.proving.domain import Domain, Side
-from fuzzytree.proving.states import Span
-from fuzzytree.reference import descend
 from fuzzytree.report.audit_rows import data_of, histogram, passing
 from fuzzytree.report.decision_map import decisions, exact_axes
 from fuzzytree.report.drawing import (
@@ -33,16 +41,8 @@ from fuzzytree.report.drawing import (
 from fuzzytree.report.svg_regions import bar_picture, map_picture, windows
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import tree_picture
-from fuzzytree.rulebase import (
-    Band,
-    Flank,
-    Part,
-    Points,
-    Rule,
-    RuleBase,
-    Semantics,
-    Variable,
-)
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import descend
 from fuzzytree.testing import random_tree
 from tests.report.page_audits import rows_of, rule_base
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from fuzzytree.auditing.codes import CODES
+from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.report.sarif import sarif
 from tests.report.audits import every_state
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fuzzytree.agreement import Agreement, Certified, Comparison, Verdict
+from fuzzytree.model.agreement import Agreement, Certified, Comparison, Verdict
 from fuzzytree.report.text import verdict_text
 
 

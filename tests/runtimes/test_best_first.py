@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import degree
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -33,10 +31,12 @@ from fuzzytree.runtimes.envelope import (
     plan_envelope,
 )
 from fuzzytree.runtimes.native import load, load_best_first
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import degree
 from fuzzytree.testing import probe_values, random_tree
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 LARGEST = float(np.finfo(np.float64).max)
 STEEP = (1.4, -3.0, 2.5, -4.0, 5.0)  # a body that overshoots at both ends

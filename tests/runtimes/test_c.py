@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError, MissingExtraError
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
+from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.runtimes import find_runtime, is_installed, needed_by
 from fuzzytree.runtimes.c import load, load_best_first
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree
 
 needs_compiler = pytest.mark.skipif(

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from fuzzytree.comparing import same_bits
-from fuzzytree.contracts import Dtype, Model, Outcome, Runtime
+from fuzzytree.checking.comparing import same_bits
 from fuzzytree.errors import LossError
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.numerics.bounds import strength_bounds
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -31,13 +29,15 @@ from fuzzytree.rulebase import (
     Term,
     Variable,
 )
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.numerics.bounds import strength_bounds
 from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
 from fuzzytree.runtimes.reference import load as load_reference
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import probe_values, random_tree, with_points
-from fuzzytree.tree import FuzzyTree
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 RUNTIMES = [runtime for runtime in all_runtimes() if is_installed(runtime)]
 EXACT = [r for r in RUNTIMES if r.dtype == "float64" and r.bound is None]

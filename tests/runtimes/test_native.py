@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.reference import BELOW_ONE, degree
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -30,6 +28,8 @@ from fuzzytree.runtimes.degrees import DOUBLE, shape_degrees
 from fuzzytree.runtimes.descent import Desk, Split, descend_row, descend_rows
 from fuzzytree.runtimes.native import load, load_best_first
 from fuzzytree.runtimes.reference import load as load_reference
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import BELOW_ONE, degree
 from fuzzytree.testing import random_tree
 
 SHAPES: list[Shape] = [

@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.programs.steps import Maker, Program, Result
-from fuzzytree.runtimes.frames import FramePlan
 from fuzzytree.runtimes.one_row import load, row_runner
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.programs.steps import Maker, Program, Result
 from fuzzytree.tactile.features.names import FEATURES
+from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.testing import random_tree
 

@@ -15,14 +15,10 @@ import onnxruntime
 import pytest
 from onnx import TensorProto, helper
 
-from fuzzytree.contracts import Dtype, Model, Outcome
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.onnx import OLDEST, Output, write
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.programs.bounds import error_bounds
-from fuzzytree.programs.systems import from_system
-from fuzzytree.reference import descend, evaluate
-from fuzzytree.rulebase import (
+from fuzzytree.model.contracts import Dtype, Model, Outcome
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -38,18 +34,22 @@ from fuzzytree.rulebase import (
     Variable,
     fingerprint,
 )
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.runtimes.reference import load as load_reference
 from fuzzytree.runtimes.systems import infer_rows
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.programs.bounds import error_bounds
+from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.reference import descend, evaluate
 from fuzzytree.testing import probe_values, random_rows, random_system, random_tree
-from fuzzytree.tree import FuzzyTree
 from tests.seeds import seeds
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
     Arrays = dict[str, npt.NDArray[np.generic]]
 

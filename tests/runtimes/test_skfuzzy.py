@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import (
+from fuzzytree.model.rulebase import (
     LR,
     Band,
     Clause,
@@ -23,6 +22,7 @@ from fuzzytree.rulebase import (
 from fuzzytree.runtimes.degrees import shape_degrees
 from fuzzytree.runtimes.sampling import HIGHEST, line_error, samples, universe
 from fuzzytree.runtimes.skfuzzy import bound, load
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree
 
 SHAPES: list[Shape] = [

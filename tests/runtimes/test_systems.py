@@ -5,16 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from fuzzytree.checking_systems import check_system
-from fuzzytree.contracts import Runtime, SystemOutcome
+from fuzzytree.checking.systems import check_system
 from fuzzytree.errors import LossError
-from fuzzytree.inference import infer
-from fuzzytree.probing import system_probes
-from fuzzytree.programs.bounds import error_bounds
-from fuzzytree.programs.systems import from_system
-from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
-from fuzzytree.runtimes.systems import infer_rows, run_system
-from fuzzytree.system import (
+from fuzzytree.model.contracts import Runtime, SystemOutcome
+from fuzzytree.model.system import (
     Call,
     Conclusion,
     Defuzzifier,
@@ -28,6 +22,12 @@ from fuzzytree.system import (
     SystemOutput,
     SystemRule,
 )
+from fuzzytree.runtimes import all_runtimes, find_runtime, is_installed
+from fuzzytree.runtimes.systems import infer_rows, run_system
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.probing import system_probes
+from fuzzytree.semantics.programs.bounds import error_bounds
+from fuzzytree.semantics.programs.systems import from_system
 from fuzzytree.testing import random_rows, random_system
 
 RUNTIMES = [

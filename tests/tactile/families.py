@@ -17,9 +17,9 @@ from fuzzytree.tactile.boards import (
     Sentinel,
     Text,
 )
-from fuzzytree.tactile.line.decoding import Decoder
+from fuzzytree.tactile.link.decoding import Decoder
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulated.encoding import banner, encoded
+from fuzzytree.tactile.simulation.encoding import banner, encoded
 
 
 def _board(

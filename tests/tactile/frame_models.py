@@ -6,13 +6,13 @@ import functools
 
 import numpy as np
 
-from fuzzytree.lowering import rules_from_tree
-from fuzzytree.rulebase import RuleBase
-from fuzzytree.runtimes.frames import features_of
+from fuzzytree.api.verbs import learn
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.tactile.features.aimed import aimed_frames
+from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tree import FuzzyTree
-from fuzzytree.verbs import learn
 
 PLAIN = Sensor(16, 16, threshold=4)
 WIDE = Sensor(

@@ -13,9 +13,9 @@ from msgspec.structs import replace
 
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.frames import Counters
-from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.link.decoding import decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulated.encoding import banner, encoded
+from fuzzytree.tactile.simulation.encoding import banner, encoded
 from tests.tactile.families import FAMILIES, check_account, frames_of, stream_of
 
 CUT_HERE = st.lists(st.integers(0, 10_000), max_size=12)

@@ -25,10 +25,10 @@ from fuzzytree.tactile.boards import (
     Text,
 )
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulated.device import Device, Truth, blob, bounds
-from fuzzytree.tactile.simulated.encoding import banner, encoded
-from fuzzytree.tactile.simulated.faults import Faults, Pause
-from fuzzytree.tactile.simulated.uart import Receiver
+from fuzzytree.tactile.simulation.device import Device, Truth, blob, bounds
+from fuzzytree.tactile.simulation.encoding import banner, encoded
+from fuzzytree.tactile.simulation.faults import Faults, Pause
+from fuzzytree.tactile.simulation.uart import Receiver
 
 MAT = Board("mat", Sensor(8, 8), Marker("AA 55"), banner=1)
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from fuzzytree.programs.evaluate import evaluate
-from fuzzytree.programs.operations import INEXACT
-from fuzzytree.programs.steps import Maker, Program, Result
 from fuzzytree.runtimes.programs import plan_program, run_program
+from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.operations import INEXACT
+from fuzzytree.semantics.programs.steps import Maker, Program, Result
 from fuzzytree.tactile.features.elementary import angle, signed_log
 
 

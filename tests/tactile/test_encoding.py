@@ -16,7 +16,7 @@ from fuzzytree.tactile.boards import (
     Text,
 )
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulated.encoding import banner, checksum, encoded
+from fuzzytree.tactile.simulation.encoding import banner, checksum, encoded
 
 CELLS = np.array([[1, 0, 258], [0, 0, 16]])
 

@@ -10,8 +10,8 @@ import pytest
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.tactile.boards import Board, Marker, Port, Protocol, Text
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulated.encoding import encoded
-from fuzzytree.tactile.simulated.faults import (
+from fuzzytree.tactile.simulation.encoding import encoded
+from fuzzytree.tactile.simulation.faults import (
     Faults,
     Pause,
     damaged,
@@ -19,7 +19,7 @@ from fuzzytree.tactile.simulated.faults import (
     noise,
     with_marker,
 )
-from fuzzytree.tactile.simulated.uart import Receiver
+from fuzzytree.tactile.simulation.uart import Receiver
 
 DATA = np.random.default_rng(1).bytes(100_000)
 

@@ -28,11 +28,11 @@ from fuzzytree.tactile.boards import (
     Text,
 )
 from fuzzytree.tactile.frames import Frame
-from fuzzytree.tactile.line import Line, open_line, opened, ports, start
+from fuzzytree.tactile.link import Line, open_line, opened, ports, start
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulated.device import Device, blob
-from fuzzytree.tactile.simulated.encoding import encoded
-from fuzzytree.tactile.simulated.faults import Faults, Pause
+from fuzzytree.tactile.simulation.device import Device, blob
+from fuzzytree.tactile.simulation.encoding import encoded
+from fuzzytree.tactile.simulation.faults import Faults, Pause
 
 BOARD = Board("mat", Sensor(8, 6), Marker("AA 55", checksum="crc16"))
 
@@ -230,7 +230,7 @@ def test_a_board_that_does_not_answer_is_asked_again(
 def test_bytes_that_are_no_frames_are_told_and_the_line_goes_on(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fuzzytree.tactile.line.watching.PATIENCE_S", 0.2)
+    monkeypatch.setattr("fuzzytree.tactile.link.watching.PATIENCE_S", 0.2)
     other = Board("mat", Sensor(4, 6), Marker("AA 55", checksum="crc16"))
     cells = np.full((4, 6), 7)
     with open_line(BOARD, terminal.name) as line:
@@ -381,7 +381,7 @@ def test_what_fails_within_the_line_is_raised_where_frames_are_taken(
     def feed(_decoder: object, _data: bytes) -> list[Cells]:
         raise RuntimeError("a decoder failed")
 
-    monkeypatch.setattr("fuzzytree.tactile.line.decoder.Decoder.feed", feed)
+    monkeypatch.setattr("fuzzytree.tactile.link.decoder.Decoder.feed", feed)
     with open_line(BOARD, terminal.name) as line:
         terminal.write(b"any")
         with pytest.raises(RuntimeError, match="a decoder failed"):

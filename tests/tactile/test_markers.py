@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fuzzytree.tactile.boards import Board, Checksum, Marker, Pressure
-from fuzzytree.tactile.line.decoding import decoder_of
-from fuzzytree.tactile.line.fixed import are_whole, are_whole_at, crc16, layout_of
+from fuzzytree.tactile.link.decoding import decoder_of
+from fuzzytree.tactile.link.fixed import are_whole, are_whole_at, crc16, layout_of
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulation.encoding import encoded
 
 PLAIN = Board("b", Sensor(1, 4), Marker("AA 55"))
 

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.programs.steps import Maker, Program, Result
-from fuzzytree.runtimes.frames import FramePlan, features_of
 from fuzzytree.runtimes.programs import plan_program, run_program
+from fuzzytree.semantics.programs.steps import Maker, Program, Result
 from fuzzytree.tactile.features import frame_program, moments
 from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.moments import Centred, complex_moment, sum_name
 from fuzzytree.tactile.features.names import FEATURES, PAPER
 from fuzzytree.tactile.features.noise import Noisy
+from fuzzytree.tactile.runtimes.frames import FramePlan, features_of
 from fuzzytree.tactile.sensor import Cells, Sensor
 from tests.tactile.frames import hard_frames
 
 if TYPE_CHECKING:
-    from fuzzytree.contracts import FloatArray
+    from fuzzytree.model.contracts import FloatArray
 
 ORDERS = [(2, 0), (1, 1), (3, 0), (2, 1), (4, 0), (3, 1), (2, 2)]
 SENSORS = [

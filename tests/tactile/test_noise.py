@@ -8,8 +8,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzytree.programs.evaluate import evaluate
-from fuzzytree.programs.steps import Maker, Result
+from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.steps import Maker, Result
 from fuzzytree.tactile.features.noise import Noise, Noisy
 
 Operation = Callable[[Noise, Noisy, Noisy], Noisy]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.tactile.simulated.objects import (
+from fuzzytree.tactile.simulation.objects import (
     OBJECTS,
     FloatArray,
     Object,
@@ -23,7 +23,7 @@ from fuzzytree.tactile.simulated.objects import (
     radius_of,
     rectangle,
 )
-from fuzzytree.tactile.simulated.physics import (
+from fuzzytree.tactile.simulation.physics import (
     PAPER,
     SIDE,
     Settings,
@@ -35,7 +35,7 @@ from fuzzytree.tactile.simulated.physics import (
     press_object,
     quantised,
 )
-from fuzzytree.tactile.simulated.wiring import Wiring, read_matrix
+from fuzzytree.tactile.simulation.wiring import Wiring, read_matrix
 
 IDEAL = Settings(
     aperture=1.0,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.readers.boards import load_board
-from fuzzytree.tactile.line import open_line
-from fuzzytree.tactile.simulated.device import Device, blob
+from fuzzytree.tactile.board_files.reader import load_board
+from fuzzytree.tactile.link import open_line
+from fuzzytree.tactile.simulation.device import Device, blob
 
 BOARDS = sorted(
     (Path(__file__).parents[2] / "examples" / "tactile" / "boards").glob("*.yaml")

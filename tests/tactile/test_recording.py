@@ -18,8 +18,8 @@ import pytest
 from fuzzytree.errors import ReadError, TableError, WriteError
 from fuzzytree.tactile.boards import Board, Marker, Protocol, Sentinel, Text
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.line import records
-from fuzzytree.tactile.line.recording import (
+from fuzzytree.tactile.link import records
+from fuzzytree.tactile.link.recording import (
     Recorder,
     Recording,
     RecordingFile,
@@ -190,7 +190,7 @@ def test_a_frame_of_a_long_recording_comes_after_the_other(tmp_path: Path) -> No
 def test_a_recording_too_large_for_memory_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fuzzytree.tactile.line.recording.LARGEST_ARRAY", 30)
+    monkeypatch.setattr("fuzzytree.tactile.link.recording.LARGEST_ARRAY", 30)
     path = tmp_path / "a.ftr"
     with pytest.raises(ReadError) as caught:
         _read(path, _record(tmp_path / "b.ftr", 3))
@@ -364,7 +364,7 @@ def test_a_disk_that_keeps_nothing_is_told(
     def fail(_file: int) -> None:
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
-    monkeypatch.setattr("fuzzytree.tactile.line.recording._to_disk", fail)
+    monkeypatch.setattr("fuzzytree.tactile.link.recording._to_disk", fail)
     recorder.write(Frame(np.zeros((3, 4), int), 0.0, 0), Counters())
     with pytest.raises(WriteError) as caught:
         recorder.close()
@@ -377,7 +377,7 @@ import sys
 import numpy as np
 from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.line.recording import Recorder
+from fuzzytree.tactile.link.recording import Recorder
 from fuzzytree.tactile.sensor import Sensor
 
 board = Board("mat", Sensor(64, 64), Marker("AA 55"))

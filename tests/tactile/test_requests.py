@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.tactile.boards import Board, Request
-from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.link.decoding import decoder_of
 from fuzzytree.tactile.sensor import Sensor
 
 BOARD = Board("b", Sensor(1, 4, full=4095), Request("10", bits=16, skip=2))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fuzzytree.tactile.boards import Board, Marker, Protocol, Request, Sentinel, Text
-from fuzzytree.tactile.line.seen import line_bytes, seen
-from fuzzytree.tactile.line.watching import Questions, Watch, frame_time
+from fuzzytree.tactile.link.seen import line_bytes, seen
+from fuzzytree.tactile.link.watching import Questions, Watch, frame_time
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulated.encoding import encoded
+from fuzzytree.tactile.simulation.encoding import encoded
 
 
 def _board(protocol: Protocol, rows: int = 4, columns: int = 6) -> Board:

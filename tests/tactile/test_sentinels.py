@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fuzzytree.tactile.boards import Board, Sentinel
-from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.link.decoding import decoder_of
 from fuzzytree.tactile.sensor import Sensor
 
 BOARD = Board("b", Sensor(2, 3, full=254), Sentinel())

@@ -13,13 +13,13 @@ import soak_line
 import soak_verdicts
 from msgspec.structs import replace
 
-from fuzzytree.readers.boards import load_board
+from fuzzytree.tactile.board_files.reader import load_board
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
-from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.link.decoding import decoder_of
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulated.device import blob
-from fuzzytree.tactile.simulated.encoding import banner, encoded
-from fuzzytree.tactile.simulated.faults import Faults, Pause
+from fuzzytree.tactile.simulation.device import blob
+from fuzzytree.tactile.simulation.encoding import banner, encoded
+from fuzzytree.tactile.simulation.faults import Faults, Pause
 
 ROOT = Path(__file__).parents[2]
 BOARDS = sorted((ROOT / "examples" / "tactile" / "boards").glob("*.yaml"))

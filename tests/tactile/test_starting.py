@@ -7,7 +7,7 @@ import pytest
 
 from fuzzytree.errors import TableError
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.line.starting import measured, remarks, still
+from fuzzytree.tactile.link.starting import measured, remarks, still
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
 BOARD = Board("mat", Sensor(3, 4), Marker("AA 55"))

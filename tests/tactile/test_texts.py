@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from fuzzytree.tactile.boards import Board, Text
 from fuzzytree.tactile.frames import Counters
-from fuzzytree.tactile.line.decoding import decoder_of
+from fuzzytree.tactile.link.decoding import decoder_of
 from fuzzytree.tactile.sensor import Sensor
 
 LINES = Board("b", Sensor(2, 2, full=1023), Text())

@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from fuzzytree.errors import InvalidModelError, TableError
-from fuzzytree.programs.steps import Maker, Program, Result
-from fuzzytree.rulebase import Value
+from fuzzytree.model.rulebase import Value
+from fuzzytree.semantics.programs.steps import Maker, Program, Result
 from fuzzytree.tactile.features.elementary import angle, signed_log
 from fuzzytree.tactile.features.moments import (
     ORDER,
@@ -125,7 +125,8 @@ def costs(sensor: Sensor, names: Sequence[str]) -> Mapping[str, float]:
 def image_program(names: Sequence[str]) -> Program:
     """Return what computes features from moments that were measured.
 
-    For images whose cells are no whole numbers; see `fuzzytree.runtimes.images`.
+    For images whose cells are no whole numbers; see
+    `fuzzytree.tactile.runtimes.images`.
 
     Args:
         names: Of the features; of cells and blocks there are none.

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.contracts import Model
-from fuzzytree.probing import landmarks
-from fuzzytree.reference import axis_values
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.probing import landmarks
+from fuzzytree.semantics.reference import axis_values
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.features.plain import plain_features
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tree import FuzzyTree
 
 Features = Callable[[Cells], npt.NDArray[np.float64]]
 """Gives features of shape (features, frames)."""

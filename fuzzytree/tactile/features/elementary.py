@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from fuzzytree.programs.steps import Maker
+from fuzzytree.semantics.programs.steps import Maker
 
 _HALVINGS = 2  # of the angle: the tangent is then at most tan(pi / 16), 0.199
 _ANGLE_TERMS = 11  # the first that is left out is below 2e-17 of the angle

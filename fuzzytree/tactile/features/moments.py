@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from fuzzytree.programs.steps import Maker
+from fuzzytree.semantics.programs.steps import Maker
 from fuzzytree.tactile.features.noise import UNIT, Noise, Noisy
 
 Power = tuple[int, int]

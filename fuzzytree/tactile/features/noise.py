@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fuzzytree.programs.steps import Maker
+from fuzzytree.semantics.programs.steps import Maker
 
 UNIT = 2.0**-53
 """The largest relative error of one rounding."""

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fuzzytree.contracts import Model
-from fuzzytree.programs.evaluate import evaluate as run
-from fuzzytree.reference import Status, descend, evaluate
-from fuzzytree.rulebase import RuleBase, Value
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import RuleBase, Value
+from fuzzytree.semantics.programs.evaluate import evaluate as run
+from fuzzytree.semantics.reference import Status, descend, evaluate
 from fuzzytree.tactile.features import FrameProgram
 from fuzzytree.tactile.features.states import State
 from fuzzytree.tactile.sensor import Cells, pressed

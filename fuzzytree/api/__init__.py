@@ -1,0 +1,1 @@
+"""The functions behind `import fuzzytree`, one for each verb."""

@@ -1,0 +1,293 @@
+"""Models made ready to answer tables, whatever holds them and whatever runs them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, overload
+
+import msgspec
+import numpy as np
+
+from fuzzytree.checking.converting import CALLED, as_model, carrier_of
+from fuzzytree.errors import LossError, MissingExtraError, ReadError
+from fuzzytree.files import read_bounded
+from fuzzytree.model.contracts import (
+    Document,
+    Fitted,
+    Model,
+    ModelSource,
+    Run,
+    Runtime,
+    SystemOutcome,
+)
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.runtimes import find_runtime, is_installed, needed_by
+from fuzzytree.runtimes.answers import Answers, answers_of, joined
+from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.runtimes.outputs import Outputs, joined_outputs
+from fuzzytree.tables import Batch, batches
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+Carried = ModelSource | OnnxModel | bytes
+"""A model, an ONNX file opened or as bytes, or the path of a file of either."""
+
+_BLOCK = 1 << 16  # rows answered at a time
+
+
+def opened(source: Carried, *, allow_loss: bool = False) -> Document | OnnxModel:
+    """Return a model as it is, and whatever a file or bytes hold ready to run.
+
+    Args:
+        source: A model, an ONNX file opened or as bytes, or the path of a file.
+        allow_loss: As in `load`.
+
+    Raises:
+        ReadError: If the file cannot be read, or is not ours.
+        LossError: As `load`.
+        MissingExtraError: If it is an ONNX file and onnxruntime is not installed.
+    """
+    match source:
+        case bytes():
+            return open_onnx(source, "the bytes")
+        case str() | os.PathLike():
+            if Path(source).suffix.lower() == ".onnx":
+                return open_onnx(read_bounded(source), os.fspath(source))
+            return as_model(source, allow_loss=allow_loss)
+        case OnnxModel():
+            return source
+        case _:
+            return as_model(source)
+
+
+@overload
+def run(
+    model: FuzzySystem,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+    allow_loss: bool = False,
+) -> Outputs: ...
+
+
+@overload
+def run(
+    model: Model | Fitted,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+    allow_loss: bool = False,
+) -> Answers: ...
+
+
+@overload
+def run(
+    model: Carried,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+    allow_loss: bool = False,
+) -> Answers | Outputs: ...
+
+
+def run(
+    model: Carried,
+    table: object,
+    *,
+    runtime: str | None = None,
+    columns: Sequence[str] | None = None,
+    with_strengths: bool = True,
+    allow_loss: bool = False,
+) -> Answers | Outputs:
+    """Answer the rows of a table: classes, or the numbers of a fuzzy system.
+
+    Classes are numbers, booleans or text, as the labels that the model was learnt from.
+
+    Args:
+        model: The model; see `Carried`.
+        table: A path, a pandas, polars or arrow table, or an array of shape
+            (rows, columns). Columns are found by name.
+        runtime: What executes the model: `native` unless given; an ONNX file is
+            always executed by onnxruntime.
+        columns: The names of an array's columns; unless given those of the table
+            that the model was learnt from.
+        with_strengths: Whether to keep the strengths of the rules, 8 bytes for each
+            rule and row.
+        allow_loss: As in `load`.
+
+    Raises:
+        TableError: If a column is absent or holds text.
+        MissingExtraError: If the runtime is not installed.
+        LossError: If the runtime cannot carry the model, or as `load`.
+        ValueError: If there is no such runtime.
+    """
+    found = opened(model, allow_loss=allow_loss)
+    ready = answering(found, runtime, with_strengths=with_strengths)
+    return ready.join([one for _, one in ready(table, columns=columns)])
+
+
+class Answering(msgspec.Struct, frozen=True):
+    """A model made ready, which answers tables piece by piece.
+
+    Attributes:
+        inputs: The columns that it needs, in order.
+        trained: The columns of the table that it was learnt from, if any.
+        answer: Answers to values of shape (inputs, rows).
+    """
+
+    inputs: tuple[str, ...]
+    trained: tuple[str, ...]
+    answer: Callable[[FloatArray], Answers | Outputs]
+
+    def __call__(
+        self,
+        table: object,
+        *,
+        columns: Sequence[str] | None = None,
+        delimiter: str | None = None,
+        name: str | None = None,
+        with_others: bool = False,
+    ) -> Iterator[tuple[Batch, Answers | Outputs]]:
+        """Yield the rows of a table in batches, with the answers to them.
+
+        The arguments are those of `fuzzytree.tables.batches`.
+
+        Raises:
+            TableError: If a column is absent or holds text.
+        """
+        for batch in batches(
+            table,
+            self.inputs,
+            trained=self.trained,
+            columns=columns,
+            delimiter=delimiter,
+            name=name,
+            with_others=with_others,
+        ):
+            rows = batch.values.shape[1]
+            starts = range(0, max(rows, 1), _BLOCK)
+            found = [self.answer(batch.values[:, k : k + _BLOCK]) for k in starts]
+            yield batch, self.join(found)
+
+    @staticmethod
+    def join(parts: Sequence[Answers | Outputs]) -> Answers | Outputs:
+        """Return the answers to several pieces of a table as one."""
+        numbers = [one for one in parts if isinstance(one, Outputs)]
+        classes = [one for one in parts if isinstance(one, Answers)]
+        return joined_outputs(numbers) if numbers else joined(classes)
+
+
+def answering(
+    model: Document | OnnxModel,
+    runtime: str | None = None,
+    *,
+    with_strengths: bool = True,
+) -> Answering:
+    """Make a model ready to answer.
+
+    Raises:
+        MissingExtraError: If the runtime is not installed.
+        LossError: If the runtime cannot carry the model.
+        ValueError: If there is no such runtime, or another one for an ONNX file.
+    """
+    if isinstance(model, OnnxModel):
+        return _answering_onnx(model, runtime, with_strengths=with_strengths)
+    if isinstance(model, FuzzySystem):
+        return _answering_system(model, runtime, with_strengths=with_strengths)
+    execute = _loaded(model, runtime or "native")
+    if isinstance(model, RuleBase):
+        ends = [rule.then for rule in model.rules]
+    else:
+        ends = [leaf.label for leaf in model.leaves]
+
+    def answer(values: FloatArray) -> Answers:
+        return answers_of(
+            execute(np.ascontiguousarray(values)),
+            choices=model.classes,
+            ends=ends,
+            semantics=model.semantics,
+            with_strengths=with_strengths,
+        )
+
+    return Answering(model.inputs, model.columns, answer)
+
+
+def _answering_system(
+    system: FuzzySystem, runtime: str | None, *, with_strengths: bool
+) -> Answering:
+    name = runtime or "native"
+    found = _runtime(name, system)
+    if found.load_system is None:
+        raise LossError(f"cannot run {system.name} in {name}: it runs no systems")
+    execute = found.load_system(system, activations=with_strengths)
+    names = tuple(one.name for one in system.outputs)
+
+    def answer(values: FloatArray) -> Outputs:
+        return _outputs_of(execute(np.ascontiguousarray(values)), names)
+
+    return Answering(system.columns, (), answer)
+
+
+def _outputs_of(outcome: SystemOutcome, names: tuple[str, ...]) -> Outputs:
+    return Outputs(names, outcome.outputs, outcome.status, outcome.activations)
+
+
+def _answering_onnx(
+    model: OnnxModel, runtime: str | None, *, with_strengths: bool
+) -> Answering:
+    if runtime is not None:
+        raise ValueError(
+            f"runtime {runtime!r}: an ONNX file runs in onnxruntime; "
+            "other runtimes need the YAML file"
+        )
+    execute, label = model.run_system, model.labels
+    if execute is not None:
+        run_system = execute  # a name that stays what it is, for type checkers
+
+        def numbers(values: FloatArray) -> Outputs:
+            return _outputs_of(run_system(values), model.names)
+
+        return Answering(model.inputs, model.columns, numbers)
+    if label is None:
+        raise ReadError(f"{model.name}: the ONNX file has no output 'label'")
+    position: dict[str | None, int] = {name: k for k, name in enumerate(model.classes)}
+
+    def answer(values: FloatArray) -> Answers:
+        outcome = model.run(values)
+        return Answers(
+            model.classes,
+            np.array([position.get(name, -1) for name in label(values)], np.int64),
+            outcome.rule,
+            outcome.status,
+            strengths=outcome.strengths if with_strengths else None,
+            label_type=model.semantics.label_type,
+        )
+
+    return Answering(model.inputs, model.columns, answer)
+
+
+def _runtime(name: str, model: Document) -> Runtime:
+    runtime = find_runtime(name)
+    carrier = carrier_of(model)
+    if carrier not in runtime.runs:
+        raise LossError(
+            f"cannot run {model.name} in {name}: it runs "
+            f"{' or '.join(runtime.runs)}, not a {CALLED[carrier]}"
+        )
+    if not is_installed(runtime):
+        raise MissingExtraError(f"the runtime {name!r} needs {needed_by(runtime)}")
+    return runtime
+
+
+def _loaded(model: Model, name: str) -> Run:
+    return _runtime(name, model).load(model)

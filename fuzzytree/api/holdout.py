@@ -1,0 +1,217 @@
+"""How well trees answer rows that they were not learnt from.
+
+Stratified folds, made from a seed. In small tables each fold chooses its settings
+anew. Large tables are sampled, class by class, and their folds take the settings that
+learning from all rows chose; with thousands of classes fewer folds are tried. So the
+test takes a bounded time, and gives the same shares each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.learning import LearningReport, Settings, learn_arrays
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.tables import Table
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.model.contracts import FloatArray, IntArray
+
+FOLDS = 5
+ROWS = 20_000
+CELLS = 1 << 20
+"""The most rows and numbers that the folds are made of; larger tables are sampled."""
+
+CHOOSING_CELLS = 1 << 15
+"""The most numbers of a table in which each fold chooses its own settings."""
+
+_CLASSES = 5000
+"""The most classes times folds that are learnt; at least one fold is tried."""
+
+_COLUMNS = 200_000
+"""The most columns times folds that are learnt; at least one fold is tried."""
+
+_FEWEST = 2 * FOLDS  # rows
+
+
+class Accuracy(msgspec.Struct, frozen=True):
+    """The share of rows that were answered right, for each fold.
+
+    Attributes:
+        folds: The share in each fold that was tried. A row that gets no class counts
+            as wrong.
+        rows: How many rows the folds are made of.
+        of: How many rows the table has.
+        is_nested: Whether each fold chose its own settings; if not, all folds took
+            those that learning from the whole table chose.
+    """
+
+    folds: tuple[float, ...]
+    rows: int
+    of: int
+    is_nested: bool
+
+    @property
+    def mean(self) -> float:
+        """The mean over the folds."""
+        return sum(self.folds) / len(self.folds)
+
+
+class Summary(msgspec.Struct, frozen=True, kw_only=True):
+    """What `learn` read, learnt, tested and wrote.
+
+    Attributes:
+        file: The file that was written.
+        fingerprint: Of the tree.
+        rows: Rows of the table that have a class.
+        columns: The columns to learn from.
+        classes: The classes.
+        missing_cells: Cells without a value.
+        rows_without_class: Rows that were left out because they have no class.
+        remarks: Columns that look unsuitable, each with the reason.
+        inputs: The columns that the tree needs.
+        leaves: Leaves of the tree.
+        accuracy: The cross-validated accuracy, the mean over the folds; null without
+            a test.
+        majority: The accuracy of predicting the most common class for every row.
+        folds: The accuracy of each fold; null without a test.
+        rows_tested: How many rows the folds are made of; null without a test.
+        is_nested: Whether each fold chose its own settings; null without a test.
+        seed: Of the folds.
+        report: What learning counted and repaired.
+    """
+
+    file: str
+    fingerprint: str
+    rows: int
+    columns: tuple[str, ...]
+    classes: tuple[str, ...]
+    missing_cells: int
+    rows_without_class: int
+    remarks: dict[str, str]
+    inputs: tuple[str, ...]
+    leaves: int
+    accuracy: float | None
+    majority: float
+    folds: tuple[float, ...] | None
+    rows_tested: int | None
+    is_nested: bool | None
+    seed: int
+    report: LearningReport
+
+
+def majority(table: Table) -> float:
+    """Return the accuracy of predicting the most common class for every row."""
+    return int(np.bincount(table.codes).max()) / len(table.codes)
+
+
+def accuracy(
+    table: Table,
+    settings: Settings,
+    report: LearningReport,
+    *,
+    folds: int = FOLDS,
+    seed: int = 0,
+    progress: Callable[[str, float], None] | None = None,
+) -> Accuracy | None:
+    """Learn without each fold in turn, and count how often the tree answers it right.
+
+    Args:
+        table: The table.
+        settings: How to learn.
+        report: Of learning from the whole table.
+        folds: How many folds.
+        seed: Of the shuffle.
+        progress: Told what is done and which share of it.
+
+    Returns:
+        The accuracies; None if the table has fewer than ten rows, or if some fold
+        leaves one class to learn from.
+    """
+    width = max(len(table.columns), 1)
+    is_nested = len(table.codes) * width <= CHOOSING_CELLS or not report.chosen
+    rows = sampled(table.codes, min(ROWS, CELLS // width), seed)
+    if len(rows) < _FEWEST:
+        return None
+    codes = table.codes[rows]
+    fold = folds_of(codes, folds, seed)
+    shares: list[float] = []
+    most = min(_CLASSES // len(table.classes), _COLUMNS // width)
+    tried = max(1, min(folds, most))
+    for number in range(tried):
+        if progress:
+            progress(f"testing fold {number + 1} of {tried}", number / tried)
+        kept, held = rows[fold != number], rows[fold == number]
+        present, known = np.unique(table.codes[kept], return_inverse=True)
+        if len(present) < 2:
+            return None
+        classes = [table.classes[code] for code in present.tolist()]
+        learnt = learn_arrays(
+            table.values.T[kept],
+            known.astype(np.int64),
+            columns=table.columns,
+            classes=classes,
+            settings=_of_fold(settings, None if is_nested else report, classes),
+        )
+        answered = _answered(learnt.tree, table, held)
+        right = answered == table.codes[held]
+        shares.append(float(np.count_nonzero(right)) / len(held))
+    return Accuracy(tuple(shares), len(rows), len(table.codes), is_nested)
+
+
+def _of_fold(
+    settings: Settings, report: LearningReport | None, classes: Sequence[str]
+) -> Settings:
+    """Return settings for the classes of a fold, as a report says they were chosen."""
+    chosen = dict(report.chosen) if report else {}
+    patterns = settings.patterns_per_class
+    if report and chosen.pop("patterns_per_class", None):
+        patterns = report.patterns
+    if isinstance(patterns, Mapping):
+        patterns = {name: patterns.get(name, 1) for name in classes}
+    choices = () if report else settings.choices
+    return msgspec.structs.replace(
+        settings, patterns_per_class=patterns, choices=choices, **chosen
+    )
+
+
+def folds_of(codes: IntArray, folds: int, seed: int) -> IntArray:
+    """Return a fold for each row, so that each class is spread evenly over them.
+
+    Example:
+        >>> folds_of(np.array([0, 0, 1, 1]), 2, 0).tolist()
+        [0, 1, 0, 1]
+    """
+    found = np.empty(len(codes), np.int64)
+    found[_by_class(codes, seed)] = np.arange(len(codes)) % folds
+    return found
+
+
+def sampled(codes: IntArray, most: int, seed: int) -> IntArray:
+    """Return at most so many rows, in order, each class in its share."""
+    if len(codes) <= most:
+        return np.arange(len(codes))
+    steps = np.arange(most) * len(codes) // most
+    return np.sort(_by_class(codes, seed)[steps])
+
+
+def _by_class(codes: IntArray, seed: int) -> npt.NDArray[np.intp]:
+    shuffled = np.random.default_rng(seed).permutation(len(codes))
+    return shuffled[np.argsort(codes[shuffled], kind="stable")]
+
+
+def _answered(tree: FuzzyTree, table: Table, rows: IntArray) -> IntArray:
+    """Return the code of the class of each row; -1 for none."""
+    position = {name: k for k, name in enumerate(table.columns)}
+    chosen = np.array([position[name] for name in tree.inputs], np.int64)
+    values: FloatArray = table.values[np.ix_(chosen, rows)]
+    code = {label: k for k, label in enumerate(table.classes)}
+    ends = np.array([-1, *(code[leaf.label] for leaf in tree.leaves)], np.int64)
+    return ends[find_runtime("native").load(tree)(values).rule]

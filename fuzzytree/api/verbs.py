@@ -1,0 +1,1115 @@
+"""What one does with fuzzytree, a function for each verb of the command line."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import stat
+import warnings
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args
+
+import msgspec
+import numpy as np
+
+from fuzzytree.api.answering import Answering, Carried, answering, opened, run
+from fuzzytree.checking.converting import (
+    CALLED,
+    Conversion,
+    as_model,
+    carrier_of,
+    convert,
+    deciding,
+    export,
+    format_of,
+    load,
+    load_content,
+    read,
+    refuse_unreadable,
+)
+from fuzzytree.errors import ReadError, TableError
+from fuzzytree.exporters import all_formats
+from fuzzytree.files import check_stream, read_bounded, reason, write_atomically
+from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.contracts import (
+    Document,
+    Dtype,
+    Model,
+    ModelSource,
+    Progress,
+    Written,
+)
+from fuzzytree.model.naming import as_names, printable
+from fuzzytree.model.options import Option
+from fuzzytree.model.rulebase import Conjunction, Kind, RuleBase, name_choice
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree, with_label_type
+from fuzzytree.runtimes import chosen_runtimes
+from fuzzytree.runtimes.onnxruntime import OnnxModel
+from fuzzytree.semantics import lowering
+from fuzzytree.semantics.conversion import as_rules, as_system
+from fuzzytree.tables import Batch, Table, batches, class_names, read_table
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    from matplotlib.figure import Figure
+
+    from fuzzytree.auditing.diff.difference_records import Difference
+    from fuzzytree.auditing.findings.codes import Code
+    from fuzzytree.auditing.findings.domains import Within
+    from fuzzytree.auditing.findings.records import Audit, Source
+    from fuzzytree.auditing.findings.records import Settings as AuditSettings
+    from fuzzytree.auditing.findings.subject import Material, Rows
+    from fuzzytree.auditing.recheck import Report as RecheckReport
+    from fuzzytree.benchmarking.records import Study
+    from fuzzytree.benchmarking.savings import Report
+    from fuzzytree.checking.programs import ProgramFile
+    from fuzzytree.checking.stability.results import Stability
+    from fuzzytree.learning import Learnt, Settings
+    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.model.tree import Use
+    from fuzzytree.numerics.bounds import Certificate
+
+__all__ = [
+    "Answering",
+    "Carried",
+    "Conversion",
+    "answering",
+    "audit",
+    "audited_rows",
+    "bench",
+    "certify",
+    "check",
+    "convert",
+    "diff",
+    "draw",
+    "explain",
+    "export",
+    "learn",
+    "learn_table",
+    "load",
+    "material",
+    "needs",
+    "opened",
+    "read",
+    "recheck",
+    "rows_of",
+    "rules_from_tree",
+    "run",
+    "save",
+    "stability",
+]
+
+
+def learn(
+    table: object,
+    *,
+    target: str | Sequence[object] | npt.NDArray[np.generic],
+    name: str | None = None,
+    ignore: Sequence[str] = (),
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    units: Mapping[str, str] | None = None,
+    progress: Progress | None = None,
+    mode: Literal["default", "paper"] = "default",
+    alpha: float = 0.9,
+    l_max: float | None = None,
+    points: int = 3,
+    separate_sides: bool = False,
+    patterns_per_class: int | Literal["auto"] | Mapping[str, int] | None = None,
+    shrinkage: float = 1e-3,
+    entry: float = 2.0,
+    costs: Mapping[str, float] | None = None,
+    choices: tuple[Literal["alpha", "l_max", "shrinkage", "entry"], ...] = (),
+    rows_per_class: int = 5_000,
+    seed: int = 0,
+    keep_reversals: bool = False,
+    missing: Literal["drop", "refuse"] = "drop",
+) -> FuzzyTree:
+    """Learn a fuzzy tree from a table with a class for each row.
+
+    Args:
+        table: A path, a pandas, polars or arrow table, or an array of shape
+            (rows, columns).
+        target: The column of the classes, or the classes themselves.
+        name: Of the tree; the file's, or `tree`, unless given.
+        ignore: Columns to leave out.
+        columns: The names of an array's columns; x1, x2, ... unless given.
+        delimiter: Of a CSV file, if its first line does not tell.
+        units: The units of columns, by name.
+        progress: Told what is done and which share of it.
+        mode: This and all below as in `fuzzytree.learning.Settings`.
+        alpha: Weight of the difference of means in the distance.
+        l_max: The paper's L_MAX.
+        points: n of the paper's 2n + 1 points on a fuzzy set.
+        separate_sides: Whether a set's two sides are fitted apart.
+        patterns_per_class: How many patterns a class has.
+        shrinkage: How far the off-diagonal of a scatter is shrunk.
+        entry: How much a further input must help a combination.
+        costs: Cost of a column by name.
+        choices: What inner validation may choose beside the patterns.
+        rows_per_class: How many rows of a class are kept for clusters and validation.
+        seed: Moves the folds of inner validation.
+        keep_reversals: Whether a wide set gets the far tails back.
+        missing: Whether rows with missing values are dropped or refused.
+
+    Raises:
+        TableError: If a column is absent or holds text, or if there are no rows.
+        LearningError: If nothing can be learnt from the table, or its target is
+            continuous.
+        ValueError: If a setting is out of its range.
+
+    Warns:
+        UserWarning: If a column looks like an identifier, or there are many classes
+            with few rows for each.
+
+    Example:
+        >>> tree = learn(
+        ...     np.array([[1.0], [1.5], [7.0], [7.5]]),
+        ...     target=["soft", "soft", "firm", "firm"],
+        ... )
+        >>> run(tree, np.array([[2.0], [7.0]])).classes
+        ['soft', 'firm']
+    """
+    from fuzzytree.learning import Settings
+    from fuzzytree.learning.suitability import remarks
+
+    settings = Settings(
+        mode=mode,
+        alpha=alpha,
+        l_max=l_max,
+        points=points,
+        separate_sides=separate_sides,
+        patterns_per_class=patterns_per_class,
+        shrinkage=shrinkage,
+        entry=entry,
+        costs=costs or {},
+        choices=choices,
+        rows_per_class=rows_per_class,
+        seed=seed,
+        keep_reversals=keep_reversals,
+        missing=missing,
+    )
+    found = read_table(
+        table, target=target, ignore=ignore, columns=columns, delimiter=delimiter
+    )
+    for column, text in remarks(found, lambda column: f"ignore=[{column!r}]"):
+        warnings.warn(f"{found.name}: {column} has {text}", stacklevel=2)
+    return learn_table(
+        found,
+        name=name or _name_of(table),
+        units=units or {},
+        settings=settings,
+        progress=progress,
+    ).tree
+
+
+def learn_table(
+    table: Table,
+    *,
+    name: str,
+    units: Mapping[str, str],
+    settings: Settings,
+    progress: Progress | None = None,
+) -> Learnt:
+    """Learn from a table that was read, and return the report beside the tree.
+
+    Raises:
+        TableError: If a unit is given for a column that is not there.
+        LearningError: If nothing can be learnt from the table.
+    """
+    from fuzzytree.learning import learn_arrays
+
+    absent = [column for column in units if column not in table.columns]
+    if absent:
+        known = ", ".join(table.columns)
+        raise TableError(
+            f"a unit for {absent[0]!r}, which is no column; it has {known}"
+        )
+    learnt = learn_arrays(
+        table.values.T,
+        table.codes,
+        columns=table.columns,
+        classes=table.classes,
+        units=units,
+        name=name,
+        settings=settings,
+        progress=progress,
+    )
+    tree = with_label_type(learnt.tree, table.label_type)
+    return msgspec.structs.replace(learnt, tree=tree)
+
+
+def _name_of(table: object) -> str:
+    if isinstance(table, str | os.PathLike):
+        return printable(Path(table).stem) or "tree"
+    return "tree"
+
+
+def rules_from_tree(
+    tree: ModelSource,
+    kind: Kind = "relative",
+    *,
+    conjunction: Conjunction | None = None,
+) -> RuleBase:
+    """Turn each path of a tree into a rule, in the order of the leaves.
+
+    Args:
+        tree: A tree, a fitted classifier, or the path of a file that holds a tree.
+        kind: `relative` for rules that equal the tree on every input; `raw` for the
+            paper's rules, whose terms are the fitted sets as they are.
+        conjunction: The AND of the rules; the tree's own unless given.
+
+    Returns:
+        A rule base whose rule k is leaf k, with the variables that the nodes use.
+
+    Raises:
+        TypeError: If it is no tree.
+        InvalidModelError: If `kind` is `raw` and the tree carries no sets.
+    """
+    found = _tree_of(tree, "rules_from_tree")
+    return lowering.rules_from_tree(found, kind, conjunction=conjunction)
+
+
+def save(
+    model: ModelSource,
+    path: str | os.PathLike[str],
+    *,
+    to: str | None = None,
+    allow_loss: bool = False,
+    **options: Option,
+) -> Written:
+    """Write a model to a file whole, or leave what stood there.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system.
+        path: The file.
+        to: The format; the one of the suffix unless given.
+        allow_loss: As in `export`.
+        options: As in `export`.
+
+    Raises:
+        WriteError: If the file cannot be written.
+        LossError: As `export`.
+        ValueError: As `export`.
+    """
+    form = to or Path(path).suffix
+    if not form:
+        raise ValueError(f"{os.fspath(path)}: has no suffix; pass to='yaml', say")
+    written = export(model, form, allow_loss=allow_loss, **options)
+    write_atomically(path, written.content)
+    return written
+
+
+def rows_of(
+    data: object,
+    model: Document,
+    *,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+) -> FloatArray | None:
+    """Return the rows of a table for a model, of shape (inputs, rows).
+
+    Args:
+        data: A table; see `fuzzytree.tables`. Without one (None) there are no rows.
+        model: Whose inputs they are for.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+
+    Raises:
+        TableError: If a column is absent or holds text, or the table has no row.
+    """
+    if data is None:
+        return None
+    values, _ = _rows(data, model, columns=columns, delimiter=delimiter)
+    return values
+
+
+def _rows(
+    data: object,
+    model: Document,
+    *,
+    columns: Sequence[str] | None,
+    delimiter: str | None,
+    name: str | None = None,
+    with_others: bool = False,
+) -> tuple[FloatArray, list[Batch]]:
+    """Return rows for a model, of shape (inputs, rows), and as they came."""
+    is_system = isinstance(model, FuzzySystem)
+    found = [
+        *batches(
+            data,
+            model.columns if isinstance(model, FuzzySystem) else model.inputs,
+            trained=() if is_system else model.columns,
+            columns=columns,
+            delimiter=delimiter,
+            name=name,
+            with_others=with_others,
+        )
+    ]
+    values = np.hstack([batch.values for batch in found])
+    if not values.shape[1]:
+        raise TableError(f"{found[0].piece.name} has no rows")
+    return values, found
+
+
+def check(
+    model: ModelSource,
+    *others: Carried,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    names: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    limit: int | None = None,
+    rows_only: bool = False,
+    run_code: bool = False,
+    allow_loss: bool = False,
+    progress: Progress | None = None,
+) -> Agreement:
+    """Compare a model with everything that is made of it, in every runtime.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system, or the path of one.
+        others: What was shipped beside it: models, ONNX files opened or as bytes, or
+            paths.
+        data: A table with rows of one's own, beside the probes.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        names: What to call each of the others; its path unless given.
+        runtimes: The names of the runtimes; all that are installed unless given.
+        limit: The most probes; 20,000 unless given, and 2,000 for a system.
+        rows_only: Whether files whose rows agree are accepted with other content: a
+            graph that this version would not write, or a system with other numbers.
+        run_code: Whether a program (C, Python, JavaScript, SQL, PMML) is run even if
+            its text is not what this version writes of the model.
+        allow_loss: As in `load`, for every file.
+        progress: Called with what is compared next and the share that is done.
+
+    Raises:
+        ReadError: If a file cannot be read, or holds another kind of model.
+        MissingExtraError: If what runs a file is not installed.
+        LossError: As `load`.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a runtime is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> check(random_tree(1), runtimes=["native"], limit=100).ok
+        True
+    """
+    first = as_model(model, allow_loss=allow_loss)
+    names = as_names(names)
+    titles = [
+        names[k] if k < len(names) else _title(other, k)
+        for k, other in enumerate(others)
+    ]
+    rest = [
+        _program(other, run_code) or opened(other, allow_loss=allow_loss)
+        for other in others
+    ]
+    values = rows_of(data, first, columns=columns, delimiter=delimiter)
+    if isinstance(first, FuzzySystem):
+        from fuzzytree.checking.systems import check_system
+
+        return check_system(
+            first,
+            *(_as_system(one, title) for one, title in zip(rest, titles, strict=True)),
+            data=values,
+            names=titles,
+            runtimes=runtimes,
+            limit=limit or 2_000,
+            rows_only=rows_only,
+            progress=progress,
+        )
+    from fuzzytree.checking import models as checking
+
+    return checking.check(
+        first,
+        *(_as_deciding(one, title) for one, title in zip(rest, titles, strict=True)),
+        data=values,
+        names=titles,
+        runtimes=runtimes,
+        limit=limit or 20_000,
+        rows_only=rows_only,
+        progress=progress,
+    )
+
+
+def _program(source: Carried, may_run: bool) -> ProgramFile | None:
+    """Return what the path of a file that is run and not read stands for."""
+    if not isinstance(source, str | os.PathLike):
+        return None
+    form = format_of(source)
+    if form.read is not None or form.name == "onnx":
+        return None
+    from fuzzytree.checking.programs import ProgramFile
+
+    return ProgramFile(form.name, read_bounded(source), may_run)
+
+
+def _as_system(
+    model: Document | OnnxModel | ProgramFile, title: str
+) -> FuzzySystem | OnnxModel | ProgramFile:
+    """Return what is compared with a system: a rule base as the number of its class.
+
+    Raises:
+        ReadError: If it is a tree.
+    """
+    if isinstance(model, FuzzyTree):
+        raise ReadError(f"{title}: is a tree, and is not compared with a fuzzy system")
+    if isinstance(model, RuleBase):
+        return as_system(model, "winner")
+    return model
+
+
+def _as_deciding(
+    model: Document | OnnxModel | ProgramFile, title: str
+) -> Model | OnnxModel | ProgramFile:
+    """Return what is compared with a tree or rules: rules that a system stands for.
+
+    Raises:
+        ReadError: If it is a system whose outputs are numbers.
+    """
+    if not isinstance(model, FuzzySystem):
+        return model
+    found = as_rules(model, None)
+    if found is None:
+        raise ReadError(
+            f"{title}: is a fuzzy system whose outputs are numbers, and is not "
+            "compared with rules or a tree"
+        )
+    return found
+
+
+def certify(
+    model: ModelSource,
+    dtype: Dtype = "float64",
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+) -> Certificate:
+    """Return how far a number type can take a model from its exact answers, at most.
+
+    Args:
+        model: A tree or a rule base, or the path of one.
+        dtype: `float64`, `mixed` or `float32`.
+        data: A table with the rows for which it shall hold; all values in the declared
+            ranges of the inputs unless given.
+        columns: The names of an array's columns.
+
+    Raises:
+        ReadError: If a file cannot be read.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If there is no such number type.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> certify(random_tree(1, combinations=0)).sentence
+        'no path can differ: no value is rounded before it meets a cut'
+    """
+    from fuzzytree.numerics import bounds
+
+    if dtype not in get_args(Dtype):
+        known = ", ".join(get_args(Dtype))
+        raise ValueError(f"there is no number type {dtype!r}; there are {known}")
+    first = _model_of(model, "certify")
+    return bounds.certify(first, dtype, rows_of(data, first, columns=columns))
+
+
+def bench(
+    model: ModelSource,
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    rows: Sequence[int] = (1, 1_000, 1_000_000),
+    threads: Sequence[int] = (1, 2),
+    only: Sequence[str] = (),
+    skip: Sequence[str] = (),
+    error: float | None = None,
+    budget_s: float = 300.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Study:
+    """Measure error against run time for every way of running a model.
+
+    Args:
+        model: A tree or a rule base, or the path of one.
+        data: A table with rows to time and to judge on, repeated where there are too
+            few; rows are made of the model's declared ranges if None.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        rows: Rows in a call: each of them is measured.
+        threads: Threads that a candidate is allowed: each of them is measured.
+        only: Names of candidates, such as `native`, questions, such as `raw rules`,
+            or kinds, such as `peer`: the others are left out.
+        skip: The same, for what is left out.
+        error: The largest error of a strength that is allowed; the advice keeps it.
+        budget_s: About how long it may take, in seconds; half of it at least goes to
+            the timed calls.
+        seed: Of the made rows, and of the order of the rounds.
+        progress: Told what is done and which share of it.
+
+    Returns:
+        The study. After Ctrl-C it holds what was measured by then.
+
+    Raises:
+        ReadError: If the model cannot be read.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a number is out of its range, or a name is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> study = bench(random_tree(1), rows=[9], only=["native"], budget_s=9)
+        >>> [point.question for point in study.points]
+        ['tree', 'relative rules', 'raw rules']
+    """
+    from fuzzytree.benchmarking import study
+
+    plan = study.Plan(tuple(rows), tuple(threads), error, budget_s=budget_s, seed=seed)
+    first = _model_of(model, "bench")
+    return study.bench(
+        first,
+        values=rows_of(data, first, columns=columns, delimiter=delimiter),
+        data=_data_name(data),
+        only=only,
+        skip=skip,
+        plan=plan,
+        tell=progress,
+    )
+
+
+def _model_of(model: ModelSource, verb: str) -> Model:
+    return deciding(as_model(model), verb)
+
+
+def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
+    found = as_model(model)
+    if not isinstance(found, FuzzyTree):
+        kind = CALLED[carrier_of(found)]
+        raise TypeError(f"{verb} takes a tree, and {found.name} is a {kind}")
+    return found
+
+
+def _data_name(data: object) -> str:
+    if isinstance(data, str | os.PathLike):
+        return Path(data).name
+    return "the table"
+
+
+def audit(
+    model: ModelSource | Material,
+    *,
+    data: object = None,
+    target: str | None = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    results: Sequence[str | os.PathLike[str]] = (),
+    within: Within = "model",
+    spreads: float | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    row: Mapping[str, float] | None = None,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    settings: AuditSettings | None = None,
+    accepted: Collection[str] = (),
+    allow_loss: bool = False,
+    repeat: str = "",
+    progress: Progress | None = None,
+) -> Audit:
+    """Ask what is odd in a rule base: dead rules, gaps, conflicts, and more.
+
+    Ctrl-C ends it early and keeps what is proved; see `Audit.was_interrupted`.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system, or the path of one; or all that
+            `material` has read, and then nothing of the next five besides.
+        data: A table with rows of one's own.
+        target: The column of the classes, if the table has one.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        results: Paths of what `Agreement.to_json` and `Stability.to_json` told of the
+            same model; the audit names them.
+        within: Where everything is asked: the ranges of the `model`, or of the `data`.
+        spreads: Instead, so many spreads around the fitted sets of each input.
+        limits: The ends of some variables, which go before the others.
+        row: A row whose nearest other decision is looked for besides.
+        select: Beginnings of codes that are asked, such as `FT1`; all if none.
+        ignore: Beginnings of codes that are left out.
+        settings: What is taken for small, and the budget.
+        accepted: Ids of findings that a baseline accepts.
+        allow_loss: As in `load`.
+        repeat: The command that asks the same, for the answers.
+        progress: Told what is done and which share of it.
+
+    Raises:
+        ReadError: If the file cannot be read, or a result is not of this model.
+        LossError: As `load`.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a limit, a code or a setting is none, or an input has no limits.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> audit(random_tree(1), select=["FT501"]).is_complete
+        True
+    """
+    from fuzzytree.auditing.engine.clock import Clock
+    from fuzzytree.auditing.engine.domain import limited
+    from fuzzytree.auditing.findings import audit as auditing
+    from fuzzytree.auditing.findings.domains import domain_of
+    from fuzzytree.auditing.findings.records import Settings
+    from fuzzytree.auditing.findings.results import with_results
+    from fuzzytree.auditing.findings.selecting import check_settings
+    from fuzzytree.auditing.findings.subject import Material
+
+    chosen = settings or Settings()
+    check_settings(chosen)
+    if not isinstance(model, Material):
+        model = material(
+            model,
+            data=data,
+            target=target,
+            columns=columns,
+            delimiter=delimiter,
+            results=results,
+            allow_loss=allow_loss,
+        )
+    elif results or allow_loss or any((data is not None, target, columns, delimiter)):
+        raise ValueError("a material is read already: give what it holds to material()")
+    read, ends = model, limits or {}
+    box = domain_of(
+        read.model,
+        within=within,
+        spreads=spreads,
+        rows=read.rows,
+        limited=ends,
+        row=row,
+    )
+    found = auditing.audit(
+        read.model,
+        rows=read.rows,
+        domain=limited(box, ends, read.model),
+        settings=chosen,
+        select=select,
+        ignore=ignore,
+        clock=Clock(chosen.budget_s, tell=progress),
+        file=read.file,
+        data=read.data,
+        row=row,
+        accepted=accepted,
+        repeat=repeat,
+    )
+    return with_results(found, read.given) if read.given else found
+
+
+def material(
+    model: ModelSource,
+    *,
+    data: object = None,
+    target: str | None = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    results: Sequence[str | os.PathLike[str]] = (),
+    allow_loss: bool = False,
+) -> Material:
+    """Return all that an audit is about, each file read once.
+
+    Args:
+        model: As in `audit`, as all others.
+        data: A table.
+        target: The column of the classes.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file.
+        results: Paths of results.
+        allow_loss: As in `load`.
+
+    Raises:
+        ReadError: If a file cannot be read, or a result is not of this model.
+        LossError: As `load`.
+        TableError: If a column is absent or holds text, the table has no row, or it
+            changes while it is read.
+    """
+    from fuzzytree.auditing.findings.places import model_file
+    from fuzzytree.auditing.findings.results import read_results
+    from fuzzytree.auditing.findings.subject import Material
+
+    file = None
+    if isinstance(model, str | os.PathLike):
+        file = model_file(os.fspath(model), _bytes_of(model))
+        model = load_content(file.content, file.name, allow_loss=allow_loss)
+    else:
+        model = as_model(model)
+    given = read_results(results, model)
+    data, name = _readable_twice(data)
+    source = _source_of(data, name)
+    rows = audited_rows(
+        data, model, target=target, columns=columns, delimiter=delimiter, name=name
+    )
+    if _source_of(data, name) != source:
+        raise TableError(f"{name}: was changed while it was read")
+    return Material(model, file, rows, source, given)
+
+
+def _readable_twice(data: object) -> tuple[object, str | None]:
+    """Return a table that can be hashed and then read, and its path if it has one.
+
+    Raises:
+        TableError: If it is a path that is not there, or of a folder or a device.
+        ReadError: If it is a pipe of more bytes than fit.
+    """
+    if not isinstance(data, str | os.PathLike):
+        return data, None
+    name = os.fspath(data)
+    try:
+        check_stream(name)
+        is_pipe = stat.S_ISFIFO(Path(name).stat().st_mode)
+    except (OSError, ValueError) as error:
+        raise TableError(f"{name}: cannot be read: {reason(error)}") from error
+    return (io.BytesIO(read_bounded(name)) if is_pipe else name), name
+
+
+def _bytes_of(path: str | os.PathLike[str]) -> bytes:
+    """Return the content of a model's file.
+
+    Raises:
+        ReadError: If it cannot be read, or is in a format that only others read.
+    """
+    refuse_unreadable(format_of(path), os.fspath(path))
+    return read_bounded(path)
+
+
+def _source_of(data: object, name: str | None = None) -> Source | None:
+    """Return the name and the hash of a table that is a file, None for another."""
+    from fuzzytree.auditing.findings.audit import source_of
+    from fuzzytree.auditing.findings.places import writable
+    from fuzzytree.auditing.findings.records import Source
+
+    if isinstance(data, io.BytesIO):
+        return source_of(name or "standard input", data.getvalue())
+    if isinstance(data, str | os.PathLike):
+        try:
+            with Path(data).open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError as error:
+            raise TableError(
+                f"{os.fspath(data)}: cannot be read: {reason(error)}"
+            ) from error
+        return Source(writable(os.fspath(data)), digest)
+    return None
+
+
+def audited_rows(
+    data: object,
+    model: Document,
+    *,
+    target: str | None = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    name: str | None = None,
+) -> Rows | None:
+    """Return the rows of a table for an audit, with their classes; None without one.
+
+    Args:
+        data: A table; see `fuzzytree.tables`.
+        model: Whose inputs they are for.
+        target: The column of the classes. A class that the model does not know is -1.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        name: What messages call the table; its path unless given.
+
+    Raises:
+        TableError: If a column is absent or holds text, or the table has no row, or
+            none of a class of the model.
+    """
+    from fuzzytree.auditing.findings.subject import Rows
+
+    if data is None:
+        return None
+    values, found = _rows(
+        data,
+        model,
+        columns=columns,
+        delimiter=delimiter,
+        name=name,
+        with_others=target is not None,
+    )
+    name = found[0].piece.name
+    if target is None:
+        return Rows(name, values)
+    known = found[0].piece.columns
+    if target not in known:
+        raise TableError(
+            f"{name} has no column {target!r}; {name_choice(target, known)}"
+        )
+    place = known.index(target)
+    labels = class_names([batch.piece.cells[place] for batch in found])
+    classes = () if isinstance(model, FuzzySystem) else model.classes
+    numbers = {label: number for number, label in enumerate(classes)}
+    codes = np.array([numbers.get(label or "", -1) for label in labels], np.int64)
+    if classes and not np.any(codes >= 0):
+        raise TableError(
+            f"{name}: no row has in column {target!r} a class of the model; "
+            f"{name_choice(str(labels[0]), classes)}"
+        )
+    return Rows(name, values, codes)
+
+
+def diff(
+    old: ModelSource,
+    new: ModelSource,
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    budget_s: float = 60.0,
+    settings: AuditSettings | None = None,
+    allow_loss: bool = False,
+    progress: Progress | None = None,
+) -> Difference:
+    """Return what has changed from one model to another, and which decisions do.
+
+    Args:
+        old: A tree, a rule base or a fuzzy system, or the path of one.
+        new: Another one, in any format.
+        data: A table with rows of one's own, which both answer.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        limits: The ends of inputs, which go before the ranges of the models.
+        budget_s: After so many seconds what is not decided stays open.
+        settings: How many points are drawn from the domain, and their seed.
+        allow_loss: As in `load`, for both files.
+        progress: Told what is done and which share of it.
+
+    Raises:
+        ReadError: If a file cannot be read, or the two are about different inputs, or
+            one gives numbers and the other decides.
+        LossError: As `load`.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a limit is none, or an input has no limits.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, combinations=0)
+        >>> diff(tree, rules_from_tree(tree)).verdict
+        'equal'
+    """
+    from fuzzytree.auditing.diff.decisions import all_inputs
+    from fuzzytree.auditing.diff.differences import (
+        difference,
+        joined_domain,
+        refuse_strangers,
+    )
+    from fuzzytree.auditing.engine.clock import Clock
+    from fuzzytree.auditing.findings.places import ModelFile, model_file
+    from fuzzytree.auditing.findings.records import Settings
+    from fuzzytree.auditing.findings.subject import Rows
+
+    clock = Clock(budget_s, tell=progress)
+    models: list[Document] = []
+    files: list[ModelFile | None] = []
+    for model in (old, new):
+        if isinstance(model, str | os.PathLike):
+            file = model_file(os.fspath(model), _bytes_of(model))
+            files.append(file)
+            models.append(load_content(file.content, file.name, allow_loss=allow_loss))
+        else:
+            files.append(None)
+            models.append(as_model(model))
+    first, second = models
+    titles = [f.name if f else m.name for f, m in zip(files, models, strict=True)]
+    refuse_strangers(first, second, (titles[0], titles[1]))
+    data, name = _readable_twice(data)
+    source = _source_of(data, name)
+    rows = None
+    if data is not None:
+        found = [
+            *batches(
+                data,
+                all_inputs(first, second),
+                columns=columns,
+                delimiter=delimiter,
+                name=name,
+            )
+        ]
+        rows = Rows(found[0].piece.name, np.hstack([batch.values for batch in found]))
+        if not rows.values.shape[1]:
+            raise TableError(f"{rows.name} has no rows")
+    return difference(
+        first,
+        second,
+        domain=joined_domain(first, second, limits or {}, rows),
+        rows=rows,
+        settings=settings or Settings(budget_s=budget_s),
+        clock=clock,
+        files=(files[0], files[1]),
+        data=source,
+    )
+
+
+def needs(
+    model: ModelSource,
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    uses: Sequence[Use] = ("tree", "relative"),
+    drop: Collection[Literal["inputs", "rules"]] = (),
+    seconds: float = 0.0,
+    progress: Progress | None = None,
+) -> Report:
+    """Return what a model needs, and what leaving out the rest saves.
+
+    Args:
+        model: A tree or a rule base; see `as_model`.
+        data: A table with rows of one's own, for the proof.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        uses: What a tree serves: its path, its `relative` rules, its `raw` rules.
+        drop: Leave out `inputs` that nothing uses, or `rules` that never fire, too.
+        seconds: How long to measure run times; 0 measures none.
+        progress: Called with what is done and which share of it.
+
+    Raises:
+        ReadError: If the file cannot be read.
+        TableError: If a column is absent or holds text, or the table has no row.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> needs(random_tree(1)).ok
+        True
+    """
+    from fuzzytree.benchmarking import savings
+    from fuzzytree.semantics.simplification import pruned
+
+    first = _model_of(model, "needs")
+    return savings.report(
+        first,
+        pruned(first, uses=uses, inputs="inputs" in drop, rules="rules" in drop),
+        uses=uses,
+        data=rows_of(data, first, columns=columns, delimiter=delimiter),
+        table=os.fspath(data) if isinstance(data, str | os.PathLike) else None,
+        delimiter=delimiter,
+        seconds=seconds,
+        tell=progress,
+    )
+
+
+def explain(code: str) -> Code:
+    """Return what a code of an audit means, why it matters, and what to do about it.
+
+    Args:
+        code: Such as `FT101`, or the id of a finding, such as `FT101-1a2b3c4d`.
+
+    Raises:
+        ValueError: If there is no such code.
+        TypeError: If it is no text.
+
+    Example:
+        >>> explain("FT101").title
+        'dead rule'
+    """
+    from fuzzytree.auditing.findings.codes import CODES
+
+    if not isinstance(code, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(
+            f"explain takes a code such as 'FT101', and not a {type(code).__name__}"
+        )
+    name = code.upper().partition("-")[0]
+    if name not in CODES:
+        choice = name_choice(name[:40], [*CODES])
+        raise ValueError(f"no code {code[:40]!r}; {choice}")
+    return CODES[name]
+
+
+def recheck(
+    audit: str | os.PathLike[str], model: str | os.PathLike[str]
+) -> RecheckReport:
+    """Check the JSON file of an audit against the YAML file of its model, on its own.
+
+    The report's `wrong` lists what does not hold; `lines()` is what the command prints.
+
+    Raises:
+        ReadError: If one of the files cannot be read.
+    """
+    from fuzzytree.auditing.recheck import CannotRunError, recheck_files
+
+    try:
+        return recheck_files(os.fspath(audit), os.fspath(model))
+    except CannotRunError as error:
+        raise ReadError(str(error)) from error
+
+
+def draw(tree: ModelSource, *, title: str | None = None) -> Figure:
+    """Draw a tree with matplotlib: its nodes, the terms of its branches, its classes.
+
+    Args:
+        tree: A tree, a fitted classifier, or the path of a file that holds a tree.
+        title: Above the picture; the name and size of the tree unless given.
+
+    Returns:
+        A figure; `figure.savefig(path)` writes it.
+
+    Raises:
+        TypeError: If it is no tree.
+        ValueError: If the tree is too large for a picture.
+        MissingExtraError: If matplotlib is not installed.
+    """
+    from fuzzytree.report import plots
+
+    return plots.draw_tree(_tree_of(tree, "draw"), title=title)
+
+
+def stability(
+    model: ModelSource,
+    *,
+    data: object = None,
+    columns: Sequence[str] | None = None,
+    delimiter: str | None = None,
+    only: Sequence[str] = (),
+    runtimes: Sequence[str] | None = None,
+    progress: Progress | None = None,
+) -> Stability:
+    """Apply the criteria N1 to N10 to a model: is it numerically stable?
+
+    Args:
+        model: A tree or a rule base, or the path of one.
+        data: A table with rows of one's own, beside the probes.
+        columns: The names of an array's columns.
+        delimiter: Of a CSV file, if its first line does not tell.
+        only: The codes of criteria, such as `N3`; all unless given.
+        runtimes: The names of the runtimes; all that are installed unless given.
+        progress: Told what is done and which share of it.
+
+    Raises:
+        ReadError: If the file cannot be read.
+        TableError: If a column is absent or holds text, or the table has no row.
+        ValueError: If a criterion or a runtime is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> stability(random_tree(1), runtimes=["native"], only=["N3", "N7"]).ok
+        True
+    """
+    from fuzzytree.checking.stability.suite import examine
+
+    first = _model_of(model, "stability")
+    chosen = chosen_runtimes(runtimes)
+    return examine(
+        first,
+        runtimes=chosen,
+        formats=all_formats(),
+        data=rows_of(data, first, columns=columns, delimiter=delimiter),
+        only=only,
+        tell=progress or (lambda _text, _share: None),
+    )
+
+
+def _title(other: Carried, position: int) -> str:
+    if isinstance(other, str | os.PathLike):
+        return os.fspath(other)
+    return f"file {position + 1}"

@@ -1,0 +1,421 @@
+"""Where two models decide otherwise, and how that comes about.
+
+The same operations on the same numbers prove decisions equal on any input. Otherwise
+rows of data, probes of both models, points drawn from the domain and points beside
+decision boundaries are tried, each answered exactly; and where these show no
+difference, boxes prove that there is none on the domain, or find it, or leave a bracket
+(`fuzzytree.auditing.engine.alike`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.diff.drafting import Evidence
+from fuzzytree.auditing.diff.matching import have_same_classes
+from fuzzytree.auditing.engine.alike import OF, alike, region
+from fuzzytree.auditing.engine.answers import Answered, answer_at, difference_at
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Declined,
+    Proved,
+    Span,
+    State,
+    Witness,
+    point_of,
+)
+from fuzzytree.auditing.engine.witnesses import simplified
+from fuzzytree.auditing.engine.wording import answer_text
+from fuzzytree.auditing.findings.domains import inputs_of
+from fuzzytree.auditing.findings.records import Answer, Settings
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.support import drawn, share
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import Rule, RuleBase, Variable
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.numerics.oracle import MISSING, TIE, UNCOVERED, Decided, decide
+from fuzzytree.semantics.probing import probe_values
+from fuzzytree.semantics.simplification import proof_faults, unguarded
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray, IntArray
+
+_PROBES = 4_000  # of each model
+_SEGMENTS = 64  # between points of different decisions, halved down to doubles
+_HALVINGS = 70
+_MOST_TOLD = 24  # pairs of classes with a witness each
+_POINTS = 0.5  # of the budget is for single points, the rest for proofs
+_PORTION = 64  # rows between two looks at the clock, at first
+_MOST_REGIONS = 4  # of which the box is looked for
+
+
+class Pair(msgspec.Struct, frozen=True, eq=False):
+    """Two models as rules, with the points on which they are compared.
+
+    Attributes:
+        old: The old rules.
+        new: The new rules.
+        inputs: The inputs of either, the old ones first.
+        domain: A side for each.
+        trees: The trees that they come from, if both are trees.
+    """
+
+    old: RuleBase
+    new: RuleBase
+    inputs: tuple[str, ...]
+    domain: Domain
+    trees: tuple[FuzzyTree, FuzzyTree] | None = None
+
+    def decided(self, values: FloatArray) -> tuple[Decided, Decided]:
+        """Return the exact answers of both to rows of shape (inputs, rows)."""
+        one, other = (
+            decide(
+                model,
+                values[[self.inputs.index(name) for name in model.inputs]],
+                with_strengths=False,
+            )
+            for model in (self.old, self.new)
+        )
+        return one, other
+
+    def old_labels(self, values: FloatArray) -> IntArray:
+        """Return the number of the old model's class for each row; -1 is no class."""
+        inputs = values[[self.inputs.index(name) for name in self.old.inputs]]
+        return decide(self.old, inputs, with_strengths=False).label
+
+    def labels(self, found: tuple[Decided, Decided]) -> tuple[IntArray, IntArray]:
+        """Return the classes of both answers, numbered alike; -1 is no class."""
+        known = list(dict.fromkeys((*self.old.classes, *self.new.classes)))
+        one, other = (
+            np.array([*map(known.index, model.classes), -1], np.int64)[decided.label]
+            for model, decided in zip((self.old, self.new), found, strict=True)
+        )
+        return one, other
+
+
+def all_inputs(old: Document, new: Document) -> tuple[str, ...]:
+    """Return the columns that either of two models needs, the old ones first."""
+    return tuple(dict.fromkeys((*inputs_of(old), *inputs_of(new))))
+
+
+def union(old: Document, new: Document) -> RuleBase:
+    """Return rules that ask nothing of the inputs of both models."""
+    inputs = tuple(Variable(name) for name in all_inputs(old, new))
+    return RuleBase("both", ("x",), inputs, (Rule((), "x"),))
+
+
+def decisions(
+    pair: Pair,
+    rows: Rows | None,
+    settings: Settings,
+    clock: Clock,
+) -> tuple[list[Answer], Evidence]:
+    """Return what is known of decisions, and how those that differ come about."""
+    whole = _same_everywhere(pair)
+    if whole is not None:
+        return [whole], Evidence(is_equal=True)
+    found = _Found(pair, clock.share(_POINTS))
+    answers: list[Answer] = []
+    if rows is not None:
+        answers.append(_on_rows(rows, found))
+    values = drawn(union(pair.old, pair.new), pair.domain, settings.rows, settings.seed)
+    many, seen = found.add(values)
+    found.add(_probes(pair))
+    if not found.witnesses:
+        found.add(_boundaries(found, values))
+    if found.witnesses:
+        answers = [*_witness_answers(pair, found), *answers]
+    else:
+        clock.tell("proving that decisions are equal", 0.3)
+        state = _alike(pair, clock)
+        if isinstance(state, Witness):
+            found.add_point(point_of(state.point))
+            answers = [*_witness_answers(pair, found), *answers]
+        else:
+            answers.insert(0, _equal_answer(pair, state))
+    is_open = not isinstance(answers[0].state, Proved)
+    if seen and is_open:
+        answers.append(_drawn_answer(many, seen, settings.seed))
+    if is_open and (found.left or found.is_cut):
+        answers.append(_left_answer(found.left))
+    return answers, found.evidence(is_equal=not is_open)
+
+
+def _alike(pair: Pair, clock: Clock) -> State:
+    """Return whether both answer alike; the budget is kept even within a box."""
+    try:
+        with enforced(clock):
+            state = alike(pair.old, pair.new, pair.domain, clock)
+    except OutOfTimeError:
+        state = Bracket(OF, 0.0, 1.0, "the budget was spent within a box")
+    if isinstance(state, Bracket) and have_same_classes(pair.old, pair.new):
+        why = "each class has the same rules: answers differ only where classes tie"
+        return Bracket(OF, 0.0, 0.0, why)
+    return state
+
+
+def _same_everywhere(pair: Pair) -> Answer | None:
+    """Return that both perform the same operations on the same numbers, if they do."""
+    old, new = pair.old, pair.new
+    faults = [*proof_faults(old, new), *unguarded(old, new), *unguarded(new, old)]
+    if faults or old.inputs != new.inputs:
+        return None
+    how = "both take the same curves of the same inputs in the same rules, on any input"
+    return Answer("FT801", "decisions", _EQUAL, Proved(how), is_finding=False)
+
+
+_EQUAL = "both models decide alike"
+
+
+def _equal_answer(pair: Pair, state: State) -> Answer:
+    sentence = f"{_EQUAL} everywhere on the domain"
+    old, new = pair.old, pair.new
+    if old.semantics.missing != new.semantics.missing or unguarded(old, new):
+        sentence += ", where no value is missing"
+    if isinstance(state, Bracket):
+        sentence = (
+            "no decision was seen to differ, and where both margins are larger than "
+            f"{state.high:.3g} none does"
+        )
+    return Answer("FT801", "decisions", sentence, state, is_finding=False)
+
+
+def _on_rows(rows: Rows, found: _Found) -> Answer:
+    hits, count = found.add(rows.values, name="row")
+    of = f"{count} rows"
+    if count < rows.values.shape[1]:
+        of = f"the first {count} of {rows.values.shape[1]} rows"
+    sentence = f"{hits} of {of} of {rows.name} are answered otherwise"
+    state = share("rows that are answered otherwise", hits, count, rows.name)
+    return Answer(
+        "FT801", "rows", sentence, state, is_finding=hits > 0, severity="error"
+    )
+
+
+def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
+    how = f"{rows} points drawn evenly from the domain, seed {seed}"
+    state = share("the domain that is answered otherwise", hits, rows, how)
+    sentence = f"{hits} of {rows} points drawn from the domain are answered otherwise"
+    return Answer("FT801", "domain", sentence, state, is_finding=hits > 0)
+
+
+def _left_answer(count: int) -> Answer:
+    reason = "the budget for single points was spent"
+    points = f"{count} points" if count else "points beside decision boundaries"
+    sentence = f"{points} were not looked at: {reason}"
+    state = Declined("FTD03", reason)
+    return Answer("FT801", "points", sentence, state, is_finding=False)
+
+
+def _witness_answers(pair: Pair, found: _Found) -> Iterator[Answer]:
+    """Yield a witness for each pair of classes, the clearest one that is known."""
+    told = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
+    for number, (labels, (_, name, found_at)) in enumerate(told[:_MOST_TOLD]):
+        point = found_at if name else _simple(pair, labels, found_at)
+        one, other = answer_at(pair.old, point), answer_at(pair.new, point)
+        state = difference_at(pair.old, pair.new, point)
+        assert state is not None  # only such points are kept
+        spans: tuple[Span, ...] = ()
+        if number < _MOST_REGIONS:
+            spans = region(pair.old, pair.new, pair.domain, point)
+        state = msgspec.structs.replace(state, region=spans)
+        sentence = f"the old model answers {_answered(one)}, the new one "
+        sentence += _answered(other)
+        if name:
+            sentence = f"{name}: {sentence}"
+        yield Answer(
+            "FT801",
+            " -> ".join(map(answer_text, labels)),
+            sentence,
+            state,
+            is_finding=True,
+            severity="error",
+            region=spans,
+        )
+    if len(told) > _MOST_TOLD:
+        left = len(told) - _MOST_TOLD
+        sentence = f"{left} more pairs of classes are answered one for the other"
+        known = told[_MOST_TOLD][1][2]
+        state = difference_at(pair.old, pair.new, known)
+        assert state is not None
+        yield Answer("FT801", "more", sentence, state, is_finding=True)
+
+
+def _simple(
+    pair: Pair, labels: tuple[str | None, str | None], point: dict[str, Fraction]
+) -> dict[str, Fraction]:
+    """Return a point of few digits at which both models answer the same as here."""
+
+    def holds(tried: Mapping[str, Fraction]) -> bool:
+        both = (answer_at(model, tried).label for model in (pair.old, pair.new))
+        return tuple(both) == labels
+
+    return simplified(point, pair.domain, holds)
+
+
+def _answered(one: Answered) -> str:
+    if not one.rule:
+        return f"{answer_text(one.label)}, for no rule fires"
+    how = f"rule {one.rule}, the first of equals" if one.is_tie else f"rule {one.rule}"
+    return f"{answer_text(one.label)} by {how}"
+
+
+class _Found:
+    """Points at which two models answer otherwise, and how that comes about.
+
+    Args:
+        pair: The two models.
+        clock: How long points are looked at; `left` counts those for which it was over,
+            and `is_cut` tells whether some were not even made.
+    """
+
+    def __init__(self, pair: Pair, clock: Clock) -> None:
+        self.pair, self.clock, self.left, self.is_cut = pair, clock, 0, False
+        self.witnesses: dict[
+            tuple[str | None, str | None], tuple[float, str, dict[str, Fraction]]
+        ] = {}
+        self.old_rules: set[int] = set()
+        self.new_rules: set[int] = set()
+        self.has_tie = self.has_none = False
+
+    def add(self, values: FloatArray, name: str = "") -> tuple[int, int]:
+        """Compare the answers to some rows, as long as there is time.
+
+        Args:
+            values: Shape (inputs, rows).
+            name: What to call a row, with its number, if it is the user's.
+
+        Returns:
+            How many differ, of how many that were looked at.
+        """
+        hits = seen = 0
+        for part in portions(values.shape[1], self.clock):
+            hits += self._add(values[:, part], name, part.start)
+            seen = min(part.stop, values.shape[1])
+        self.left += values.shape[1] - seen
+        return hits, seen
+
+    def _add(self, values: FloatArray, name: str, start: int) -> int:
+        found = self.pair.decided(values)
+        one, other = self.pair.labels(found)
+        rows = np.flatnonzero(one != other)
+        margins = np.minimum(found[0].margin, found[1].margin)
+        missing = (found[0].status == MISSING) | (found[1].status == MISSING)
+        known = rows[~missing[rows]]
+        self.old_rules |= {*found[0].rule[known].tolist()} - {0}
+        self.new_rules |= {*found[1].rule[known].tolist()} - {0}
+        status = np.concatenate([each.status[known] for each in found])
+        self.has_tie |= bool((status == TIE).any())
+        self.has_none |= bool((status == UNCOVERED).any())
+        for row in _clearest(one[known], other[known], margins[known]):
+            place = int(known[row])
+            x = zip(self.pair.inputs, values[:, place].tolist(), strict=True)
+            point = {key: Fraction(value) for key, value in x}
+            title = f"{name} {start + place + 1}" if name else ""
+            self.add_point(point, float(margins[place]), title)
+        return int(rows.size)
+
+    def add_point(
+        self, point: dict[str, Fraction], margin: float = 0.0, name: str = ""
+    ) -> None:
+        """Keep a point, if its pair of classes has no clearer one."""
+        one, other = answer_at(self.pair.old, point), answer_at(self.pair.new, point)
+        self.old_rules |= {one.rule} - {0}
+        self.new_rules |= {other.rule} - {0}
+        self.has_tie |= one.is_tie or other.is_tie
+        self.has_none |= not (one.rule and other.rule)
+        kept = self.witnesses.get((one.label, other.label))
+        is_better = kept is not None and margin > kept[0] and (name or not kept[1])
+        if kept is None or is_better:
+            self.witnesses[one.label, other.label] = (margin, name, point)
+
+    def evidence(self, *, is_equal: bool) -> Evidence:
+        """Return how differing decisions come about."""
+        return Evidence(
+            frozenset(self.old_rules),
+            frozenset(self.new_rules),
+            self.has_tie,
+            self.has_none,
+            is_equal,
+        )
+
+
+def portions(count: int, clock: Clock) -> Iterator[slice]:
+    """Yield parts of some rows until the clock is over: at least one, if there are any.
+
+    Rows in fractions take long: parts grow as long as they take little of what is left.
+    """
+    start, size = 0, _PORTION
+    while start < count and (not start or not clock.is_over):
+        before = clock.left_s
+        yield slice(start, start + size)
+        start += size
+        left = clock.left_s
+        if math.isinf(left) or (before - left) * 16 < left:
+            size *= 2
+
+
+def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
+    """Return the row with the largest margin for each pair of classes."""
+    best: dict[tuple[int, int], int] = {}
+    for row, key in enumerate(zip(one.tolist(), other.tolist(), strict=True)):
+        if key not in best or margins[row] > margins[best[key]]:
+            best[key] = row
+    return list(best.values())
+
+
+def _probes(pair: Pair) -> FloatArray:
+    """Return the probes of both models that are on the domain."""
+    sides = [pair.domain.side(name) for name in pair.inputs]
+    low = np.array([side.low if side else 0.0 for side in sides])
+    high = np.array([side.high if side else 0.0 for side in sides])
+    made: list[FloatArray] = []
+    for model in (pair.old, pair.new):
+        known = probe_values(model, _PROBES)
+        # An input that this model does not ask stays in the middle of its side.
+        values = np.repeat((low / 2 + high / 2)[:, None], known.shape[1], axis=1)
+        values[[pair.inputs.index(name) for name in model.inputs]] = known
+        made.append(values)
+    values = np.hstack(made)
+    inside = (values >= low[:, None]) & (values <= high[:, None])
+    kept: FloatArray = values[:, inside.all(axis=0)]
+    return kept
+
+
+def _boundaries(found: _Found, values: FloatArray) -> FloatArray:
+    """Return points beside the old model's decision boundaries, to the last double.
+
+    Points of different decisions are joined, and the line is halved as long as its
+    ends are decided otherwise by the old model, or until the clock is over.
+    """
+    if not values.shape[1]:
+        return values
+    pair, clock = found.pair, found.clock
+    made: list[IntArray] = []
+    labels = pairs = np.zeros(0, np.int64)
+    for part in portions(values.shape[1], clock):
+        made.append(pair.old_labels(values[:, part]))
+        labels = np.concatenate(made)
+        pairs = np.flatnonzero(labels[:-1] != labels[1:])[:_SEGMENTS]
+        if pairs.size == _SEGMENTS:
+            break
+    found.is_cut = pairs.size < _SEGMENTS and labels.size < values.shape[1]
+    low, high, known = values[:, pairs], values[:, pairs + 1], labels[pairs]
+    seen = [low, high]
+    for _ in range(_HALVINGS if pairs.size else 0):
+        if clock.is_over:
+            found.is_cut = True
+            break
+        middle = low / 2 + high / 2
+        is_low = pair.old_labels(middle) == known
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+        seen.append(middle)
+    return np.hstack(seen)

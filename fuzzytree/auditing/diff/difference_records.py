@@ -1,0 +1,131 @@
+"""How one model differs from another, as frozen values."""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+import msgspec
+
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
+from fuzzytree.auditing.findings.records import Answer, Measure, Place, Settings, Source
+from fuzzytree.model.rulebase import Value
+
+FORMAT: Final = "fuzzytree-diff/1"
+
+Grade = Literal["breaking", "non-breaking", "cosmetic"]
+Verdict = Literal["equal", "changed", "open"]
+
+
+class Change(Value, frozen=True):
+    """One thing that the new model says otherwise than the old one.
+
+    Attributes:
+        grade: `breaking`: a decision is known to change by it, or whoever calls the
+            model must change. `non-breaking`: none is known to, although strengths
+            may. `cosmetic`: it is for people only.
+        is_proved: Whether the grade is certain; it is not for a non-breaking change
+            while decisions are not proved equal.
+        part: What has changed: `class`, `input`, `combination`, `term`, `rule`,
+            `order`, `answer`, `range`, `unit`, `name`, `columns` or `support`; of a
+            system also `output` or `block`.
+        sentence: The change, as one sentence.
+        old_rules: The numbers of the old rules concerned, from 1.
+        new_rules: The numbers of the new rules concerned.
+        measures: Numbers that belong to it, such as how far two curves are apart.
+        old: Where it stands in the old file.
+        new: Where it stands in the new file.
+        code: The kind of finding.
+    """
+
+    grade: Grade
+    is_proved: bool
+    part: str
+    sentence: str
+    old_rules: tuple[int, ...] = ()
+    new_rules: tuple[int, ...] = ()
+    measures: tuple[Measure, ...] = ()
+    old: Place | None = None
+    new: Place | None = None
+    code: Literal["FT802"] = "FT802"
+
+
+class Compared(Value, frozen=True):
+    """One of the two models.
+
+    Attributes:
+        name: What it calls itself.
+        form: What it is: `tree`, `rules` or `system`.
+        fingerprint: The SHA-256 of its content.
+        file: Where it was read from, None if from memory.
+    """
+
+    name: str
+    form: str
+    fingerprint: str
+    file: Source | None = None
+
+
+class Difference(Value, frozen=True):
+    """What has changed from one model to another, and which decisions do.
+
+    Attributes:
+        version: Of fuzzytree.
+        old: The first model.
+        new: The second one.
+        data: The table that was given, if one was.
+        rows: How many rows it has.
+        domain: Where decisions were compared.
+        settings: The rows that were drawn, their seed and the budget; of no other
+            meaning here.
+        changes: What is said otherwise, breaking ones first.
+        answers: What is known of decisions: where they differ, or that they do not.
+    """
+
+    version: str
+    old: Compared
+    new: Compared
+    data: Source | None
+    rows: int
+    domain: Domain
+    settings: Settings
+    changes: tuple[Change, ...]
+    answers: tuple[Answer, ...]
+    format: Literal["fuzzytree-diff/1"] = FORMAT
+
+    def __repr__(self) -> str:
+        """Show how many changes there are, and what is known of the decisions."""
+        count = len(self.changes)
+        noun = "change" if count == 1 else "changes"
+        return f"Difference({count} {noun}, decisions {self.verdict})"
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether decisions are proved equal, known to change, or neither."""
+        if any(one.is_finding for one in self.answers):
+            return "changed"
+        proved = any(
+            isinstance(one.state, Proved) and one.subject == "decisions"
+            for one in self.answers
+        )
+        unsure = any(isinstance(one.state, Bracket | Declined) for one in self.answers)
+        return "equal" if proved and not unsure else "open"
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing breaks: no decision is known to change, and no caller must.
+
+        What is not proved equal is `ok` too; see `verdict`.
+        """
+        breaks = any(one.grade == "breaking" for one in self.changes)
+        return self.verdict != "changed" and not breaks
+
+    @property
+    def witnesses(self) -> tuple[Witness, ...]:
+        """The points at which the two are shown to answer otherwise."""
+        return tuple(a.state for a in self.answers if isinstance(a.state, Witness))
+
+    def to_json(self) -> str:
+        """Return everything as JSON; see `schemas/diff.schema.json`."""
+        facts = {"ok": self.ok, "verdict": self.verdict, **msgspec.to_builtins(self)}
+        return msgspec.json.format(msgspec.json.encode(facts), indent=2).decode()

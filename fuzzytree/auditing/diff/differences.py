@@ -1,0 +1,220 @@
+"""What changed from one model to another: structure by identity, decisions by proof."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+
+from fuzzytree.auditing.diff.decisions import Pair, all_inputs, decisions, union
+from fuzzytree.auditing.diff.difference_records import Change, Compared, Difference
+from fuzzytree.auditing.diff.drafting import graded
+from fuzzytree.auditing.diff.structure import drafts
+from fuzzytree.auditing.diff.system_differences import compared
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.domain import Domain, Side, limited
+from fuzzytree.auditing.findings.audit import source_of
+from fuzzytree.auditing.findings.domains import domain_of, inputs_of
+from fuzzytree.auditing.findings.places import ModelFile
+from fuzzytree.auditing.findings.records import Settings, Source
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.checking.converting import carrier_of
+from fuzzytree.errors import ReadError
+from fuzzytree.formats.yaml.spots import in_system
+from fuzzytree.model.agreement import version
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import Path, RuleBase, fingerprint, name_choice
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.conversion import as_rules
+from fuzzytree.semantics.lowering import rules_from_tree
+
+
+def refuse_strangers(old: Document, new: Document, names: tuple[str, str]) -> None:
+    """Refuse two models that are about different things.
+
+    Raises:
+        ReadError: If no input of one is an input of the other.
+    """
+    one, other = inputs_of(old), inputs_of(new)
+    if one and other and not set(one) & set(other):
+        raise ReadError(
+            f"{names[1]}: has no input in common with {names[0]}: it asks "
+            f"{', '.join(map(repr, other))}, and that asks "
+            f"{', '.join(map(repr, one))}"
+        )
+
+
+def deciding(model: Document, name: str) -> FuzzyTree | RuleBase:
+    """Return a model that decides: a system only if it stands for rules.
+
+    Raises:
+        ReadError: If its outputs are numbers.
+    """
+    if not isinstance(model, FuzzySystem):
+        return model
+    found = as_rules(model, None)
+    if found is None:
+        raise ReadError(
+            f"{name}: is a fuzzy system whose outputs are numbers, and is not "
+            "compared with rules or a tree"
+        )
+    return found
+
+
+def joined_domain(
+    old: Document,
+    new: Document,
+    limits: Mapping[str, tuple[float, float]],
+    rows: Rows | None = None,
+) -> Domain:
+    """Return where two models are compared: what either of them declares.
+
+    Args:
+        old: A model.
+        new: Another one.
+        limits: The ends of inputs, which go before what is declared.
+        rows: Rows of the inputs of either, for inputs without range and curve.
+
+    Raises:
+        ValueError: If an input has no limits, or if those given are none.
+    """
+    inputs = all_inputs(old, new)
+    for name in limits:
+        if name not in inputs:
+            raise ValueError(
+                f"limits for {name!r}, which is no input; {name_choice(name, inputs)}"
+            )
+    sides: dict[str, Side] = {}
+    for model in (old, new):
+        asked = None
+        if rows is not None:
+            places = [inputs.index(name) for name in inputs_of(model)]
+            asked = Rows(rows.name, rows.values[places])
+        for side in domain_of(model, rows=asked, limited=limits).sides:
+            known = sides.get(side.variable)
+            origins = (known.origin if known else "unused", side.origin)
+            if origins[0] == "unused" or origins == ("curves", "model"):
+                sides[side.variable] = side
+            elif known is not None and known.origin == side.origin:
+                low, high = min(known.low, side.low), max(known.high, side.high)
+                sides[side.variable] = Side(side.variable, low, high, side.origin)
+    given = Domain(tuple(sides.values()))
+    if limits:
+        given = limited(given, limits, union(old, new))
+    ends = {side.variable: side for side in given.sides}
+    return Domain(tuple(ends[name] for name in inputs))
+
+
+def difference(
+    old: Document,
+    new: Document,
+    *,
+    domain: Domain,
+    rows: Rows | None = None,
+    settings: Settings | None = None,
+    clock: Clock | None = None,
+    files: tuple[ModelFile | None, ModelFile | None] = (None, None),
+    data: Source | None = None,
+) -> Difference:
+    """Return what changed from one model to another.
+
+    Args:
+        old: A tree, a rule base or a fuzzy system.
+        new: Another one.
+        domain: A side for each input of either.
+        rows: Rows of the inputs of either, the old one's first.
+        settings: How many points are drawn, and their seed.
+        clock: How much time there is.
+        files: Where the two were read from.
+        data: Where the rows were read from.
+
+    Raises:
+        ReadError: If one decides and the other gives numbers.
+
+    Example:
+        >>> from fuzzytree.auditing.findings.domains import domain_of, inputs_of
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, combinations=0)
+        >>> difference(tree, tree, domain=domain_of(tree)).verdict
+        'equal'
+    """
+    settings = settings or Settings()
+    clock = clock or Clock()
+    both = old, new
+    if _give_numbers(old) and _give_numbers(new):
+        assert isinstance(old, FuzzySystem)  # no other model gives numbers
+        assert isinstance(new, FuzzySystem)
+        told, answers = compared(old, new, domain, rows, settings, clock)
+    else:
+        titles = [
+            file.name if file else model.name
+            for file, model in zip(files, both, strict=True)
+        ]
+        models = deciding(old, titles[0]), deciding(new, titles[1])
+        pair = _pair(*models, domain)
+        clock.tell("comparing rules", 0.0)
+        found = [*drafts(pair.old, pair.new, domain, pair.trees)]
+        clock.tell("comparing decisions", 0.1)
+        answers, evidence = decisions(pair, rows, settings, clock)
+        told = [(graded(one, evidence), one.old, one.new) for one in found]
+    changes = [_placed(change, paths, both, files) for change, *paths in told]
+    order = {"breaking": 0, "non-breaking": 1, "cosmetic": 2}
+    one, other = (
+        Compared(
+            model.name,
+            carrier_of(model),
+            fingerprint(model),
+            source_of(file.name, file.content) if file else None,
+        )
+        for model, file in zip(both, files, strict=True)
+    )
+    return Difference(
+        version(),
+        one,
+        other,
+        data,
+        0 if rows is None else rows.values.shape[1],
+        domain,
+        settings,
+        tuple(sorted(changes, key=lambda change: order[change.grade])),
+        tuple(answers),
+    )
+
+
+def _pair(old: FuzzyTree | RuleBase, new: FuzzyTree | RuleBase, domain: Domain) -> Pair:
+    one, other = (
+        rules_from_tree(m) if isinstance(m, FuzzyTree) else m for m in (old, new)
+    )
+    trees = None
+    if isinstance(old, FuzzyTree) and isinstance(new, FuzzyTree):
+        trees = (old, new)
+    return Pair(one, other, all_inputs(one, other), domain, trees)
+
+
+def _give_numbers(model: Document) -> bool:
+    return isinstance(model, FuzzySystem) and as_rules(model, None) is None
+
+
+def _placed(
+    change: Change,
+    paths: Sequence[Path | None],
+    models: Sequence[Document],
+    files: Sequence[ModelFile | None],
+) -> Change:
+    """Return a change with its places; a tree's rules are its leaves."""
+    places = [
+        None if file is None or path is None else file.place(_path(model, path))
+        for file, path, model in zip(files, paths, models, strict=True)
+    ]
+    return msgspec.structs.replace(change, old=places[0], new=places[1])
+
+
+def _path(model: Document, path: Path) -> Path:
+    match model:
+        case FuzzyTree() if path[0] == "rules":
+            return ("leaves", *path[1:])
+        case FuzzySystem():  # that stands for rules
+            return in_system(path)
+        case _:
+            return path

@@ -1,0 +1,228 @@
+"""Which rule of one rule base is which rule of another: by what they say, not by order.
+
+Rules are the same if they ask the same curves of the same inputs and conclude the same
+class, whatever terms are called. Others are matched, the nearest first: equal clauses
+and another class; equal words, with curves that changed; some clauses in common.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter, defaultdict
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
+
+from fuzzytree.auditing.engine.curves import Piece, pieces
+from fuzzytree.auditing.engine.stretches import Key
+from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape, shapes_of
+
+How = Literal["same", "class", "curves", "clauses"]
+
+_MOST_LEFT = 400  # rules on either side, of which each two are compared
+
+ClauseKey = tuple[Key, bool, frozenset[int]]
+NamedKey = tuple[str, bool, frozenset[str]]
+
+
+class Match(NamedTuple):
+    """Two rules that are taken for one.
+
+    Attributes:
+        old: Its number in the old rule base, from 1.
+        new: Its number in the new one.
+        how: `same`: it says the same. `class`: another class alone. `curves`: the same
+            words, of which some mean other curves. `clauses`: some clauses differ.
+    """
+
+    old: int
+    new: int
+    how: How
+
+
+class Matching(NamedTuple):
+    """The rules of two rule bases.
+
+    Attributes:
+        matches: The rules that both have, in the order of the old ones.
+        removed: The numbers of the old rules that the new one does not have.
+        added: The numbers of the new rules that the old one does not have.
+        left: How many rules were too many to be compared with each other.
+    """
+
+    matches: tuple[Match, ...]
+    removed: tuple[int, ...]
+    added: tuple[int, ...]
+    left: int
+
+
+class Curves:
+    """Numbers for curves: equal ones for curves of equal degrees everywhere."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[tuple[Piece, ...], int] = {}
+        self._known: dict[Shape, int] = {}
+
+    def number(self, shape: Shape) -> int:
+        """Return the number of a curve."""
+        if shape not in self._known:
+            joined = tuple(_joined(pieces(shape)))
+            self._known[shape] = self._numbers.setdefault(joined, len(self._numbers))
+        return self._known[shape]
+
+
+def _joined(laid: Sequence[Piece]) -> Iterable[Piece]:
+    """Yield pieces, neighbours of one formula as one."""
+    runs = itertools.groupby(laid, lambda piece: (piece.polynomial, piece.cap))
+    for (polynomial, cap), run in runs:
+        first, *rest = run
+        yield Piece(first.low, rest[-1].high if rest else first.high, polynomial, cap)
+
+
+class Said:
+    """What the rules of a rule base say, as keys that can be compared.
+
+    Args:
+        rules: The rule base.
+        curves: Numbers its curves.
+        names: What the classes are called in the other rule base.
+    """
+
+    def __init__(
+        self, rules: RuleBase, curves: Curves, names: Mapping[str, str] | None = None
+    ) -> None:
+        shapes = shapes_of(rules.variables)
+        keys: dict[str, Key] = {v.name: v.parts or v.name for v in rules.variables}
+        numbers = {place: curves.number(shape) for place, shape in shapes.items()}
+        self.rules = rules.rules
+        self.names = names or {}
+        self._clauses: dict[Clause, ClauseKey] = {}
+        for clause in {clause for rule in rules.rules for clause in rule.when}:
+            asked = frozenset(numbers[clause.variable, term] for term in clause.terms)
+            self._clauses[clause] = (keys[clause.variable], clause.negated, asked)
+
+    def clause(self, clause: Clause) -> ClauseKey:
+        """Return what a clause asks."""
+        return self._clauses[clause]
+
+    def then(self, rule: Rule) -> str:
+        """Return the class of a rule, as the other rule base calls it."""
+        return self.names.get(rule.then, rule.then)
+
+    def same(self, rule: Rule) -> Hashable:
+        """Return what rules have in common that say the same."""
+        return self.asked(rule), self.then(rule)
+
+    def asked(self, rule: Rule) -> Hashable:
+        """Return what rules have in common that ask the same."""
+        return frozenset(map(self.clause, rule.when))
+
+    def words(self, rule: Rule) -> Hashable:
+        """Return what rules have in common that read the same."""
+        return frozenset(map(words_of, rule.when)), self.then(rule)
+
+
+def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
+    """Return whether each class is as strong in both rule bases, at any input.
+
+    So it is where it has the same rules, in any order and any number of times; the two
+    can then differ only where two classes are equally strong.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> turned = RuleBase(
+        ...     "b", rules.classes, rules.variables, rules.rules[::-1], rules.semantics
+        ... )
+        >>> have_same_classes(rules, turned)
+        True
+    """
+    one, other = old.semantics, new.semantics
+    if (one.conjunction, one.uncovered) != (other.conjunction, other.uncovered):
+        return False
+    curves = Curves()
+    asked: list[set[Hashable]] = []
+    for rules in (old, new):
+        said = Said(rules, curves)
+        known: set[Hashable] = set()
+        for rule in rules.rules:
+            counts = Counter(map(said.clause, rule.when))
+            if one.conjunction == "min":  # a clause that stands twice counts once
+                counts = Counter({*counts})
+            known.add((frozenset(counts.items()), rule.then))
+        asked.append(known)
+    return asked[0] == asked[1]
+
+
+def words_of(clause: Clause) -> NamedKey:
+    """Return how a clause reads, whatever the order of its terms."""
+    return clause.variable, clause.negated, frozenset(clause.terms)
+
+
+def matching(one: Said, other: Said) -> Matching:
+    """Match the rules of two rule bases.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> said = Said(rules, Curves())
+        >>> {match.how for match in matching(said, said).matches}
+        {'same'}
+    """
+    old, new = (dict(enumerate(said.rules, 1)) for said in (one, other))
+    found: list[Match] = []
+    steps: tuple[tuple[How, Callable[[Said, Rule], Hashable]], ...] = (
+        ("same", Said.same),
+        ("class", Said.asked),
+        ("curves", Said.words),
+    )
+    for how, key in steps:
+        pairs = _paired(
+            {number: key(one, rule) for number, rule in old.items()},
+            {number: key(other, rule) for number, rule in new.items()},
+        )
+        found += [Match(a, b, how) for a, b in pairs]
+        for a, b in pairs:
+            del old[a], new[b]
+    left = len(old) + len(new) if max(len(old), len(new)) > _MOST_LEFT else 0
+    if not left:
+        for a, b in _nearest(one, old, other, new):
+            found.append(Match(a, b, "clauses"))
+            del old[a], new[b]
+    return Matching(tuple(sorted(found)), tuple(old), tuple(new), left)
+
+
+def _paired(
+    old: Mapping[int, Hashable], new: Mapping[int, Hashable]
+) -> list[tuple[int, int]]:
+    """Return pairs of equal keys, the first with the first."""
+    waiting: defaultdict[Hashable, list[int]] = defaultdict(list)
+    for number, key in reversed([*new.items()]):
+        waiting[key].append(number)
+    return [(n, waiting[key].pop()) for n, key in old.items() if waiting.get(key)]
+
+
+def _nearest(
+    one: Said, old: Mapping[int, Rule], other: Said, new: Mapping[int, Rule]
+) -> list[tuple[int, int]]:
+    """Return pairs of rules that have clauses in common, those with the most first."""
+    scored: list[tuple[float, int, int]] = []
+    keys = {n: [(other.clause(c), words_of(c)) for c in r.when] for n, r in new.items()}
+    for a, rule in old.items():
+        mine = [(one.clause(c), words_of(c)) for c in rule.when]
+        for b, match in new.items():
+            common = sum(
+                any(x == y or u == v for y, v in keys[b]) for x, u in mine
+            )  # either the curves are the same or the words
+            score = 2.0 * common / (len(mine) + len(keys[b]) or 1)
+            if common:
+                score += 0.5 * (one.then(rule) == other.then(match))
+                scored.append((-score, a, b))
+    pairs: dict[int, int] = {}
+    taken: set[int] = set()
+    for _, a, b in sorted(scored):
+        if a not in pairs and b not in taken:
+            pairs[a] = b
+            taken.add(b)
+    return list(pairs.items())

@@ -1,0 +1,344 @@
+"""The number of a system's output in fractions, and how far two outputs can be apart.
+
+Outputs that weight numbers are evaluated exactly where every curve and operation is one
+of fractions. A bound holds for real numbers: a weighted average moves by no more than
+its numbers do while the degrees stay, and always lies between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from functools import reduce
+from types import MappingProxyType
+from typing import NoReturn
+
+from fuzzytree.auditing.diff.system_meanings import Entry, entries, facts_of
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.model.system import (
+    And,
+    Condition,
+    Formula,
+    FuzzySystem,
+    Is,
+    Label,
+    Linear,
+    Not,
+    Or,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+)
+from fuzzytree.numerics.exact import exact_degree
+from fuzzytree.semantics.conversion import joined_outputs
+from fuzzytree.semantics.conversion.shapes import shape_of
+
+_ONE = Fraction(1)
+_Operation = Callable[[Fraction, Fraction], Fraction]
+_NORMS: Mapping[str, _Operation] = MappingProxyType(
+    {
+        "minimum": min,
+        "product": lambda a, b: a * b,
+        "bounded difference": lambda a, b: max(Fraction(0), a + b - 1),
+        "maximum": max,
+        "algebraic sum": lambda a, b: a + b - a * b,
+        "bounded sum": lambda a, b: min(_ONE, a + b),
+        "sum": lambda a, b: a + b,
+    }
+)
+_HEDGES: Mapping[str, Callable[[Fraction], Fraction]] = MappingProxyType(
+    {
+        "any": lambda _: _ONE,
+        "not": lambda d: 1 - d,
+        "very": lambda d: d**2,
+        "cubed": lambda d: d**3,
+        "very very": lambda d: d**4,
+    }
+)
+
+Point = Mapping[str, Fraction]
+
+
+class NotExactError(Exception):
+    """A part of a system has no value in fractions."""
+
+
+def number_at(system: FuzzySystem, output: str, point: Point) -> Fraction | None:
+    """Return the number of an output at a point, None where it is no number.
+
+    Args:
+        system: The system.
+        output: The name of one of its outputs.
+        point: A value for each column.
+
+    Raises:
+        NotExactError: If the output looks at a curve, or some curve, norm, hedge or
+            activation is none of fractions, or a rule asks an output.
+    """
+    one = next(each for each in system.outputs if each.name == output)
+    how = one.defuzzifier
+    if not how.is_weighted or output in joined_outputs(system):
+        raise NotExactError(output)
+    values = _values(system.inputs, point)
+    total = weight = Fraction(0)
+    is_number = False
+    for block in system.blocks:
+        for rule in block.rules:
+            then = [each.output for each in rule.then]
+            if output not in then or not rule.weight:
+                continue
+            if block.activation.method != "general":
+                raise NotExactError(block.activation.method)
+            degree = Fraction(rule.weight)
+            degree *= 1 if rule.when is None else _at(rule.when, block, system, values)
+            for conclusion in rule.then if degree > 0 else ():
+                degree = _hedged(conclusion.hedges, degree)
+                if conclusion.output == output and degree > 0:
+                    label = _label(one, conclusion.label)
+                    total += degree * _number(label, system.columns, values)
+                    weight += degree
+                    is_number = True
+    if not is_number:
+        return _answered(one, None)
+    is_average = how.method == "weighted average"
+    return _answered(one, total / weight if is_average else total)
+
+
+def _values(inputs: Sequence[SystemInput], point: Point) -> dict[str, Fraction]:
+    values: dict[str, Fraction] = {}
+    for one in inputs:
+        value = (
+            point[one.name]
+            if not one.parts
+            else sum(
+                (
+                    Fraction(p.weight) * (values[p.input] - Fraction(p.centre))
+                    for p in one.parts
+                ),
+                Fraction(0),
+            )
+        )
+        values[one.name] = _held(one, value) if one.clips else value
+    return values
+
+
+def _held(one: SystemInput | SystemOutput, value: Fraction) -> Fraction:
+    value = value if one.low is None else max(value, Fraction(one.low))
+    return value if one.high is None else min(value, Fraction(one.high))
+
+
+def _answered(one: SystemOutput, number: Fraction | None) -> Fraction | None:
+    if number is None and one.default is not None:
+        number = Fraction(one.default)
+    return _held(one, number) if one.clips and number is not None else number
+
+
+def _label(one: SystemInput | SystemOutput, name: str) -> Label:
+    return next(label for label in one.labels if label.name == name)
+
+
+def _number(label: Label, columns: Sequence[str], values: Point) -> Fraction:
+    match label.curve:
+        case Singleton(value=value):
+            return Fraction(value)
+        case Linear(weights=weights, offset=offset):
+            pairs = zip(columns, weights, strict=True)
+            return sum((Fraction(w) * values[n] for n, w in pairs), Fraction(offset))
+        case curve:
+            raise NotExactError(str(curve))
+
+
+def _hedged(hedges: Sequence[str], degree: Fraction) -> Fraction:
+    for hedge in reversed(hedges):
+        if hedge not in _HEDGES:
+            raise NotExactError(hedge)
+        degree = _HEDGES[hedge](degree)
+    return degree
+
+
+def _at(
+    when: Condition, block: RuleBlock, system: FuzzySystem, values: Point
+) -> Fraction:
+    match when:
+        case Is(variable=name, label=label, hedges=hedges):
+            if label is None:
+                return _hedged(hedges, Fraction(0))  # the last, `any`, makes 1 of it
+            one = next((each for each in system.inputs if each.name == name), None)
+            found = None if one is None else _label(one, label)
+            shape = None if found is None else shape_of(found.curve)
+            if found is None or shape is None:
+                return _nothing(name)
+            degree = Fraction(found.height) * exact_degree(shape, values[name])
+            return _hedged(hedges, degree)
+        case Not(part=part):
+            return 1 - _at(part, block, system, values)
+        case And(parts=parts):
+            norm: str = block.conjunction or "minimum"
+        case Or(parts=parts):
+            norm = block.disjunction or "maximum"
+    if norm not in _NORMS:
+        raise NotExactError(norm)
+    return reduce(_NORMS[norm], (_at(part, block, system, values) for part in parts))
+
+
+def _nothing(name: str) -> NoReturn:
+    raise NotExactError(name)
+
+
+# --- bounds
+
+_Ends = tuple[Fraction, Fraction]
+
+
+def most(
+    old: FuzzySystem, new: FuzzySystem, output: str, domain: Domain
+) -> tuple[Fraction, str] | None:
+    """Return how far an output of two systems is apart at most, and why.
+
+    It holds in real numbers, for points of the domain at which both answer a number.
+
+    Args:
+        old: A system.
+        new: Another one with an output of that name.
+        output: The name.
+        domain: A side for each column of either.
+
+    Returns:
+        None where nothing bounds the output, such as a formula.
+    """
+    one, other = (
+        next(each for each in system.outputs if each.name == output)
+        for system in (old, new)
+    )
+    known = entries(old, output, domain), entries(new, output, domain)
+    found = _moved(old, new, (one, other), known, domain)
+    spans = [
+        _span(system, each, asked, domain)
+        for system, each, asked in zip((old, new), (one, other), known, strict=True)
+    ]
+    if found is None and (spans[0] is None or spans[1] is None):
+        return None
+    if spans[0] is None or spans[1] is None:
+        return found
+    (a, b), (c, d) = spans[0], spans[1]
+    apart = max(abs(d - a), abs(b - c), Fraction(0))
+    if found is not None and found[0] <= apart:
+        return found
+    return apart, "both answers lie between the numbers that rules conclude"
+
+
+def _moved(
+    old: FuzzySystem,
+    new: FuzzySystem,
+    outputs: tuple[SystemOutput, SystemOutput],
+    known: tuple[Sequence[Entry], Sequence[Entry]],
+    domain: Domain,
+) -> tuple[Fraction, str] | None:
+    """Return the bound where only numbers differ, and all degrees are the same."""
+    one, other = outputs
+    same = [entry.strength for entry in known[0]] == [e.strength for e in known[1]]
+    is_other = facts_of(one)[1:] != facts_of(other)[1:]
+    if not same or is_other or not one.defuzzifier.is_weighted:
+        return None
+    joined = joined_outputs(old) | joined_outputs(new)
+    is_sum = one.defuzzifier.method == "weighted sum"
+    if one.name in joined or (is_sum and not (_is_small(old) and _is_small(new))):
+        return None
+    moves: list[Fraction] = []
+    for a, b in zip(*known, strict=True):
+        move = _move(old, new, (a, b), domain)
+        if move is None:
+            return None
+        moves.append(move * Fraction(a.most) if is_sum else move)
+    bound = sum(moves, Fraction(0)) if is_sum else max(moves, default=Fraction(0))
+    if one.default != other.default:
+        if one.default is None or other.default is None:
+            return None
+        bound = max(bound, abs(Fraction(one.default) - Fraction(other.default)))
+    return (
+        bound,
+        "degrees are the same, and no number that rules conclude moves by more",
+    )
+
+
+def _is_small(system: FuzzySystem) -> bool:
+    """Return whether no degree of a condition is above 1."""
+    curves = [label.curve for one in system.inputs for label in one.labels]
+    norms = {block.disjunction for block in system.blocks}
+    return "sum" not in norms and not any(isinstance(one, Formula) for one in curves)
+
+
+def _move(
+    old: FuzzySystem, new: FuzzySystem, pair: tuple[Entry, Entry], domain: Domain
+) -> Fraction | None:
+    """Return how far the numbers of two entries are apart on the domain, at most."""
+    one, other = pair[0].label, pair[1].label
+    if one is None or other is None or one.height != other.height:
+        return None
+    a, b = _weights(old, one), _weights(new, other)
+    if a is None or b is None:
+        return None
+    names = {**a[0], **b[0]}
+    apart = {
+        name: a[0].get(name, Fraction(0)) - b[0].get(name, Fraction(0))
+        for name in names
+    }
+    ends = _linear_span(apart, a[1] - b[1], domain)
+    return None if ends is None else max(abs(ends[0]), abs(ends[1]))
+
+
+def _weights(
+    system: FuzzySystem, label: Label
+) -> tuple[dict[str, Fraction], Fraction] | None:
+    """Return the number of a label as a sum of columns; None if it is none."""
+    match label.curve:
+        case Singleton(value=value):
+            return {}, Fraction(value)
+        case Linear(weights=weights, offset=offset):
+            clipped = {one.name for one in system.inputs if one.clips}
+            pairs = zip(system.columns, weights, strict=True)
+            found = {name: Fraction(weight) for name, weight in pairs if weight}
+            return None if clipped & {*found} else (found, Fraction(offset))
+        case _:
+            return None
+
+
+def _linear_span(
+    weights: Mapping[str, Fraction], offset: Fraction, domain: Domain
+) -> _Ends | None:
+    low = high = offset
+    for name, weight in weights.items():
+        side = domain.side(name)
+        if side is None:
+            return None
+        ends = sorted((weight * Fraction(side.low), weight * Fraction(side.high)))
+        low, high = low + ends[0], high + ends[1]
+    return low, high
+
+
+def _span(
+    system: FuzzySystem, one: SystemOutput, known: Sequence[Entry], domain: Domain
+) -> _Ends | None:
+    """Return between which ends an output's numbers lie."""
+    found: list[_Ends] = []
+    if not one.defuzzifier.is_weighted:
+        assert one.low is not None  # a system without range is refused
+        assert one.high is not None
+        found.append((Fraction(one.low), Fraction(one.high)))
+    elif one.defuzzifier.method == "weighted sum":
+        return None
+    else:
+        for entry in known:
+            weights = None if entry.label is None else _weights(system, entry.label)
+            ends = None if weights is None else _linear_span(*weights, domain)
+            if ends is None:
+                return None
+            found.append(ends)
+    if one.default is not None:
+        default = Fraction(one.default)
+        found.append((default, default))
+    if not found:
+        return None
+    low, high = min(low for low, _ in found), max(high for _, high in found)
+    return (_held(one, low), _held(one, high)) if one.clips else (low, high)

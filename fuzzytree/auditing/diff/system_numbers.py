@@ -1,0 +1,387 @@
+"""How the numbers of two fuzzy systems differ: proved alike, shown, or bounded.
+
+Outputs that are computed by the same operations, or are the same function of real
+numbers, are proved alike. The others are compared on probes of both systems, on points
+drawn from the domain and on rows of data; the point where one differs most is told with
+all digits, in fractions where the systems allow it, and a bound says how far the two
+can be apart at most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.diff.decisions import portions
+from fuzzytree.auditing.diff.matching import Curves
+from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
+from fuzzytree.auditing.diff.system_meanings import computed, meant
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Declined,
+    Proved,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.auditing.engine.witnesses import simplified
+from fuzzytree.auditing.findings.records import Answer, Measure, Settings
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.support import share
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.runtimes.systems import run_system
+from fuzzytree.semantics.probing import system_probes
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray, SystemRun
+
+_PROBES = 2_000  # of each system
+_DRAWN = 4_000  # at most, for numbers take longer than decisions
+_ROUNDING = 1e-9  # relative; what one function of real numbers may differ by
+_MOST_SHOWN = 0.9  # of the largest difference, at a witness of fewer digits
+_ALIKE = "both systems compute alike"
+
+
+class Pair(NamedTuple):
+    """Two systems, and where they are compared.
+
+    Attributes:
+        old: The old system.
+        new: The new one.
+        columns: The columns of either, the old one's first.
+        domain: A side for each.
+    """
+
+    old: FuzzySystem
+    new: FuzzySystem
+    columns: tuple[str, ...]
+    domain: Domain
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The names of the outputs that both have."""
+        names = {one.name for one in self.new.outputs}
+        return tuple(one.name for one in self.old.outputs if one.name in names)
+
+
+def number_answers(
+    pair: Pair, rows: Rows | None, settings: Settings, clock: Clock
+) -> list[Answer]:
+    """Return what is known of the numbers of two systems; nothing if none is of both.
+
+    Args:
+        pair: The systems.
+        rows: Rows of the columns of either.
+        settings: How many points are drawn, and their seed.
+        clock: How much time there is.
+    """
+    try:
+        with enforced(clock):
+            hows = _hows(pair)
+            open_ = [name for name, how in hows.items() if how is not _SAME]
+            if not open_:
+                return [_proved(pair, _ALIKE, _SAME.how)] if hows else []
+            runs = [run_system(system) for system in (pair.old, pair.new)]
+    except OutOfTimeError:
+        reason = "the budget was spent"
+        sentence = f"the numbers of the two were not compared: {reason}"
+        state = Declined("FTD03", reason)
+        return [Answer("FT801", "numbers", sentence, state, is_finding=False)]
+    rounded = frozenset(name for name, how in hows.items() if how is _ROUNDED)
+    found = _Found(pair, open_, rounded, runs)
+    answers = [*_sampled(found, rows, settings, clock)]
+    if found.differing:
+        answers = [*map(found.witness, found.differing), *answers]
+    elif None not in hows.values():
+        is_rounded = bool(rounded)
+        how = _ROUNDED.how if is_rounded else _HELD.how
+        sentence = f"{_ALIKE} everywhere on the domain"
+        sentence += ", but for rounding" if is_rounded else ""
+        measures = (Measure("largest difference by rounding", found.rounding),)
+        whole = _proved(pair, sentence, how)
+        if is_rounded:
+            whole = msgspec.structs.replace(whole, measures=measures)
+        return [whole, *answers]
+    for name, known in hows.items():
+        if known is not None and name not in found.largest:
+            sentence = f"both systems compute {name!r} alike{known.where}"
+            proof = Proved(known.how)
+            answers.append(Answer("FT801", name, sentence, proof, is_finding=False))
+    answers += [found.bound(name) for name, how in hows.items() if how is None]
+    return answers
+
+
+class _Alike(NamedTuple):
+    """How an output is known to be alike, and where."""
+
+    how: str
+    where: str
+
+
+_SAME = _Alike("both perform the same operations on the same numbers", "")
+_HELD = _Alike(_SAME.how, " everywhere on the domain")
+_ROUNDED = _Alike(
+    "both are one function of real numbers: equal curves in equal rules",
+    " everywhere on the domain, but for rounding",
+)
+
+
+def _hows(pair: Pair) -> dict[str, _Alike | None]:
+    """Return how each output of both is known to be alike; None if it is not."""
+    both, curves = (pair.old, pair.new), Curves()
+    keys = (
+        (_SAME, [computed(system) for system in both]),
+        (_HELD, [computed(system, pair.domain) for system in both]),
+        (_ROUNDED, [meant(system, curves, pair.domain) for system in both]),
+    )
+    return {
+        name: next(
+            (how for how, (a, b) in keys if name in a and a[name] == b.get(name)), None
+        )
+        for name in pair.outputs
+    }
+
+
+def _proved(pair: Pair, sentence: str, how: str) -> Answer:
+    if {*pair.old.columns} != {*pair.new.columns}:
+        sentence += ", where no value is missing"
+    return Answer("FT801", "decisions", sentence, Proved(how), is_finding=False)
+
+
+def _sampled(
+    found: _Found, rows: Rows | None, settings: Settings, clock: Clock
+) -> Iterator[Answer]:
+    """Yield how often outputs differ, and what the budget left out."""
+    pair = found.pair
+    sides = [pair.domain.side(name) for name in pair.columns]
+    low, high = (
+        np.array([getattr(side, end) for side in sides if side])[:, None]
+        for end in ("low", "high")
+    )
+    chance = np.random.default_rng(settings.seed)
+    u = chance.random((len(pair.columns), min(settings.rows, _DRAWN)))
+    asked: list[tuple[str, FloatArray, str]] = []
+    if rows is not None:
+        asked.append(("rows", rows.values, f"rows of {rows.name}"))
+    probes = np.hstack(
+        [_probes(one, pair.columns, low, high) for one in (pair.old, pair.new)]
+    )
+    asked.append(("probes", probes, "probes of both systems within the domain"))
+    drawn = f"points drawn evenly from the domain, seed {settings.seed}"
+    asked.append(("domain", low * (1.0 - u) + high * u, drawn))
+    left = 0
+    for place, (subject, values, how) in enumerate(asked):
+        clock.tell("comparing numbers", place / len(asked))
+        count = values.shape[1]
+        if count:
+            hits, seen = found.add(values, clock.share(1.0 / (len(asked) - place)))
+            left += count - seen
+            if seen:
+                yield _counted(found, subject, hits, seen, how)
+    if left:
+        reason = "the budget was spent"
+        sentence = f"{left} points were not looked at: {reason}"
+        state = Declined("FTD03", reason)
+        yield Answer("FT801", "points", sentence, state, is_finding=False)
+
+
+def _counted(found: _Found, subject: str, hits: int, seen: int, how: str) -> Answer:
+    state = share("rows in which an output differs", hits, seen, f"{seen} {how}")
+    sentence = f"no output differs on {seen} {how}"
+    if hits:
+        sentence = f"an output differs on {hits} of {seen} {how}"
+    elif found.rounding:
+        sentence += ", but for rounding"
+    return Answer(
+        "FT801",
+        subject,
+        sentence,
+        state,
+        is_finding=hits > 0,
+        severity="error" if hits else "info",
+    )
+
+
+def _probes(
+    system: FuzzySystem, columns: Sequence[str], low: FloatArray, high: FloatArray
+) -> FloatArray:
+    known = system_probes(system, limit=_PROBES)
+    middle = (low / 2 + high / 2)[:, 0].tolist()
+    table = [
+        [row.get(name, at) for row in known]
+        for name, at in zip(columns, middle, strict=True)
+    ]
+    values = np.array(table, np.float64).reshape(len(columns), len(known))
+    inside = ((values >= low) & (values <= high)).all(axis=0)
+    kept: FloatArray = values[:, inside]
+    return kept
+
+
+class _Largest(NamedTuple):
+    """Where an output was seen to differ most."""
+
+    gap: float
+    was: float
+    now: float
+    row: Mapping[str, float]
+
+
+class _Found:
+    """Where outputs were seen to differ.
+
+    Args:
+        pair: The systems.
+        outputs: The outputs that are compared.
+        rounded: Those that are one function, so that rounding is no difference.
+        runs: What runs each system.
+    """
+
+    def __init__(
+        self,
+        pair: Pair,
+        outputs: Sequence[str],
+        rounded: frozenset[str],
+        runs: Sequence[SystemRun],
+    ) -> None:
+        self.pair, self.outputs, self.runs = pair, outputs, runs
+        self.is_rounded = np.array([name in rounded for name in outputs])
+        self.largest: dict[str, _Largest] = {}
+        self.rounding = 0.0
+
+    @property
+    def differing(self) -> list[str]:
+        """The outputs that were seen to differ."""
+        return [name for name in self.outputs if name in self.largest]
+
+    def add(self, values: FloatArray, clock: Clock) -> tuple[int, int]:
+        """Compare some rows as long as there is time; return how many differ, of."""
+        hits = seen = 0
+        for part in portions(values.shape[1], clock):
+            try:
+                with enforced(clock):
+                    hits += self._add(values[:, part])
+            except OutOfTimeError:
+                break
+            seen = min(part.stop, values.shape[1])
+        return hits, seen
+
+    def _add(self, values: FloatArray) -> int:
+        one, other = self._numbers(values)
+        with np.errstate(invalid="ignore", over="ignore"):
+            gap = np.abs(one - other)
+            size = np.fmax(np.fmax(np.abs(one), np.abs(other)), 1.0)
+        gap[(one == other) | (np.isnan(one) & np.isnan(other))] = 0.0
+        gap[np.isnan(gap)] = np.inf
+        is_small = self.is_rounded[:, None] & (gap <= _ROUNDING * size)
+        self.rounding = max(self.rounding, float(gap[is_small].max(initial=0.0)))
+        gap[is_small] = 0.0
+        for place, row in enumerate(gap.argmax(axis=1).tolist()):
+            name, most_ = self.outputs[place], float(gap[place, row])
+            kept = self.largest.get(name)
+            if most_ and (kept is None or most_ > kept.gap):
+                at = zip(self.pair.columns, values[:, row].tolist(), strict=True)
+                was, now = float(one[place, row]), float(other[place, row])
+                self.largest[name] = _Largest(most_, was, now, dict(at))
+        return int((gap > 0.0).any(axis=0).sum())
+
+    def _numbers(self, values: FloatArray) -> list[FloatArray]:
+        """Return what both compute, each of shape (outputs, rows)."""
+        found: list[FloatArray] = []
+        pair = self.pair
+        for system, run in zip((pair.old, pair.new), self.runs, strict=True):
+            rows = values[[pair.columns.index(name) for name in system.columns]]
+            known = [one.name for one in system.outputs]
+            found.append(run(rows).outputs[[known.index(n) for n in self.outputs]])
+        return found
+
+    def witness(self, name: str) -> Answer:
+        """Return where an output differs most, of what was seen."""
+        found = self.largest[name]
+        point = {key: Fraction(value) for key, value in found.row.items()}
+        how = "as the reference computes it"
+        said = f"{name!r} is {_shown(found.now)}, and was {_shown(found.was)}"
+        measure = Measure("largest difference", found.gap)
+        try:
+            point = self._simple(name, point)
+            was, now = self._exact(name, point)
+            apart = None if was is None or now is None else abs(now - was)
+            if apart != 0:
+                how = "in fractions"
+                said = f"{name!r} is {_shown(now)}, and was {_shown(was)}"
+                exact = None if apart is None else str(apart)
+                gap = math.inf if apart is None else float(apart)
+                measure = Measure("largest difference", gap, exact)
+            else:  # rounding alone
+                point = {key: Fraction(value) for key, value in found.row.items()}
+        except NotExactError:
+            pass
+        return Answer(
+            "FT801",
+            name,
+            f"{said}, {how}",
+            Witness(coordinates(point), ()),
+            is_finding=True,
+            severity="error",
+            measures=(measure,),
+        )
+
+    def _exact(
+        self, name: str, point: Mapping[str, Fraction]
+    ) -> tuple[Fraction | None, Fraction | None]:
+        """Return the numbers of an output in both systems, in fractions."""
+        pair = self.pair
+        return number_at(pair.old, name, point), number_at(pair.new, name, point)
+
+    def _simple(self, name: str, point: Mapping[str, Fraction]) -> dict[str, Fraction]:
+        """Return a point of few digits where an output differs nearly as much."""
+        least = self._apart(name, point) * _MOST_SHOWN
+        return simplified(
+            point, self.pair.domain, lambda tried: self._apart(name, tried) >= least
+        )
+
+    def _apart(self, name: str, point: Mapping[str, Fraction]) -> float:
+        was, now = self._exact(name, point)
+        if was is None or now is None:
+            return 0.0 if was is now else math.inf
+        return float(abs(now - was))
+
+    def bound(self, name: str) -> Answer:
+        """Return between which numbers the largest difference of an output lies."""
+        of = f"the largest difference of {name!r} where both answer a number"
+        known = most(self.pair.old, self.pair.new, name, self.pair.domain)
+        seen = self.largest.get(name)
+        if known is None:
+            reason = "nothing bounds what its rules conclude"
+            sentence = f"how far {name!r} can differ at most is not known: {reason}"
+            state: State = Declined("FTD02", reason)
+            return Answer(
+                "FT801", f"bound of {name}", sentence, state, is_finding=False
+            )
+        high, why = outwards(known[0])[1], known[1]
+        is_within = (
+            seen is not None
+            and math.isfinite(seen.gap)
+            and all(
+                side.low <= seen.row[side.variable] <= side.high
+                for side in self.pair.domain.sides
+                if side.variable in seen.row
+            )
+        )
+        low = min(seen.gap, high) if seen is not None and is_within else 0.0
+        state = Bracket(of, low, high, why)
+        sentence = f"{name!r} differs by at most {high:.6g} where both answer a number"
+        return Answer("FT801", f"bound of {name}", sentence, state, is_finding=False)
+
+
+def _shown(number: Fraction | float | None) -> str:
+    if number is None or math.isnan(number):
+        return "no number"
+    return repr(float(number))

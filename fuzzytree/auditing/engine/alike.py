@@ -1,0 +1,401 @@
+"""Do two rule bases decide alike everywhere on a box? Branch and bound in fractions.
+
+A box is a product of stretches of the axes that either model asks; combinations count
+as axes of their own, which only makes more boxes. On a box the strength of each rule
+has bounds, and a rule is *beaten* if another one is preferred to it at every point:
+certainly stronger, or as strong and before it. What is left of a model are the rules
+that may win there. The box is settled
+
+- if both models answer one and the same class on it, or
+- if the same rules are left of both in the same order, for which their forms count and
+  not their names: then whichever wins in one wins in the other.
+
+If what the two may answer has nothing in common, any point of the box is a witness. All
+other boxes are halved, best where a curve changes its formula or crosses another.
+"""
+
+from __future__ import annotations
+
+import heapq
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Final, Literal, NamedTuple
+
+from fuzzytree.auditing.engine.answers import difference_at
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.contenders import Box, Contender, Left, left_on, same
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.points import Places, Point, middle
+from fuzzytree.auditing.engine.states import Bracket, Proved, Span, State, Witness
+from fuzzytree.auditing.engine.stretches import Axis, Key, Numbered, Stretch, laid
+from fuzzytree.auditing.engine.variables import span
+from fuzzytree.model.rulebase import RuleBase, Variable
+
+MOST_BOXES = 4_000
+"""Boxes that are looked at, unless the clock ends before."""
+
+TOUCHING = 2.0**-50
+"""Where classes are no further apart than this, boxes are not halved any more."""
+
+OF: Final = "the smaller of both margins where the two answer otherwise"
+_DEEP = 12  # halvings, before which no box is taken for a touching tie
+_HALVINGS = 60  # of what a region may still grow by
+_DEEPEST = 60  # halvings of a box in which both answer otherwise, but no double is met
+
+
+def alike(
+    old: RuleBase,
+    new: RuleBase,
+    domain: Domain,
+    clock: Clock,
+    *,
+    most: int = MOST_BOXES,
+) -> State:
+    """Decide whether two rule bases answer alike on all of a domain.
+
+    Args:
+        old: A rule base.
+        new: Another one.
+        domain: A side for each input of either.
+        clock: How much time is left.
+        most: The most boxes that are looked at.
+
+    Returns:
+        `Proved`: they answer alike. `Witness`: they do not, here. `Bracket`: they can
+        differ only where the margin of one of them is at most so large.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Rule
+        >>> one = RuleBase("one", ("a", "b"), (), (Rule((), "a"),))
+        >>> two = RuleBase("two", ("a", "b"), (), (Rule((), "b"),))
+        >>> alike(one, one, Domain(()), Clock()).how
+        'both answer alike in every box: 1 box settled'
+        >>> alike(one, two, Domain(()), Clock()).claims[1].label
+        'b'
+    """
+    return _Search(old, new, domain).run(clock, most)
+
+
+class _Open(NamedTuple):
+    """A box that is open.
+
+    Attributes:
+        margin: At least the largest margin on it.
+        box: The box.
+        depth: How often it was halved.
+        rules: Of each model the places of the rules that may win on it; all if None.
+    """
+
+    margin: float
+    box: Box
+    depth: int
+    rules: tuple[tuple[int, ...] | None, ...] = (None, None)
+
+
+class _Found(NamedTuple):
+    """What keeps a box open: the margin on it, and where to halve it, if anywhere."""
+
+    margin: float
+    cut: tuple[int, Fraction] | None
+    rules: tuple[tuple[int, ...] | None, ...]
+
+
+class _Todo:
+    """The boxes that are open, in two orders."""
+
+    def __init__(self, first: _Open) -> None:
+        self._open: dict[int, _Open] = {}
+        self._by_margin: list[tuple[float, int]] = []
+        self._by_age: deque[int] = deque()
+        self._count = 0
+        self.put(first)
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    @property
+    def margin(self) -> float:
+        """The largest margin of an open box."""
+        while self._by_margin[0][1] not in self._open:
+            heapq.heappop(self._by_margin)
+        return -self._by_margin[0][0]
+
+    @property
+    def is_touching(self) -> bool:
+        """Whether all open boxes are small, and classes as good as tie on them."""
+        return self.margin <= TOUCHING and self._oldest.depth > _DEEP
+
+    @property
+    def _oldest(self) -> _Open:
+        while self._by_age[0] not in self._open:
+            self._by_age.popleft()
+        return self._open[self._by_age[0]]
+
+    def put(self, box: _Open) -> None:
+        """Add a box."""
+        self._open[self._count] = box
+        heapq.heappush(self._by_margin, (-box.margin, self._count))
+        self._by_age.append(self._count)
+        self._count += 1
+
+    def take(self) -> _Open:
+        """Remove the oldest box, or the one with the largest margin, by turns."""
+        margin, number = -self.margin, self._by_margin[0][1]
+        if self._count % 4 or not margin:
+            box = self._oldest
+            del self._open[self._by_age.popleft()]
+            return box
+        return self._open.pop(number)
+
+
+class _Search:
+    """Two rule bases on common axes, and the boxes that are open."""
+
+    def __init__(self, old: RuleBase, new: RuleBase, domain: Domain) -> None:
+        self.models = (old, new)
+        asked = _asked(old, new)
+        ends = [
+            (key, Stretch(*span(variable, domain), True))
+            for key, variable in asked.items()
+        ]
+        self.is_empty = any(whole.low > whole.high for _, whole in ends)
+        self.axes, self.rules = laid((old, new), ends)
+        self.places = Places(self.models, list(asked), domain)
+
+    def run(self, clock: Clock, most: int) -> State:
+        """Settle boxes: by turns the largest, and where the margin may be largest."""
+        if self.is_empty:
+            return Proved("no point of the inputs is within the domain")
+        whole = tuple(axis.whole for axis in self.axes)
+        todo = _Todo(_Open(1.0, whole, 0))
+        settled, stuck = 0, -1.0
+        while todo:
+            margin = max(todo.margin, stuck)
+            if settled + len(todo) > most or clock.is_over or todo.is_touching:
+                return self._open(margin, settled, len(todo), clock)
+            if not settled % 64:
+                clock.tell("settling boxes", settled / (settled + len(todo)))
+            box = todo.take()
+            found = self._look(box)
+            if isinstance(found, Witness):
+                return found
+            if found is None or found.cut is None:
+                settled += 1
+                stuck = stuck if found is None else max(stuck, found.margin)
+                continue
+            for half in _halves(box.box, *found.cut):
+                margin = min(found.margin, 1.0)
+                todo.put(_Open(margin, half, box.depth + 1, found.rules))
+        if stuck >= 0.0:
+            why = "no double is known that reaches what is open"
+            return Bracket(OF, 0.0, stuck, why)
+        noun = "box" if settled == 1 else "boxes"
+        return Proved(f"both answer alike in every box: {settled} {noun} settled")
+
+    def _open(self, margin: float, settled: int, left: int, clock: Clock) -> Bracket:
+        why = "enough boxes were halved"
+        if margin <= TOUCHING:
+            why = "only ties are left, or nearly so"
+        elif clock.is_over:
+            why = "the budget was spent"
+        return Bracket(
+            OF,
+            0.0,
+            margin,
+            f"{why}: {settled} boxes are settled, and {left} are open",
+        )
+
+    def _look(self, given: _Open) -> Witness | _Found | None:
+        """Settle a box (None), find a witness in it, or say how to halve it."""
+        _, box, depth, among = given
+        one, other = (
+            left_on(model, asked, self.axes, box, known)
+            for model, asked, known in zip(self.models, self.rules, among, strict=True)
+        )
+        first, second = self._answers(0, one), self._answers(1, other)
+        if len(first) == 1 and first == second:
+            return None
+        old, new = (model.semantics for model in self.models)
+        if (one.is_sure or old.uncovered == new.uncovered) and same(
+            one, other, (old.conjunction, new.conjunction)
+        ):
+            return None
+        is_apart = first.isdisjoint(second)
+        points = self._points(box, is_wanted=is_apart or depth % 4 == 0)
+        if points is None:
+            return None
+        for point in points:
+            near = self.places.in_doubles(point)
+            witness = None if near is None else difference_at(*self.models, near)
+            if witness is not None:
+                return witness
+        is_beyond = is_apart and (depth > _DEEPEST or not self.places.has_sums)
+        cut = None if is_beyond else self._cut(box, [*one.rules, *other.rules])
+        rules = tuple(tuple(rule.place for rule in left.rules) for left in (one, other))
+        return _Found(min(one.margin, other.margin), cut, rules)
+
+    def answers(self, box: Box) -> tuple[set[str | None], set[str | None]] | None:
+        """Return the one answer of each model on all of a box, None if one has more."""
+        one, other = (
+            self._answers(number, left_on(model, asked, self.axes, box))
+            for number, (model, asked) in enumerate(
+                zip(self.models, self.rules, strict=True)
+            )
+        )
+        return (one, other) if len(one) == len(other) == 1 else None
+
+    def _answers(self, model: int, left: Left) -> set[str | None]:
+        found: set[str | None] = {rule.then for rule in left.rules}
+        if not left.is_sure:
+            found.add(self.models[model].semantics.uncovered)
+        return found
+
+    def _points(self, box: Box, *, is_wanted: bool) -> list[Point] | None:
+        """Return points of a box to try; None if no input reaches it."""
+        if not is_wanted:
+            return []
+        if not self.places.has_sums:
+            return self.places.some(box)
+        point = self.places.solved(box)
+        return None if point is None else [point]
+
+    def _cut(self, box: Box, rules: Sequence[Contender]) -> tuple[int, Fraction] | None:
+        """Return the axis and the place where halving a box promises most.
+
+        That is an edge that most of the rules have which may be the strongest, as the
+        cut of a tree's root is; where there is none left, the axis on which some
+        degree varies most.
+        """
+        votes: dict[tuple[int, Fraction], int] = {}
+        top = max((rule.high for rule in rules), default=0.0)
+        for rule in (one for one in rules if one.high == top):
+            for axis, number in rule.clauses:
+                low, high, is_closed = box[axis]
+                for edge in self.axes[axis].edges[number]:
+                    if low < edge < high or (is_closed and edge == low < high):
+                        votes[axis, edge] = votes.get((axis, edge), 0) + 1
+        if votes:
+            return min(votes, key=lambda one: (-votes[one], one))
+        wide = self._widest(box, rules)
+        return None if wide is None else (wide, _cut_at(self.axes[wide], box[wide]))
+
+    def _widest(self, box: Box, rules: Sequence[Contender]) -> int | None:
+        """Return the axis on which a degree that matters varies most."""
+        is_min = all(m.semantics.conjunction == "min" for m in self.models)
+        common: set[Numbered] = set()
+        if rules and not is_min:
+            common = set.intersection(*({*rule.form} for rule in rules))
+        doubt: dict[int, tuple[float, float]] = {}
+        for rule in rules:
+            for clause, form in zip(rule.clauses, rule.form, strict=True):
+                low, high = rule.bounds[clause]
+                high = min(high, rule.high) if is_min else high
+                stretch, whole = box[clause[0]], self.axes[clause[0]].whole
+                if stretch.low == stretch.high or low > high:
+                    continue
+                # A factor of all rules says nothing of who is stronger.
+                width = 0.0 if form in common else high - low
+                length = float((stretch.high - stretch.low) / (whole.high - whole.low))
+                known = doubt.get(clause[0], (0.0, length))
+                doubt[clause[0]] = max(known, (width, length))
+        return max(doubt, key=lambda one: (doubt[one], -one), default=None)
+
+
+def _cut_at(axis: Axis, stretch: Stretch) -> Fraction:
+    """Return where a stretch is cut: near its middle, at a mark of the axis if any."""
+    low, high, is_closed = stretch
+    centre = middle(stretch)
+    place = bisect_left(axis.marks, centre)
+    near = [
+        mark
+        for mark in axis.marks[max(place - 1, 0) : place + 1]
+        if low < mark < high or (is_closed and mark == low)
+    ]
+    return min(near, key=lambda mark: abs(mark - centre), default=centre)
+
+
+def _asked(old: RuleBase, new: RuleBase) -> dict[Key, Variable]:
+    """Return the variables that some rule of either model asks, by their keys."""
+    found: dict[Key, Variable] = {}
+    for model in (old, new):
+        asked = {clause.variable for rule in model.rules for clause in rule.when}
+        for variable in model.variables:
+            if variable.name in asked:
+                found.setdefault(variable.parts or variable.name, variable)
+    return found
+
+
+def _halves(box: Box, axis: int, at: Fraction) -> Iterator[Box]:
+    low, high, is_closed = box[axis]
+    for part in (Stretch(low, at, is_closed), Stretch(at, high)):
+        yield (*box[:axis], part, *box[axis + 1 :])
+
+
+def region(
+    old: RuleBase, new: RuleBase, domain: Domain, point: Point
+) -> tuple[Span, ...]:
+    """Return a closed box around a point on which both answer as they do there.
+
+    Variables of which any value on the domain will do are left out. It is found by
+    stretching one side after the other, so a larger box may exist.
+
+    Args:
+        old: A rule base.
+        new: Another one.
+        domain: A side for each input of either.
+        point: Where they answer otherwise.
+
+    Returns:
+        Nothing where a combination is asked, or the point is not on the domain.
+    """
+    search = _Search(old, new, domain)
+    if search.places.has_sums or search.places.in_doubles(point) != point:
+        return ()
+    at = [point[str(axis.key)] for axis in search.axes]
+    box = tuple(Stretch(x, x, True) for x in at)
+    wanted = search.answers(box)
+    spans: list[Span] = []
+    for place, axis in enumerate(search.axes):
+        whole = Stretch(axis.whole.low, axis.whole.high, True)
+        wide = (*box[:place], whole, *box[place + 1 :])
+        if search.answers(wide) == wanted:
+            box = wide
+            continue
+        for field in ("low", "high"):
+            box = _stretched(search, box, place, field, wanted)
+        low, high, _ = box[place]
+        spans.append(Span(str(axis.key), float(low), float(high)))
+    return tuple(spans)
+
+
+def _stretched(
+    search: _Search,
+    box: Box,
+    place: int,
+    field: Literal["low", "high"],
+    wanted: object,
+) -> Box:
+    """Return a box with one end moved outwards as far as the answers stay."""
+
+    def moved(end: Fraction) -> Box:
+        low, high, _ = box[place]
+        ends = (end, high) if field == "low" else (low, end)
+        stretch = Stretch(*ends, True)
+        return (*box[:place], stretch, *box[place + 1 :])
+
+    best, beyond = (
+        getattr(one, field) for one in (box[place], search.axes[place].whole)
+    )
+    if search.answers(moved(beyond)) == wanted:
+        return moved(beyond)
+    for _ in range(_HALVINGS):
+        near = Fraction(float((best + beyond) / 2))
+        if near in (best, beyond):
+            break
+        if search.answers(moved(near)) == wanted:
+            best = near
+        else:
+            beyond = near
+    return moved(best)

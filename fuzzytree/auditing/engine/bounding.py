@@ -1,0 +1,402 @@
+"""Branch and bound: what rules reach on a domain, certified, under any conjunction.
+
+That a rule is never stronger than *one* other on a box is seen almost at once, for
+their ratio is a product of ratios of one input each, and what two rules share cancels.
+Only where different rivals are ahead at different places must boxes become small.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from fuzzytree.auditing.engine.branching import (
+    TOO_MANY,
+    Found,
+    Verdict,
+    filled,
+    search,
+    simplified,
+)
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.ground import ground, strengths_at
+from fuzzytree.auditing.engine.lines import Pair
+from fuzzytree.auditing.engine.space import Seen, Space
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Claim,
+    Proved,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.auditing.engine.variables import Point
+from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.engine.wording import counted
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.numerics.enclosures import U
+from fuzzytree.numerics.exact import outwards
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import IntArray
+
+_EASY = 2_000  # boxes that are looked at without knowing the order of curves
+_PATIENCE = 100_000  # boxes, before a lead that may be none is left open
+
+TINY: Final = 2.0**-50
+"""A lead that roundings of doubles can feign."""
+
+
+# --- the lead of a rule
+
+
+def wins_by_boxes(
+    rules: RuleBase,
+    domain: Domain,
+    rule: int,
+    rivals: Collection[int],
+    clock: Clock | None = None,
+    *,
+    tolerance: float = TINY,
+) -> State:
+    """Return whether a rule is somewhere stronger than each of some others.
+
+    Args:
+        rules: The rules.
+        domain: Where it is asked.
+        rule: The number of the rule, from 1.
+        rivals: The numbers of the others; without any it is asked whether the rule
+            fires at all.
+        clock: How much time there is; no limit unless given.
+        tolerance: A lead that is for certain no larger than this is not sought on.
+
+    Returns:
+        `Proved`: it never is. `Witness`: it is, at a point that was evaluated in
+        fractions. `Bracket`: the largest lead is between these.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.auditing.engine.domain import Side
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1), conjunction="product")
+        >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
+        >>> found = wins_by_boxes(rules, box, 1, {2, 3})
+        >>> found.claims[0].kind, found.claims[0].rivals
+        ('beats', (2, 3))
+    """
+    lead = _Lead(rules, domain, rule, rivals)
+    found = lead.search(clock or Clock(), tolerance, is_first_enough=True)
+    if found.point is not None:
+        return lead.witness(found.point)
+    if not found.why:
+        return Proved(_why(found))
+    return lead.bracket(found)
+
+
+def largest_lead_by_boxes(
+    rules: RuleBase,
+    domain: Domain,
+    rule: int,
+    rivals: Collection[int],
+    clock: Clock | None = None,
+    *,
+    tolerance: float = 1e-6,
+) -> Bracket:
+    """Return by how much, at most, a rule is stronger than each of some others.
+
+    Args:
+        rules: The rules.
+        domain: Where it is asked.
+        rule: The number of the rule, from 1.
+        rivals: The numbers of the others.
+        clock: How much time there is; no limit unless given.
+        tolerance: How near the bracket's ends should come to each other.
+
+    Returns:
+        A bracket; both ends are 0 for a rule that never is.
+    """
+    lead = _Lead(rules, domain, rule, rivals)
+    return lead.bracket(lead.search(clock or Clock(), tolerance))
+
+
+class _Lead:
+    """By how much a rule is ahead of the strongest of its rivals."""
+
+    def __init__(
+        self, rules: RuleBase, domain: Domain, rule: int, rivals: Collection[int]
+    ) -> None:
+        self.rule, self.rivals = rule, tuple(sorted(rivals))
+        self.given = ground(rules, domain)
+        self.chosen = (rule - 1, *(number - 1 for number in self.rivals))
+        self.pairs = [Pair(rule - 1, other) for other in self.chosen[1:]]
+        self.space = Space(self.given, self.chosen, self.pairs)
+
+    def search(
+        self, clock: Clock, tolerance: float, *, is_first_enough: bool = False
+    ) -> Found:
+        def run(limit: float) -> Found:
+            return search(
+                self.space,
+                self._judge,
+                self._exact,
+                clock,
+                floor=Fraction(0),
+                tolerance=tolerance,
+                patience=_PATIENCE if is_first_enough else 0,
+                limit=limit,
+                is_first_enough=is_first_enough,
+            )
+
+        first = run(_EASY)
+        if first.why != TOO_MANY:
+            return first
+        self.space = Space(self.given, self.chosen, self.pairs, is_ordered=True)
+        found = run(math.inf)
+        return found._replace(boxes=first.boxes + found.boxes)
+
+    def _judge(self, seen: Seen, boxes: IntArray) -> Verdict:
+        del boxes
+        table = seen.table
+        high = table.high[:, 0]
+        if not self.rivals:
+            bound, worth = high, np.stack([w[:, 0] for w in seen.widths], axis=1)
+        else:
+            bound = np.min(high[:, np.newaxis] - table.low[:, 1:], axis=1)
+            bound *= 1.0 + 4 * U
+            if self.space.is_product:
+                most = table.most.min(axis=1)
+                is_over = most <= 1.0
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    share = (1.0 - 1.0 / most * (1.0 - 4 * U)) * (1.0 + 4 * U)
+                    bound = np.minimum(bound, high * share * (1.0 + 4 * U))
+            else:
+                most = table.most.max(axis=1)
+                is_over = most >= high
+                bound = np.minimum(bound, (high - most) * (1.0 + 4 * U))
+            bound = np.where(is_over, -np.inf, bound)
+            is_open = table.least <= 1.0
+            parts = zip(seen.spreads, seen.widths, strict=True)
+            worth = np.stack(
+                [(s * is_open).sum(axis=1) + w[:, 0] for s, w in parts], axis=1
+            )
+        value = table.at[:, 0] - table.at[:, 1:].max(axis=1, initial=0.0)
+        is_over = (high == 0.0) | seen.is_empty
+        return Verdict(np.where(is_over, -np.inf, bound), value, worth)
+
+    def lead(self, point: Mapping[str, Fraction]) -> Fraction:
+        strengths = strengths_at(self.given, point)
+        best = max((strengths[n - 1] for n in self.rivals), default=Fraction(0))
+        return strengths[self.rule - 1] - best
+
+    def _exact(self, point: Point) -> tuple[Fraction, Point] | None:
+        whole = filled(self.given, point)
+        return (self.lead(whole), whole) if is_within(self.given, whole) else None
+
+    def claims(self) -> tuple[Claim, ...]:
+        return (Claim("beats", rules=(self.rule,), rivals=self.rivals),)
+
+    def witness(self, point: Point) -> Witness:
+        least = self.lead(point) / 2
+        plain = simplified(self.given, point, lambda p: self.lead(p) >= least)
+        return Witness(coordinates(plain), self.claims())
+
+    def bracket(self, found: Found) -> Bracket:
+        has_point = found.point is not None
+        return Bracket(
+            f"the largest lead of rule {self.rule}",
+            max(outwards(found.value)[0], 0.0),
+            min(max(found.bound, 0.0), 1.0),
+            _why(found),
+            coordinates(found.point or {}),
+            self.claims() if has_point else (),
+        )
+
+
+def _why(found: Found) -> str:
+    text = f"{counted(found.boxes, 'box', 'boxes')} visited"
+    return f"{found.why}: {text}" if found.why else f"{text}, none is left"
+
+
+# --- the strongest rule where it is weakest
+
+
+def least_cover_by_boxes(
+    rules: RuleBase,
+    domain: Domain,
+    clock: Clock | None = None,
+    *,
+    tolerance: float = 1e-6,
+) -> Bracket:
+    """Return how strong the strongest rule is where that is least.
+
+    Args:
+        rules: The rules.
+        domain: Where it is asked.
+        clock: How much time there is; no limit unless given.
+        tolerance: How near the bracket's ends should come to each other.
+
+    Returns:
+        A bracket; its point is where the strongest rule is as weak as `high`.
+    """
+    cover = _Cover(rules, domain)
+    return cover.bracket(cover.search(clock or Clock(), Fraction(-1), tolerance))
+
+
+def below_by_boxes(
+    rules: RuleBase,
+    domain: Domain,
+    epsilon: float | Fraction,
+    clock: Clock | None = None,
+) -> State:
+    """Return whether all rules are somewhere weaker than a level; 0 asks for none.
+
+    Args:
+        rules: The rules.
+        domain: Where it is asked.
+        epsilon: The level, in [0, 1]. For 0 it is asked whether no rule fires.
+        clock: How much time there is; no limit unless given.
+
+    Returns:
+        `Proved`: some rule reaches the level everywhere. `Witness`: none does here.
+        `Bracket`: how strong the strongest rule is where that is least.
+    """
+    level = Fraction(epsilon)
+    cover = _Cover(rules, domain, is_zero_wanted=not level)
+    floor = -level if level else Fraction(-1, 2**1100)
+    found = cover.search(clock or Clock(), floor, 0.0, is_first_enough=True)
+    if found.point is not None:
+        return cover.witness(found.point, level)
+    if not found.why:
+        return Proved(_why(found))
+    return cover.bracket(found)
+
+
+class _Cover:
+    """Minus the strength of the strongest rule."""
+
+    def __init__(
+        self, rules: RuleBase, domain: Domain, *, is_zero_wanted: bool = False
+    ) -> None:
+        self.given = ground(rules, domain)
+        self.numbers = tuple(range(1, len(rules.rules) + 1))
+        self.space = Space(self.given, range(len(rules.rules)))
+        self.is_zero_wanted = is_zero_wanted
+
+    def search(
+        self,
+        clock: Clock,
+        floor: Fraction,
+        tolerance: float,
+        *,
+        is_first_enough: bool = False,
+    ) -> Found:
+        return search(
+            self.space,
+            self._judge,
+            self._exact,
+            clock,
+            floor=floor,
+            tolerance=tolerance,
+            is_first_enough=is_first_enough,
+        )
+
+    def _judge(self, seen: Seen, boxes: IntArray) -> Verdict:
+        rows = np.arange(len(boxes))
+        strongest = seen.table.at.argmax(axis=1)
+        bound = np.where(seen.is_empty, -np.inf, -seen.table.low.max(axis=1))
+        worth = np.stack([width[rows, strongest] for width in seen.widths], axis=1)
+        return Verdict(bound, -seen.table.at[rows, strongest], worth)
+
+    def strongest(self, point: Mapping[str, Fraction]) -> Fraction:
+        return max(strengths_at(self.given, point))
+
+    def _exact(self, point: Point) -> tuple[Fraction, Point] | None:
+        whole = filled(self.given, point)
+        if not is_within(self.given, whole):
+            return None
+        found = self.strongest(whole)
+        return None if self.is_zero_wanted and found else (-found, whole)
+
+    def witness(self, point: Point, level: Fraction) -> Witness:
+        def holds(near: Point) -> bool:
+            found = self.strongest(near)
+            return found < level if level else not found
+
+        claims = (Claim("below", rules=self.numbers, level=str(level)),)
+        return Witness(coordinates(simplified(self.given, point, holds)), claims)
+
+    def bracket(self, found: Found) -> Bracket:
+        point = found.point or filled(self.given, {})
+        is_known = found.point is not None or is_within(self.given, point)
+        high = self.strongest(point) if is_known else Fraction(1)
+        return Bracket(
+            "the strength of the strongest rule where it is weakest",
+            min(max(-found.bound, 0.0), 1.0),
+            outwards(high)[1],
+            _why(found),
+            coordinates(point) if is_known else (),
+        )
+
+
+# --- two rules at once
+
+
+def highest_by_boxes(
+    rules: RuleBase,
+    domain: Domain,
+    one: int,
+    other: int,
+    clock: Clock | None = None,
+    *,
+    tolerance: float = 1e-6,
+) -> Bracket:
+    """Return the highest level that two rules reach at the same input.
+
+    Args:
+        rules: The rules.
+        domain: Where it is asked.
+        one: The number of a rule, from 1.
+        other: The number of another one.
+        clock: How much time there is; no limit unless given.
+        tolerance: How near the bracket's ends should come to each other.
+
+    Returns:
+        A bracket; its point is where both reach `low`.
+    """
+    given = ground(rules, domain)
+    space = Space(given, (one - 1, other - 1))
+
+    def judge(seen: Seen, boxes: IntArray) -> Verdict:
+        del boxes
+        bound = np.where(seen.is_empty, -np.inf, seen.table.high.min(axis=1))
+        worth = np.stack([width.sum(axis=1) for width in seen.widths], axis=1)
+        return Verdict(bound, seen.table.at.min(axis=1), worth)
+
+    def exact(point: Point) -> tuple[Fraction, Point] | None:
+        whole = filled(given, point)
+        strengths = strengths_at(given, whole)
+        both = min(strengths[one - 1], strengths[other - 1])
+        return (both, whole) if is_within(given, whole) else None
+
+    found = search(
+        space,
+        judge,
+        exact,
+        clock or Clock(),
+        floor=Fraction(0),
+        tolerance=tolerance,
+    )
+    reached = Claim("reaches", rules=(one, other), level=str(found.value))
+    return Bracket(
+        f"the highest level that rules {one} and {other} both reach",
+        outwards(found.value)[0],
+        min(found.bound, 1.0),
+        _why(found),
+        coordinates(found.point or {}),
+        (reached,) if found.point is not None else (),
+    )

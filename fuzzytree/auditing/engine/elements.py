@@ -1,0 +1,244 @@
+"""The curves that rules use on one axis, and the places where something changes."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.auditing.engine.curves import (
+    ONE,
+    ZERO,
+    Piece,
+    degree_after,
+    piece_at,
+    pieces,
+)
+from fuzzytree.auditing.engine.polynomials import (
+    Polynomial,
+    Root,
+    common_factor,
+    derivative,
+    difference,
+    divided,
+    integer_roots,
+    integers,
+    magnitude,
+    refined,
+    roots,
+    squarefree,
+    value_at,
+)
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import Band, Points, Shape
+from fuzzytree.numerics.exact import CAP
+
+_ENDS = ((ZERO,), (ONE,))
+
+ALWAYS = Band()
+"""The curve of a rule that asks nothing of a variable."""
+
+
+class Element(NamedTuple):
+    """A curve that rules use: a shape, or 1 minus it."""
+
+    shape: Shape
+    is_complement: bool = False
+
+    def degree(self, x: Fraction) -> Fraction:
+        """Return the exact degree at a value."""
+        checkpoint()
+        found = piece_at(pieces(self.shape), x).degree(x)
+        return 1 - found if self.is_complement else found
+
+    def degree_after(self, x: Fraction) -> Fraction:
+        """Return the exact limit of the degree from the right."""
+        found = degree_after(pieces(self.shape), x)
+        return 1 - found if self.is_complement else found
+
+    def pieces(self) -> tuple[tuple[Piece, Polynomial], ...]:
+        """Return the pieces of the shape, each with its own polynomial on it."""
+        return tuple(
+            (
+                piece,
+                difference((ONE,), piece.polynomial)
+                if self.is_complement
+                else piece.polynomial,
+            )
+            for piece in pieces(self.shape)
+        )
+
+
+class Place(NamedTuple):
+    """Where something can change on an axis: between `low` and `high`.
+
+    Attributes:
+        low: At most the place; the place itself if `low == high`.
+        high: At least the place.
+        of: What is zero there, and the root; None where the place is rational.
+    """
+
+    low: Fraction
+    high: Fraction
+    of: tuple[Polynomial, Root] | None = None
+
+
+def places(elements: Sequence[Element]) -> tuple[Place, ...]:
+    """Return all places where the order or direction of some curves can change."""
+    found: set[Fraction] = set()
+    irrational: list[Place] = []
+    laid = [element.pieces() for element in elements]
+    levels = sorted(
+        {ZERO, ONE}
+        | {
+            level
+            for of in laid
+            for piece, polynomial in of
+            if piece.cap == CAP and len(polynomial) > 1
+            for level in (CAP, 1 - CAP)
+        }
+    )
+    for element, of in zip(elements, laid, strict=True):
+        is_kept = isinstance(element.shape, Points)  # lines that stay in [0, 1]
+        for piece, polynomial in of:
+            found.update(end for end in (piece.low, piece.high) if end is not None)
+            if len(polynomial) > 1:
+                ends = piece.low, piece.high
+                turning = integers(derivative(polynomial))[0]
+                if len(turning) > 1:
+                    _solve(turning, *ends, found, irrational)
+                for level in levels:
+                    if not is_kept or ZERO < level < ONE:
+                        met = _crossing(polynomial, (level,))
+                        _solve(met, *ends, found, irrational)
+    for one, other in itertools.combinations(laid, 2):
+        checkpoint()
+        for low, high, p, q in _overlaps(one, other):
+            is_asked = p in _ENDS or q in _ENDS  # where one meets 0 or 1 is known
+            if (len(p) > 1 or len(q) > 1) and not is_asked:
+                _solve(_crossing(p, q), low, high, found, irrational)
+    return tuple(_apart([*(Place(x, x) for x in found), *irrational]))
+
+
+def _apart(found: Iterable[Place]) -> list[Place]:
+    """Return places apart from each other: one place that was met twice stands once.
+
+    Two that cannot be told apart are left to touch.
+    """
+    kept: list[Place] = []
+    todo = sorted(found, key=lambda one: (one.low, one.high), reverse=True)
+    while todo:
+        after = todo.pop()
+        if not kept or after.low > kept[-1].high:
+            kept.append(after)
+            continue
+        before = kept.pop()
+        same = _same(before, after)
+        if same is not None:
+            todo.append(same)
+            continue
+        pair = sorted(_told_apart(before, after), key=lambda one: one.low)
+        if pair[1].low > pair[0].high:
+            todo += reversed(pair)  # the lower one may meet those before
+        else:
+            kept += pair
+    return kept
+
+
+def _same(one: Place, other: Place) -> Place | None:
+    """Return two places that touch as one, if they are the same for sure."""
+    if one.of is None or other.of is None:
+        exact, vague = (one, other) if one.of is None else (other, one)
+        if vague.of is None:
+            return exact if exact.low == vague.low else None
+        return exact if _is_only_root(vague.of[0], exact.low, vague) else None
+    low, high = max(one.low, other.low), min(one.high, other.high)
+    if not (one.of[1].is_sure and other.of[1].is_sure and low < high):
+        return None
+    # A root of what two polynomials have in common is a root of both, and each has
+    # only one in its place.
+    shared = common_factor(one.of[0], other.of[0])
+    if len(shared) > 1 and value_at(shared, low) * value_at(shared, high) < 0:
+        return Place(low, high, (shared, Root(low, high)))
+    return None
+
+
+def _is_only_root(of: Polynomial, at: Fraction, place: Place) -> bool:
+    """Return whether a polynomial is 0 at a value, and nowhere else in a place."""
+    if place.low == place.high:
+        return at == place.low
+    if value_at(of, at) != 0:
+        return False
+    while len(of) > 1 and value_at(of, at) == 0:
+        of = divided(of, at)
+    ends = place.low, place.high
+    return all(value_at(of, end) for end in ends) and not roots(of, *ends)
+
+
+def _told_apart(one: Place, other: Place) -> tuple[Place, Place]:
+    """Return two places that touch as narrow as it takes for them to be apart."""
+    for bits in (64, 128, 512):
+        one, other = (_narrowed(place, bits) for place in (one, other))
+        if one.high < other.low or other.high < one.low:
+            break
+    return one, other
+
+
+def _narrowed(place: Place, bits: int) -> Place:
+    if place.of is None:
+        return place
+    size = max(abs(place.low), abs(place.high)) or ONE
+    root = refined(*place.of, bits - magnitude(size))
+    return Place(root.low, root.high, (place.of[0], root))
+
+
+def _crossing(one: Polynomial, other: Polynomial) -> list[int]:
+    """Return a positive multiple of a difference, in whole numbers."""
+    a, of_a = integers(one)
+    b, of_b = integers(other)
+    common = math.gcd(of_a, of_b)
+    of_a, of_b = of_a // common, of_b // common
+    return [x * of_b - y * of_a for x, y in itertools.zip_longest(a, b, fillvalue=0)]
+
+
+def _solve(
+    numbers: Sequence[int],
+    low: Fraction | None,
+    high: Fraction | None,
+    found: set[Fraction],
+    irrational: list[Place],
+) -> None:
+    if low is None or high is None:
+        return
+    met = integer_roots(numbers, low, high)
+    if not all(root.is_sure for root in met):  # it may be a double one
+        numbers = integers(squarefree(tuple(map(Fraction, numbers))))[0]
+        met = integer_roots(numbers, low, high)
+    for root in met:
+        if root.low == root.high:
+            found.add(root.low)
+        else:
+            of = tuple(map(Fraction, numbers))
+            irrational.append(Place(root.low, root.high, (of, root)))
+
+
+def _overlaps(
+    one: Sequence[tuple[Piece, Polynomial]], other: Sequence[tuple[Piece, Polynomial]]
+) -> Iterator[tuple[Fraction | None, Fraction | None, Polynomial, Polynomial]]:
+    """Yield where a piece of one curve and one of another both hold."""
+    i = j = 0
+    low: Fraction | None = None
+    while True:
+        (a, p), (b, q) = one[i], other[j]
+        high = a.high if b.high is None or _is_first(a.high, b.high) else b.high
+        if low is None or high is None or low < high:
+            yield low, high, p, q
+        if high is None:
+            return
+        i, j, low = i + (a.high == high), j + (b.high == high), high
+
+
+def _is_first(one: Fraction | None, other: Fraction) -> bool:
+    return one is not None and one < other

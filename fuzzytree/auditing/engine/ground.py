@@ -1,0 +1,439 @@
+"""A rule base on a box, made ready for exact questions under the minimum.
+
+Every axis is cut into cells (`fuzzytree.auditing.engine.axes`). The values that
+elements have at the cells' ends are the *critical levels*; known as intervals, they are
+joined where they touch into *bands*, in order. Between two neighbouring bands the
+picture is the same at every level, and inside a cell all that matters of an element is
+the band of its least and of its largest value.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.engine.axes import Cells, cut
+from fuzzytree.auditing.engine.crowds import crossings
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.elements import ALWAYS, Element, Place, places
+from fuzzytree.auditing.engine.levels import Level, level_at, told_apart
+from fuzzytree.auditing.engine.variables import span, variable_value
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Variable, shapes_of
+from fuzzytree.numerics.exact import exact_degree
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.model.contracts import IntArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+
+MOST_NUMBERS: Final = 1 << 24
+"""The most values of curves and rules in cells that are kept, as doubles."""
+
+MOST_FRACTIONS: Final = 1 << 21
+"""The same as fractions."""
+
+
+class TooManyCellsError(MemoryError):
+    """Curves cross so often that their cells are too many to be kept."""
+
+
+class Axis(msgspec.Struct, frozen=True, eq=False, dict=True):
+    """What the rules ask of one variable.
+
+    Attributes:
+        variable: The variable.
+        elements: The distinct curves; the first is that of a rule that asks nothing.
+        asked: For each rule its clauses here, each as the elements of which it takes
+            the largest; the rule takes the least of its clauses.
+    """
+
+    variable: Variable
+    elements: tuple[Element, ...]
+    asked: tuple[tuple[tuple[int, ...], ...], ...]
+
+    @functools.cached_property
+    def found(self) -> tuple[Place, ...]:
+        """All places where something changes."""
+        return _places(self.elements)
+
+    @functools.cached_property
+    def crossings(self) -> int:
+        """How often curves cross at least."""
+        return crossings(self.elements)
+
+
+class Laid(NamedTuple):
+    """An axis on the box.
+
+    Attributes:
+        axis: The axis.
+        cells: Its cells.
+        of: Shape (rules, cells): the element that is a rule's degree in each cell.
+        of_start: Shape (rules,): the same at the lower end itself.
+        least: Shape (elements, cells): the band of the least value.
+        most: Shape (elements, cells): the band of the largest value.
+        at: Shape (elements, zones): the band of the value at each zone.
+        after: The same, of the limit from above.
+        is_zero: Shape (elements, cells): whether an element is 0 throughout.
+        is_zero_at: Shape (elements, zones): whether it is 0 there, for sure.
+        may_be_zero_at: The same, as far as it can be told.
+    """
+
+    axis: Axis
+    cells: Cells
+    of: IntArray
+    of_start: IntArray
+    least: IntArray
+    most: IntArray
+    at: IntArray
+    after: IntArray
+    is_zero: BoolArray
+    is_zero_at: BoolArray
+    may_be_zero_at: BoolArray
+
+
+class Bands(NamedTuple):
+    """The critical levels, joined where they touch, in ascending order.
+
+    Attributes:
+        low: The lower ends.
+        high: The upper ends.
+        is_sharp: Whether a band is one level that is known exactly.
+    """
+
+    low: list[Fraction]
+    high: list[Fraction]
+    is_sharp: BoolArray
+
+    def low_after(self, band: int) -> Fraction:
+        """Return the lower end of the next band, 1 if there is none."""
+        return self.low[band + 1] if band + 1 < len(self.low) else Fraction(1)
+
+
+class Ground(msgspec.Struct, frozen=True, eq=False, dict=True):
+    """A rule base on a box.
+
+    Attributes:
+        rules: The rules.
+        domain: The box.
+        axes: What the rules ask, variable by variable.
+        ends: The two ends of each axis on the box, of combinations too; None where
+            no point of the box is within the sides of a combination.
+        is_fine: Whether levels are known as fractions, narrow without limit.
+    """
+
+    rules: RuleBase
+    domain: Domain
+    axes: tuple[Axis, ...]
+    ends: tuple[tuple[Fraction, Fraction], ...] | None
+    is_fine: bool = False
+
+    @functools.cached_property
+    def laid(self) -> tuple[tuple[Laid, ...], Bands]:
+        """The axes on the box, and the critical levels of all of them.
+
+        Raises:
+            TooManyCellsError: If they would be too large.
+        """
+        assert self.ends is not None  # of a box that is not empty
+        if not self.is_kept:
+            raise TooManyCellsError("its curves cross more often than can be kept")
+        for axis, (low, high) in zip(self.axes, self.ends, strict=True):
+            name = axis.variable.name
+            if name not in self._cut:  # who comes back after a spent budget goes on
+                self._cut[name] = cut(
+                    axis.elements, axis.found, low, high, is_fine=self.is_fine
+                )
+        return _laid(self.axes, [*self._cut.values()], is_fine=self.is_fine)
+
+    @functools.cached_property
+    def _cut(self) -> dict[str, Cells]:
+        return {}
+
+    @functools.cached_property
+    def is_kept(self) -> bool:
+        """Whether all values of curves and rules in cells can be kept."""
+        most = MOST_FRACTIONS if self.is_fine else MOST_NUMBERS
+
+        def is_within(counts: Iterator[int]) -> bool:
+            size = 0
+            for axis, count in zip(self.axes, counts, strict=False):
+                size += (count + 1) * (len(axis.elements) + len(axis.asked))
+                if size > most:  # the rest is not counted
+                    return False
+            return True
+
+        # Counting takes much less time than finding.
+        return is_within(axis.crossings for axis in self.axes) and is_within(
+            len(axis.found) for axis in self.axes
+        )
+
+    @functools.cached_property
+    def near_levels(self) -> tuple[list[float], list[float]]:
+        """The lower and the upper ends of all bands, as floats near them."""
+        bands = self.laid[1]
+        return [*map(float, bands.low)], [*map(float, bands.high)]
+
+    @functools.cached_property
+    def fine(self) -> Ground:
+        """The same ground with levels known as fractions."""
+        return Ground(self.rules, self.domain, self.axes, self.ends, is_fine=True)
+
+    def opens(self, variable: str) -> bool:
+        """Return whether the lower end of a variable is left out."""
+        side = self.domain.side(variable)
+        return side is not None and side.is_open
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no point of the inputs' box is within all sides."""
+        return self.ends is None
+
+
+@functools.lru_cache(maxsize=4)  # many questions are asked of the same
+def ground(rules: RuleBase, domain: Domain) -> Ground:
+    """Return a rule base made ready for questions on a box.
+
+    Args:
+        rules: The rules.
+        domain: A side for each input, and for combinations that are limited besides.
+
+    Raises:
+        ValueError: If an input has no side.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.auditing.engine.domain import Side
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))
+        >>> ground(rules, box).is_empty
+        False
+    """
+    missing = [name for name in rules.inputs if domain.side(name) is None]
+    if missing:
+        raise ValueError(f"the domain has no side for {missing[0]!r}")
+    axes = _axes(rules)
+    return Ground(rules, domain, axes, _ends(axes, domain))
+
+
+def narrowed(given: Ground, domain: Domain) -> Ground:
+    """Return the same rules on another box; the axes' places are kept."""
+    return Ground(given.rules, domain, given.axes, _ends(given.axes, domain))
+
+
+def _ends(
+    axes: Sequence[Axis], domain: Domain
+) -> tuple[tuple[Fraction, Fraction], ...] | None:
+    ends: list[tuple[Fraction, Fraction]] = []
+    for axis in axes:
+        low, high = span(axis.variable, domain)
+        if low > high:
+            return None
+        ends.append((low, high))
+    return tuple(ends)
+
+
+_places = functools.lru_cache(maxsize=1 << 12)(places)
+
+
+@functools.lru_cache(maxsize=64)
+def _axes(rules: RuleBase) -> tuple[Axis, ...]:
+    shapes = shapes_of(rules.variables)
+    made: list[Axis] = []
+    for variable in rules.variables:
+        elements: dict[Element, int] = {Element(ALWAYS): 0}
+        asked = tuple(
+            _asked(variable.name, rule.when, shapes, elements) for rule in rules.rules
+        )
+        is_last = variable is rules.variables[-1]
+        if any(asked) or (is_last and not made):  # rules that ask nothing have one too
+            of = tuple(elements)
+            made.append(Axis(variable, of, asked))
+    return tuple(made)
+
+
+def _asked(
+    variable: str,
+    when: Sequence[Clause],
+    shapes: Mapping[tuple[str, str], object],
+    elements: dict[Element, int],
+) -> tuple[tuple[int, ...], ...]:
+    """Return what a rule asks of a variable: the least of the largest of elements."""
+    checkpoint()
+    groups: list[tuple[int, ...]] = []
+    for clause in when:
+        if clause.variable != variable:
+            continue
+        of = [
+            elements.setdefault(
+                Element(shapes[variable, term], clause.negated),  # type: ignore[arg-type]
+                len(elements),
+            )
+            for term in clause.terms
+        ]
+        # 1 - max(a, b) is the least of 1 - a and 1 - b
+        groups += [(one,) for one in of] if clause.negated else [tuple(of)]
+    return tuple(groups)
+
+
+def _laid(
+    axes: Sequence[Axis], cells: Sequence[Cells], *, is_fine: bool
+) -> tuple[tuple[Laid, ...], Bands]:
+    if not axes:  # rules that ask nothing, and have a strength of 1
+        one = [Fraction(1)]
+        return (), Bands(one, one, np.array([True]))
+    ends = [side for of in cells for side in (of.left, of.right)]
+    # Level 0 is always among them, so that there is a level below any other.
+    low = np.concatenate([[0.0], *(side[0].ravel() for side in ends)])
+    high = np.concatenate([[0.0], *(side[1].ravel() for side in ends)])
+    band, bands = _bands(low, high)
+    if is_fine:
+        sure = told_apart(band, low, high, partial(_level, axes, cells))
+        band, bands = _bands(low, high, sure)
+    made: list[Laid] = []
+    start = 1
+    for axis, of in zip(axes, cells, strict=True):
+        size = of.left[0].size
+        left, right = (
+            band[at : at + size].reshape(of.left[0].shape)
+            for at in (start, start + size)
+        )
+        start += 2 * size
+        ends_of_cells = right[:, :-1], left[:, 1:]
+        made.append(
+            Laid(
+                axis,
+                of,
+                _chosen(axis, of.rank),
+                _chosen(axis, of.start_rank[np.newaxis])[:, 0],
+                np.minimum(*ends_of_cells),
+                np.maximum(*ends_of_cells),
+                left,
+                right,
+                of.is_zero,
+                of.is_zero_at,
+                of.left[0] == 0,
+            )
+        )
+    return tuple(made), bands
+
+
+def _bands(
+    low: npt.NDArray[np.float64] | npt.NDArray[np.object_],
+    high: npt.NDArray[np.float64] | npt.NDArray[np.object_],
+    sure: Sequence[int] = (),
+) -> tuple[IntArray, Bands]:
+    """Return the band of each interval, and the bands.
+
+    Those in `sure` are one number each, and the same one where they are equal.
+    """
+    order = np.argsort(low, kind="stable")
+    reach = np.maximum.accumulate(high[order])
+    starts = np.concatenate([[True], low[order][1:] > reach[:-1]])
+    numbers = np.cumsum(starts) - 1
+    band = np.empty(len(low), dtype=np.int64)
+    band[order] = numbers
+    first = np.flatnonzero(starts)
+    last = np.append(first[1:], len(order)) - 1
+    lows = [Fraction(one) for one in low[order][first]]
+    highs = [Fraction(one) for one in reach[last]]
+    sharp = np.array([a == b for a, b in zip(lows, highs, strict=True)])
+    sharp[band[list(sure)]] = True
+    return band, Bands(lows, highs, sharp)
+
+
+def _level(
+    axes: Sequence[Axis], cells: Sequence[Cells], number: int
+) -> Level | Fraction | None:
+    """Return a critical level by its number: 0, then all of each axis and side."""
+    number -= 1
+    for axis, of in zip(axes, cells, strict=True):
+        size = of.left[0].size
+        if number < 2 * size:
+            row, zone = divmod(number % size, len(of.zones))
+            low, high = of.zones[zone]
+            if low == high:
+                return Fraction((of.right if number >= size else of.left)[0, row, zone])
+            if of.is_vague[zone]:
+                return None
+            found = axis.found or ()  # they were cut there
+            place = found[bisect_right(found, low, key=lambda one: one.low) - 1]
+            return level_at(axis.elements[row], place, low, high)
+        number -= 2 * size
+    return Fraction(0)
+
+
+def _chosen(axis: Axis, rank: IntArray) -> IntArray:
+    """Return which element is each rule's degree, given the order in some cells."""
+    chosen = np.zeros((len(axis.asked), len(rank)), dtype=np.int64)
+    every = np.arange(len(rank))
+    for number, groups in enumerate(axis.asked):
+        checkpoint()
+        best: IntArray | None = None
+        for group in groups:
+            of = np.array(group)
+            top = of[rank[:, of].argmax(axis=1)]
+            best = (
+                top
+                if best is None
+                else np.where(rank[every, top] < rank[every, best], top, best)
+            )
+        if best is not None:
+            chosen[number] = best
+    return chosen
+
+
+def strengths_at(given: Ground, point: Mapping[str, Fraction]) -> list[Fraction]:
+    """Return every rule's exact strength at a point of the inputs.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.auditing.engine.domain import Side
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))
+        >>> point = dict.fromkeys(rules.inputs, Fraction(1, 3))
+        >>> max(strengths_at(ground(rules, box), point))
+        Fraction(1, 1)
+    """
+    return rule_strengths(given.rules, point)
+
+
+def rule_strengths(
+    rules: RuleBase, point: Mapping[str, Fraction], of: Sequence[Rule] | None = None
+) -> list[Fraction]:
+    """Return every rule's exact strength, or that of some rules, without a domain."""
+    checkpoint()
+    every = rules.rules if of is None else of
+    is_product = rules.semantics.conjunction == "product"
+    shapes = shapes_of(rules.variables)
+    clauses = dict.fromkeys(c for rule in every for c in rule.when)
+    asked = {clause.variable for clause in clauses}
+    values = {
+        v.name: variable_value(v, point) for v in rules.variables if v.name in asked
+    }
+    degrees: dict[Clause, Fraction] = {}
+    for clause in clauses:
+        value = values[clause.variable]
+        found = max(
+            exact_degree(shapes[clause.variable, t], value) for t in clause.terms
+        )
+        degrees[clause] = 1 - found if clause.negated else found
+    one = Fraction(1)
+    each = [[degrees[clause] for clause in rule.when] for rule in every]
+    if is_product:
+        return [math.prod(of_rule, start=one) for of_rule in each]
+    return [min(of_rule, default=one) for of_rule in each]

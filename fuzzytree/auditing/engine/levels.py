@@ -1,0 +1,281 @@
+"""Critical levels that coincide without being rational, told from near ones exactly.
+
+At an irrational place, the one root of q in an interval, a curve has the value of its
+polynomial p there: an algebraic number. It is a zero of the first linear relation among
+the powers of p modulo q. Two such numbers within one narrow interval are equal if all
+that their two relations have there is a single zero; otherwise narrower intervals part
+them, and that ends because numbers that differ are some distance apart.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from fuzzytree.auditing.engine.curves import ONE, ZERO, piece_at, pieces
+from fuzzytree.auditing.engine.elements import Element, Place
+from fuzzytree.auditing.engine.measures import multiplied
+from fuzzytree.auditing.engine.polynomials import (
+    Polynomial,
+    Root,
+    composed,
+    difference,
+    division,
+    integers,
+    magnitude,
+    refined,
+    roots,
+    squarefree,
+)
+from fuzzytree.model.interrupts import checkpoint
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from fuzzytree.model.contracts import IntArray
+
+_BITS: Final = (0, 512, 1024, 4096)  # to which places are known, one after another
+
+
+class Level(NamedTuple):
+    """A value of a curve at an irrational place.
+
+    Attributes:
+        polynomial: The curve there.
+        of: What is 0 at the place, and nowhere else in the interval of the root.
+        root: The place.
+        least: The curve is at least this.
+        most: The curve is at most this.
+    """
+
+    polynomial: Polynomial
+    of: Polynomial
+    root: Root
+    least: Fraction = ZERO
+    most: Fraction = ONE
+
+    def between(self, bits: int) -> tuple[Fraction, Fraction]:
+        """Return bounds of the value, from so many bits of the place; 0: as it is."""
+        at = self.root
+        if bits:
+            size = max(abs(at.low), abs(at.high)) or ONE
+            at = refined(self.of, at, bits - magnitude(size))
+        middle, half = (at.low + at.high) / 2, (at.high - at.low) / 2
+        numbers, common = integers(composed(self.polynomial, middle, half))
+        about = Fraction(numbers[0], common)
+        off = Fraction(sum(map(abs, numbers[1:])), common)
+        return about - off, about + off
+
+
+@functools.lru_cache(maxsize=1 << 14)
+def level_at(
+    element: Element, place: Place, low: Fraction, high: Fraction
+) -> Level | Fraction | None:
+    """Return a curve's value at an irrational place, None if it is not known for sure.
+
+    Args:
+        element: The curve.
+        place: The place.
+        low: At most the place, and nearer to it than the place's own bounds.
+        high: At least the place.
+    """
+    if place.of is None or not place.of[1].is_sure:
+        return None
+    polynomial, root = place.of[0], Root(low, high)
+    piece = piece_at(pieces(element.shape), place.low)
+    least, most, own = ZERO, piece.cap, piece.polynomial
+    if element.is_complement:
+        least, most, own = 1 - most, ONE, difference((ONE,), own)
+    polynomial = difference(polynomial, (ZERO,))
+    _, own = division(own, polynomial)
+    if len(own) == 1:
+        return min(max(own[0], least), most)
+    level = Level(own, polynomial, root, least, most)
+    low, high = level.between(_BITS[0])
+    known = level if least < low and high < most else _clipped(level)
+    # A fraction of few digits in so narrow an interval is hardly there by chance.
+    near = ((low + high) / 2).limit_denominator(1 << 64)
+    is_near = isinstance(known, Level) and low <= near <= high
+    return near if is_near and _compared(level, near) == 0 else known
+
+
+def _clipped(level: Level) -> Level | Fraction | None:
+    """Return the end of its range that a value is at or beyond, or the value."""
+    for end, sign in ((level.least, -1), (level.most, 1)):
+        order = _compared(level, end)
+        if order is None:
+            return None
+        if order * sign >= 0:
+            return end
+    return level
+
+
+def _compared(one: Level, other: Level | Fraction) -> int | None:
+    """Return the sign of one value minus another; None if they are too near to tell."""
+    for bits in _BITS:
+        checkpoint()
+        low, high = one.between(bits)
+        least, most = (
+            (other, other) if isinstance(other, Fraction) else other.between(bits)
+        )
+        if high < least:
+            return -1
+        if low > most:
+            return 1
+        joint = _joint(_relation(one), _relation(other))
+        margin = high - low or ONE
+        ends = min(low, least) - margin, max(high, most) + margin
+        met = roots(joint, *ends)
+        if len(met) == 1 and met[0].is_sure:
+            return 0
+    return None
+
+
+def _relation(level: Level | Fraction) -> Polynomial:
+    if isinstance(level, Fraction):
+        return (-level, ONE)
+    return relation(level.polynomial, level.of)
+
+
+@functools.lru_cache(maxsize=1 << 10)
+def _joint(one: Polynomial, other: Polynomial) -> Polynomial:
+    """Return a polynomial that is 0 where one of two is, and there only once."""
+    return squarefree(one if one == other else multiplied(one, other))
+
+
+@functools.lru_cache(maxsize=1 << 10)
+def relation(polynomial: Polynomial, of: Polynomial) -> Polynomial:
+    """Return what is 0 at the values of p where q is 0: p's relation modulo q.
+
+    Args:
+        polynomial: p.
+        of: q, of degree 1 at least.
+
+    Example:
+        >>> square = (Fraction(0), Fraction(0), Fraction(1))
+        >>> golden = (Fraction(-1), Fraction(-1), Fraction(1))  # x * x = x + 1
+        >>> [int(one) for one in relation(square, golden)]  # t * t = 3 t - 1
+        [1, -3, 1]
+    """
+    size = len(of) - 1
+    rows: list[tuple[int, list[Fraction], list[Fraction]]] = []
+    power: Polynomial = (ONE,)
+    for degree in range(size + 1):
+        row = [*power, *(ZERO,) * (size - len(power))]
+        told = [ZERO] * degree + [ONE]
+        for pivot, known, by in rows:
+            share = row[pivot]
+            if share:
+                row = [a - share * b for a, b in zip(row, known, strict=True)]
+                for place, one in enumerate(by):
+                    told[place] -= share * one
+        left = [place for place, one in enumerate(row) if one]
+        if not left:
+            return tuple(told)
+        scale = row[left[0]]
+        rows.append((left[0], [a / scale for a in row], [a / scale for a in told]))
+        _, power = division(multiplied(power, polynomial), of)
+    raise AssertionError  # size + 1 rows of size numbers are dependent
+
+
+# --- many levels
+
+
+Span = tuple[Fraction, Fraction]
+
+
+def parted(levels: Sequence[Level | Fraction]) -> list[Span] | None:
+    """Return bounds of levels: the same for equal ones, apart for others.
+
+    None if some are too near to tell.
+
+    Example:
+        >>> two = (Fraction(-2), Fraction(0), Fraction(1))
+        >>> root = roots(two, Fraction(1), Fraction(2))[0]
+        >>> side, square = (ZERO, Fraction(1, 2)), (ZERO, ZERO, Fraction(1, 4))
+        >>> a, b = (Level(one, two, root) for one in (side, square))
+        >>> found = parted([a, b, Fraction(1, 2), a])
+        >>> found[0] == found[3], found[1] == found[2], found[0][0] > found[1][1]
+        (True, True, True)
+    """
+    unlike: list[Level | Fraction] = []
+    member: list[int] = []
+    known: dict[Level | Fraction, int] = {}
+    # Rational ones first: what equals them is told by them.
+    order = sorted(range(len(levels)), key=lambda n: isinstance(levels[n], Level))
+    for number in order:
+        level = levels[number]
+        if level not in known:
+            found = _place_of(level, unlike)
+            if found is None:
+                return None
+            known[level] = found
+        member.append(known[level])
+    for bits in _BITS:
+        spans = [
+            (one, one) if isinstance(one, Fraction) else one.between(bits)
+            for one in unlike
+        ]
+        inner = sorted(spans)
+        if all(a[1] < b[0] for a, b in itertools.pairwise(inner)):
+            by_number = dict(zip(order, member, strict=True))
+            return [spans[by_number[number]] for number in range(len(levels))]
+    return None
+
+
+def _place_of(level: Level | Fraction, unlike: list[Level | Fraction]) -> int | None:
+    """Return the number of what a level equals among unlike ones; it may be added."""
+    for number, other in enumerate(unlike):
+        if isinstance(level, Fraction):
+            order: int | None = int(level != other)
+        else:
+            order = _compared(level, other)
+        if order is None:
+            return None
+        if order == 0:
+            return number
+    unlike.append(level)
+    return len(unlike) - 1
+
+
+def told_apart(
+    band: IntArray,
+    low: npt.NDArray[np.object_],
+    high: npt.NDArray[np.object_],
+    level_of: Callable[[int], Level | Fraction | None],
+) -> list[int]:
+    """Set bounds of levels of one band to be the same, or apart, where that is known.
+
+    Args:
+        band: The band of each level.
+        low: The lower bounds, which are changed.
+        high: The upper ones.
+        level_of: What a level is, by number.
+
+    Returns:
+        The numbers of those that are known exactly now.
+    """
+    members: dict[int, list[int]] = {}
+    for number, of in enumerate(band.tolist()):
+        members.setdefault(of, []).append(number)
+    sure: list[int] = []
+    for numbers in members.values():
+        if all(low[n] == high[n] == low[numbers[0]] for n in numbers):
+            continue
+        checkpoint()
+        levels = [level_of(number) for number in numbers]
+        known = [level for level in levels if level is not None]
+        spans = parted(known) if len(known) == len(levels) else None
+        if spans is None:
+            continue
+        # All bounds of equal ones hold, and none leaves the band.
+        for span in set(spans):
+            equal = [n for n, own in zip(numbers, spans, strict=True) if own == span]
+            least, most = max(span[0], *low[equal]), min(span[1], *high[equal])
+            low[equal], high[equal] = least, most
+        sure += numbers
+    return sure

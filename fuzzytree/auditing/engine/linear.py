@@ -1,0 +1,370 @@
+"""Points that satisfy linear inequalities, decided in fractions.
+
+The tableau holds integers: each basic variable, times its own whole number, is a sum of
+whole multiples of the others. Pivots follow Bland's rule, so that none comes back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.model.interrupts import checkpoint
+
+ZERO, ONE = Fraction(0), Fraction(1)
+
+_MOST_DIGITS = 17  # every double is told from its neighbours by so many
+
+
+class Row(NamedTuple):
+    """An inequality: `low <= sum of weights[i] x_i <= high`.
+
+    Attributes:
+        weights: By the number of the variable, from 0.
+        low: The lower bound; None if there is none.
+        high: The upper bound; None if there is none.
+        is_open_low: Whether the sum must be strictly above `low`.
+        is_open_high: Whether the sum must be strictly below `high`.
+    """
+
+    weights: Mapping[int, Fraction]
+    low: Fraction | None = None
+    high: Fraction | None = None
+    is_open_low: bool = False
+    is_open_high: bool = False
+
+
+Range = tuple[Fraction, Fraction]
+_Bound = tuple[Fraction | None, Fraction | None]
+
+
+def feasible(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | None:
+    """Return a point that satisfies all inequalities, or None if there is none.
+
+    The point lies deep inside those that are strict: the least of their slacks, in
+    shares of what the row can reach, is at least half of the largest possible one. Its
+    coordinates are doubles of few digits where that leaves it inside.
+
+    Args:
+        ranges: The closed range of each variable.
+        rows: The inequalities.
+
+    Example:
+        >>> unit = (Fraction(0), Fraction(1))
+        >>> both = Row({0: Fraction(1), 1: Fraction(1)}, low=Fraction(2))
+        >>> feasible([unit, unit], [both])
+        [Fraction(1, 1), Fraction(1, 1)]
+        >>> feasible([unit, unit], [both._replace(is_open_low=True)]) is None
+        True
+    """
+    if any(low > high for low, high in ranges):
+        return None
+    found = solved(ranges, rows)
+    return None if isinstance(found, Row) else found
+
+
+def solved(ranges: Sequence[Range], rows: Sequence[Row]) -> list[Fraction] | Row | None:
+    """Return a point that satisfies all inequalities, or why there is none.
+
+    Args:
+        ranges: The closed range of each variable; none is empty.
+        rows: The inequalities.
+
+    Returns:
+        As `feasible`; but where the rows have nothing in common with the ranges, even
+        with their ends, a sum of multiples of rows that no point of the ranges
+        satisfies (Farkas), as a lower bound. It holds wherever the rows hold, so it
+        tells how much wider the ranges must be, at least.
+
+    Example:
+        >>> unit = (Fraction(0), Fraction(1))
+        >>> one = Row({0: Fraction(1), 1: Fraction(1)}, low=Fraction(3))
+        >>> two = Row({0: Fraction(1), 1: Fraction(-1)}, low=Fraction(0))
+        >>> found = solved([unit, unit], [one, two])
+        >>> {place: str(w) for place, w in found.weights.items()}, str(found.low)
+        ({0: '1', 1: '1'}, '3')
+    """
+    reaches = [_reach(ranges, row) for row in rows]
+    tableau = _Tableau(ranges, rows, reaches)
+    broken = tableau.repair()
+    if broken is not None:
+        return tableau.against(broken)
+    slack = ZERO
+    if any(row.is_open_low or row.is_open_high for row in rows):
+        slack = tableau.raise_slack()
+        if slack <= 0:
+            return None
+    point = tableau.values[: len(ranges)]
+    kept = [
+        _closed(row, slack / 2 * reach)
+        for row, reach in zip(rows, reaches, strict=True)
+    ]
+    return _simplified(point, ranges, kept)
+
+
+def holds(row: Row, values: Sequence[Fraction]) -> bool:
+    """Return whether an inequality holds for some values of the variables."""
+    total = sum((w * values[i] for i, w in row.weights.items()), ZERO)
+    if row.low is not None and (
+        total < row.low or (row.is_open_low and total == row.low)
+    ):
+        return False
+    return row.high is None or not (
+        total > row.high or (row.is_open_high and total == row.high)
+    )
+
+
+def _reach(ranges: Sequence[Range], row: Row) -> Fraction:
+    """Return how far a row's sum varies within the ranges; 1 if it does not."""
+    spans = (abs(w) * (ranges[i][1] - ranges[i][0]) for i, w in row.weights.items())
+    return sum(spans, ZERO) or ONE
+
+
+def _closed(row: Row, slack: Fraction) -> Row:
+    """Return a row whose strict sides are drawn in by a slack, and closed."""
+    low, high = row.low, row.high
+    if row.is_open_low and low is not None:
+        low += slack
+    if row.is_open_high and high is not None:
+        high -= slack
+    return Row(row.weights, low, high)
+
+
+def _simplified(
+    point: list[Fraction], ranges: Sequence[Range], rows: Sequence[Row]
+) -> list[Fraction]:
+    """Return a point of few digits that satisfies the rows as well, one by one."""
+    found = list(point)
+    totals = [sum((w * found[i] for i, w in row.weights.items()), ZERO) for row in rows]
+    for place, (least, most) in enumerate(ranges):
+        low, high = least, most
+        touched = [n for n, row in enumerate(rows) if row.weights.get(place)]
+        for number in touched:
+            row, weight = rows[number], rows[number].weights[place]
+            ends = [
+                None
+                if bound is None
+                else found[place] + (bound - totals[number]) / weight
+                for bound in (row.low, row.high)
+            ]
+            below, above = ends if weight > 0 else reversed(ends)
+            low = low if below is None else max(low, below)
+            high = high if above is None else min(high, above)
+        step = simple(low, high) - found[place]
+        found[place] += step
+        for number in touched:
+            totals[number] += rows[number].weights[place] * step
+    return found
+
+
+class _Tableau:
+    """Variables, the rows' sums and the slack, some of which are sums of the others.
+
+    Attributes:
+        values: Of all variables: those given, one for each side of a row, the slack.
+    """
+
+    def __init__(
+        self,
+        ranges: Sequence[Range],
+        rows: Sequence[Row],
+        reaches: Sequence[Fraction],
+    ) -> None:
+        sides = [
+            side
+            for row, reach in zip(rows, reaches, strict=True)
+            for side in _sides(row, reach)
+        ]
+        self.slack = len(ranges) + len(sides)
+        self.bounds: list[_Bound] = [
+            *ranges,
+            *((ZERO, None) for _ in sides),
+            (ZERO, ONE),
+        ]
+        self.values = [(low + high) / 2 for low, high in ranges]
+        self.sides = dict(enumerate(sides, len(ranges)))
+        self.sums: dict[int, dict[int, int]] = {}
+        self.scales: dict[int, int] = {}
+        for number, (weights, constant, share) in self.sides.items():
+            # The side's number is constant + sum - share * slack >= 0; the constant
+            # moves into the bound.
+            total = sum((w * self.values[i] for i, w in weights.items()), ZERO)
+            self.values.append(total)
+            self.bounds[number] = (-constant, None)
+            terms = {**weights, self.slack: -share}
+            scale = math.lcm(*(one.denominator for one in terms.values()))
+            self.scales[number] = scale
+            self.sums[number] = {i: int(w * scale) for i, w in terms.items() if w}
+        self.values.append(ZERO)
+
+    def repair(self) -> int | None:
+        """Bring every sum within its bounds; return one for which it is impossible."""
+        while True:
+            checkpoint()
+            broken = next((one for one in sorted(self.sums) if self._gap(one)), None)
+            if broken is None:
+                return None
+            gap = self._gap(broken)
+            entering = self._helpful(broken, is_up=gap > 0)
+            if entering is None:
+                return broken
+            step = gap * self.scales[broken] / self.sums[broken][entering]
+            self._move(entering, step)
+            self._pivot(broken, entering)
+
+    def against(self, broken: int) -> Row:
+        """Return the sum of sides of rows that keeps a variable out of its bounds.
+
+        The variable is a sum of others, all of which are at the end that helps it most.
+        Sides have a lower end only, so that those in the sum have the sign that makes
+        the multiples of all of them, the broken one's too, be 0 or more.
+        """
+        sign = 1 if self._gap(broken) > 0 else -1
+        terms, scale = self.sums[broken], self.scales[broken]
+        multiples = {i: Fraction(-sign * w, scale) for i, w in terms.items()}
+        multiples[broken] = Fraction(sign)
+        weights: dict[int, Fraction] = {}
+        low = ZERO
+        for number, (given, constant, _) in self.sides.items():
+            times = multiples.get(number, ZERO)
+            low -= times * constant
+            for place, weight in given.items():
+                weights[place] = weights.get(place, ZERO) + times * weight
+        return Row({place: w for place, w in weights.items() if w}, low)
+
+    def raise_slack(self) -> Fraction:
+        """Make the slack as large as possible, from a point that satisfies all."""
+        while True:
+            checkpoint()
+            if self.slack not in self.sums:
+                moving, sign = self.slack, 1
+            else:
+                found = self._helpful(self.slack, is_up=True)
+                if found is None:
+                    return self.values[self.slack]
+                moving = found
+                sign = 1 if self.sums[self.slack][found] > 0 else -1
+            room, blocking = self._room(moving, sign)
+            self._move(moving, sign * room)
+            if blocking is not None:
+                self._pivot(blocking, moving)
+            elif moving == self.slack:
+                return self.values[self.slack]
+
+    def _gap(self, number: int) -> Fraction:
+        """Return what a variable lacks to its bounds: positive if it must rise."""
+        low, high = self.bounds[number]
+        value = self.values[number]
+        if low is not None and value < low:
+            return low - value
+        if high is not None and value > high:
+            return high - value
+        return ZERO
+
+    def _helpful(self, number: int, *, is_up: bool) -> int | None:
+        """Return the first variable that can move a sum up or down."""
+        for other in sorted(self.sums[number]):
+            low, high = self.bounds[other]
+            rises = (self.sums[number][other] > 0) is is_up
+            end = high if rises else low
+            if end is None or self.values[other] != end:
+                return other
+        return None
+
+    def _room(self, moving: int, sign: int) -> tuple[Fraction, int | None]:
+        """Return how far a variable can move, and the first sum that stops it."""
+        end = self.bounds[moving][sign > 0]
+        room = None if end is None else abs(end - self.values[moving])
+        blocking = None
+        for number in sorted(self.sums):
+            weight = self.sums[number].get(moving, 0) * sign
+            end = self.bounds[number][weight > 0]
+            if not weight or end is None:
+                continue
+            free = (end - self.values[number]) * self.scales[number] / weight
+            if room is None or free < room:
+                room, blocking = free, number
+        assert room is not None  # the slack is at most 1
+        return room, blocking
+
+    def _move(self, moving: int, step: Fraction) -> None:
+        self.values[moving] += step
+        for number, terms in self.sums.items():
+            if moving in terms:
+                share = Fraction(terms[moving], self.scales[number])
+                self.values[number] += share * step
+
+    def _pivot(self, leaving: int, entering: int) -> None:
+        """Express the entering variable by the leaving one, and put it in."""
+        terms, scale = self.sums.pop(leaving), self.scales.pop(leaving)
+        own = terms.pop(entering)
+        sign = 1 if own > 0 else -1
+        solved = {i: -sign * w for i, w in terms.items()}
+        solved[leaving] = sign * scale
+        self._put(entering, solved, abs(own))
+        for number in [one for one in self.sums if entering in self.sums[one]]:
+            row = self.sums[number]
+            weight = row.pop(entering)
+            merged = {i: w * abs(own) for i, w in row.items()}
+            for i, w in solved.items():
+                merged[i] = merged.get(i, 0) + weight * w
+            self._put(number, merged, self.scales[number] * abs(own))
+
+    def _put(self, number: int, terms: dict[int, int], scale: int) -> None:
+        common = math.gcd(scale, *terms.values())
+        self.sums[number] = {i: w // common for i, w in terms.items() if w}
+        self.scales[number] = scale // common
+
+
+def _sides(
+    row: Row, reach: Fraction
+) -> Iterator[tuple[dict[int, Fraction], Fraction, Fraction]]:
+    """Yield weights, constant and share of the slack of what must be at least 0."""
+    weights = {i: w for i, w in row.weights.items() if w}
+    if row.low is not None:
+        yield weights, -row.low, reach if row.is_open_low else ZERO
+    if row.high is not None:
+        down = {i: -w for i, w in weights.items()}
+        yield down, row.high, reach if row.is_open_high else ZERO
+
+
+def simple(low: Fraction, high: Fraction) -> Fraction:
+    """Return the double of the fewest decimal digits strictly between two numbers.
+
+    Of several it is the one nearest to the middle. Without a double between them it is
+    the middle itself; of two equal numbers it is that number.
+
+    Raises:
+        ValueError: If `low` is above `high`.
+
+    Example:
+        >>> float(simple(Fraction(2, 7), Fraction(1, 3)))
+        0.3
+        >>> float(simple(Fraction(997), Fraction(1003)))
+        1000.0
+    """
+    if low > high:
+        raise ValueError(f"no number from {low} to {high}")
+    middle = (low + high) / 2
+    if low == high:
+        return low
+    if low < 0 < high:
+        return ZERO
+    largest = max(-low, high)
+    size = len(str(largest.numerator)) - len(str(largest.denominator))
+    for power in range(size, size - _MOST_DIGITS - 2, -1):
+        unit = Fraction(10) ** power
+        found = round(middle / unit) * unit
+        if low < (near := _nearest(found)) < high:
+            return near
+    near = _nearest(middle)
+    return near if low < near < high else middle
+
+
+def _nearest(number: Fraction) -> Fraction:
+    try:
+        return Fraction(float(number))
+    except OverflowError:
+        return number

@@ -1,0 +1,253 @@
+"""Curves that hold rules at one level: where rules can tie under the minimum.
+
+A *pivot* is a cell of an axis in which a curve is all of our rules' degree there; where
+it is their least one, it is the strength of all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from fuzzytree.auditing.engine.contests import Contest, weakest
+from fuzzytree.auditing.engine.covering import maximal
+from fuzzytree.auditing.engine.ground import Laid
+from fuzzytree.auditing.engine.linear import simple
+from fuzzytree.auditing.engine.parts import START, Stretch, part_of, stretch
+from fuzzytree.auditing.engine.shared import is_constant
+from fuzzytree.auditing.engine.tied import Asked
+
+if TYPE_CHECKING:
+    from fuzzytree.auditing.engine.ground import BoolArray
+    from fuzzytree.model.contracts import IntArray
+
+
+class Pivot(NamedTuple):
+    """Where a rule, or all of ours, are as strong as one curve.
+
+    Attributes:
+        axis: The axis.
+        cell: The cell.
+        element: The curve.
+        mask: The rivals that do not exceed it.
+        beside: Where the rest of ours are as strong as theirs, of the same level.
+    """
+
+    axis: int
+    cell: int
+    element: int
+    mask: int
+    beside: Pivot | None = None
+
+    @property
+    def all(self) -> tuple[Pivot, ...]:
+        """This one, and the one beside it."""
+        return (self,) if self.beside is None else (self, self.beside)
+
+
+class _Seen(NamedTuple):
+    """The rules' degrees in the cells of an axis; at its value where it has only one.
+
+    Attributes:
+        cells: The cells.
+        of: Shape (rules, cells): the element that is a rule's degree.
+        height: The same shape: its rank.
+        is_zero: The same shape: whether it is 0 throughout.
+    """
+
+    cells: list[int]
+    of: IntArray
+    height: IntArray
+    is_zero: BoolArray
+
+
+def _seen(laid: Laid) -> _Seen:
+    count = len(laid.cells.rank)
+    if not count:
+        of = laid.of_start[:, np.newaxis]
+        return _Seen(
+            [START], of, laid.cells.start_rank[of], laid.is_zero_at[of[:, 0], :1]
+        )
+    columns = np.arange(count)
+    height = laid.cells.rank[columns, laid.of]
+    is_zero = laid.is_zero[laid.of, columns]
+    return _Seen([*range(count)], laid.of, height, is_zero)
+
+
+def whole(laid: Laid, cell: int) -> Stretch:
+    """Return all of a cell, or the one value of an axis."""
+    if cell == START:
+        return Stretch(*laid.cells.zones[0], is_open=False)
+    return Stretch(*laid.cells.between[cell])
+
+
+def value_of(
+    laid: Laid, pivot: Pivot, levels: tuple[Fraction, Fraction]
+) -> Fraction | None:
+    """Return a value of a pivot's axis at which its level is well between two."""
+    low, high, _ = whole(laid, pivot.cell)
+    ends, room = (low, high), (levels[1] - levels[0]) / 4
+    element = laid.axis.elements[pivot.element]
+    for level, is_high in ((levels[0] + room, True), (levels[1] - room, False)):
+        part = part_of(element, ends, level, is_high=is_high, bits=64)
+        low, high = max(low, part.low), min(high, part.high)
+    return simple(low, high) if low < high else None
+
+
+def ends_of(laid: Laid, element: int, cell: int) -> tuple[int, int]:
+    """Return the bands of the least and the largest value of a curve in a cell."""
+    if cell == START:
+        return int(laid.at[element, 0]), int(laid.at[element, 0])
+    return int(laid.least[element, cell]), int(laid.most[element, cell])
+
+
+def levels_of(contest: Contest, least: int, most: int, *, is_each: bool) -> list[int]:
+    """Return bands from which on, up to the next one, nothing changes.
+
+    Where axes share inputs every level matters: at another one other values are free.
+    """
+    if is_each:
+        return [*range(least, most)] or [least]
+    inner = {band for band in contest.inner_events if least < band < most}
+    return sorted({least, *inner})
+
+
+def pivots(contest: Contest, asked: Asked, axis: int, *, is_each: bool) -> list[Pivot]:
+    """Return the cells of an axis in which all of ours are the same curve, not 0.
+
+    Of cells between the same levels one will do, unless each is asked for.
+    """
+    laid = contest.ground.laid[0][axis]
+    seen = _seen(laid)
+    ours = seen.height[np.array(contest.ours)]
+    rivals = seen.height[np.array(contest.rivals, dtype=np.int64)]
+    mine = seen.of[contest.ours[0]]
+    fits = (ours == ours[0]).all(axis=0) & ~seen.is_zero[contest.ours[0]]
+    is_below = rivals < ours[0] + _limits(asked)
+    found: dict[tuple[int, ...], Pivot] = {}
+    for column in np.flatnonzero(fits).tolist():
+        mask = sum(1 << n for n in np.flatnonzero(is_below[:, column]).tolist())
+        element, cell = int(mine[column]), seen.cells[column]
+        key = element, mask, *ends_of(laid, element, cell), cell * is_each
+        found.setdefault(key, Pivot(axis, cell, element, mask))
+    return list(found.values())
+
+
+def crossed(contest: Contest, asked: Asked, *, is_each: bool) -> list[Pivot]:
+    """Return pairs of constants of one level, on two axes, that hold two rules."""
+    if len(asked.ours) < 2:
+        return []
+    one, other = ([*_held(contest, asked, rule)] for rule in contest.ours)
+    found: dict[tuple[int, ...], Pivot] = {}
+    key: tuple[int, ...]
+    for first, level in one:
+        for second, same in other:
+            if first.axis != second.axis and level == same:
+                key = level, first.axis, first.mask, second.axis, second.mask
+                if is_each:
+                    key = *key, first.cell, second.cell
+                found.setdefault(key, first._replace(beside=second))
+    return list(found.values())
+
+
+def _held(contest: Contest, asked: Asked, rule: int) -> Iterator[tuple[Pivot, int]]:
+    """Yield where a rule, the least of ours, is constant and not 0, with the band."""
+    for axis, laid in enumerate(contest.ground.laid[0]):
+        seen = _seen(laid)
+        height, mine = seen.height[rule], seen.of[rule]
+        fits = (height <= seen.height[np.array(contest.ours)]).all(axis=0)
+        fits &= ~seen.is_zero[rule]
+        rivals = seen.height[np.array(contest.rivals, dtype=np.int64)]
+        is_behind = rivals < height + _limits(asked)
+        for column in np.flatnonzero(fits).tolist():
+            element, cell = int(mine[column]), seen.cells[column]
+            least, most = ends_of(laid, element, cell)
+            if least == most and is_constant(laid, element, cell):
+                mask = sum(
+                    1 << n for n in np.flatnonzero(is_behind[:, column]).tolist()
+                )
+                yield Pivot(axis, cell, element, mask), least
+
+
+def _limits(asked: Asked) -> IntArray:
+    """Return, of each rival, by how many ranks it must stay below: 0, or 1 less."""
+    return np.array([0] * len(asked.strict) + [1] * len(asked.weak), dtype=np.int64)[
+        :, np.newaxis
+    ]
+
+
+def flat_family(
+    contest: Contest, asked: Asked, axis: int, band: int, *, is_within: bool = False
+) -> tuple[int, ...]:
+    """Return what does not exceed a level where ours reach it.
+
+    Rivals are left strictly below it, or stay at it as curves that are constant.
+
+    Args:
+        contest: Our rules and their rivals.
+        asked: Which of these must be weaker.
+        axis: The axis.
+        band: The band of the level, which is sharp.
+        is_within: Of a band that is not: what may hold somewhere in it, never too
+            little.
+    """
+    options, laid = contest.all_inner[axis], contest.ground.laid[0][axis]
+    masks: list[int] = []
+    limit = band + 1 if is_within else band  # below which rivals are left
+    least = -np.iinfo(np.int64).max if is_within else START
+    for number in np.flatnonzero(options.where >= least).tolist():
+        cell, top = int(options.where[number]), int(options.top[number])
+        if top > band or (
+            top == band and (is_within or _least(contest, laid, cell) == band)
+        ):
+            behind = options.floor[number] < limit
+            for place in range(len(asked.strict), len(behind)):
+                behind[place] |= cell >= START and stays(
+                    contest, laid, cell, place, band
+                )
+            masks.append(sum(1 << n for n in np.flatnonzero(behind).tolist()))
+    return maximal(masks)
+
+
+def _least(contest: Contest, laid: Laid, cell: int) -> int:
+    """Return the band of the least value of our weakest rule in a cell."""
+    return ends_of(laid, weakest(laid, contest.ours, cell), cell)[0]
+
+
+def stays(contest: Contest, laid: Laid, cell: int, rival: int, band: int) -> bool:
+    """Return whether a rival's curve is constant in a cell, in a band."""
+    if cell == START:
+        return bool(laid.at[laid.of_start[contest.rivals[rival]], 0] == band)
+    element = laid.of[contest.rivals[rival], cell]
+    return bool(laid.least[element, cell] == band == laid.most[element, cell])
+
+
+def part_at(
+    contest: Contest, axis: int, level: Fraction, mask: int, flat: int | None
+) -> Stretch | None:
+    """Return where on an axis ours reach a level and some rivals stay below it.
+
+    Where the level is a band, `flat`, rivals may also stay in it.
+    """
+    options, laid = contest.all_inner[axis], contest.ground.laid[0][axis]
+    every = [n for n in range(len(contest.rivals)) if mask >> n & 1]
+    order = np.argsort(-options.top, kind="stable")
+    for number in order[options.where[order] >= START].tolist():
+        rivals = [
+            n
+            for n in every
+            if flat is None
+            or not stays(contest, laid, int(options.where[number]), n, flat)
+        ]
+        if (options.floor[number, rivals] > options.top[number]).any():
+            continue
+        cell = int(options.where[number])
+        mine = weakest(laid, contest.ours, cell)
+        below = {weakest(laid, [contest.rivals[n]], cell) for n in rivals}
+        found = stretch(laid, cell, level, [mine], below)
+        if found is not None:
+            return found
+    return None

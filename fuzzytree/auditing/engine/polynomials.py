@@ -1,0 +1,502 @@
+"""Polynomials with rational coefficients, and where they are zero: in integers.
+
+A polynomial is a tuple of fractions, the constant first. Roots are isolated by the
+signs of Bernstein coefficients (Descartes' rule: no change of sign, no root; one
+change, exactly one) and halving; nothing is rounded. A float only guesses where a root
+is: signs in integers decide.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import Value
+
+Polynomial = tuple[Fraction, ...]
+
+_DEEPEST = 96  # halvings, after which roots that are not apart stay one place
+_FINE = 52  # bits of the place of a root within its interval, at first
+
+
+class Root(Value, frozen=True):
+    """A place where a polynomial is zero, or nearly is: from `low` to `high`.
+
+    Attributes:
+        low: At most the root; the root itself if `low == high`.
+        high: At least the root.
+        is_sure: Whether there is exactly one root; otherwise there are none or several
+            within less than 2**-96 of the interval that was searched.
+    """
+
+    low: Fraction
+    high: Fraction
+    is_sure: bool = True
+
+
+def value_at(polynomial: Polynomial, x: Fraction) -> Fraction:
+    """Return the exact value of a polynomial, in integers but for one division.
+
+    Example:
+        >>> value_at((Fraction(1), Fraction(2)), Fraction(1, 2))
+        Fraction(2, 1)
+    """
+    numbers, common = integers(polynomial)
+    top, bottom = x.numerator, x.denominator
+    total, power = numbers[-1], 1
+    for number in reversed(numbers[:-1]):
+        power *= bottom
+        total = total * top + number * power
+    return Fraction(total, common * power)
+
+
+Integers = tuple[int, ...]
+
+_KNOWN: dict[int, tuple[Polynomial, Integers, int]] = {}  # by identity: no hashing
+_MOST_KNOWN = 1 << 14
+
+
+def integers(polynomial: Polynomial) -> tuple[Integers, int]:
+    """Return the coefficients over their common denominator, and the denominator."""
+    known = _KNOWN.get(id(polynomial))
+    if known is not None and known[0] is polynomial:
+        return known[1], known[2]
+    common = math.lcm(*(one.denominator for one in polynomial))
+    scaled = tuple(one.numerator * (common // one.denominator) for one in polynomial)
+    if len(_KNOWN) >= _MOST_KNOWN:
+        _KNOWN.clear()
+    _KNOWN[id(polynomial)] = polynomial, scaled, common
+    return scaled, common
+
+
+def derivative(polynomial: Polynomial) -> Polynomial:
+    """Return the derivative; of a constant, 0.
+
+    Example:
+        >>> derivative((Fraction(5), Fraction(3), Fraction(1)))
+        (Fraction(3, 1), Fraction(2, 1))
+    """
+    if len(polynomial) < 2:
+        return (Fraction(0),)
+    return tuple(power * one for power, one in enumerate(polynomial[1:], 1))
+
+
+def difference(one: Polynomial, other: Polynomial) -> Polynomial:
+    """Return one polynomial minus another, without zeros at its end."""
+    size = max(len(one), len(other))
+    padded = [(*each, *(Fraction(0),) * (size - len(each))) for each in (one, other)]
+    found = [a - b for a, b in zip(*padded, strict=True)]
+    while len(found) > 1 and not found[-1]:
+        found.pop()
+    return tuple(found)
+
+
+def divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
+    """Return p / (x - at), where p is 0 at `at` (Horner's scheme).
+
+    Example:
+        >>> square = (Fraction(-1), Fraction(0), Fraction(1))
+        >>> [int(one) for one in divided(square, Fraction(1))]
+        [1, 1]
+    """
+    found: list[Fraction] = []
+    carried = Fraction(0)
+    for one in reversed(polynomial[1:]):
+        carried = one + carried * at
+        found.append(carried)
+    return tuple(reversed(found))
+
+
+def monic(polynomial: Polynomial) -> Polynomial:
+    """Return the multiple of a polynomial whose last coefficient is 1; 0 stays 0.
+
+    Example:
+        >>> [str(one) for one in monic((Fraction(1), Fraction(2), Fraction(0)))]
+        ['1/2', '1']
+    """
+    end = max((n for n, one in enumerate(polynomial, 1) if one), default=0)
+    return tuple(one / polynomial[end - 1] for one in polynomial[:end]) or (
+        Fraction(0),
+    )
+
+
+def composed(polynomial: Polynomial, offset: Fraction, slope: Fraction) -> Polynomial:
+    """Return p(offset + slope x) as a polynomial in x.
+
+    Example:
+        >>> composed((Fraction(0), Fraction(0), Fraction(1)), Fraction(1), Fraction(2))
+        (Fraction(1, 1), Fraction(4, 1), Fraction(4, 1))
+    """
+    numbers, common = integers(polynomial)
+    bottom = math.lcm(offset.denominator, slope.denominator)
+    shifted, power = _shifted(
+        numbers,
+        offset.numerator * (bottom // offset.denominator),
+        slope.numerator * (bottom // slope.denominator),
+        bottom,
+    )
+    return tuple(Fraction(one, common * power) for one in shifted)
+
+
+def _shifted(
+    numbers: Sequence[int], offset: int, slope: int, bottom: int
+) -> tuple[list[int], int]:
+    """Return bottom**n p((offset + slope z) / bottom), and bottom**n."""
+    found = [numbers[-1]]
+    power = 1
+    for number in reversed(numbers[:-1]):
+        power *= bottom
+        scaled = [offset * one for one in found]
+        scaled.append(0)
+        for place, one in enumerate(found):
+            scaled[place + 1] += slope * one
+        scaled[0] += number * power
+        found = scaled
+    return found, power
+
+
+def roots(polynomial: Polynomial, low: Fraction, high: Fraction) -> tuple[Root, ...]:
+    """Return the places in the open interval where a polynomial is zero, in order.
+
+    The places are apart from each other, and each is at most 2**-48 of the interval
+    wide. A polynomial that is 0 everywhere has none.
+
+    Raises:
+        ValueError: If the interval is empty.
+
+    Example:
+        >>> [(p.low, p.high) for p in roots((Fraction(-1), Fraction(3)), *map(Fraction, (0, 1)))]
+        [(Fraction(1, 3), Fraction(1, 3))]
+        >>> two = roots((Fraction(-2), Fraction(0), Fraction(1)), *map(Fraction, (0, 9)))
+        >>> len(two), two[0].low ** 2 < 2 < two[0].high ** 2
+        (1, True)
+    """  # noqa: E501
+    if not low < high:
+        raise ValueError(f"no interval from {low} to {high}")
+    return integer_roots(integers(polynomial)[0], low, high)
+
+
+def integer_roots(
+    numbers: Sequence[int], low: Fraction, high: Fraction
+) -> tuple[Root, ...]:
+    """Return what `roots` does, of a polynomial with whole coefficients."""
+    checkpoint()
+    while len(numbers) > 1 and not numbers[-1]:
+        numbers = numbers[:-1]
+    if len(numbers) == 1:
+        return ()
+    if len(numbers) == 2:
+        at = Fraction(-numbers[0], numbers[1])
+        return (Root(at, at),) if low < at < high else ()
+    bottom = math.lcm(low.denominator, high.denominator)
+    start = low.numerator * (bottom // low.denominator)
+    width = high.numerator * (bottom // high.denominator) - start
+    unit, _ = _shifted(numbers, start, width, bottom)
+    size = high - low
+    return tuple(
+        Root(low + size * a, low + size * b, is_sure)
+        for a, b, is_sure in _unit_roots(unit)
+    )
+
+
+def _unit_roots(numbers: list[int]) -> list[tuple[Fraction, Fraction, bool]]:
+    """Return the places in (0, 1) where a polynomial with integer coefficients is 0."""
+    degree = len(numbers) - 1
+    found: list[tuple[Fraction, Fraction, bool]] = []
+    todo = [(0, 0, _bernstein(numbers))]
+    while todo:
+        level, index, bends = todo.pop()
+        changes = _changes(bends)
+        if changes == 0:
+            continue
+        size = Fraction(1, 1 << level)
+        if changes == 1:
+            found.append(_single(numbers, bends, level, index))
+            continue
+        if level == _DEEPEST:
+            found.append((index * size, (index + 1) * size, False))
+            continue
+        left, right = _halves(bends, degree)
+        if right[0] == 0:
+            middle = (2 * index + 1) * size / 2
+            found.append((middle, middle, True))
+        todo += [(level + 1, 2 * index, left), (level + 1, 2 * index + 1, right)]
+    return _apart(sorted(found))
+
+
+def _apart(
+    found: list[tuple[Fraction, Fraction, bool]],
+) -> list[tuple[Fraction, Fraction, bool]]:
+    """Join places that touch; two roots there are no longer told apart."""
+    kept: list[tuple[Fraction, Fraction, bool]] = []
+    for low, high, is_sure in found:
+        if kept and low <= kept[-1][1]:
+            kept[-1] = (kept[-1][0], max(high, kept[-1][1]), False)
+        else:
+            kept.append((low, high, is_sure))
+    return kept
+
+
+@functools.cache
+def _weights(degree: int) -> tuple[int, ...]:
+    """Return degree! over each binomial coefficient: whole numbers i! (degree - i)!."""
+    return tuple(
+        math.factorial(i) * math.factorial(degree - i) for i in range(degree + 1)
+    )
+
+
+@functools.cache
+def _choices(degree: int) -> tuple[int, ...]:
+    return tuple(math.comb(degree, i) for i in range(degree + 1))
+
+
+def _bernstein(numbers: Sequence[int]) -> list[int]:
+    """Return degree! times the Bernstein coefficients: sums of C(j, i) over C(n, i)."""
+    degree = len(numbers) - 1
+    found = [a * b for a, b in zip(numbers, _weights(degree), strict=True)]
+    for step in range(degree):  # Pascal's triangle, by additions
+        for place in range(degree, step, -1):
+            found[place] += found[place - 1]
+    return found
+
+
+def _changes(bends: Sequence[int]) -> int:
+    signs = [one > 0 for one in bends if one]
+    return sum(a != b for a, b in itertools.pairwise(signs))
+
+
+def _halves(bends: Sequence[int], degree: int) -> tuple[list[int], list[int]]:
+    """Return the coefficients on both halves, times 2**degree (de Casteljau)."""
+    row = list(bends)
+    left, right = [row[0] << degree], [row[-1] << degree]
+    for step in range(1, degree + 1):
+        row = [a + b for a, b in itertools.pairwise(row)]
+        left.append(row[0] << (degree - step))
+        right.append(row[-1] << (degree - step))
+    return left, right[::-1]
+
+
+def _single(
+    numbers: Sequence[int], bends: Sequence[int], level: int, index: int
+) -> tuple[Fraction, Fraction, bool]:
+    """Return a narrow place of the one root in a dyadic interval."""
+    guess = _guess(bends)
+    rising = next(one for one in reversed(bends) if one) > 0
+    shift = max(level, 0) + _FINE
+    base = index << _FINE
+    for width in (8, 256, 1 << 16, 1 << 32):
+        middle = base + round(guess * (1 << _FINE))
+        low = max(middle - width, base)
+        high = min(middle + width, base + (1 << _FINE))
+        below, above = _sign(numbers, low, shift), _sign(numbers, high, shift)
+        if below == 0 and low > base:
+            return Fraction(low, 1 << shift), Fraction(low, 1 << shift), True
+        if above == 0 and high < base + (1 << _FINE):
+            return Fraction(high, 1 << shift), Fraction(high, 1 << shift), True
+        starts_well = low == base or (below < 0) == rising
+        ends_well = high == base + (1 << _FINE) or (above > 0) == rising
+        if starts_well and ends_well:
+            return _bisected(numbers, low, high, shift, 16, is_rising=rising)
+    return _bisected(numbers, base, base + (1 << _FINE), shift, 16, is_rising=rising)
+
+
+def _bisected(
+    numbers: Sequence[int],
+    low: int,
+    high: int,
+    shift: int,
+    width: int,
+    *,
+    is_rising: bool,
+) -> tuple[Fraction, Fraction, bool]:
+    """Halve the place of a root, in steps of 2**-shift, until it is narrow."""
+    while high - low > width:
+        middle = (low + high) // 2
+        sign = _sign(numbers, middle, shift)
+        if sign == 0:
+            return Fraction(middle, 1 << shift), Fraction(middle, 1 << shift), True
+        if (sign > 0) == is_rising:
+            high = middle
+        else:
+            low = middle
+    return Fraction(low, 1 << shift), Fraction(high, 1 << shift), True
+
+
+def _sign(numbers: Sequence[int], at: int, shift: int) -> int:
+    """Return the sign of a polynomial at at / 2**shift."""
+    total = numbers[-1]
+    moved = 0
+    for number in reversed(numbers[:-1]):
+        moved += shift
+        total = total * at + (number << moved)
+    return (total > 0) - (total < 0)
+
+
+def _guess(bends: Sequence[int]) -> float:
+    """Return about where the one root in [0, 1] is, in floats (Illinois' method)."""
+    weighted = [a * b for a, b in zip(bends, _choices(len(bends) - 1), strict=True)]
+    most = max(map(abs, weighted))
+    drop = max(most.bit_length() - 1000, 0)
+    scale = float(most >> drop)
+    row = [(one >> drop) / scale for one in weighted]
+    low, high = 0.0, 1.0
+    below, above = row[0], row[-1]
+    if below * above >= 0.0:  # an end is a root, or too near to tell
+        below = below or -math.copysign(1e-9, above)
+        above = above or -math.copysign(1e-9, below)
+    last = 0
+    for _ in range(40):
+        middle = high - above * (high - low) / (above - below)
+        if not low < middle < high:
+            middle = (low + high) / 2
+        found = _weighted_value(row, middle)
+        if found == 0.0 or high - low < 2.0**-_FINE:
+            return middle
+        if (found > 0.0) == (above > 0.0):
+            high, above = middle, found
+            below = below / 2 if last > 0 else below
+            last = 1
+        else:
+            low, below = middle, found
+            above = above / 2 if last < 0 else above
+            last = -1
+    return (low + high) / 2
+
+
+def _weighted_value(row: Sequence[float], at: float) -> float:
+    """Return the sum of row[i] at**i (1 - at)**(n - i), by Horner's scheme."""
+    near, rest = (row, at) if at > 0.5 else (row[::-1], 1.0 - at)
+    ratio = (1.0 - rest) / rest
+    total = 0.0
+    for one in near:
+        total = total * ratio + one
+    return float(total * rest ** (len(row) - 1))
+
+
+def magnitude(number: Fraction) -> int:
+    """Return the power of 2 that a number, not 0, is about; also beyond doubles.
+
+    Example:
+        >>> magnitude(Fraction(10) ** 400), magnitude(Fraction(-1, 1000))
+        (1329, -8)
+    """
+    return abs(number.numerator).bit_length() - number.denominator.bit_length() + 1
+
+
+def refined(polynomial: Polynomial, root: Root, bits: int) -> Root:
+    """Return a sure root's place, at most 2**-bits wide, by signs in fractions.
+
+    On scales far above 1 the number of bits may be below 0.
+
+    Example:
+        >>> two = (Fraction(-2), Fraction(0), Fraction(1))
+        >>> found = refined(two, Root(Fraction(1), Fraction(2)), 100)
+        >>> found.high - found.low <= Fraction(1, 2**100)
+        True
+    """
+    low, high = root.low, root.high
+    goal = Fraction(2) ** -bits
+    if not root.is_sure or high - low <= goal:
+        return root
+    below, above = value_at(polynomial, low), value_at(polynomial, high)
+    rising = above > 0 or below < 0
+    power = 2  # the interval is cut into 2**power parts
+    while (size := high - low) > goal:
+        power = max(min(power, magnitude(size / goal)), 1)
+        share = Fraction(1, 2)
+        if below * above < 0:  # an end that is 0 is another root
+            share = below / (below - above)
+        part = size / (1 << power)
+        place = min(max(math.floor(share * (1 << power)), 0), (1 << power) - 1)
+        first = low + place * part
+        for at in (first, first + part):  # where the chord crosses, if it is straight
+            if not low < at < high:
+                continue
+            found = value_at(polynomial, at)
+            if found == 0:
+                return Root(at, at)
+            if (found > 0) == rising:
+                high, above = at, found
+                break
+            low, below = at, found
+        power = power * 2 if high - low <= part else power // 2
+    return Root(low, high, root.is_sure)
+
+
+def common_factor(one: Polynomial, other: Polynomial) -> Polynomial:
+    """Return the largest polynomial that divides two others, by Euclid's algorithm.
+
+    Its coefficients are whole numbers without a common divisor.
+
+    Example:
+        >>> common_factor(*(tuple(map(Fraction, p)) for p in ((-1, 0, 1), (-2, 1, 1))))
+        (Fraction(-1, 1), Fraction(1, 1))
+    """
+    a, b = _primitive(integers(one)[0]), _primitive(integers(other)[0])
+    while b:
+        if len(a) < len(b):
+            a, b = b, a
+        while a and len(a) >= len(b):
+            scale, shift = a[-1], len(a) - len(b)
+            a = [b[-1] * number for number in a]
+            for place, number in enumerate(b):
+                a[place + shift] -= scale * number
+            a = _primitive(a)
+        a, b = b, a
+    return tuple(map(Fraction, a))
+
+
+def squarefree(polynomial: Polynomial) -> Polynomial:
+    """Return a polynomial with the same zeros, each of which it has only once.
+
+    Example:
+        >>> square = tuple(map(Fraction, (4, 0, -4, 0, 1)))  # (x**2 - 2)**2
+        >>> [int(one) for one in squarefree(square)]
+        [-2, 0, 1]
+    """
+    repeated = common_factor(polynomial, derivative(polynomial))
+    found, _ = division(polynomial, repeated)
+    return tuple(map(Fraction, _primitive(integers(found)[0])))
+
+
+def division(polynomial: Polynomial, by: Polynomial) -> tuple[Polynomial, Polynomial]:
+    """Return a polynomial divided by another one, and the rest.
+
+    Example:
+        >>> cube, golden = (0, 0, 0, 1), (-1, -1, 1)
+        >>> parts = division(tuple(map(Fraction, cube)), tuple(map(Fraction, golden)))
+        >>> [[int(one) for one in part] for part in parts]
+        [[1, 1], [1, 2]]
+    """
+    rest, found = list(polynomial), list[Fraction]()
+    while len(rest) >= len(by):
+        found.append(rest[-1] / by[-1])
+        for place in range(1, len(by) + 1):
+            rest[-place] -= found[-1] * by[-place]
+        rest.pop()
+    zero = (Fraction(0),)
+    return tuple(reversed(found)) or zero, difference(tuple(rest) or zero, zero)
+
+
+def _primitive(numbers: Sequence[int]) -> list[int]:
+    """Return coefficients without zeros at the end and without a common divisor."""
+    found = list(numbers)
+    while found and not found[-1]:
+        found.pop()
+    common = math.gcd(*found) * (1 if not found or found[-1] > 0 else -1)
+    return [number // common for number in found]
+
+
+def integral(polynomial: Polynomial, low: Fraction, high: Fraction) -> Fraction:
+    """Return the exact integral from `low` to `high`.
+
+    Example:
+        >>> integral((Fraction(0), Fraction(2)), Fraction(0), Fraction(3))
+        Fraction(9, 1)
+    """
+    whole = (Fraction(0), *(one / n for n, one in enumerate(polynomial, 1)))
+    return value_at(whole, high) - value_at(whole, low)

@@ -1,0 +1,374 @@
+"""Search a box for a point at which some rules reach a level and others do not.
+
+At each level between two critical ones (`fuzzytree.auditing.engine.contests`) the
+options of the axes are sets of rivals left below, and the question is whether a choice
+on every axis leaves all of them below: `fuzzytree.auditing.engine.covering`. What is
+strict spans an open interval of levels, so it is seen at a level between two bands; or
+it lies within one band, where the bounds of critical levels do not tell their order.
+There every option that may be open is taken for open: if even that does not suffice,
+nothing is missed; if it does, the question is asked again with critical levels known as
+fractions.
+
+Axes that share inputs are first taken as free. If nothing is found then, there is
+nothing; if something is, values of the inputs are sought by linear inequalities in
+fractions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.auditing.engine.axes import between
+from fuzzytree.auditing.engine.boxes import region_around
+from fuzzytree.auditing.engine.choices import choices, parts_of, union
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.contests import Contest, weakest
+from fuzzytree.auditing.engine.covering import cover
+from fuzzytree.auditing.engine.ground import Ground, TooManyCellsError, strengths_at
+from fuzzytree.auditing.engine.parts import START, Stretch, stretch
+from fuzzytree.auditing.engine.seeking import leader, plainer
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Claim,
+    Proved,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.auditing.engine.variables import Point
+from fuzzytree.auditing.engine.witnesses import coupled, is_within, point_with
+from fuzzytree.auditing.engine.wording import counted
+from fuzzytree.numerics.exact import outwards
+
+_MOST_CHOICES = 2_000  # of values for axes that share inputs, in one question
+_DEEPEST = 4  # halvings of levels for axes that share inputs
+
+
+class Question(NamedTuple):
+    """Is there a point at which some level separates rules from rivals?
+
+    Attributes:
+        ours: The numbers of the rules that must reach the level; without any, nothing
+            need reach it.
+        rivals: The numbers of the rules that must stay below it.
+        ceiling: The level is at most this; None if any will do.
+        of: What a bracket is about.
+    """
+
+    ours: tuple[int, ...]
+    rivals: tuple[int, ...]
+    ceiling: Fraction | None
+    of: str
+
+
+def searched(given: Ground, question: Question, clock: Clock) -> State:
+    """Return whether there is such a point: `Proved` if there is none."""
+    return _Search(given, question, clock).state()
+
+
+class _Search:
+    """One question, with what was visited for it."""
+
+    def __init__(self, given: Ground, question: Question, clock: Clock) -> None:
+        self.given, self.question, self.clock = given, question, clock
+        self.groups = coupled(given)
+        self.levels = self.choices = 0
+        self.is_open = False
+
+    def state(self) -> State:
+        if not self.given.axes:
+            point = point_with(self.given, {})
+            found = None if point is None else self._checked(self.given, point)
+            return found or Proved("no rule asks anything")
+        try:
+            found = self._sought() if self.groups else None
+            if found is not None:
+                return found
+            found = self._at_levels(self.given)
+            if found is None and self._may_hide_in_bands(self.given):
+                found = self._at_levels(self.given.fine)
+                if found is None and self._may_hide_in_bands(self.given.fine):
+                    return self._bracket(
+                        self._widest_band(), "two critical levels are too near to tell"
+                    )
+        except OutOfTimeError:
+            return self._bracket(1.0, "the budget was spent")
+        except TooManyCellsError as error:
+            return self._bracket(1.0, str(error))
+        if found is not None:
+            return found
+        if self.is_open:
+            return self._bracket(
+                1.0, "the inputs of its variables depend on each other"
+            )
+        return Proved(self._how())
+
+    def _sought(self) -> Witness | None:
+        """Return a witness that floats led to, if there is one."""
+        ours, rivals, _, _ = self.question
+        point = leader(self.given, ours, rivals)
+        found = self._checked(self.given, point)
+        if found is None:
+            return None
+        plain = plainer(self.given, point, ours, rivals)
+        return self._checked(self.given, plain) or found
+
+    def _contest(self, given: Ground) -> Contest:
+        ours, rivals, _, _ = self.question
+        return Contest(given, tuple(n - 1 for n in ours), tuple(n - 1 for n in rivals))
+
+    def _levels(self, contest: Contest) -> Iterator[tuple[int, Fraction]]:
+        """Yield bands from which up to another level nothing changes, and that level.
+
+        With a ceiling, what is left below only grows with the level: the highest do.
+        """
+        bands, ceiling = contest.bands, self.question.ceiling
+        events = contest.all_events if self.groups else contest.events
+        if ceiling is not None:
+            below = [n for n, high in enumerate(bands.high) if high < ceiling]
+            if below:
+                yield below[-1], min(ceiling, bands.low_after(below[-1]))
+            return
+        lows, highs = contest.ground.near_levels
+        found: list[tuple[float, int, int]] = []
+        above = len(lows) - 1
+        for band in events:
+            if band + 1 < len(lows):
+                found.append((highs[band] - lows[above], -band, above))
+                above = band
+        # Between levels far apart the lead is large, and so is the box around it.
+        for _, band, above in sorted(found):
+            yield -band, bands.low[above]
+
+    def _doubtful(self, contest: Contest) -> Iterator[int]:
+        """Yield bands within which the order of levels is not known and matters."""
+        bands, ceiling = contest.bands, self.question.ceiling
+        if ceiling is not None:
+            yield from (
+                n
+                for n, (low, high) in enumerate(zip(bands.low, bands.high, strict=True))
+                if low < ceiling <= high
+            )
+            return
+        for band in contest.events:
+            if not bands.is_sharp[band] and bands.high[band]:
+                yield band
+
+    def _how(self) -> str:
+        contest = self._contest(self.given)
+        cells = sum(len(options.where) for options in contest.all_options)
+        axes = len(self.given.axes)
+        levels, parts = counted(self.levels, "level"), counted(cells, "cell")
+        text = f"{levels} with {parts} on {counted(axes, 'axis', 'axes')} visited"
+        if not self.choices:
+            return text
+        return f"{text}, {counted(self.choices, 'choice')} of inputs"
+
+    def _bracket(self, high: float, why: str) -> Bracket:
+        return Bracket(self.question.of, 0.0, high, f"{why}: {self._how()}")
+
+    def _widest_band(self) -> float:
+        bands = self.given.fine.laid[1]
+        widest = max(b - a for a, b in zip(bands.low, bands.high, strict=True))
+        return outwards(widest)[1]
+
+    def _at_levels(self, given: Ground) -> Witness | None:
+        contest = self._contest(given)
+        known: dict[tuple[tuple[int, ...], ...], tuple[int, ...] | None] = {}
+        for band, above in self._levels(contest):
+            self.levels += 1
+            families = tuple(options.at_gap(band) for options in contest.options)
+            if families not in known:
+                known[families] = cover(families, contest.full, self.clock)
+            chosen = known[families]
+            found = None
+            if chosen is not None:
+                levels = contest.bands.high[band], above
+                found = (
+                    self._among_inputs(contest, band, levels)
+                    if self.groups
+                    else self._witness(contest, band, levels, chosen)
+                )
+            if found is not None:
+                return found
+        return None
+
+    def _may_hide_in_bands(self, given: Ground) -> bool:
+        """Return whether what is asked may happen within a band."""
+        contest = self._contest(given)
+        known: dict[tuple[tuple[int, ...], ...], bool] = {}
+        for band in self._doubtful(contest):
+            self.levels += 1
+            families = tuple(options.at_band(band) for options in contest.options)
+            if families not in known:
+                known[families] = cover(families, contest.full, self.clock) is not None
+            if known[families]:
+                return True
+        return False
+
+    # --- witnesses
+
+    def _witness(
+        self,
+        contest: Contest,
+        band: int,
+        levels: tuple[Fraction, Fraction],
+        chosen: Sequence[int],
+    ) -> Witness | None:
+        level = between(*levels)
+        wanted: dict[int, Stretch] = {}
+        left = contest.full
+        # Axes that leave many rivals below come first: few axes then matter.
+        order = sorted(range(len(chosen)), key=lambda a: -chosen[a].bit_count())
+        for axis in order:
+            part = self._part(contest, axis, band, level, chosen[axis] & left)
+            if part is None:
+                self._lost()
+                return None
+            wanted[axis] = part
+            left &= ~chosen[axis]
+        point = point_with(contest.ground, wanted)
+        found = None if point is None else self._checked(contest.ground, point)
+        if found is None:
+            self._lost()
+        return found
+
+    def _lost(self) -> None:
+        """Note that an option that is open could not be made a point."""
+        self.is_open = True
+
+    def _part(
+        self, contest: Contest, axis: int, band: int, level: Fraction, mask: int
+    ) -> Stretch | None:
+        """Return values of an axis that leave some rivals below a level."""
+        options, laid = contest.options[axis], contest.ground.laid[0][axis]
+        bits = [n for n in range(len(contest.rivals)) if mask >> n & 1]
+        fits = (options.top > band) & (options.where >= START)
+        fits &= (options.floor[:, bits] <= band).all(axis=1)
+        # Of the options that fit, the one where the rule is strongest.
+        order = sorted(fits.nonzero()[0], key=lambda n: -int(options.top[n]))
+        for number in order[:4]:
+            cell = int(options.where[number])
+            rivals = [contest.rivals[n] for n in bits]
+            part = stretch(
+                laid,
+                cell,
+                level,
+                [weakest(laid, contest.ours, cell)],
+                {weakest(laid, [rival], cell) for rival in rivals},
+            )
+            if part is not None:
+                return part
+        return None
+
+    def _checked(self, given: Ground, point: Point) -> Witness | None:
+        """Return a point as a witness, if it is one in fractions."""
+        ours, rivals, ceiling, _ = self.question
+        strengths = strengths_at(given, point)
+        mine = min((strengths[n - 1] for n in ours), default=ceiling or Fraction(1))
+        best = max((strengths[n - 1] for n in rivals), default=Fraction(0))
+        if not (mine > best and is_within(given, point)):
+            return None
+        claims: tuple[Claim, ...]
+        if ceiling is not None:
+            claims = (Claim("below", rules=rivals, level=str(ceiling)),)
+        else:
+            claims = (
+                Claim("beats", rules=ours, rivals=rivals),
+                *(
+                    Claim("strength", rules=(n,), level=str(strengths[n - 1]))
+                    for n in ours
+                ),
+            )
+        region = region_around(given, point, ours, rivals, between=(best, mine))
+        return Witness(coordinates(point), claims, region)
+
+    # --- axes that share inputs
+
+    def _among_inputs(
+        self, contest: Contest, band: int, levels: tuple[Fraction, Fraction]
+    ) -> Witness | None:
+        """Return a witness at levels between two, where options do not change.
+
+        What the axes may be at any of the levels is closed off first; where inputs
+        remain that may do, the levels are halved.
+        """
+        todo = [(levels, 0)]
+        while todo:
+            (low, high), depth = todo.pop()
+            if not any(self._choices(contest, band, (low, high), is_outer=True)):
+                continue
+            middle = (low + high) / 2
+            for wanted in self._choices(
+                contest, band, (middle, middle), is_outer=False
+            ):
+                point = point_with(contest.ground, wanted)
+                found = None if point is None else self._checked(contest.ground, point)
+                if found is not None:
+                    return found
+            if depth == _DEEPEST:
+                self._lost()
+                continue
+            todo += [((low, middle), depth + 1), ((middle, high), depth + 1)]
+        return None
+
+    def _tell(self) -> None:
+        """Count a choice of inputs, and end the search where they are too many."""
+        self.clock.check()
+        self.choices += 1
+        if self.choices > _MOST_CHOICES:
+            raise OutOfTimeError
+
+    def _choices(
+        self,
+        contest: Contest,
+        band: int,
+        levels: tuple[Fraction, Fraction],
+        *,
+        is_outer: bool,
+    ) -> Iterator[dict[int, Stretch]]:
+        """Yield values of the axes that leave all rivals below, and some point has.
+
+        Args:
+            contest: The question.
+            band: The band below the levels.
+            levels: The rule must reach the lower one, the rivals stay below the upper.
+            is_outer: Whether what may suffice at some level between counts; the free
+                axes are then not told.
+        """
+        joined = sorted({axis for group in self.groups for axis in group})
+        free = [a for a in range(len(contest.options)) if a not in joined]
+        families = [contest.options[axis].at_gap(band) for axis in free]
+        parts = {
+            axis: [
+                *parts_of(
+                    contest,
+                    contest.all_options[axis],
+                    axis,
+                    band,
+                    levels,
+                    is_outer=is_outer,
+                )
+            ]
+            for axis in joined
+        }
+        rest = union(mask for family in families for mask in family)
+        for wanted, covered in choices(
+            contest.ground, parts, contest.full, rest, {}, self._tell
+        ):
+            left = contest.full & ~covered
+            chosen = cover(families, left, self.clock)
+            if chosen is None:
+                continue
+            if is_outer:
+                yield wanted
+                continue
+            found = {
+                axis: self._part(contest, axis, band, levels[0], mask & left)
+                for axis, mask in zip(free, chosen, strict=True)
+            }
+            whole = {axis: part for axis, part in found.items() if part is not None}
+            if len(whole) == len(found):
+                yield wanted | whole

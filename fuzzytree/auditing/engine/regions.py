@@ -1,0 +1,197 @@
+"""The crisp regions of a tree: which part of the inputs each leaf decides.
+
+A branch is taken where its variable lies in one of the intervals that it owns, open
+below and closed above. So a leaf's region is a product of unions of intervals, one for
+each variable on its path, and nothing of it is rounded. Where a variable is a
+combination, its interval is a linear condition on the inputs.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.linear import Row, feasible
+from fuzzytree.auditing.engine.variables import linear_form, span, variable_value
+from fuzzytree.model.rulebase import Value, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, intervals
+from fuzzytree.numerics.exact import outwards
+
+Interval = tuple[float | None, float | None]
+"""An open lower and a closed upper end; None is no end."""
+
+Union = tuple[Interval, ...]
+"""Intervals in order, apart from each other."""
+
+EVERYWHERE: Union = ((None, None),)
+
+
+class Region(Value, frozen=True):
+    """What a leaf decides.
+
+    Attributes:
+        leaf: The leaf's number, from 1.
+        label: Its class.
+        sides: The variables that its path asks, in that order, each with the values
+            that lead on; none if no value does.
+    """
+
+    leaf: int
+    label: str
+    sides: tuple[tuple[str, Union], ...]
+
+
+def regions(tree: FuzzyTree) -> tuple[Region, ...]:
+    """Return the region of each leaf, in the order of the leaves.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> [region.label for region in regions(random_tree(3, leaves=2))]
+        ['class 1', 'class 2']
+    """
+    start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
+    todo: list[tuple[Branch, dict[str, Union]]] = [(start, {})]
+    found: list[Region] = []
+    while todo:
+        branch, sides = todo.pop()
+        if branch.leaf is not None:
+            label = tree.leaves[branch.leaf - 1].label
+            found.append(Region(branch.leaf, label, tuple(sides.items())))
+        elif branch.node is not None:
+            node = tree.nodes[branch.node - 1]
+            before = sides.get(node.variable, EVERYWHERE)
+            for index in reversed(range(len(node.branches))):
+                owned = tuple(
+                    interval
+                    for owner, interval in zip(
+                        node.owners, intervals(node), strict=True
+                    )
+                    if owner == index
+                )
+                step = {**sides, node.variable: common(before, owned)}
+                todo.append((node.branches[index], step))
+    return tuple(found)
+
+
+def common(one: Union, other: Union) -> Union:
+    """Return what two unions of intervals have in common.
+
+    Example:
+        >>> common(((None, 1.0), (2.0, None)), ((0.0, 3.0),))
+        ((0.0, 1.0), (2.0, 3.0))
+    """
+    met = (
+        (_later(a, b), _earlier(c, d))
+        for (a, c), (b, d) in itertools.product(one, other)
+    )
+    return tuple(
+        (low, high) for low, high in met if low is None or high is None or low < high
+    )
+
+
+def _later(a: float | None, b: float | None) -> float | None:
+    return b if a is None else a if b is None else max(a, b)
+
+
+def _earlier(a: float | None, b: float | None) -> float | None:
+    return b if a is None else a if b is None else min(a, b)
+
+
+def box_count(region: Region) -> int:
+    """Return of how many boxes a region is made, without looking at a domain."""
+    return math.prod(len(union) for _, union in region.sides)
+
+
+def boxes(region: Region, tree: FuzzyTree, domain: Domain) -> Iterator[Domain]:
+    """Yield the boxes of a region within a domain; those that are empty are left out.
+
+    A box has a side for each side of the domain and for each combination on the path.
+    Whether the inputs can meet the sides of combinations is left to `point_in`.
+    """
+    variables = {variable.name: variable for variable in tree.variables}
+    sides = {side.variable: side for side in domain.sides}
+    choices: list[list[Side]] = []
+    for name, union in region.sides:
+        whole = sides.pop(name, None) or _whole(variables[name], domain)
+        choices.append([met for met in (cut_side(whole, of) for of in union) if met])
+    order = {name: place for place, name in enumerate(variables)}
+    for chosen in itertools.product(*choices):
+        made = (*sides.values(), *chosen)
+        yield Domain(tuple(sorted(made, key=lambda side: order[side.variable])))
+
+
+def _whole(variable: Variable, domain: Domain) -> Side:
+    """Return all values of a combination on a domain, rounded outwards."""
+    low, high = span(variable, domain)
+    return Side(variable.name, outwards(low)[0], outwards(high)[1])
+
+
+def cut_side(side: Side, interval: Interval) -> Side | None:
+    """Return the part of a side within an interval, None if there is none.
+
+    Example:
+        >>> cut_side(Side("x", 0.0, 2.0), (None, 0.0))
+        Side(variable='x', low=0.0, high=0.0, origin='limits', is_open=False)
+        >>> cut_side(Side("x", 0.0, 2.0), (2.0, None)) is None
+        True
+    """
+    below, above = interval
+    low, is_open = side.low, side.is_open
+    if below is not None and below >= low:
+        low, is_open = below, True
+    high = side.high if above is None else min(side.high, above)
+    if low > high or (low == high and is_open):
+        return None
+    return Side(side.variable, low, high, side.origin, is_open)
+
+
+def point_in(box: Domain, tree: FuzzyTree) -> dict[str, Fraction] | None:
+    """Return a point of the inputs in a box, deep inside it; None if there is none.
+
+    Its coordinates have few digits.
+
+    Args:
+        box: A side for each input, and for any combinations.
+        tree: Whose inputs and combinations they are.
+    """
+    number = {name: place for place, name in enumerate(tree.inputs)}
+    variables = {variable.name: variable for variable in tree.variables}
+    ranges: dict[str, tuple[Fraction, Fraction]] = {}
+    rows: list[Row] = []
+    for side in box.sides:
+        low, high = Fraction(side.low), Fraction(side.high)
+        ranges[side.variable] = low, high
+        weights, constant = linear_form(variables[side.variable], number)
+        rows.append(Row(weights, low - constant, high - constant, side.is_open))
+    wanted = [ranges[name] for name in tree.inputs]
+    inner = [row if row.low == row.high else _strict(row) for row in rows]
+    found = feasible(wanted, inner) or feasible(wanted, rows)
+    return None if found is None else dict(zip(tree.inputs, found, strict=True))
+
+
+def _strict(row: Row) -> Row:
+    return row._replace(is_open_low=True, is_open_high=True)
+
+
+def leaf_at(tree: FuzzyTree, point: Mapping[str, Fraction]) -> int:
+    """Return the number of the leaf that a point of the inputs reaches, exactly.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(3)
+        >>> leaf_at(tree, dict.fromkeys(tree.inputs, Fraction(0)))
+        4
+    """
+    variables = {variable.name: variable for variable in tree.variables}
+    number = 1 if tree.nodes else None
+    leaf = 1
+    while number is not None:
+        node = tree.nodes[number - 1]
+        value = variable_value(variables[node.variable], point)
+        passed = sum(1 for cut in node.cuts if value > cut)
+        branch = node.branches[node.owners[passed]]
+        number, leaf = branch.node, branch.leaf or leaf
+    return leaf

@@ -1,0 +1,182 @@
+"""How an answer is known: five states, none of which looks like another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from typing import Literal
+
+from fuzzytree.model.rulebase import Value
+
+Carrier = Literal["rules", "tree", "raw rules", "old", "new"]
+"""Which model a claim is about: the audited rules, the tree they come from, its raw
+rules, or one of two that are compared."""
+
+ClaimKind = Literal[
+    "strength", "beats", "ties", "below", "reaches", "decides", "degree", "covered"
+]
+
+
+class Coordinate(Value, frozen=True):
+    """The value of one input, with all its digits.
+
+    Attributes:
+        input: The input.
+        exact: The value as `p/q`, or `p` where it is whole.
+        decimal: The nearest double, by its shortest decimal digits.
+        hex: That double as C writes it, such as `0x1.8p+1`; None if the exact value is
+            no double.
+    """
+
+    input: str
+    exact: str
+    decimal: str
+    hex: str | None
+
+
+class Claim(Value, frozen=True):
+    """What is said of a point, so that anyone can evaluate it again.
+
+    Attributes:
+        kind: `strength`: that of `rules[0]` is `level`. `beats`: each of `rules` is
+            strictly stronger than each of `rivals`. `ties`: all of `rules` are equally
+            strong, and strictly stronger than each of `rivals`. `below`: every one of
+            `rules` has a strength below `level`, or of 0 where `level` is `0`.
+            `reaches`: every one of `rules` has a strength of at least `level`.
+            `decides`: the model's answer is `label`; None is no class. `degree`: that
+            of the term `term` of `variable` is `level`. `covered`: some rule fires.
+        of: The model that it is said of.
+        rules: The numbers of rules, from 1.
+        rivals: The numbers of others.
+        level: A number as `p/q`.
+        label: A class.
+        variable: A variable.
+        term: One of its terms.
+    """
+
+    kind: ClaimKind
+    of: Carrier = "rules"
+    rules: tuple[int, ...] = ()
+    rivals: tuple[int, ...] = ()
+    level: str | None = None
+    label: str | None = None
+    variable: str | None = None
+    term: str | None = None
+
+
+class Span(Value, frozen=True):
+    """A variable's part of a region: from `low` to `high`; None has no such end."""
+
+    variable: str
+    low: float | None
+    high: float | None
+
+
+class Proved(Value, frozen=True, tag="PROVED", tag_field="state"):
+    """It holds on all of the domain.
+
+    Attributes:
+        how: What was visited, with counts, in a sentence.
+    """
+
+    how: str
+
+
+class Witness(Value, frozen=True, tag="WITNESS", tag_field="state"):
+    """It happens: here.
+
+    Attributes:
+        point: A value for every input.
+        claims: What holds there; each was evaluated in fractions.
+        region: A box around the point on which it holds too, with only the variables
+            that matter; empty if it was not looked for.
+    """
+
+    point: tuple[Coordinate, ...]
+    claims: tuple[Claim, ...]
+    region: tuple[Span, ...] = ()
+
+
+class Bracket(Value, frozen=True, tag="BRACKET", tag_field="state"):
+    """A number lies between two: the budget was spent before it was known better.
+
+    Attributes:
+        of: What the number is, such as `the largest lead of rule 3`.
+        low: It is at least this.
+        high: It is at most this.
+        why: What stopped it, in a sentence.
+        point: Where one of the two ends is reached, if such a point is known: `low` of
+            what is largest somewhere, `high` of a distance.
+        claims: What holds at the point.
+    """
+
+    of: str
+    low: float
+    high: float
+    why: str
+    point: tuple[Coordinate, ...] = ()
+    claims: tuple[Claim, ...] = ()
+
+
+class Sampled(Value, frozen=True, tag="SAMPLED", tag_field="state"):
+    """A share that was counted in a sample.
+
+    Attributes:
+        of: What was counted.
+        hits: In how many of the rows it holds.
+        rows: How many rows were looked at.
+        low: The lower end of the confidence interval of the share.
+        high: The upper end.
+        confidence: Of the interval, such as 0.95.
+        how: Where the rows come from, with the seed if they were drawn.
+    """
+
+    of: str
+    hits: int
+    rows: int
+    low: float
+    high: float
+    confidence: float
+    how: str
+
+
+class Declined(Value, frozen=True, tag="DECLINED", tag_field="state"):
+    """It was not decided.
+
+    Attributes:
+        code: Why, as a code that `fuzzytree explain` tells about.
+        reason: Why, in a sentence.
+    """
+
+    code: str
+    reason: str
+
+
+State = Proved | Witness | Bracket | Sampled | Declined
+
+
+def coordinates(point: Mapping[str, Fraction]) -> tuple[Coordinate, ...]:
+    """Return a point with all its digits.
+
+    Example:
+        >>> coordinates({"x": Fraction(3, 2)})[0]
+        Coordinate(input='x', exact='3/2', decimal='1.5', hex='0x1.8000000000000p+0')
+    """
+    return tuple(_coordinate(name, value) for name, value in point.items())
+
+
+def _coordinate(name: str, value: Fraction) -> Coordinate:
+    near = float(value)
+    is_double = math.isfinite(near) and Fraction(near) == value
+    return Coordinate(name, str(value), repr(near), near.hex() if is_double else None)
+
+
+def point_of(found: Iterable[Coordinate]) -> dict[str, Fraction]:
+    """Return the exact values of a point, by input.
+
+    Example:
+        >>> point_of(coordinates({"x": Fraction(1, 3)}))
+        {'x': Fraction(1, 3)}
+    """
+    return {one.input: Fraction(one.exact) for one in found}

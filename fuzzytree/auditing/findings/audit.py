@@ -1,0 +1,355 @@
+"""An audit: every family of questions is asked, and what is known is kept."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple, cast
+
+import msgspec
+
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.engine.wording import counted
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.domains import domain_of, inputs_of
+from fuzzytree.auditing.findings.limits import LIMITS, digest_of
+from fuzzytree.auditing.findings.places import ModelFile, places_of, with_ids, writable
+from fuzzytree.auditing.findings.records import (
+    INTERRUPTED,
+    Answer,
+    Audit,
+    Policy,
+    Settings,
+    Source,
+)
+from fuzzytree.auditing.findings.selecting import check_settings, chosen_codes
+from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.auditing.findings.views import View, view
+from fuzzytree.model.agreement import version
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import RuleBase, fingerprint, name_choice
+from fuzzytree.model.tree import FuzzyTree
+
+Asking = Callable[[Subject], Iterator[Answer]]
+
+
+class Family(msgspec.Struct, frozen=True):
+    """Questions that one module of this package asks.
+
+    Attributes:
+        module: Its name; its `answers` yields an answer to each question.
+        codes: Of the questions.
+        part: How much it may take of the time that is left. Who needs less leaves the
+            rest to those behind.
+    """
+
+    module: str
+    codes: tuple[str, ...]
+    part: float = 0.5
+
+
+FAMILIES: Final = (
+    Family("terms", ("FT401", "FT404"), 0.2),
+    Family("support", ("FT701",), 0.2),
+    Family("gaps", ("FT301",), 0.2),
+    Family("deciding", ("FT101", "FT102", "FT103", "FT202")),
+    Family("trees", ("FT101", "FT205")),
+    Family("pairs", ("FT104", "FT105", "FT106", "FT107", "FT201")),
+    Family("disagreement", ("FT203",)),
+    Family("shapes", ("FT402",), 0.2),
+    Family("overlaps", ("FT403",), 0.2),
+    Family("complexity", ("FT501",), 0.2),
+    Family("robustness", ("FT204",)),
+    Family("carriers", ("FT601", "FT602"), 1.0),
+)
+"""In the order in which they are asked: first what is quick and what is grave, so that
+a spent budget costs as little as it can."""
+
+ASKED: Final = frozenset(code for family in FAMILIES for code in family.codes)
+"""The codes that an audit asks; the others belong to a comparison, or say why not."""
+
+_OF_A_ROW = "FT204"
+_LATE = "FTD03"
+_TOO_LARGE = "it needs more memory than there is"
+
+
+def audit(
+    model: Document,
+    *,
+    rows: Rows | None = None,
+    domain: Domain | None = None,
+    settings: Settings | None = None,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    clock: Clock | None = None,
+    file: ModelFile | None = None,
+    data: Source | None = None,
+    row: Mapping[str, float] | None = None,
+    accepted: Collection[str] = (),
+    repeat: str = "",
+) -> Audit:
+    """Ask everything of a model, and return what is known.
+
+    When the budget is spent, or at a Ctrl-C, nothing new is begun: what is proved is
+    kept, and the rest stands among what was not asked.
+
+    Args:
+        model: The model.
+        rows: The user's rows.
+        domain: Where everything is asked; the model's ranges unless given.
+        settings: What is taken for small.
+        select: Beginnings of codes that are asked; all if none.
+        ignore: Beginnings of codes that are left out.
+        clock: The budget; that of the settings unless given.
+        file: The file of the model, for places.
+        data: The table that the rows come from.
+        row: A row whose nearest other decision is looked for besides.
+        accepted: Ids of findings that a baseline accepts.
+        repeat: The command that asks all of this again.
+
+    Raises:
+        ValueError: If a code or a setting is none, or the domain is not known.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> audit(random_tree(1), select=["FT501"]).is_complete
+        True
+    """
+    settings = settings or Settings()
+    check_settings(settings)
+    wanted = chosen_codes(select, ignore)
+    domain = domain or domain_of(model)
+    clock = clock or Clock(settings.budget_s)
+    if row is not None:
+        _check_row(row, inputs_of(model))
+    viewed = view(model, domain)
+    asked = _ask_view(viewed, rows, row, settings, clock, wanted)
+    kept = sorted(
+        (one for one in asked.answers if one.code in wanted), key=lambda one: one.code
+    )
+    held = viewed.held
+    whole = (viewed.rules, viewed.raw) if held is None else (held.lower,)
+    carriers = [rules for rules in whole if rules is not None]
+    curves = {name: one.key for name, one in held.terms.items()} if held else {}
+    answers = tuple(
+        _placed(one, viewed, model, file, repeat)
+        for one in with_ids(kept, carriers, curves)
+    )
+    ids = {one.id for one in answers if one.is_finding}
+    found = Audit(
+        version=version(),
+        model=model.name,
+        form=_form(model),
+        fingerprint=fingerprint(model),
+        file=source_of(file.name, file.content) if file else None,
+        data=data,
+        rows=0 if rows is None else rows.values.shape[1],
+        policy=viewed.policy,
+        domain=viewed.domain,
+        settings=settings,
+        answers=answers,
+        unasked=tuple(_unasked(viewed.policy, wanted, asked)),
+        limits=LIMITS,
+        is_complete=not asked.cut,
+        accepted=tuple(sorted(ids.intersection(accepted))),
+        numbers=() if _is_plain(viewed.numbers) else viewed.numbers,
+    )
+    # A count among doubles is a double from here on, as it is for who reads the file.
+    found = msgspec.json.decode(msgspec.json.encode(found), type=Audit)
+    return msgspec.structs.replace(found, digest=digest_of(found))
+
+
+def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
+    """Refuse a row without a finite value for each input.
+
+    Raises:
+        ValueError: If it is one.
+    """
+    for name, value in row.items():
+        if name not in inputs:
+            raise ValueError(
+                f"the row has a value of {name!r}, which is no input; "
+                f"{name_choice(name, inputs)}"
+            )
+        if not math.isfinite(value):
+            raise ValueError(f"the row's {name!r} must be finite, not {value!r}")
+    absent = [name for name in inputs if name not in row]
+    if absent:
+        raise ValueError(f"the row has no value of {', '.join(map(repr, absent))}")
+
+
+def _ask_view(
+    found: View,
+    rows: Rows | None,
+    row: Mapping[str, float] | None,
+    settings: Settings,
+    clock: Clock,
+    wanted: set[str],
+) -> _Asked:
+    """Ask all families about a view; nothing if it holds no rule."""
+    asked = _Asked([*found.declined])
+    if found.rules is None:
+        return asked
+    subject = Subject(
+        rules=found.rules,
+        policy=found.policy,
+        domain=found.domain,
+        settings=settings,
+        clock=clock,
+        tree=found.tree,
+        raw=found.raw,
+        system=found.system,
+        rows=rows,
+        places=found.places,
+        declined=found.declined,
+        is_whole=found.is_whole,
+        held=found.held,
+    )
+    _ask_all([*_tasks(wanted, row)], subject, clock, asked)
+    return asked
+
+
+def source_of(name: str, content: bytes) -> Source:
+    """Return the name of a file and the SHA-256 of its bytes."""
+    return Source(writable(name), hashlib.sha256(content).hexdigest())
+
+
+class _Asked:
+    """What came of the families so far.
+
+    Attributes:
+        answers: All of them.
+        cut: Why a code was cut short or not begun, by code.
+    """
+
+    def __init__(self, answers: list[Answer]) -> None:
+        self.answers = answers
+        self.cut: dict[str, str] = {}
+
+
+class _Task(NamedTuple):
+    """Questions that are asked together, and what asks them."""
+
+    codes: Sequence[str]
+    ask: Asking
+    part: float
+
+
+def _tasks(wanted: set[str], row: Mapping[str, float] | None) -> Iterator[_Task]:
+    """Yield what is asked, in order: the user's row first, then the families."""
+    if row is not None and _OF_A_ROW in wanted:
+        yield _Task([_OF_A_ROW], functools.partial(_row_answers, row), 0.5)
+    for family in FAMILIES:
+        codes = [code for code in family.codes if code in wanted]
+        if codes:
+            ask = functools.partial(_answers, family.module)
+            yield _Task(codes, ask, family.part)
+
+
+def _answers(module: str, subject: Subject) -> Iterator[Answer]:
+    """Return what a family answers; it is imported when it is asked."""
+    found = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
+    # Every module of the table has a function of this type; a test asks each.
+    return cast("Asking", found.answers)(subject)
+
+
+def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[Answer]:
+    from fuzzytree.auditing.findings.robustness import row_answers
+
+    return row_answers(subject, row)
+
+
+def _ask_all(
+    tasks: Sequence[_Task], subject: Subject, clock: Clock, asked: _Asked
+) -> None:
+    """Ask everything, each task within its part of the budget."""
+    why = f"the budget of {subject.settings.budget_s:g} s is spent"
+    for position, task in enumerate(tasks):
+        part = 1.0 if position == len(tasks) - 1 else task.part
+        own = clock.share(part, tell=_telling(clock, position, len(tasks)))
+        try:
+            clock.check()
+            own.tell(CODES[task.codes[0]].title, 0.0)
+            with enforced(own):
+                for answer in task.ask(msgspec.structs.replace(subject, clock=own)):
+                    asked.answers.append(answer)
+                    if _is_late(answer):
+                        asked.cut[answer.code] = why
+        except OutOfTimeError:
+            asked.cut |= dict.fromkeys(task.codes, why)
+        except MemoryError:
+            asked.cut |= dict.fromkeys(task.codes, _TOO_LARGE)
+        except KeyboardInterrupt:
+            rest = [code for one in tasks[position:] for code in one.codes]
+            asked.cut |= dict.fromkeys(rest, INTERRUPTED)
+            return
+
+
+def _is_late(answer: Answer) -> bool:
+    return isinstance(answer.state, Declined) and answer.state.code == _LATE
+
+
+def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], None]:
+    """Return a function that tells a family's progress as part of all."""
+    return lambda text, share: clock.tell(text, (position + share) / count)
+
+
+def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
+    """Yield what was not asked and why, in order of the codes."""
+    answered = Counter(one.code for one in asked.answers)
+    for code in sorted(ASKED):
+        name = f"{code} {CODES[code].title}"
+        if code not in wanted:
+            yield f"{name}: left out by the user"
+        elif code in asked.cut:
+            begun = "not asked"
+            if answered[code]:
+                begun = f"cut short after {counted(answered[code], 'answer')}"
+            yield f"{name}: {begun}: {asked.cut[code]}"
+        elif code in answered:
+            continue
+        elif policy.decision == "all" and CODES[code].decision == "strongest":
+            yield f"{name}: not asked: every rule takes part in the answer"
+        elif answered and all(one.startswith("FTD") for one in answered):
+            yield f"{name}: nothing is left to ask it of, beside what was declined"
+        else:
+            yield f"{name}: nothing in this model to ask it of"
+
+
+def _placed(
+    answer: Answer,
+    viewed: View,
+    model: Document,
+    file: ModelFile | None,
+    repeat: str,
+) -> Answer:
+    """Return an answer with its places and the command that finds it again."""
+    numbers = [viewed.numbers[number - 1] for number in answer.rules]
+    if not numbers and answer.subject in viewed.left_out:
+        numbers = [viewed.left_out[answer.subject]]
+    return msgspec.structs.replace(
+        answer,
+        places=places_of(answer, model, file, numbers),
+        repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
+    )
+
+
+def _is_plain(numbers: Sequence[int]) -> bool:
+    """Return whether the rules of a view are those of the model, one by one."""
+    return [*numbers] == [*range(1, len(numbers) + 1)]
+
+
+def _form(model: Document) -> str:
+    match model:
+        case FuzzyTree():
+            return "tree"
+        case RuleBase(kind=kind):
+            return f"{kind} rules" if kind else "rules"
+        case _:
+            return "system"

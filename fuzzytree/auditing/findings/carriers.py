@@ -1,0 +1,236 @@
+"""Does every form of a model, in every runtime at hand, answer as the model?
+
+Bits are compared on probes that aim at every clause, and on the rows; what a number
+type can change about a decision is certified for all of the domain; and a share of the
+rows, or of drawn points, tells how often that could matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State
+from fuzzytree.auditing.findings import conventions
+from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.findings.support import drawn, share
+from fuzzytree.checking.comparing import probed
+from fuzzytree.checking.models import check
+from fuzzytree.checking.systems import check_system
+from fuzzytree.model.agreement import Agreement, Basis, Certified, Comparison
+from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.numerics.bounds import Certificate, certify
+from fuzzytree.semantics.lowering import forms
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.runtimes.onnxruntime import OnnxModel
+
+RUNTIMES: Final = (
+    "native",
+    "native mixed",
+    "native float32",
+    "onnxruntime float64",
+    "onnxruntime mixed",
+    "onnxruntime float32",
+)
+"""What is run: our own arrays and ONNX, in each number type; the native ones are held
+against exact arithmetic."""
+
+OF_SYSTEMS: Final = ("reference", "native", "onnxruntime float64")
+
+PROBES: Final = 2_000
+"""The most probes of a comparison."""
+
+_DTYPES: Final[Mapping[str, Dtype]] = MappingProxyType(
+    {"float64": "float64", "mixed": "mixed", "float32": "float32"}
+)
+_MOST_ROWS = 2_000  # rows or points that stand behind the probes
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Ask whether what is made of a model answers as it does.
+
+    Raises:
+        OutOfTimeError: If the budget is spent.
+    """
+    subject.clock.check()
+    values, how = _points(subject)
+    found = agreement(subject, values)
+    yield from told(subject, found, values)
+    if subject.system is None:
+        made = {str(name): form for name, form in forms(_model(subject)).items()}
+        for one in found.certificates:
+            subject.clock.check()
+            yield from _certified(
+                subject, one, made[one.carrier.rpartition(" in ")[0]], how
+            )
+    yield from conventions.answers(subject)
+
+
+def _model(subject: Subject) -> Model:
+    return subject.rules if subject.tree is None else subject.tree
+
+
+def _points(subject: Subject) -> tuple[FloatArray, str]:
+    """Return the user's rows, or drawn points without, and where they come from."""
+    settings = subject.settings
+    most = min(settings.rows, _MOST_ROWS)
+    if subject.rows is None:
+        points = drawn(subject.rules, subject.domain, most, settings.seed)
+        return points, f"points drawn evenly from the domain, seed {settings.seed}"
+    values, name = subject.rows.values, subject.rows.name
+    count = values.shape[1]
+    if count <= most:
+        return values, f"every row of {name}"
+    chosen = np.random.default_rng(settings.seed).choice(count, most, replace=False)
+    return values[:, np.sort(chosen)], f"rows drawn from {name}, seed {settings.seed}"
+
+
+def agreement(
+    subject: Subject, values: FloatArray, *others: Model | OnnxModel
+) -> Agreement:
+    """Return what a check finds of the model and all that is made of it.
+
+    Args:
+        subject: The model.
+        values: Rows beside the probes, shape (inputs, rows).
+        others: Carriers that were shipped with it.
+    """
+    if subject.system is not None:
+        return check_system(
+            subject.system, data=values, runtimes=OF_SYSTEMS, limit=PROBES
+        )
+    return check(_model(subject), *others, data=values, runtimes=RUNTIMES, limit=PROBES)
+
+
+def told(subject: Subject, found: Agreement, values: FloatArray) -> Iterator[Answer]:
+    """Yield the answers that a check gives: each disagreement, and the rest in short.
+
+    Args:
+        subject: The model.
+        found: What was found of it.
+        values: The rows beside the probes that it was found on.
+    """
+    clean: dict[Basis, list[Comparison]] = {}
+    for one in found.comparisons:
+        if one.verdict in ("DISAGREES", "rows only"):
+            yield _disagreement(subject, one, values)
+        elif one.verdict == "agrees":  # raw rules differ from a tree by design: FT203
+            basis = "proof" if one.basis in ("file", "all cells") else one.basis
+            clean.setdefault(basis, []).append(one)
+    for basis, ones in clean.items():
+        yield _agreeing(basis, ones)
+    for text in found.skipped:
+        if text.startswith("all cells"):  # a proof covers them
+            continue
+        name = text.partition(" is not installed")[0].partition(": ")[0]
+        sentence = f"{name} is not compared: {text}"
+        yield Answer("FT601", name, sentence, Declined("FTD08", text), is_finding=False)
+
+
+def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answer:
+    noun = "probes and rows" if one.basis == "rows" else "ways"
+    facts = "; ".join(one.detail[:2])
+    sentence = (
+        f"{one.carrier} disagrees with {one.against} in {one.differing} of "
+        f"{one.rows} {noun}"
+    )
+    state: State = Proved(f"both were run or read; {facts}")
+    if subject.system is None and one.told:
+        model = _model(subject)
+        made = {str(name): form for name, form in forms(model).items()}
+        form = made.get(_form(one), model)
+        rows = probed(model, values, PROBES).values
+        witness = conventions.witness(subject, form, rows[:, [*one.told]])
+        state = witness or state
+    return Answer(
+        "FT601",
+        one.carrier,
+        f"{sentence}: {facts}" if facts else sentence,
+        state,
+        is_finding=True,
+        severity="error",
+        measures=(
+            Measure("rows that differ", one.differing),
+            Measure("rows of another class", one.flips),
+            Measure("largest difference", one.largest_difference),
+        ),
+    )
+
+
+def _form(one: Comparison) -> str:
+    """Return the form of the model that a carrier's title names, after its runtime."""
+    return one.carrier.rpartition(": ")[2]
+
+
+def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> Answer:
+    """Return the answer that sums up comparisons in which nothing differs."""
+    ones = [*ones]
+    how = "; ".join(f"{c.carrier} and {c.against}: {c.rows}, {c.origin}" for c in ones)
+    match basis:
+        case "rows":
+            rows = max(one.rows for one in ones)
+            text = f"{len(ones)} carriers answer alike on up to {rows} probes and rows"
+        case "calls":
+            text = f"{len(ones)} carriers answer alike however they are called"
+        case _:
+            text = f"{len(ones)} carriers are equal on every input"
+    return Answer("FT601", f"carriers, by {basis}", text, Proved(how), is_finding=False)
+
+
+# --- what a number type can change
+
+
+def _certified(
+    subject: Subject, one: Certified, form: Model, how: str
+) -> Iterator[Answer]:
+    """Yield the bound of a number type's error, and where it leaves a class open."""
+    name = one.carrier
+    if one.verdict == "DISAGREES":
+        facts = "; ".join(one.detail[:2])
+        text = f"{name} errs by more than its certified bound: {facts}"
+        proof = Proved("each row was compared with its exact answer")
+        yield Answer("FT601", name, text, proof, is_finding=True, severity="error")
+    bound = certify(_within(form, subject.domain), _DTYPES[one.dtype])
+    measures = []
+    if bound.delta is not None:
+        measures.append(Measure("certified error of a strength", bound.delta))
+        measures.append(Measure("margin that is certain", 2.0 * bound.delta))
+    if one.largest is not None:
+        measures.append(Measure("largest error seen", one.largest))
+    sentence = f"{name}: {bound.sentence}"
+    state = _bounded(bound, one)
+    yield Answer("FT601", name, sentence, state, False, measures=tuple(measures))
+    if one.on == "data" and one.rows:
+        noun = "rows" if subject.rows is not None else "points"
+        text = f"{name}: the class is open on {one.in_band} of {one.rows} {noun}"
+        seen = share(f"{noun} within the band of {name}", one.in_band, one.rows, how)
+        yield Answer("FT601", f"{name}, its band", text, seen, is_finding=False)
+
+
+def _bounded(bound: Certificate, one: Certified) -> State:
+    origin = bound.origin.replace("the declared ranges", "the domain")
+    if bound.delta is not None or not bound.reasons:
+        return Proved(origin)
+    seen = one.largest or 0.0
+    of = f"the largest error of a strength of {one.carrier}"
+    return Bracket(of, seen, 1.0, "; ".join(bound.reasons))
+
+
+def _within(form: Model, domain: Domain) -> Model:
+    """Return a model that declares the domain as the ranges of its variables."""
+    sides = {side.variable: side for side in domain.sides}
+    variables = tuple(
+        replace(one, low=sides[one.name].low, high=sides[one.name].high)
+        if one.name in sides
+        else one
+        for one in form.variables
+    )
+    return replace(form, variables=variables)

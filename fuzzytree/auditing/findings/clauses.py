@@ -1,0 +1,261 @@
+"""Is a clause needed? It is if some input is decided otherwise without it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.alike import alike
+from fuzzytree.auditing.engine.answers import answer_at
+from fuzzytree.auditing.engine.dominance import Compared
+from fuzzytree.auditing.engine.ground import Ground, ground, rule_strengths
+from fuzzytree.auditing.engine.states import (
+    Claim,
+    Proved,
+    State,
+    Witness,
+    coordinates,
+    point_of,
+)
+from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.findings.records import Answer, Label, Measure
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.findings.support import drawn
+from fuzzytree.auditing.findings.turns import Turns
+from fuzzytree.model.rulebase import Clause, Rule, RuleBase, clause_text
+from fuzzytree.numerics.oracle import decide
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray, IntArray
+
+MOST_ROWS: Final = 4096
+"""The most rows that are drawn to find an input where a clause matters."""
+
+MOST_SHOWN: Final = 100
+"""The most clauses that matter which are told one by one."""
+
+_MOST_STRENGTHS = 1 << 24  # of all rules with and without each clause, at all rows
+_MOST_TRIED = 4  # rows that are evaluated in fractions for one clause
+
+
+class _Dropped(NamedTuple):
+    """A clause that is left out.
+
+    Attributes:
+        rule: The number of its rule, from 1.
+        clause: The clause.
+        shorter: The rule without it.
+    """
+
+    rule: int
+    clause: Clause
+    shorter: Rule
+
+    def of(self, rules: RuleBase) -> RuleBase:
+        """Return the rule base without the clause."""
+        every = list(rules.rules)
+        every[self.rule - 1] = self.shorter
+        return replace(rules, rules=tuple(every))
+
+
+def clause_answers(subject: Subject) -> Iterator[Answer]:
+    """Answer for each clause whether some input is decided otherwise without it."""
+    every = [*_dropped(subject.rules)]
+    if not every:
+        return
+    both = replace(
+        subject.rules,
+        rules=(*subject.rules.rules, *(one.shorter for one in every)),
+    )
+    given = ground(both, subject.domain)
+    compared = Compared(given)
+    seen = _Seen(subject, given, both)
+    count = len(subject.rules.rules)
+    silent = [
+        number for number in range(1, count + 1) if not compared.fires[number - 1]
+    ]
+    needed, turns = 0, Turns(subject.clock, 0.9)
+    for number, one in enumerate(every, count + 1):
+        if one.rule in silent:
+            continue
+        subject.clock.check()
+        subject.clock.tell("irrelevant clause", (number - count) / len(every))
+        state = _state(subject, compared, seen, one, number, turns)
+        if state is None:
+            turns.left_out += 1
+            continue
+        if isinstance(state, Witness):
+            needed += 1
+            if needed > MOST_SHOWN:
+                continue
+        yield _answer(subject, one, state)
+    yield from turns.rest("FT107", "clause", "whether they are needed")
+    for number in silent:
+        name = subject.rule_name(number)
+        yield Answer(
+            "FT107",
+            name,
+            f"{name} never fires, so that its clauses are not asked one by one",
+            Proved("one of its clauses is 0 on all of the domain"),
+            is_finding=False,
+            rules=(number,),
+        )
+    if needed > MOST_SHOWN:
+        rest = needed - MOST_SHOWN
+        text = "clause matters: it decides"
+        text = text if rest == 1 else "clauses matter: each decides"
+        yield Answer(
+            "FT107",
+            "clauses",
+            f"{rest} more {text} some input",
+            Proved("an input was found for each, and evaluated in fractions"),
+            is_finding=False,
+            measures=(Measure("clauses", rest),),
+        )
+
+
+def _dropped(rules: RuleBase) -> Iterator[_Dropped]:
+    for number, rule in enumerate(rules.rules, 1):
+        for place, clause in enumerate(rule.when):
+            rest = (*rule.when[:place], *rule.when[place + 1 :])
+            yield _Dropped(number, clause, replace(rule, when=rest))
+
+
+def _state(
+    subject: Subject,
+    compared: Compared,
+    seen: _Seen,
+    one: _Dropped,
+    number: int,
+    turns: Turns,
+) -> State | None:
+    left = len(compared.ground.rules.rules) - number + 1
+    if compared.never_weaker(one.rule, number) == "always":
+        return Proved("the rule is as strong without it everywhere")
+    by = _backed(subject, compared, one, number)
+    if by is not None:
+        return Proved(by)
+    found = seen.witness(one, number - 1)
+    if found is not None:
+        return found
+    shorter = one.of(subject.rules)
+    turn = partial(alike, subject.rules, shorter, subject.domain)
+    state = turns.ask(left, turn)
+    if isinstance(state, Witness):
+        point = point_of(state.point)
+        return _witness(subject.rules, point)
+    return state
+
+
+def _backed(
+    subject: Subject, compared: Compared, one: _Dropped, number: int
+) -> str | None:
+    """Return why the shorter rule never decides what another one does not."""
+    rules = subject.rules.rules
+    for other in range(1, len(rules) + 1):
+        if other == one.rule:
+            continue
+        between = rules[min(other, one.rule) : max(other, one.rule) - 1]
+        is_alike = rules[other - 1].then == one.shorter.then
+        # Behind it a rule of the class counts only if none of another stands between.
+        is_first = other < one.rule or (
+            is_alike and all(rule.then == one.shorter.then for rule in between)
+        )
+        if is_first and compared.never_weaker(other, number) == "always":
+            kind = "the same" if is_alike else "another"
+            name = subject.rule_name(other)
+            return f"{name} of {kind} class is as strong everywhere"
+    return None
+
+
+def _witness(rules: RuleBase, point: dict[str, Fraction]) -> Witness:
+    """Return a point as a witness, with what the rules decide there."""
+    label = answer_at(rules, point).label
+    return Witness(coordinates(point), (Claim("decides", label=label),))
+
+
+class _Seen:
+    """Rows of the domain, with the strengths of all rules with and without clauses."""
+
+    def __init__(self, subject: Subject, given: Ground, both: RuleBase) -> None:
+        self.rules, self.given = subject.rules, given
+        self.count = len(subject.rules.rules)
+        most = min(MOST_ROWS, _MOST_STRENGTHS // len(both.rules))
+        rows, seed = subject.settings.rows, subject.settings.seed
+        self.values = drawn(subject.rules, subject.domain, min(rows, most), seed)
+        strengths = decide(both, self.values).strengths
+        assert strengths is not None  # they were asked for
+        self.strengths: FloatArray = strengths
+        numbers = {label: n for n, label in enumerate(subject.rules.classes)}
+        self.classes: IntArray = np.array(
+            [numbers[rule.then] for rule in subject.rules.rules]
+        )
+        uncovered = subject.rules.semantics.uncovered
+        self.uncovered = -1 if uncovered is None else numbers[uncovered]
+        whole = self.strengths[: self.count]
+        self.best, self.first = whole.max(axis=0), whole.argmax(axis=0)
+        found = self.classes[self.first]
+        self.labels = np.where(self.best > 0.0, found, self.uncovered)
+        self.known: dict[int, list[Fraction]] = {}
+
+    def _point(self, row: int) -> dict[str, Fraction]:
+        values = map(Fraction, self.values[:, row].tolist())
+        return dict(zip(self.rules.inputs, values, strict=True))
+
+    def _label(self, strengths: Sequence[Fraction]) -> str | None:
+        best = max(strengths)
+        if not best:
+            return self.rules.semantics.uncovered
+        return self.rules.rules[strengths.index(best)].then
+
+    def witness(self, one: _Dropped, number: int) -> Witness | None:
+        """Return a row that is decided otherwise without a clause, if one is seen."""
+        own, strengths = one.rule - 1, self.strengths[number]
+        # A rule only gains without a clause: it wins, or everything stays the same.
+        wins = (strengths > self.best) | ((strengths == self.best) & (own < self.first))
+        is_other = self.labels != self.classes[own]
+        rows = np.flatnonzero(wins & is_other & (strengths > 0.0))
+        # The clearest first: those where the rule gains most.
+        gain = strengths[rows] - self.strengths[own, rows]
+        for row in rows[np.argsort(-gain, kind="stable")][:_MOST_TRIED].tolist():
+            point = self._point(row)
+            if not is_within(self.given, point):
+                continue
+            if row not in self.known:
+                self.known[row] = rule_strengths(self.rules, point)
+            exact = [*self.known[row]]
+            label = self._label(exact)
+            (exact[own],) = rule_strengths(self.rules, point, [one.shorter])
+            if self._label(exact) != label:
+                return Witness(coordinates(point), (Claim("decides", label=label),))
+        return None
+
+
+def _answer(subject: Subject, one: _Dropped, state: State) -> Answer:
+    name = subject.rule_name(one.rule)
+    text = f"{clause_text(one.clause)!r}"
+    sentence = f"{name} decides the same without {text}"
+    if isinstance(state, Witness):
+        label = state.claims[0].label
+        before = "no class" if label is None else f"{label!r}"
+        sentence = (
+            f"{name} needs {text}: without it {before} becomes {one.shorter.then!r} "
+            "at some input"
+        )
+    elif not isinstance(state, Proved):
+        sentence = f"whether {name} needs {text} is open"
+    return Answer(
+        "FT107",
+        f"{name}, {text}",
+        sentence,
+        state,
+        is_finding=isinstance(state, Proved),
+        severity="info",
+        rules=(one.rule,),
+        terms=tuple(Label(one.clause.variable, term) for term in one.clause.terms),
+    )

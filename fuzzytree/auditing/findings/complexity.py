@@ -1,0 +1,178 @@
+"""How large a rule base is: counts, and the index of Nauck with an exact integral."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from fractions import Fraction
+
+from fuzzytree.auditing.engine.curves import ONE, ZERO
+from fuzzytree.auditing.engine.measures import Bounds, Line, apart, local
+from fuzzytree.auditing.engine.polynomials import (
+    Polynomial,
+    difference,
+    integral,
+    roots,
+    value_at,
+)
+from fuzzytree.auditing.engine.states import Proved
+from fuzzytree.auditing.engine.wording import counted, short
+from fuzzytree.auditing.findings.ranges import Range, measure, ranges
+from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Tell how many rules, clauses and terms there are, and the index of Nauck."""
+    rules = subject.rules
+    clauses = [len(rule.when) for rule in rules.rules]
+    measures = [
+        Measure("rules", len(clauses)),
+        Measure("clauses", sum(clauses)),
+        Measure("most clauses of a rule", max(clauses)),
+        Measure("clauses per rule", sum(clauses) / len(clauses)),
+        Measure("distinct terms in use", len(_terms(rules))),
+        Measure("variables in use", len({variable for variable, _ in _terms(rules)})),
+    ]
+    if subject.tree is not None:
+        measures.append(Measure("depth of the tree", depth(subject.tree)))
+    index = nauck(subject)
+    text = f"{counted(len(clauses), 'rule')} with {counted(sum(clauses), 'clause')}"
+    if subject.system is not None and subject.policy.decision == "all":
+        text = f"audited as {text}"  # ways count, and rules left out do not
+    if index is not None:
+        names = ("complexity", "coverage", "partition")
+        measures += [
+            measure(f"{name} of Nauck", value)
+            for name, value in zip(names, index, strict=True)
+        ]
+        size, covered, partition = index
+        product = Bounds(
+            size.low * covered.low * partition.low,
+            size.high * covered.high * partition.high,
+        )
+        measures.append(measure("index of Nauck", product))
+        text += f", index of Nauck {short(product.nearest)}"
+    yield Answer(
+        "FT501",
+        "the rule base",
+        text,
+        Proved("counted, and integrated in fractions"),
+        is_finding=False,
+        measures=tuple(measures),
+    )
+
+
+def depth(tree: FuzzyTree) -> int:
+    """Return how many nodes the longest path of a tree asks.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> depth(random_tree(3, leaves=2))
+        1
+    """
+    # Nodes stand before those below them.
+    depths = [1] * len(tree.nodes)
+    for number, node in enumerate(tree.nodes):
+        for branch in node.branches:
+            if branch.node is not None:
+                depths[branch.node - 1] = depths[number] + 1
+    return max(depths, default=0)
+
+
+def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
+    """Return the three factors of the index of Nauck on the domain.
+
+    D. D. Nauck, "Measuring interpretability in rule-based classification systems",
+    FUZZ-IEEE 2003, pages 196 to 201. With m classes, n_k variables in rule k, and p_i
+    terms of variable i, of those that rules use:
+
+    - complexity: m / (n_1 + n_2 + ...);
+    - coverage: the mean over the variables of the mean over the range of h_i(x), where
+      h is the sum s of the degrees of all p_i terms if s <= 1, and otherwise
+      (p_i - s) / (p_i - 1);
+    - partition: the mean over the variables of 1 / (p_i - 1), and 1 for one term.
+
+    Integrals are taken exactly, not on a grid.
+
+    Returns:
+        None if no rule uses a variable, a range is a point, or a term has no exact
+        shape.
+    """
+    asked = _terms(subject.rules)
+    if subject.held and not asked.isdisjoint(subject.held.terms):
+        return None
+    names = {variable for variable, _ in asked}
+    used = [of for of in ranges(subject) if of.variable.name in names]
+    lengths = [len({c.variable for c in rule.when}) for rule in subject.rules.rules]
+    if not used or any(of.low == of.high for of in used):
+        return None
+    size = Fraction(len(subject.rules.classes), sum(lengths))
+    coverages: list[Bounds] = []
+    for of in used:
+        subject.clock.check()
+        coverages.append(coverage(of))
+    counts = [len(of.variable.terms) for of in used]
+    shares = [Fraction(1, max(count - 1, 1)) for count in counts]
+    partition = sum(shares, ZERO) / len(shares)
+    return (
+        Bounds(size, size),
+        Bounds(
+            sum((one.low for one in coverages), ZERO) / len(coverages),
+            sum((one.high for one in coverages), ZERO) / len(coverages),
+        ),
+        Bounds(partition, partition),
+    )
+
+
+def coverage(of: Range) -> Bounds:
+    """Return the mean of h(x) over a range, as `nauck` defines it.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Points, Term, Variable
+        >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
+        >>> both = Variable("x", (Term("low", down), Term("high", up)))
+        >>> coverage(Range(both, Fraction(0), Fraction(1), False)).exact
+        '1'
+    """
+    terms = of.variable.terms
+    made = apart([term.shape for term in terms], of.low, of.high)
+    total, slack = ZERO, sum((b - a for a, b in made.cells.zones), ZERO)
+    for low, high in made.cells.between:
+        summed = _sum(made, (low + high) / 2)
+        over = difference(summed, (ONE,))
+        places = [*roots(over, low, high)]
+        slack += sum((root.high - root.low for root in places), ZERO)
+        starts = [low, *(root.high for root in places)]
+        ends = [*(root.low for root in places), high]
+        for a, b in zip(starts, ends, strict=True):
+            part = summed
+            if value_at(over, (a + b) / 2) > 0:
+                # More than 1 is summed up only by two terms or more.
+                count = len(terms)
+                part = tuple(
+                    c / (1 - count) for c in difference(summed, (Fraction(count),))
+                )
+            total += integral(part, a, b)
+    width = of.high - of.low
+    return Bounds(total / width, min((total + slack) / width, ONE))
+
+
+def _sum(made: Line, at: Fraction) -> Polynomial:
+    found: Polynomial = (ZERO,)
+    for element in made.elements:
+        negative = tuple(-c for c in local(element, at))
+        found = difference(found, negative)
+    return found
+
+
+def _terms(rules: RuleBase) -> set[tuple[str, str]]:
+    return set(
+        itertools.chain.from_iterable(
+            ((clause.variable, term) for term in clause.terms)
+            for rule in rules.rules
+            for clause in rule.when
+        )
+    )

@@ -1,0 +1,340 @@
+"""Where runtimes usually part: ties, missing values, ends of curves, far outside.
+
+Each question is a finite list of probes, answered by every form of a model in every
+runtime at hand, and all answers must be alike.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from fuzzytree.auditing.engine.states import (
+    Carrier,
+    Claim,
+    Proved,
+    State,
+    Witness,
+    coordinates,
+)
+from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.findings.support import drawn, outside
+from fuzzytree.checking.comparing import Answers, labels
+from fuzzytree.errors import LossError
+from fuzzytree.model.contracts import Model, SystemOutcome
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.numerics.oracle import TIE, decide, exact_answer
+from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics.probing import few_probes, probe_values
+from fuzzytree.semantics.reference import Status
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.model.contracts import FloatArray, IntArray, Run, SystemRun
+
+    BoolArray = npt.NDArray[np.bool_]
+
+RUNTIMES: Final = ("native", "reference", "onnxruntime float64")
+"""What is asked, if it is installed; the first is what the others are held against."""
+
+MOST: Final = 240
+"""The most probes of one question."""
+
+_OF_SYSTEMS = ("missing values", "infinite values", "far outside")
+_BASES = 6  # rows in which one value is replaced
+_TRIED = 1_000  # probes, and as many drawn points, among which ties are looked for
+_FAR = (-1e300, -1e30, 1e30, 1e300)
+
+
+class Question(NamedTuple):
+    """A convention, and the probes that ask for it.
+
+    Attributes:
+        name: What is asked, such as `missing values`.
+        values: Shape (inputs, probes).
+        left_out: How many probes were too many. Of ends and cuts a spread is asked;
+            `fuzzytree check` asks all.
+    """
+
+    name: str
+    values: FloatArray
+    left_out: int = 0
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Ask whether all forms and runtimes answer alike where these usually part.
+
+    Raises:
+        OutOfTimeError: If the budget is spent.
+    """
+    if subject.system is not None:
+        yield from _of_system(subject, subject.system)
+        return
+    runs = [*_runs(subject.rules if subject.tree is None else subject.tree)]
+    for question in questions(subject):
+        subject.clock.check()
+        found = [
+            Answers(title, form, run(question.values)) for title, form, run in runs
+        ]
+        yield from told(subject, question, found)
+
+
+def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
+    """Yield each form of a model in each runtime, the native ones first of a form."""
+    for name, form in forms(model).items():
+        kind = "tree" if isinstance(form, FuzzyTree) else "rules"
+        for runtime in map(find_runtime, RUNTIMES):
+            if kind in runtime.runs and is_installed(runtime):
+                with contextlib.suppress(LossError):  # told by the other comparisons
+                    yield f"{runtime.name}: {name}", form, runtime.load(form)
+
+
+def questions(subject: Subject) -> Iterator[Question]:
+    """Yield the conventions with their probes, at most `MOST` of each.
+
+    Example:
+        >>> from fuzzytree.auditing.findings.records import Settings
+        >>> from fuzzytree.auditing.findings.views import view
+        >>> from fuzzytree.auditing.engine.clock import Clock
+        >>> from fuzzytree.auditing.engine.domain import Domain, Side
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1)
+        >>> box = Domain(tuple(Side(name, 0.0, 1.0) for name in tree.inputs))
+        >>> seen = view(tree, box)
+        >>> subject = Subject(seen.rules, seen.policy, box, Settings(), Clock())
+        >>> [question.name for question in questions(subject)][:3]
+        ['ties', 'missing values', 'infinite values']
+    """
+    rules = subject.rules
+    yield _ties(subject)
+    aimed = few_probes(rules, 2 * MOST)[:MOST]  # the first half: ends of all clauses
+    bases = aimed[:: max(len(aimed) // _BASES, 1)][:_BASES]
+    inputs = {name: ([math.nan], [math.inf, -math.inf]) for name in rules.inputs}
+    missing = ((n, x) for n, (nan, _) in inputs.items() for x in nan)
+    infinite = ((n, x) for n, (_, inf) in inputs.items() for x in inf)
+    yield _question("missing values", rules, bases, missing)
+    yield _question("infinite values", rules, bases, infinite)
+    ends = np.array([[row[name] for row in aimed] for name in rules.inputs])
+    yield Question("ends of curves and cuts", ends.reshape(len(rules.inputs), -1))
+    yield _question("far outside", rules, bases, _outside(subject))
+
+
+def _question(
+    name: str,
+    rules: RuleBase,
+    bases: Sequence[Mapping[str, float]],
+    changes: Iterable[tuple[str, float]],
+) -> Question:
+    """Return rows in which one value is replaced, in each of the bases."""
+    made = [{**row, one: x} for one, x in changes for row in bases]
+    step = -(-len(made) // MOST) or 1
+    kept = made[::step]
+    table = [[row[one] for row in kept] for one in rules.inputs]
+    values = np.array(table, np.float64).reshape(len(rules.inputs), len(kept))
+    return Question(name, values, len(made) - len(kept))
+
+
+def _ties(subject: Subject) -> Question:
+    """Return the points on which rules tie exactly, of drawn ones and of probes."""
+    points = np.hstack(
+        [
+            probe_values(subject.rules, _TRIED),
+            drawn(subject.rules, subject.domain, _TRIED, subject.settings.seed),
+        ]
+    )
+    is_tied = np.zeros(points.shape[1], np.bool_)
+    for rules in (subject.rules, subject.raw):
+        if rules is not None:
+            is_tied |= decide(rules, points, with_strengths=False).status == TIE
+    tied = points[:, is_tied]
+    return Question("ties", tied[:, :MOST], max(tied.shape[1] - MOST, 0))
+
+
+def _outside(subject: Subject) -> Iterator[tuple[str, float]]:
+    """Yield values next to the domain, one width beyond it, and far away."""
+    for name in subject.rules.inputs:
+        side = subject.domain.side(name)
+        if side is not None:
+            width = min(side.high - side.low, 1e300)
+            yield name, math.nextafter(side.low, -math.inf)
+            yield name, math.nextafter(side.high, math.inf)
+            yield name, max(side.low - width, -1e308)
+            yield name, min(side.high + width, 1e308)
+        for far in _FAR:
+            yield name, far
+
+
+def told(
+    subject: Subject, question: Question, found: Sequence[Answers]
+) -> Iterator[Answer]:
+    """Yield what carriers answer to a question: each that differs, or that none does.
+
+    Args:
+        subject: The model.
+        question: The question.
+        found: Answers of each carrier; the first of a form is held against the first
+            of all, the others against the first of their form. Raw rules are a model
+            of their own.
+    """
+    count = question.values.shape[1]
+    first: dict[str, Answers] = {}
+    is_alike = True
+    for one in found:
+        form = one.title.rpartition(": ")[2]
+        base = first.setdefault(form, one)
+        if base is one and form != "raw rules":
+            base = found[0]
+        rows = np.flatnonzero(_differ(one, base))
+        if rows.size:
+            is_alike = False
+            yield _broken(subject, question, one, base, rows)
+    if is_alike:
+        text = f"{question.name}: {len(found)} carriers answer {count} probes alike"
+        if not count:
+            text = f"{question.name}: no probe of it was met"
+        how = f"each probe was answered by {', '.join(one.title for one in found)}"
+        if question.left_out:
+            how += f"; {question.left_out} more probes were left out"
+        yield Answer("FT602", question.name, text, Proved(how), is_finding=False)
+
+
+def _differ(one: Answers, base: Answers) -> BoolArray:
+    """Return where two carriers answer another class, or miss a value differently.
+
+    A tree does not know ties: between a tree and rules these are no difference.
+    """
+    differ: BoolArray = labels(one) != labels(base)
+    differ |= one.outcome.rule != base.outcome.rule
+    if type(one.model) is type(base.model):
+        differ |= one.outcome.status != base.outcome.status
+        return differ
+    missing = [x.outcome.status == Status.MISSING for x in (one, base)]
+    differ |= missing[0] != missing[1]
+    return differ
+
+
+def _broken(
+    subject: Subject, question: Question, one: Answers, base: Answers, rows: IntArray
+) -> Answer:
+    values = question.values[:, rows]
+    probe = _probe(subject, values[:, 0])
+    row = int(rows[0])
+    sentence = (
+        f"{question.name}: {one.title} answers {_said(one, row)} where {base.title} "
+        f"answers {_said(base, row)}, at {probe}; "
+        f"{rows.size} of {question.values.shape[1]} probes differ"
+    )
+    found: State | None = witness(subject, base.model, values)
+    proof = Proved(f"both were run on the probe {probe}")
+    return Answer(
+        "FT602",
+        f"{question.name}, {one.title}",
+        sentence,
+        found or proof,
+        is_finding=True,
+        severity="error",
+    )
+
+
+def _said(answers: Answers, row: int) -> str:
+    number = int(labels(answers)[row])
+    label = "no class" if number < 0 else repr(answers.model.classes[number])
+    rule, status = int(answers.outcome.rule[row]), int(answers.outcome.status[row])
+    how = "" if status == Status.DECIDED else f", {Status(status).name.lower()}"
+    return f"{label} ({f'rule {rule}' if rule else 'no rule'}{how})"
+
+
+# --- systems
+
+
+def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
+    """Ask a system's runtimes where values are missing, infinite or far away.
+
+    How an answer came about must be alike, and which outputs have a number. Numbers
+    are compared among the carriers, within what rounding may do to them.
+    """
+    runs: list[tuple[str, SystemRun]] = []
+    for runtime in map(find_runtime, RUNTIMES):
+        if runtime.load_system is not None and is_installed(runtime):
+            with contextlib.suppress(LossError):  # told by the other comparisons
+                runs.append((runtime.name, runtime.load_system(system)))
+    for question in questions(subject):
+        if question.name not in _OF_SYSTEMS:
+            continue
+        subject.clock.check()
+        found = [(name, run(question.values)) for name, run in runs]
+        yield from told_of_system(subject, question, found)
+
+
+def told_of_system(
+    subject: Subject, question: Question, found: Sequence[tuple[str, SystemOutcome]]
+) -> Iterator[Answer]:
+    """Yield what runtimes of a system answer: each that differs, or that none does."""
+    count = question.values.shape[1]
+    first, base = found[0]
+    is_alike = True
+    for name, one in found[1:]:
+        differ = one.status != base.status
+        differ |= (np.isnan(one.outputs) != np.isnan(base.outputs)).any(axis=0)
+        rows = np.flatnonzero(differ)
+        if not rows.size:
+            continue
+        is_alike = False
+        probe = _probe(subject, question.values[:, rows[0]])
+        text = (
+            f"{question.name}: {name} and {first} differ in which outputs have a "
+            f"number, at {probe}; {rows.size} of {count} probes differ"
+        )
+        yield Answer(
+            "FT602",
+            f"{question.name}, {name}",
+            text,
+            Proved(f"both were run on the probe {probe}"),
+            is_finding=True,
+            severity="error",
+        )
+    if is_alike:
+        text = f"{question.name}: {len(found)} carriers answer {count} probes alike"
+        how = f"each probe was answered by {', '.join(name for name, _ in found)}"
+        yield Answer("FT602", question.name, text, Proved(how), is_finding=False)
+
+
+def _probe(subject: Subject, values: FloatArray) -> str:
+    pairs = zip(subject.rules.inputs, values.tolist(), strict=True)
+    return ", ".join(f"{name} {x!r}" for name, x in pairs)
+
+
+# --- witnesses
+
+
+def witness(subject: Subject, form: Model, values: FloatArray) -> Witness | None:
+    """Return the first of some rows that lies in the domain, with the model's answer.
+
+    Args:
+        subject: The model.
+        form: The form of it that the rows were answered by.
+        values: Shape (inputs, rows).
+    """
+    inside = ~outside(subject.rules, subject.domain, values)
+    inside &= np.isfinite(values).all(axis=0)
+    for row in np.flatnonzero(inside).tolist()[:1]:
+        named = dict(zip(form.inputs, values[:, row].tolist(), strict=True))
+        of: Carrier = "rules"
+        if isinstance(form, FuzzyTree):
+            of = "tree"
+        elif form.kind == "raw" and subject.tree is not None:
+            of = "raw rules"
+        claim = Claim("decides", of=of, label=exact_answer(form, named).label)
+        point = {name: Fraction(x) for name, x in named.items()}
+        return Witness(coordinates(point), (claim,))
+    return None

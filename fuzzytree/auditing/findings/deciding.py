@@ -1,0 +1,356 @@
+"""Questions about what each rule decides: does it ever win, by how much, or tie?"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.glimpses import Glimpses
+from fuzzytree.auditing.engine.ground import Ground
+from fuzzytree.auditing.engine.leads import largest_lead
+from fuzzytree.auditing.engine.shared import may_tie
+from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State, Witness
+from fuzzytree.auditing.engine.ties import decides_by_order, tie
+from fuzzytree.auditing.engine.wins import wins
+from fuzzytree.auditing.engine.wording import counted
+from fuzzytree.auditing.findings.records import Answer, Measure, Severity
+from fuzzytree.auditing.findings.sides import Sides, sides_of
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.findings.turns import Turns
+
+if TYPE_CHECKING:
+    from fuzzytree.auditing.engine.ground import BoolArray
+
+MOST_SHOWN: Final = 20
+"""The most ties that are told one by one."""
+
+_PART = 0.25  # of the time that is left, for one question
+_APART = Proved("they share no curve, and no constant")
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Answer whether rules win, lead, are needed, and tie.
+
+    Where every rule that fires takes part in the answer, it is asked whether it fires.
+    """
+    sides = sides_of(subject)
+    given = sides.lower
+    if given.is_empty:
+        return
+    if subject.policy.decision == "all":
+        yield from _firing(subject, sides)
+        return
+    seen = Glimpses(given, subject.settings.seed)
+    won: dict[int, Witness] = {}
+    yield from _winning(subject, seen, won)
+    yield from _leading(subject, seen, won)
+    ties = _Ties(subject, given)
+    yield from _needed(subject, seen, ties)
+    yield from ties.answers()
+
+
+def _firing(subject: Subject, sides: Sides) -> Iterator[Answer]:
+    """Answer whether each rule fires; a rule of several ways, whether one of them."""
+    ways: dict[str, list[int]] = {}
+    for number in range(1, len(subject.rules.rules) + 1):
+        ways.setdefault(subject.rule_name(number), []).append(number)
+    for name, numbers in ways.items():
+        states: list[State] = []
+        for number in numbers:
+            subject.clock.check()
+            states.append(sides.firing(number, subject.clock.share(_PART)))
+            if isinstance(states[-1], Witness):
+                break
+        state = next((s for s in states if not isinstance(s, Proved)), states[0])
+        is_dead = isinstance(state, Proved)
+        sentence = (
+            f"{name} never fires: no value of the domain makes its condition hold"
+            if is_dead
+            else f"{name} fires"
+            if isinstance(state, Witness)
+            else f"it is open whether {name} ever fires"
+        )
+        yield Answer(
+            "FT101", name, sentence, state, is_dead, "error", rules=(numbers[0],)
+        )
+
+
+def _rivals(subject: Subject, number: int) -> tuple[int, ...]:
+    """Return the rules of other classes."""
+    label = subject.rules.rules[number - 1].then
+    return tuple(
+        other for other, rule in enumerate(subject.rules.rules, 1) if rule.then != label
+    )
+
+
+def _winning(
+    subject: Subject, seen: Glimpses, won: dict[int, Witness]
+) -> Iterator[Answer]:
+    """Answer whether each rule wins strictly; those that were not seen to win first.
+
+    Args:
+        subject: The rules.
+        seen: What points show of them.
+        won: Is given where each rule wins.
+    """
+    given = seen.given
+    count = len(subject.rules.rules)
+    turns = Turns(subject.clock, 0.5)
+    order = sorted(range(1, count + 1), key=seen.is_ahead)
+    for place, number in enumerate(order):
+        name = subject.rule_name(number)
+        subject.clock.tell(f"does {name} win", place / count)
+        rivals = _rivals(subject, number)
+        state = turns.ask(count - place, partial(wins, given, number, rivals))
+        if not isinstance(state, Proved | Witness):
+            state = seen.wins(number, rivals) or state
+        if isinstance(state, Witness):
+            won[number] = state
+        if state is None:
+            turns.left_out += 1
+            continue
+        # A tree's own cuts tell this of its leaves:
+        # `fuzzytree.auditing.findings.trees`.
+        if subject.tree is None:
+            yield _won(subject, given, number, state)
+        if not isinstance(state, Proved | Witness):
+            sentence = f"how far {name} leads is open, for it is open whether it wins"
+            yield Answer("FT102", name, sentence, state, False, rules=(number,))
+    yield from turns.rest("FT101", "rule", "whether they ever win")
+    # Only of a rule that is known to win is it asked how far it leads.
+    yield from turns.rest("FT102", "rule", "how far they lead")
+
+
+def _leading(
+    subject: Subject, seen: Glimpses, won: dict[int, Witness]
+) -> Iterator[Answer]:
+    """Answer whether each rule that wins leads by enough."""
+    turns = Turns(subject.clock, 0.5)
+    for place, (number, state) in enumerate(sorted(won.items())):
+        name = subject.rule_name(number)
+        subject.clock.tell(f"how far does {name} lead", place / len(won))
+        rivals = _rivals(subject, number)
+        start = seen.wins(number, rivals) or state
+        found = turns.ask(
+            len(won) - place,
+            partial(_led, subject, seen.given, number, rivals, (state, start)),
+        )
+        if found is None:
+            turns.left_out += 1
+            continue
+        yield found
+    yield from turns.rest("FT102", "rule", "how far they lead")
+
+
+def _won(subject: Subject, given: Ground, number: int, state: State) -> Answer:
+    name = subject.rule_name(number)
+    if isinstance(state, Witness):
+        sentence = f"{name} wins somewhere"
+        return Answer(
+            "FT101", name, sentence, state, False, rules=(number,), region=state.region
+        )
+    if not isinstance(state, Proved):
+        sentence = f"it is open whether {name} ever wins"
+        return Answer("FT101", name, sentence, state, False, rules=(number,))
+    rivals = _rivals(subject, number)
+    order = decides_by_order(
+        given,
+        number,
+        [n for n in rivals if n < number],
+        [n for n in rivals if n > number],
+        subject.clock.share(_PART),
+    )
+    if isinstance(order, Witness):
+        sentence = (
+            f"{name} decides by its place in the list alone: where it is strongest, a "
+            "rule of another class further down is exactly as strong"
+        )
+        return Answer("FT101", name, sentence, order, True, "warning", rules=(number,))
+    fires = wins(given, number, (), subject.clock.share(_PART))
+    if isinstance(fires, Proved):
+        sentence = f"{name} never fires on the domain"
+        return Answer("FT101", name, sentence, fires, True, "error", rules=(number,))
+    sentence = (
+        f"{name} never wins: wherever it fires, a rule of another class is at least "
+        "as strong"
+    )
+    severity: Severity = "error"
+    if not isinstance(order, Proved):
+        sentence += "; whether it decides by its place in the list is open"
+        severity = "warning"
+    return Answer("FT101", name, sentence, state, True, severity, rules=(number,))
+
+
+def _led(
+    subject: Subject,
+    given: Ground,
+    number: int,
+    rivals: tuple[int, ...],
+    known: tuple[Witness, Witness],
+    clock: Clock,
+) -> Answer:
+    """Return the answer for a rule of which two points are known at which it wins."""
+    name = subject.rule_name(number)
+    won, start = known
+    enough = Fraction(subject.settings.lead)
+    found = largest_lead(given, number, rivals, start, enough, clock)
+    measures = (
+        Measure("largest lead, at least", found.low),
+        Measure("largest lead, at most", found.high),
+    )
+    if found.low >= subject.settings.lead:
+        state = Witness(found.point, found.claims)
+        sentence = f"{name} leads by {found.low:.4g} at least somewhere"
+        return Answer(
+            "FT102",
+            name,
+            sentence,
+            state,
+            False,
+            rules=(number,),
+            measures=measures[:1],
+        )
+    is_marginal = found.high < subject.settings.lead
+    sentence = (
+        f"{name} never leads by {subject.settings.lead:g}: at most by {found.high:.3g}"
+        if is_marginal
+        else f"no lead of {name} above {found.low:.3g} was found, and one above "
+        f"{found.high:.3g} is excluded"
+    )
+    return Answer(
+        "FT102", name, sentence, found, is_marginal, "warning",
+        rules=(number,), region=won.region, measures=measures,
+    )  # fmt: skip
+
+
+class _Ties:
+    """Which rules of different classes tie as the strongest; each pair asked once."""
+
+    def __init__(self, subject: Subject, given: Ground) -> None:
+        self.subject, self.given = subject, given
+        self.turns = Turns(subject.clock, 0.9)
+        self.known: dict[tuple[int, int], State] = {}
+        self.may: BoolArray | None = None
+
+    def of(self, one: int, other: int, left: int) -> State | None:
+        """Return whether two rules tie, None if the time does not suffice.
+
+        Args:
+            one: The number of a rule, from 1.
+            other: The number of another.
+            left: How many questions are left, this one too.
+        """
+        pair = min(one, other), max(one, other)
+        if pair in self.known:
+            return self.known[pair]
+        if self.may is None:
+            self.may = self.turns.ask(1, lambda _: may_tie(self.given))
+        if self.may is not None and not self.may[one - 1, other - 1]:
+            return _APART
+        state = self.turns.ask(left, partial(tie, self.given, *pair))
+        if state is not None:
+            self.known[pair] = state
+        return state
+
+    def answers(self) -> Iterator[Answer]:
+        """Answer for pairs that tie one by one, for all others together."""
+        rules = self.subject.rules.rules
+        told = 0
+        left_open: list[State] = []
+        unasked = 0
+        pairs = [
+            (one, other)
+            for one, other in itertools.combinations(range(1, len(rules) + 1), 2)
+            if rules[one - 1].then != rules[other - 1].then
+        ]
+        for place, (one, other) in enumerate(pairs, 1):
+            self.subject.clock.tell("which rules tie", place / len(pairs))
+            state = self.of(one, other, len(pairs) - place + 1)
+            unasked += state is None
+            if isinstance(state, Declined | Bracket):
+                left_open.append(state)
+            if isinstance(state, Witness):
+                told += 1
+                if told <= MOST_SHOWN:
+                    yield self._tied(one, other, state)
+        if not pairs:
+            return
+        how = f"{len(pairs)} pairs of rules of different classes asked"
+        measures = (
+            Measure("pairs", len(pairs)),
+            Measure("pairs that tie", told),
+            Measure("pairs told one by one", min(told, MOST_SHOWN)),
+            Measure("pairs left open", len(left_open) + unasked),
+        )
+        sentence = (
+            f"of {len(pairs)} pairs of rules of different classes, {told} tie as the "
+            "strongest on more than a surface"
+        )
+        state = left_open[0] if left_open else Proved(how)
+        if unasked:
+            sentence += f"; {counted(unasked, 'pair')} could not be asked"
+            state = Declined("FTD03", "the budget was spent")
+        yield Answer(
+            "FT202", "pairs of rules", sentence, state, False, measures=measures
+        )
+
+    def _tied(self, one: int, other: int, state: Witness) -> Answer:
+        first, second = self.subject.rule_name(one), self.subject.rule_name(other)
+        sentence = (
+            f"{first} and {second} are equally strong, and the strongest, on more than "
+            "a surface: the order of the rules alone decides there"
+        )
+        return Answer(
+            "FT202", f"{first} and {second}", sentence, state, True, "warning",
+            rules=(one, other),
+        )  # fmt: skip
+
+
+def _needed(subject: Subject, seen: Glimpses, ties: _Ties) -> Iterator[Answer]:
+    """Answer whether leaving out a rule changes a decision."""
+    count = len(subject.rules.rules)
+    if count == 1:
+        return
+    turns = Turns(subject.clock, 0.5)
+    for number in range(1, count + 1):
+        name = subject.rule_name(number)
+        subject.clock.tell(f"is {name} needed", number / count)
+        others = tuple(n for n in range(1, count + 1) if n != number)
+        state = seen.wins_alone(number, others) or turns.ask(
+            count - number + 1, partial(wins, seen.given, number, others)
+        )
+        if state is None:
+            turns.left_out += 1
+            continue
+        if isinstance(state, Witness):
+            sentence = f"{name} is somewhere stronger than every other rule"
+            yield Answer("FT103", name, sentence, state, False, rules=(number,))
+            continue
+        if not isinstance(state, Proved):
+            sentence = f"it is open whether {name} is needed"
+            yield Answer("FT103", name, sentence, state, False, rules=(number,))
+            continue
+        later = [n for n in _rivals(subject, number) if n > number]
+        known = [ties.of(number, n, len(later)) for n in later]
+        if None in known:
+            turns.left_out += 1
+            continue
+        tied = [one for one in known if one and not isinstance(one, Proved)]
+        if tied:
+            sentence = (
+                f"{name} is nowhere stronger than all others, and where it ties with "
+                "another class it may decide by its place"
+            )
+            yield Answer("FT103", name, sentence, tied[0], False, rules=(number,))
+            continue
+        sentence = (
+            f"{name} is superfluous: nowhere is it stronger than all other rules, and "
+            "without it no decision changes"
+            + (", but where strengths only touch" if later else "")
+        )
+        yield Answer("FT103", name, sentence, state, True, "info", rules=(number,))
+    yield from turns.rest("FT103", "rule", "whether they are needed")

@@ -1,0 +1,300 @@
+"""The domain of a model: its ranges, its curves, spreads around its sets, or rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Literal, assert_never
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import LR, Band, Points, Variable
+from fuzzytree.model.system import FuzzySystem, SystemInput
+from fuzzytree.model.system.curves import (
+    Arc,
+    Bell,
+    Binary,
+    Concave,
+    Cosine,
+    Curve,
+    Formula,
+    Gaussian,
+    Linear,
+    PiCurve,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Spike,
+    Trapezoid,
+    TwoGaussians,
+)
+from fuzzytree.model.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+Within = Literal["model", "data"]
+
+_MOST_FAULTS = 10
+_STEEP = 5.0  # a sigmoid is within 0.7 % of its ends so many times 1 / slope away
+
+
+def domain_of(
+    model: Document,
+    *,
+    within: Within = "model",
+    spreads: float | None = None,
+    rows: Rows | None = None,
+    limited: Iterable[str] = (),
+    row: Mapping[str, float] | None = None,
+) -> Domain:
+    """Return where a model is asked, a side for each input.
+
+    Args:
+        model: The model.
+        within: `model`: the ranges that it declares; where there is none, the span
+            of the input's curves, and as much again on both sides where one of them
+            goes on without end; where there is no curve either, the rows. `data`: the
+            smallest and largest value of the rows.
+        spreads: If given, so many spreads around the means of the fitted sets of
+            each input instead, and around the mean of the rows for an input without.
+            An input of which none of this is known, and on which nothing depends,
+            is asked from 0 to 1 (or to the row's value), and any number would do.
+        rows: The rows, in the order of the model's inputs.
+        limited: Inputs whose limits come from elsewhere; they are left out.
+        row: A row that is asked about besides.
+
+    Raises:
+        ValueError: If an input has no such values; the sentence says what to give.
+    """
+    if spreads is not None and not (math.isfinite(spreads) and spreads > 0.0):
+        raise ValueError(f"spreads must be above 0 and finite, not {spreads!r}")
+    if within == "data" and spreads is None and rows is None:
+        raise ValueError("limits from data need rows (--data TABLE)")
+    left_out = set(limited)
+    sides: list[Side] = []
+    faults: list[str] = []
+    for position, axis in enumerate(_axes(model)):
+        values = None if rows is None else rows.values[position]
+        if axis.name in left_out:
+            continue
+        try:
+            if spreads is not None:
+                sides.append(_around(axis, spreads, values))
+            elif within == "data":
+                sides.append(_seen(axis, values))
+            else:
+                sides.append(_declared(axis, values))
+        except ValueError as error:
+            if axis.is_used:
+                faults.append(str(error))
+            else:
+                value = (row or {}).get(axis.name, 0.0)
+                ends = (0.0, 1.0, value if math.isfinite(value) else 0.0)
+                sides.append(Side(axis.name, min(ends), max(ends), "unused"))
+    if faults:
+        more = [f"and {len(faults) - _MOST_FAULTS} more such inputs"]
+        raise ValueError(
+            "\n".join(faults[:_MOST_FAULTS] + (more if faults[_MOST_FAULTS:] else []))
+        )
+    return Domain(tuple(sides))
+
+
+def inputs_of(model: Document) -> tuple[str, ...]:
+    """Return the columns that a model needs, in its order."""
+    return model.columns if isinstance(model, FuzzySystem) else model.inputs
+
+
+def _declared(axis: _Axis, values: FloatArray | None) -> Side:
+    """Return the range of an input, or the span of its curves, or of its rows.
+
+    Raises:
+        ValueError: If it has none.
+    """
+    name, low, high = axis.name, axis.low, axis.high
+    if low is not None and high is not None:
+        return Side(name, low, high, "model")
+    ends = [*axis.ends, *(one for one in (low, high) if one is not None)]
+    if not axis.ends and values is not None:
+        return _seen(axis, values)
+    if not axis.ends:
+        raise ValueError(
+            f"input {name!r} has neither a range nor a curve to take its limits from; "
+            f"give {_limits_of(name)}, or rows (--data TABLE)"
+        )
+    width = 0.0
+    if axis.is_open or max(ends) == min(ends):
+        width = max(ends) - min(ends) or max(abs(ends[0]), 1.0)
+    low = min(ends) - width if low is None else low
+    high = max(ends) + width if high is None else high
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise ValueError(
+            f"the curves of input {name!r} span more than doubles hold; "
+            f"give {_limits_of(name)}"
+        )
+    return Side(name, low, high, "curves")
+
+
+def _seen(axis: _Axis, values: FloatArray | None) -> Side:
+    """Return the smallest and the largest value of the rows.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    finite = np.empty(0) if values is None else values[np.isfinite(values)]
+    if not finite.size:
+        raise ValueError(
+            f"the rows have no value of input {axis.name!r}; "
+            f"give {_limits_of(axis.name)}"
+        )
+    return Side(axis.name, float(finite.min()), float(finite.max()), "data")
+
+
+def _around(axis: _Axis, spreads: float, values: FloatArray | None) -> Side:
+    """Return the span of some spreads around the sets of an input, or its rows' mean.
+
+    Raises:
+        ValueError: If it has no sets, and there are no rows.
+    """
+    ends = [
+        end
+        for one in axis.sets
+        for end in (
+            one.mean - spreads * one.left.spread,
+            one.mean + spreads * one.right.spread,
+        )
+    ]
+    if not ends:
+        finite = np.empty(0) if values is None else values[np.isfinite(values)]
+        if not finite.size:
+            raise ValueError(
+                f"input {axis.name!r} has no fitted sets to count spreads from; "
+                f"give rows (--data TABLE), or {_limits_of(axis.name)}"
+            )
+        mean, spread = float(np.mean(finite)), float(np.std(finite))
+        ends = [mean - spreads * spread, mean + spreads * spread]
+    if not all(map(math.isfinite, ends)):
+        raise ValueError(
+            f"{spreads!r} spreads of input {axis.name!r} span more than doubles hold"
+        )
+    return Side(axis.name, min(ends), max(ends), "spreads")
+
+
+def _limits_of(name: str) -> str:
+    return f"its limits (--limits {f'{name}=LOW:HIGH'!r})"
+
+
+class _Axis(msgspec.Struct, frozen=True):
+    """What a model says about the values of an input."""
+
+    name: str
+    low: float | None
+    high: float | None
+    ends: tuple[float, ...]
+    is_open: bool
+    sets: tuple[LR, ...]
+    is_used: bool
+
+
+def _axes(model: Document) -> Iterator[_Axis]:
+    """Yield the inputs of a model, in its order."""
+    if isinstance(model, FuzzySystem):
+        curves = [label.curve for one in model.inputs for label in one.labels]
+        summed = _summed(model.inputs)
+        if any(isinstance(curve, Formula | Linear) for curve in curves):
+            summed = {one.name for one in model.inputs}  # which they may name
+        for one in model.inputs:
+            if not one.parts:
+                yield _axis(one, [label.curve for label in one.labels], summed)
+        return
+    summed = _summed(model.variables)
+    fitted = model.sets if isinstance(model, FuzzyTree) else ()
+    for variable in model.variables:
+        if not variable.parts:
+            terms = [
+                *variable.terms,
+                *(t for s in fitted if s.variable == variable.name for t in s.terms),
+            ]
+            yield _axis(variable, [term.shape for term in terms], summed)
+
+
+def _summed(variables: Iterable[Variable | SystemInput]) -> set[str]:
+    """Return the inputs that combinations are made of."""
+    return {part.input for one in variables for part in one.parts}
+
+
+def _axis(
+    one: Variable | SystemInput, curves: Iterable[Curve], summed: Collection[str]
+) -> _Axis:
+    curves = tuple(curves)
+    ends = tuple(end for curve in curves for end in _ends(curve))
+    sets = tuple(curve for curve in curves if isinstance(curve, LR))
+    is_open = any(map(_is_open, curves))
+    is_used = one.name in summed or any(curve != Band() for curve in curves)
+    return _Axis(one.name, one.low, one.high, ends, is_open, sets, is_used)
+
+
+def _is_open(curve: Curve) -> bool:
+    """Return whether a curve stays above 0 without end."""
+    match curve:
+        case Band(low=low, high=high):
+            return low is None or high is None
+        case Points(degrees=degrees):
+            return degrees[0] > 0.0 or degrees[-1] > 0.0
+        case Trapezoid(a=a, d=d):
+            return a is None or d is None
+        case _:
+            return isinstance(curve, Sigmoid | SCurve | Concave | Arc | Binary)
+
+
+def _ends(curve: Curve) -> Iterator[float]:
+    """Yield the values between which a curve changes; of formulas, none."""
+    match curve:
+        case Band(low=low, high=high, left=left, right=right):
+            yield from (one for one in (low, high) if one is not None)
+            yield from (one.end for one in (left, right) if one is not None)
+        case LR(mean=mean, left=left_side, right=right_side):
+            yield mean - left_side.spread * left_side.reach
+            yield mean + right_side.spread * right_side.reach
+        case Points(values=values):
+            yield from (values[0], values[-1])
+        case Trapezoid() | PiCurve():
+            corners = (curve.a, curve.b, curve.c, curve.d)
+            yield from (one for one in corners if one is not None)
+        case Gaussian(mean=mean, deviation=deviation):
+            yield from _about(mean, 3 * deviation)
+        case TwoGaussians(left=low, right=high):
+            yield low - 3 * curve.left_deviation
+            yield high + 3 * curve.right_deviation
+        case Sigmoid(inflection=middle, slope=slope):
+            yield from _about(middle, _STEEP / slope if slope else 0.0)
+        case (
+            SigmoidDifference(first=one, second=other)
+            | SigmoidProduct(first=one, second=other)
+        ):
+            yield from (*_ends(one), *_ends(other))
+        case Bell(center=middle, width=width):
+            yield from _about(middle, 3 * width)
+        case Cosine(center=middle, width=width) | Spike(center=middle, width=width):
+            yield from _about(middle, width / 2)
+        case SCurve(start=start, end=end) | Arc(start=start, end=end):
+            yield from (start, end)
+        case SemiEllipse(start=start, end=end) | Concave(inflection=start, end=end):
+            yield from (start, end)
+        case Binary(start=value) | Singleton(value=value):
+            yield value
+        case Linear() | Formula():
+            return
+        case _:
+            assert_never(curve)
+
+
+def _about(middle: float, reach: float) -> tuple[float, float]:
+    return middle - reach, middle + reach

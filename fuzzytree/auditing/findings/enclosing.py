@@ -1,0 +1,295 @@
+"""Curves that are no polynomials, held between two lines of points.
+
+The engine asks exact questions of points joined by lines. A curve such as a gaussian
+stands between two of these, *lower* <= curve <= *upper* on all of a range:
+
+- `fuzzytree.semantics.conversion.points` places points that are off by a bound at most,
+  so the curve is within the bound of them, above and below.
+- The lower line is besides at least the curve's least degree on the range, where that
+  is known: a gaussian is 0 nowhere. Both lines are within 0 and 1.
+- Where a curve meets 0 or 1 at a point, and bends towards it, lines meet it there too.
+  A point at which the upper line is 0 is then a point of degree 0.
+
+Degrees of points are rounded downwards in the lower line and upwards in the upper one;
+places that are rounded move to the side where the line stays below, or above. Every
+point is held against the curve's own value, enclosed by `fuzzytree.numerics
+.curve_values`, before it is believed.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from typing import Final, Literal, NamedTuple
+
+from fuzzytree.auditing.engine.elements import Element
+from fuzzytree.errors import LossError
+from fuzzytree.model.rulebase import Points, Shape
+from fuzzytree.model.system import (
+    Bell,
+    Concave,
+    Cosine,
+    Curve,
+    Gaussian,
+    PiCurve,
+    SCurve,
+    Sigmoid,
+    SigmoidProduct,
+    Spike,
+    TwoGaussians,
+)
+from fuzzytree.numerics.curve_values import degree_between
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.semantics.conversion.points import points_for
+
+HALF_GAP: Final = 2.0**-11
+"""How far a curve is from the points in its place at most."""
+
+_MORE = 1 + Fraction(1, 2**20)  # of a bound that was computed in doubles
+
+Side = Literal["lower", "upper"]
+Range = tuple[Fraction, Fraction]
+Knot = tuple[float, Fraction]
+"""A point of a line before it is rounded."""
+Name = tuple[str, str]
+"""A variable and one of its terms."""
+
+
+class Enclosed(NamedTuple):
+    """A curve between two lines.
+
+    Attributes:
+        lower: Nowhere above it on the range.
+        upper: Nowhere below it.
+        key: What the curve is: equal for equal curves only.
+    """
+
+    lower: Shape
+    upper: Shape
+    key: tuple[object, ...]
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether both lines are the curve itself."""
+        return self.lower == self.upper
+
+    @property
+    def swapped(self) -> Enclosed:
+        """The same with the upper line in the place of the lower one."""
+        return Enclosed(self.upper, self.lower, ("swapped", *self.key))
+
+
+@functools.lru_cache(maxsize=256)
+def enclosed(curve: Curve, of: Range | None) -> Enclosed | None:
+    """Return two lines between which a curve is.
+
+    Args:
+        curve: The curve.
+        of: The range on which they hold it; None for everywhere.
+
+    Returns:
+        None if there are no such lines: of a formula nothing is known between points.
+
+    Example:
+        >>> of = Fraction(-3), Fraction(3)
+        >>> found = enclosed(Gaussian(0.0, 1.0), of)
+        >>> found.lower.degrees[0] > 0.01, float(gap(found, of)) < 0.001
+        (True, True)
+    """
+    try:
+        found = points_for(curve, HALF_GAP)
+    except LossError:
+        return None
+    off = Fraction(found.bound) * _MORE
+    values, degrees = found.points.values, found.points.degrees
+    if not _is_near(curve, found.points, off):
+        return None
+    middle = [*zip(values, map(Fraction, degrees), strict=True)]
+    below, above = [(x, d - off) for x, d in middle], [(x, d + off) for x, d in middle]
+    if _is_smooth(curve):
+        for place in range(len(middle)):
+            x, degree = middle[place]
+            if degree in (0, 1) and _is_exact(curve, found.points, place):
+                line = above if degree == 0 else below
+                line[place] = x, degree
+    least = Fraction(0) if of is None else _least(curve, of)
+    lower = laid([*clipped(below, least, "lower")], "lower", of)
+    upper = laid([*clipped(above, Fraction(1), "upper")], "upper", of)
+    return Enclosed(lower, upper, (curve,))
+
+
+def pointed(shape: Shape, of: Range | None) -> Enclosed | None:
+    """Return a shape as points: itself if it is points, else lines around it."""
+    if isinstance(shape, Points):
+        return Enclosed(shape, shape, (shape,))
+    return enclosed(shape, of)
+
+
+def complement(found: Enclosed) -> Enclosed | None:
+    """Return 1 minus a curve; None if it is no points."""
+    sides: list[Shape] = []
+    for shape, pick in ((found.upper, 0), (found.lower, 1)):
+        if not isinstance(shape, Points):
+            return None
+        sides.append(_mapped(shape, lambda degree: 1 - degree, pick))
+    return Enclosed(sides[0], sides[1], ("not", *found.key))
+
+
+def scaled(found: Enclosed, factor: float) -> Enclosed | None:
+    """Return a curve times a factor in [0, 1]; None if it is no points.
+
+    Example:
+        >>> half = scaled(Enclosed(line := Points((0.0,), (0.5,)), line, ()), 0.5)
+        >>> half.lower.degrees, half.is_exact
+        ((0.25,), True)
+    """
+    sides: list[Shape] = []
+    for shape, pick in ((found.lower, 0), (found.upper, 1)):
+        if not isinstance(shape, Points):
+            return None
+        sides.append(_mapped(shape, lambda degree: degree * Fraction(factor), pick))
+    return Enclosed(sides[0], sides[1], (factor, *found.key))
+
+
+def _mapped(
+    points: Points, change: Callable[[Fraction], Fraction], pick: int
+) -> Points:
+    """Return points whose degrees are changed, and rounded down (0) or up (1)."""
+    degrees = (outwards(change(Fraction(one)))[pick] for one in points.degrees)
+    return Points(points.values, tuple(degrees))
+
+
+@functools.lru_cache(maxsize=256)
+def gap(found: Enclosed, of: Range) -> Fraction:
+    """Return how far two lines are apart at most on a range."""
+    low, high = of
+    apart = Fraction(0)
+    lines = Element(found.lower), Element(found.upper)
+    for shape in (found.lower, found.upper):
+        if isinstance(shape, Points):
+            inner = (Fraction(x) for x in shape.values)
+            for x in (low, *(x for x in inner if low <= x <= high), high):
+                lower, upper = (line.degree(x) for line in lines)
+                behind = [line.degree_after(x) for line in lines]
+                apart = max(apart, abs(upper - lower), abs(behind[1] - behind[0]))
+    return apart
+
+
+# --- points that are believed
+
+
+def _is_near(curve: Curve, points: Points, off: Fraction) -> bool:
+    """Return whether the points are as near to the curve as they are said to be."""
+    for place, (x, degree) in enumerate(zip(*_parts(points), strict=True)):
+        if _is_step(points, place):
+            continue
+        found = degree_between(curve, x)
+        if found is None or found.low < degree - off or found.high > degree + off:
+            return False
+    return True
+
+
+def _parts(points: Points) -> tuple[list[Fraction], list[Fraction]]:
+    return [*map(Fraction, points.values)], [*map(Fraction, points.degrees)]
+
+
+def _is_step(points: Points, place: int) -> bool:
+    """Return whether a point is the upper end of a step: only what is behind has it."""
+    return place > 0 and points.values[place] == points.values[place - 1]
+
+
+def _is_exact(curve: Curve, points: Points, place: int) -> bool:
+    """Return whether a curve has the degree of a point, or jumps to it."""
+    if _is_step(points, place):
+        return True
+    found = degree_between(curve, Fraction(points.values[place]))
+    degree = Fraction(points.degrees[place])
+    return found is not None and found.low == found.high == degree
+
+
+def _is_smooth(curve: Curve) -> bool:
+    """Return whether a curve bends towards 0 where it is 0, and towards 1 at 1.
+
+    Below 1 it is then above its chords, and above 0 below them.
+    """
+    match curve:
+        case Bell(slope=slope):
+            return slope > 0.5
+        case _:
+            kinds = (SCurve, PiCurve, Cosine, Gaussian, TwoGaussians)
+            return isinstance(curve, kinds)
+
+
+def _least(curve: Curve, of: Range) -> Fraction:
+    """Return what a curve is not below on a range; it rises, then falls, or is 0."""
+    kinds = (Gaussian, TwoGaussians, Sigmoid, SigmoidProduct, Concave, Spike)
+    is_risen = isinstance(curve, kinds) or (isinstance(curve, Bell) and curve.slope > 0)
+    if not is_risen:
+        return Fraction(0)
+    found = [degree_between(curve, x) for x in of]
+    low = min(one.low for one in found if one is not None)
+    return Fraction(outwards(low)[0])
+
+
+# --- lines
+
+
+def clipped(knots: Sequence[Knot], limit: Fraction, side: Side) -> Iterator[Knot]:
+    """Yield a line held at a limit; where it meets it, the limit lasts longer.
+
+    Args:
+        knots: The points of the line.
+        limit: What a lower line does not go below, an upper one not above.
+        side: Which of the two it is.
+    """
+    sign = 1 if side == "lower" else -1
+    previous: Knot | None = None
+    for x, degree in knots:
+        if previous is not None and previous[0] < x:
+            yield from _meeting(previous, (x, degree), limit, sign)
+        yield x, limit if (limit - degree) * sign > 0 else degree
+        previous = x, degree
+
+
+def _meeting(one: Knot, other: Knot, limit: Fraction, sign: int) -> Iterator[Knot]:
+    (a, p), (b, q) = one, other
+    is_beyond = (limit - p) * sign > 0
+    if is_beyond == ((limit - q) * sign > 0):
+        return
+    exact = Fraction(a) + (limit - p) / (q - p) * (Fraction(b) - Fraction(a))
+    low, high = outwards(exact)
+    place = high if is_beyond else low
+    yield min(max(place, a), b), limit
+
+
+def laid(knots: Sequence[Knot], side: Side, of: Range | None) -> Points:
+    """Return a line as points, with degrees rounded to its side; only on a range."""
+    pick = 0 if side == "lower" else 1
+    made = [(x, outwards(degree)[pick]) for x, degree in knots]
+    kept: list[tuple[float, float]] = []
+    for x, degree in made:
+        if len(kept) > 1 and kept[-1][0] == kept[-2][0] == x:
+            kept.pop()  # within a step only its two ends count
+        kept.append((x, degree))
+    if of is not None:
+        kept = _trimmed(kept, of)
+    kept = [*_joints(kept)]
+    values, degrees = zip(*kept, strict=True)
+    return Points(values, degrees)
+
+
+def _trimmed(knots: list[tuple[float, float]], of: Range) -> list[tuple[float, float]]:
+    """Return the points of a line on a range, and one more on either side."""
+    low, high = of
+    first = next((n for n, (x, _) in enumerate(knots) if x >= low), len(knots))
+    last = next((n for n, (x, _) in enumerate(knots) if x > high), len(knots) - 1)
+    return knots[max(first - 1, 0) : last + 1]
+
+
+def _joints(knots: Sequence[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """Yield the points of a line without those within a level stretch."""
+    for place, (x, degree) in enumerate(knots):
+        beside = knots[max(place - 1, 0) : place + 2]
+        if len(beside) < 3 or any(d != degree for _, d in beside):
+            yield x, degree

@@ -1,0 +1,183 @@
+"""Questions about inputs that no rule covers, or none covers well."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Final
+
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.clock import OutOfTimeError
+from fuzzytree.auditing.engine.cover import uncovered
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.ground import Ground, narrowed
+from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
+from fuzzytree.auditing.engine.variables import span
+from fuzzytree.auditing.findings.records import Answer, Measure, Severity
+from fuzzytree.auditing.findings.rows import ranked
+from fuzzytree.auditing.findings.sides import Sides, sides_of
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.numerics.exact import outwards
+
+MOST_GAPS: Final = 8
+"""The most gaps that are told one by one."""
+
+_MOST_BOXES = 64  # parts of the domain in which a gap is looked for
+_MOST_SIDES = 3  # of a gap that a sentence tells
+_PART = 0.3  # of the time that is left, for one question
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Answer whether some input is covered by no rule, or by less than epsilon."""
+    if not subject.is_whole:
+        reason = "rules that are left out of the view may cover what the others do not"
+        sentence = "whether an input is covered by no rule is not decided"
+        yield Answer("FT301", "cover", sentence, Declined("FTD07", reason), False)
+        return
+    sides = sides_of(subject)
+    if sides.lower.is_empty:
+        return
+    bare = sides.uncovered(subject.clock.share(_PART))
+    if isinstance(bare, Witness):
+        yield from _gaps(subject, sides.upper, bare)
+        return
+    sentence = "some rule fires everywhere on the domain"
+    if not isinstance(bare, Proved):
+        sentence = "it is open whether some rule fires everywhere"
+    yield Answer("FT301", "cover", sentence, bare, False)
+    yield _weak(subject, sides)
+
+
+def _weak(subject: Subject, sides: Sides) -> Answer:
+    """Answer whether some rule reaches epsilon everywhere, and how little is least."""
+    epsilon = subject.settings.epsilon
+    state = sides.below(Fraction(epsilon), subject.clock.share(_PART))
+    least = sides.least_cover(subject.clock.share(_PART))
+    measures = (
+        Measure("strength where it is least, at least", least.low),
+        Measure("strength where it is least, at most", least.high),
+    )
+    subject_of = f"cover of {epsilon:g}"
+    if isinstance(state, Proved):
+        sentence = f"some rule has a strength of at least {epsilon:g} everywhere"
+        return Answer("FT301", subject_of, sentence, state, False, measures=measures)
+    if isinstance(state, Witness):
+        sentence = (
+            f"no rule has a strength of {epsilon:g} {_place(state.region)}; where it "
+            f"is least, the strongest rule has {least.high:.3g}"
+        )
+        return Answer(
+            "FT301", subject_of, sentence, state, True, "warning",
+            region=state.region, measures=measures,
+        )  # fmt: skip
+    sentence = f"it is open whether some rule reaches {epsilon:g} everywhere"
+    return Answer("FT301", subject_of, sentence, state, False, measures=measures)
+
+
+def _gaps(subject: Subject, given: Ground, first: Witness) -> Iterator[Answer]:
+    """Answer with the gaps that were found, the nearest to a row first."""
+    found, is_all = _separate(subject, given, first)
+    told = [_gap(subject, state) for state in found]
+    if subject.rows is not None:
+        rules = subject.rules
+        found_near = ranked(
+            told, subject.rows, subject.domain, rules.inputs, rules.variables
+        )
+        told = [*found_near]
+    yield from (
+        replace(one, subject=f"gap {place}") for place, one in enumerate(told, 1)
+    )
+    if not is_all:
+        sentence = f"there may be more gaps than the {len(found)} that are told"
+        reason = f"{MOST_GAPS} gaps at most are looked for, within the budget"
+        state = Declined("FTD05", reason)
+        yield Answer("FT301", "more gaps", sentence, state, False)
+
+
+def _gap(subject: Subject, state: Witness) -> Answer:
+    answer = subject.policy.uncovered
+    what = "no class" if answer is None else f"{answer!r}"
+    if subject.policy.decision == "all":
+        what = "what the outputs have by default"
+    sentence = f"no rule fires {_place(state.region)}: the answer is {what}"
+    severity: Severity = "warning" if answer is None else "info"
+    return Answer("FT301", "gap", sentence, state, True, severity, region=state.region)
+
+
+def _place(region: tuple[Span, ...]) -> str:
+    """Return where a gap is, for a sentence."""
+    told = [f"{one.variable!r} is {_stretch(one)}" for one in region[:_MOST_SIDES]]
+    if len(region) > _MOST_SIDES:
+        told.append("so on")
+    return f"where {' and '.join(told)}" if told else "here"
+
+
+def _stretch(side: Span) -> str:
+    low, high = (None if end is None else f"{end:.6g}" for end in (side.low, side.high))
+    if low is None or high is None:
+        return f"at most {high}" if low is None else f"at least {low}"
+    if low == high:  # six digits do not tell them apart
+        return f"about {low}" if side.low != side.high else low
+    return f"{low} to {high}"
+
+
+def _separate(
+    subject: Subject, given: Ground, first: Witness
+) -> tuple[list[Witness], bool]:
+    """Return gaps in separate parts of the domain, and whether these are all."""
+    found = [first]
+    todo = deque(_around(given, subject.domain, first.region))
+    tried = 0
+    clock = subject.clock.share(_PART)
+    while todo:
+        if len(found) == MOST_GAPS or tried == _MOST_BOXES:
+            return found, False
+        box = todo.popleft()
+        tried += 1
+        try:
+            state: State = uncovered(narrowed(given, box), clock)
+            clock.check()
+        except OutOfTimeError:
+            return found, False
+        if isinstance(state, Witness):
+            found.append(replace(state, region=_held(state, box, subject.domain)))
+            todo += _around(given, box, state.region)
+        elif not isinstance(state, Proved):
+            return found, False
+    return found, True
+
+
+def _held(state: Witness, box: Domain, domain: Domain) -> tuple[Span, ...]:
+    """Return the region of a gap in a part of the domain, with the part's own ends."""
+    known = {one.variable for one in state.region}
+    parts = (
+        Span(side.variable, side.low, side.high)
+        for side in box.sides
+        if side.variable not in known and side != domain.side(side.variable)
+    )
+    return (*state.region, *parts) if known else ()
+
+
+def _around(given: Ground, box: Domain, region: tuple[Span, ...]) -> Iterator[Domain]:
+    """Yield the parts of a box outside an inner one; together they are all of it."""
+    sides = {side.variable: side for side in box.sides}
+    variables = {axis.variable.name: axis.variable for axis in given.axes}
+    for inner in region:
+        if inner.low is None or inner.high is None:
+            return  # of no region that is told
+        side = sides.get(inner.variable)
+        if side is None:
+            ends = span(variables[inner.variable], box)
+            low, high = outwards(ends[0])[0], outwards(ends[1])[1]
+            side = Side(inner.variable, low, high, "model")
+        for low, high in (
+            (side.low, math.nextafter(inner.low, -math.inf)),
+            (math.nextafter(inner.high, math.inf), side.high),
+        ):
+            if low <= high:
+                part = Side(side.variable, low, high, side.origin)
+                yield Domain(tuple({**sides, side.variable: part}.values()))
+        sides[side.variable] = Side(side.variable, inner.low, inner.high, side.origin)

@@ -1,0 +1,245 @@
+"""A view's rules with their weights, from below and from above.
+
+Every strength lies between those of two rule bases of points: the *lower* one takes
+each curve from below and the *upper* one from above; of a negated clause it is the
+other way round. Both have the same rules, in which a clause may ask a term made for
+it, so that "it does" is asked of the lower one and "it never does" of the upper one.
+
+A weight w is part of both. Under the minimum `w min(a, b) = min(w a, w b)`: each clause
+asks its terms times the weight, exactly where every product is a double, and between
+its neighbours otherwise. Under the product, and where a rule asks nothing, a clause is
+added whose degree is the weight everywhere. (`fuzzytree.semantics.inference` multiplies
+the rounded degree of the condition by the weight, in one rounding more.)
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+
+import msgspec
+
+from fuzzytree.auditing.engine.states import Bracket, State, Witness
+from fuzzytree.auditing.findings.enclosing import (
+    Enclosed,
+    Name,
+    Range,
+    Side,
+    complement,
+    gap,
+    pointed,
+    scaled,
+)
+from fuzzytree.model.rulebase import (
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Shape,
+    Term,
+    Variable,
+    shapes_of,
+)
+from fuzzytree.numerics.exact import outwards
+
+
+class Held(msgspec.Struct, frozen=True, eq=False, dict=True):
+    """Rules from below and from above.
+
+    Attributes:
+        lower: No rule is weaker in truth.
+        upper: No rule is stronger in truth.
+        terms: The terms of both that are no plain shapes of the model.
+        rules: The numbers of the rules that differ in both.
+        gap: How far the lines of a curve are apart at most.
+    """
+
+    lower: RuleBase
+    upper: RuleBase
+    terms: Mapping[Name, Enclosed]
+    rules: frozenset[int]
+    gap: float
+
+    @property
+    def why(self) -> str:
+        """Why something is not known better, for a bracket."""
+        return f"curves are known to within {self.gap:.2g}"
+
+    def key(self, number: int) -> tuple[object, ...]:
+        """Return what a rule asks: equal for rules that ask the same."""
+        asked = (
+            (one.variable, one.negated, frozenset(self._keys(one)))
+            for one in self.lower.rules[number - 1].when
+        )
+        return tuple(sorted(asked, key=repr))
+
+    def asked(self, clause: Clause) -> tuple[tuple[object, ...], float, float]:
+        """Return what a clause asks, and times which weights: the least, the most."""
+        weights, keys = set[float](), set[tuple[object, ...]]()
+        for key in self._keys(clause):
+            is_weighted = isinstance(key[0], float)
+            weights.add(float(str(key[0])) if is_weighted else 1.0)
+            keys.add(key[1:] if is_weighted else key)
+        what = clause.variable, clause.negated, frozenset(keys)
+        return what, min(weights), max(weights)
+
+    def _keys(self, clause: Clause) -> Iterator[tuple[object, ...]]:
+        """Yield what the terms of a clause are."""
+        for term in clause.terms:
+            name = clause.variable, term
+            known = self.terms.get(name)
+            yield (self._shapes[name],) if known is None else known.key
+
+    @functools.cached_property
+    def _shapes(self) -> Mapping[Name, Shape]:
+        return shapes_of(self.lower.variables)
+
+    def certified(self, state: State) -> State:
+        """Return what a state of the lower rules says of the true ones.
+
+        Strengths of rules that are held are not told: they are larger in truth.
+        """
+        if not isinstance(state, Witness | Bracket):
+            return state
+        claims = tuple(
+            one
+            for one in state.claims
+            if one.kind != "strength" or self.rules.isdisjoint(one.rules)
+        )
+        return msgspec.structs.replace(state, claims=claims)
+
+
+def held(
+    rules: RuleBase,
+    weights: Sequence[float],
+    terms: Mapping[Name, Enclosed],
+    ranges: Mapping[str, Range | None],
+) -> Held | None:
+    """Return rules from below and from above; None if they are plain.
+
+    Args:
+        rules: The rules as people read them, without weights.
+        weights: The weight of each.
+        terms: The terms that are held between lines.
+        ranges: The values of each variable, as far as they are known.
+
+    Raises:
+        ValueError: If a weight has no place: a rule without clauses, and no input.
+    """
+    if not terms and all(weight == 1.0 for weight in weights):
+        return None
+    made = _Made(rules, terms, ranges)
+    own = tuple(
+        Rule(tuple(made.clauses(rule, weight)), rule.then)
+        for rule, weight in zip(rules.rules, weights, strict=True)
+    )
+    inexact = {name for name, one in made.terms.items() if not one.is_exact}
+    asked = [
+        {(clause.variable, term) for clause in rule.when for term in clause.terms}
+        for rule in own
+    ]
+    known = {name for of in asked for name in of} & inexact
+    apart = (gap(made.terms[one], of) for one in known if (of := ranges[one[0]]))
+    return Held(
+        msgspec.structs.replace(rules, rules=own, variables=made.variables("lower")),
+        msgspec.structs.replace(rules, rules=own, variables=made.variables("upper")),
+        made.terms,
+        frozenset(n for n, of in enumerate(asked, 1) if of & inexact),
+        outwards(max(apart, default=Fraction(0)))[1],
+    )
+
+
+class _Made:
+    """The terms of both rule bases, as they are made for clauses."""
+
+    def __init__(
+        self,
+        rules: RuleBase,
+        terms: Mapping[Name, Enclosed],
+        ranges: Mapping[str, Range | None],
+    ) -> None:
+        self.rules, self.ranges = rules, ranges
+        self.is_product = rules.semantics.conjunction == "product"
+        self.plain: Mapping[Name, Shape] = shapes_of(rules.variables)
+        self.terms = {**terms}
+
+    def clauses(self, rule: Rule, weight: float) -> Iterator[Clause]:
+        """Yield the clauses of a rule, its weight among them."""
+        for clause in rule.when:
+            if weight == 1.0 or self.is_product:
+                yield self._sided(clause)
+            else:
+                yield from self._weighted(clause, weight)
+        if weight != 1.0 and (self.is_product or not rule.when):
+            yield self._constant(rule, weight)
+
+    def _sided(self, clause: Clause) -> Clause:
+        """Return a clause whose degree is lower in the lower rules."""
+        names = [(clause.variable, term) for term in clause.terms]
+        if not clause.negated or not any(name in self.terms for name in names):
+            return clause
+        made = [
+            self._named(f"{name[1]}, other side", name[0], self.terms[name].swapped)
+            if name in self.terms
+            else name[1]
+            for name in names
+        ]
+        return Clause(clause.variable, tuple(made), negated=True)
+
+    def _weighted(self, clause: Clause, weight: float) -> Iterator[Clause]:
+        """Yield a clause's degree times a weight; `w (1 - max(a, b))` as two."""
+        made: list[str] = []
+        for term in clause.terms:
+            one = self._points(clause.variable, term)
+            text = f"{term} x {weight!r}"
+            if clause.negated:
+                one, text = complement(one) or one, f"not {text}"
+            found = scaled(one, weight)
+            assert found is not None  # of points
+            made.append(self._named(text, clause.variable, found))
+        if clause.negated:
+            yield from (Clause(clause.variable, (name,)) for name in made)
+        else:
+            yield Clause(clause.variable, tuple(made))
+
+    def _points(self, variable: str, term: str) -> Enclosed:
+        """Return a term as points, between two lines if need be."""
+        known = self.terms.get((variable, term))
+        if known is not None:
+            return known
+        found = pointed(self.plain[variable, term], self.ranges[variable])
+        if found is None:
+            raise ValueError(f"the curve of {term!r} of {variable!r} has no points")
+        return found
+
+    def _constant(self, rule: Rule, weight: float) -> Clause:
+        """Return a clause that has the same degree everywhere."""
+        asked = [clause.variable for clause in rule.when]
+        names = asked or [one.name for one in self.rules.variables]
+        if not names:
+            raise ValueError("there is no input that a weight could be laid upon")
+        line = Points((0.0,), (weight,))
+        found = Enclosed(line, line, (line,))
+        return Clause(names[0], (self._named(f"x {weight!r}", names[0], found),))
+
+    def _named(self, text: str, variable: str, one: Enclosed) -> str:
+        """Return the name of a term that is made, kept once."""
+        while self.terms.get((variable, text), one) != one or (
+            (variable, text) in self.plain and (variable, text) not in self.terms
+        ):
+            text += "'"
+        self.terms[variable, text] = one
+        return text
+
+    def variables(self, side: Side) -> tuple[Variable, ...]:
+        """Return the variables with all terms, from below or from above."""
+        found: list[Variable] = []
+        for variable in self.rules.variables:
+            shapes = {term.name: term.shape for term in variable.terms}
+            for (name, term), one in self.terms.items():
+                if name == variable.name:
+                    shapes[term] = one.lower if side == "lower" else one.upper
+            terms = tuple(Term(term, shape) for term, shape in shapes.items())
+            found.append(msgspec.structs.replace(variable, terms=terms))
+        return tuple(found)

@@ -1,0 +1,399 @@
+"""Questions about two rules: is one superfluous, hidden, a copy, or in conflict?"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final
+
+from fuzzytree.auditing.engine.factors import Distance
+from fuzzytree.auditing.engine.meeting import Meeting
+from fuzzytree.auditing.engine.states import Declined, Proved, State, Witness
+from fuzzytree.auditing.engine.witnesses import coupled
+from fuzzytree.auditing.engine.wording import counted, short
+from fuzzytree.auditing.findings.clauses import clause_answers
+from fuzzytree.auditing.findings.ranges import measure
+from fuzzytree.auditing.findings.records import Answer, Measure, Severity
+from fuzzytree.auditing.findings.sides import Sides, sides_of
+from fuzzytree.auditing.findings.subject import Subject
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+NEARLY: Final = Fraction(1, 10**6)
+"""Two antecedents are nearly the same if no degree differs by more than this."""
+
+MOST_SHOWN: Final = 20
+"""The most conflicts that are told one by one."""
+
+Pair = tuple[int, int]
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Answer what is to be said of pairs of rules, and of single clauses."""
+    compared = sides_of(subject)
+    if compared.lower.is_empty:
+        return
+    yield from _subsumed(subject, compared)
+    if subject.policy.decision == "strongest":
+        yield from _masked(subject, compared)
+    yield from _copied(subject, compared)
+    yield from _conflicts(subject, compared)
+    if subject.policy.decision == "strongest":
+        yield from clause_answers(subject)
+
+
+def _then(subject: Subject, number: int) -> str:
+    return subject.rules.rules[number - 1].then
+
+
+def _pairs(subject: Subject, *, is_alike: bool) -> Iterator[Pair]:
+    """Yield the pairs of rules of one class, or of two; not ways of one rule."""
+    count = len(subject.rules.rules)
+    for one, other in itertools.combinations(range(1, count + 1), 2):
+        subject.clock.check()
+        is_same = _then(subject, one) == _then(subject, other)
+        if is_same is is_alike and not _is_one(subject, one, other):
+            yield one, other
+
+
+def _is_one(subject: Subject, one: int, other: int) -> bool:
+    """Return whether two rules are two ways in which one rule of a system holds."""
+    names = [subject.rule_name(number) for number in (one, other)]
+    wholes = {name.split(" of ", 1)[1] for name in names if name.startswith("way ")}
+    return len(wholes) == 1 and all(name.startswith("way ") for name in names)
+
+
+def _noun(subject: Subject) -> str:
+    return "class" if subject.policy.decision == "strongest" else "conclusion"
+
+
+# --- FT104 and FT105: is one rule at least as strong everywhere?
+
+
+def _subsumed(subject: Subject, compared: Sides) -> Iterator[Answer]:
+    asked = undecided = 0
+    found: dict[int, list[int]] = {}
+    for pair in _pairs(subject, is_alike=True):
+        if not all(compared.fires[number - 1] for number in pair):
+            continue
+        asked += 1
+        forth, back = (
+            compared.never_weaker(*each) for each in (pair, (pair[1], pair[0]))
+        )
+        undecided += "open" in (forth, back)
+        if forth == "always":
+            found.setdefault(pair[1], []).append(pair[0])
+        elif back == "always":
+            found.setdefault(pair[0], []).append(pair[1])
+    for weak, strong in sorted(found.items()):
+        name, by = subject.rule_name(weak), subject.rule_name(strong[0])
+        noun = _noun(subject)
+        yield Answer(
+            "FT104",
+            name,
+            f"{name} is subsumed by {by}: wherever it fires, {by} of the same {noun} "
+            "is at least as strong",
+            Proved(_how(compared)),
+            is_finding=True,
+            severity="warning",
+            rules=(weak, *strong),
+            measures=(Measure("rules that subsume it", len(strong)),),
+        )
+    counts = asked, len(found), undecided
+    yield from _rest_of_strengths("FT104", subject, compared, *counts)
+
+
+def _masked(subject: Subject, compared: Sides) -> Iterator[Answer]:
+    asked = undecided = 0
+    found: dict[int, list[tuple[int, bool]]] = {}
+    for first, second in _pairs(subject, is_alike=False):
+        if not all(compared.fires[number - 1] for number in (first, second)):
+            continue
+        asked += 1
+        verdict = compared.never_weaker(first, second)
+        if verdict == "always":
+            found.setdefault(second, []).append((first, True))
+            continue
+        back = compared.from_below.above(second, first)
+        undecided += "open" in (verdict, back)
+        if back == "always":
+            found.setdefault(first, []).append((second, False))
+    for weak, strong in sorted(found.items()):
+        number, is_before = strong[0]
+        name, by = subject.rule_name(weak), subject.rule_name(number)
+        why = "is at least as strong and stands before it"
+        if not is_before:
+            why = "is stronger"
+        yield Answer(
+            "FT105",
+            name,
+            f"{name} is never answered: wherever it fires, {by} of class "
+            f"{_then(subject, number)!r} {why}",
+            Proved(_how(compared)),
+            is_finding=True,
+            severity="error",
+            rules=(weak, *(number for number, _ in strong)),
+            measures=(Measure("rules that mask it", len(strong)),),
+        )
+    counts = asked, len(found), undecided
+    yield from _rest_of_strengths("FT105", subject, compared, *counts)
+
+
+def _how(compared: Sides) -> str:
+    cells = sum(len(laid.cells.rank) for laid in compared.lower.laid[0])
+    means = "ratios of degrees" if compared.is_product else "orders of degrees"
+    axes = len(compared.lower.axes)
+    return f"{means} in {cells} cells on {counted(axes, 'axis', 'axes')} were compared"
+
+
+def _rest_of_strengths(
+    code: str,
+    subject: Subject,
+    compared: Sides,
+    asked: int,
+    found: int,
+    undecided: int,
+) -> Iterator[Answer]:
+    """Yield what is known of all pairs of which nothing is found."""
+    if not asked:
+        return
+    silent = len(compared.fires) - int(compared.fires.sum())
+    word = "subsumed" if code == "FT104" else "masked"
+    kind = f"one {_noun(subject)}" if code == "FT104" else "two classes"
+    among = f"{counted(asked, 'pair')} of {kind}"
+    rest = "no rule" if not found else "no other rule"
+    state: State = Proved(_how(compared))
+    sentence = f"{rest} is {word}, among {among}"
+    shared = coupled(compared.lower)
+    if shared:
+        reason = "the inputs of variables depend on each other"
+        sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
+        state = Declined("FTD04", reason)
+    elif undecided:
+        reason = f"{counted(undecided, 'pair')} of strengths are too near to tell"
+        sentence = f"{rest} is shown to be {word}, among {among}: {reason}"
+        state = Declined("FTD02", reason)
+    yield Answer(
+        code,
+        "pairs of rules",
+        sentence,
+        state,
+        is_finding=False,
+        measures=(
+            Measure("pairs", asked),
+            Measure("pairs too near to tell", undecided),
+            Measure("rules that never fire", silent),
+        ),
+    )
+
+
+# --- FT106: do two rules ask the same?
+
+
+def _copied(subject: Subject, compared: Sides) -> Iterator[Answer]:
+    count = len(subject.rules.rules)
+    copies: list[tuple[Pair, Distance]] = []
+    pairs = near = 0
+    for pair in itertools.combinations(range(1, count + 1), 2):
+        subject.clock.check()
+        if _is_one(subject, *pair):
+            continue
+        pairs += 1
+        known = compared.distance(*pair, NEARLY)
+        if known is None:
+            near += compared.is_near(*pair, NEARLY)
+        elif known.whole <= NEARLY:
+            copies.append((pair, known))
+        else:
+            near += 1
+    decides = subject.policy.decision == "strongest"
+    for pair, found in copies:
+        first, second = (subject.rule_name(number) for number in pair)
+        one, other = (_then(subject, number) for number in pair)
+        is_exact = not found.each.high
+        nearly = "the same antecedent" if is_exact else "nearly the same antecedent"
+        if one == other:
+            text = f"and the same {_noun(subject)} {one!r}"
+        elif decides:
+            text = f"and contradict each other: {one!r} and {other!r}"
+        else:
+            text = f"and different conclusions: {one!r} and {other!r}"
+        measures: tuple[Measure, ...] = (measure("largest distance", found.each),)
+        if not is_exact:
+            variable = compared.lower.axes[found.axis].variable
+            text += (
+                f"; degrees differ by at most {short(found.each.high)}, "
+                f"at {variable.name!r} = {short(found.at)}"
+            )
+            measures += (Measure("place of it", float(found.at), unit=variable.unit),)
+        severity: Severity = "warning"
+        if one != other:  # a contradiction; in a system two rules for two outputs
+            severity = "error" if decides else "info"
+        yield Answer(
+            "FT106",
+            f"{first} and {second}",
+            f"{first} and {second} have {nearly} {text}",
+            Proved("their curves were compared piece by piece in fractions"),
+            is_finding=True,
+            severity=severity,
+            rules=pair,
+            measures=measures,
+        )
+    if not pairs:
+        return
+    among = counted(pairs, "pair")
+    rest = "no two rules" if not copies else "no other two rules"
+    sentence = f"{rest} have nearly the same antecedent, among {among}"
+    state: State = Proved(
+        f"somewhere their degrees differ by more than {short(NEARLY)}"
+    )
+    if near:
+        reason = f"{counted(near, 'pair')} of degrees are too near to tell"
+        sentence = f"{rest} are shown to have nearly the same antecedent, among "
+        sentence += f"{among}: {reason}"
+        state = Declined("FTD02", reason)
+    yield Answer(
+        "FT106",
+        "pairs of rules",
+        sentence,
+        state,
+        is_finding=False,
+        measures=(Measure("pairs", pairs),),
+    )
+
+
+# --- FT201: do rules of different classes reach a level together?
+
+
+def _conflicts(subject: Subject, compared: Sides) -> Iterator[Answer]:
+    level = subject.settings.level
+    near: list[tuple[float, Pair]] = []
+    clean = touching = 0
+    bounds: dict[int, FloatArray] = {}
+    for one, other in _pairs(subject, is_alike=False):
+        if not _may_conflict(subject, one, other):
+            continue
+        if one not in bounds:
+            bounds[one] = compared.highest(one)
+        most = float(bounds[one][other - 1])
+        if most < level:
+            clean += 1
+        else:
+            near.append((-most, (one, other)))
+    near.sort()
+    told = hidden = 0
+    own = subject.clock.share(0.5)
+    for place, (_, pair) in enumerate(near):
+        if own.is_over or (told == MOST_SHOWN and not compared.is_product):
+            hidden += len(near) - place
+            break
+        subject.clock.check()
+        found = compared.meet(*pair, Fraction(level), subject.clock.share(0.05))
+        is_shown = isinstance(found.state, Witness)
+        if found.level.high < level or isinstance(found.state, Proved):
+            clean += 1
+            touching += found.is_touch
+        elif is_shown and told == MOST_SHOWN:
+            hidden += 1
+        else:
+            told += is_shown
+            yield _conflict(subject, pair, found)
+    if clean or hidden:
+        yield _rest_of_conflicts(subject, compared, (clean, touching), hidden)
+
+
+def _may_conflict(subject: Subject, one: int, other: int) -> bool:
+    """Return whether two rules say different things of one output."""
+    if subject.policy.decision == "strongest" or subject.system is None:
+        return True
+    told = [
+        {
+            (output.name, part)
+            for output in subject.system.outputs
+            for part in _then(subject, number).split(" and ")
+            if part.startswith(f"{output.name} is ")
+        }
+        for number in (one, other)
+    ]
+    shared = {name for name, _ in told[0]} & {name for name, _ in told[1]}
+    return any(name in shared for name, _ in told[0] ^ told[1])
+
+
+def _conflict(subject: Subject, pair: Pair, found: Meeting) -> Answer:
+    first, second = (subject.rule_name(number) for number in pair)
+    one, other = (_then(subject, number) for number in pair)
+    low, high = found.level
+    reached = level_reached(found)
+    level, most = "highest common level", "highest common level at most"
+    if isinstance(found.state, Witness):
+        region = found.state.region
+        sentence = (
+            f"{first} and {second} conflict: both reach {reached} at one input, "
+            f"and say {one!r} and {other!r}"
+        )
+        exact = str(low) if low == high else None
+        measures = [Measure(level, float(low), exact)]
+        if high - low > NEARLY:
+            least = "highest common level at least"
+            measures = [Measure(least, float(low)), Measure(most, float(high))]
+    else:
+        region = ()
+        sentence = (
+            f"{first} and {second} may conflict, on {one!r} and {other!r}: no more "
+            f"than {short(high)} is reached by both"
+        )
+        measures = [Measure(most, float(high))]
+    return Answer(
+        "FT201",
+        f"{first} and {second}",
+        sentence,
+        found.state,
+        is_finding=isinstance(found.state, Witness),
+        severity="info",
+        rules=pair,
+        region=region,
+        measures=tuple(measures),
+    )
+
+
+def level_reached(found: Meeting) -> str:
+    """Return the level that two rules both reach, as their sentence says it.
+
+    A point in fractions may fall a little short of a level that is irrational.
+    """
+    low = found.level.low
+    if not isinstance(found.state, Witness):
+        return short(low)
+    shown = [Fraction(one.level or 0) for one in found.state.claims]
+    is_short = max(shown, default=low) < low or (low < 1 and short(low) == "1")
+    return f"{'nearly ' if is_short else ''}{short(low)}"
+
+
+def _rest_of_conflicts(
+    subject: Subject, compared: Sides, told: tuple[int, int], hidden: int
+) -> Answer:
+    clean, touching = told
+    level, noun = short(subject.settings.level), _noun(subject)
+    kind = "classes" if noun == "class" else "conclusions"
+    pairs, reach = counted(clean, "pair"), "reaches" if clean == 1 else "reach"
+    never = f"{pairs} of rules of different {kind} never {reach} {level} together"
+    parts = [never] if clean else []
+    if touching:
+        parts.append(f"{touching} of them at most touch it, at irrational values")
+    if hidden:
+        more = counted(hidden, "more pair")
+        parts.append(f"{more} of rules may reach {level}, not told one by one")
+    means = "products" if compared.is_product else "minima"
+    return Answer(
+        "FT201",
+        "pairs of rules",
+        "; ".join(parts),
+        Proved(f"the largest {means} of degrees were found on each axis"),
+        is_finding=bool(hidden),
+        measures=(
+            Measure("pairs that never do", clean),
+            Measure("pairs not told one by one", hidden),
+        ),
+    )

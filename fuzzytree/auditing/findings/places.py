@@ -1,0 +1,191 @@
+"""Where rules and terms stand in a model's file, and ids that outlive their order."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+import msgspec
+
+from fuzzytree.auditing.findings.records import Answer, Label, Place
+from fuzzytree.checking.converting import format_of
+from fuzzytree.errors import ReadError
+from fuzzytree.model.contracts import Document, Locate
+from fuzzytree.model.rulebase import Path, Rule, RuleBase, sentence, shapes_of
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
+
+
+def _nowhere(_: Path) -> None:
+    """Say that no place is known."""
+
+
+class ModelFile(msgspec.Struct, frozen=True, eq=False):
+    """A file that a model was read from.
+
+    Attributes:
+        name: Its path as the user wrote it.
+        content: Its bytes.
+        locate: Tells where the parts of its model stand.
+    """
+
+    name: str
+    content: bytes
+    locate: Locate = _nowhere
+
+    def place(self, path: Path) -> Place | None:
+        """Return where a part of the model stands, None if that is not known."""
+        spot = self.locate(path)
+        return None if spot is None else Place(writable(self.name), *spot)
+
+
+def writable(text: str) -> str:
+    """Return a text as UTF-8 holds it: bytes of a path that are no text as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def model_file(name: str, content: bytes) -> ModelFile:
+    """Return a file with its places; it is read for them when they are asked for."""
+
+    @functools.cache
+    def known() -> Locate:
+        try:
+            find = format_of(name).places
+            return _nowhere if find is None else find(content, name)
+        except ReadError:  # such as another format under this suffix
+            return _nowhere
+
+    return ModelFile(name, content, lambda path: known()(path))
+
+
+def rule_path(model: Document, number: int) -> Path:
+    """Return where a model holds a rule; a tree's rules are its leaves.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> rule_path(random_tree(1), 2)
+        ('leaves', 1)
+    """
+    match model:
+        case RuleBase():
+            return ("rules", number - 1)
+        case FuzzyTree():
+            return ("leaves", number - 1)
+        case FuzzySystem():
+            return _system_rule_path(model, number)
+
+
+def _system_rule_path(system: FuzzySystem, number: int) -> Path:
+    for position, block in enumerate(system.blocks):
+        if number <= len(block.rules):
+            return ("blocks", position, "rules", number - 1)
+        number -= len(block.rules)
+    return ("blocks",)
+
+
+def term_path(model: Document, label: Label) -> Path:
+    """Return where a model holds a term; `variables` if it has none of that name."""
+    if isinstance(model, FuzzySystem):
+        return _label_path(model, label)
+    for k, variable in enumerate(model.variables):
+        terms = [term.name for term in variable.terms]
+        if variable.name == label.variable and label.term in terms:
+            return ("variables", k, "terms", terms.index(label.term))
+    for k, fitted in enumerate(model.sets if isinstance(model, FuzzyTree) else ()):
+        terms = [term.name for term in fitted.terms]
+        if fitted.variable == label.variable and label.term in terms:
+            return ("sets", k, "terms", terms.index(label.term))
+    return ("variables",)
+
+
+def _label_path(system: FuzzySystem, label: Label) -> Path:
+    for position, one in enumerate(system.variables):
+        names = [found.name for found in one.labels]
+        if one.name == label.variable and label.term in names:
+            k = position - len(system.inputs)
+            field = ("inputs", position) if k < 0 else ("outputs", k)
+            return (*field, "labels", names.index(label.term))
+    return ("inputs",)
+
+
+def places_of(
+    answer: Answer, model: Document, file: ModelFile | None, numbers: Iterable[int]
+) -> tuple[Place, ...]:
+    """Return where the rules and terms of an answer stand, in that order.
+
+    Args:
+        answer: The answer.
+        model: The model in the file.
+        file: The file; without one there are no places.
+        numbers: The numbers in the file of the answer's rules.
+    """
+    if file is None:
+        return ()
+    paths = [rule_path(model, number) for number in numbers]
+    paths += [term_path(model, label) for label in answer.terms]
+    found = (file.place(path) for path in paths)
+    return tuple(dict.fromkeys(place for place in found if place is not None))
+
+
+# --- ids
+
+
+def with_ids(
+    answers: Iterable[Answer],
+    carriers: Sequence[RuleBase],
+    curves: Mapping[tuple[str, str], object] | None = None,
+) -> Iterator[Answer]:
+    """Yield answers with ids: the code and a hash of what it is about.
+
+    The hash is taken over the sentences and curves of the rules and the terms
+    concerned, whatever their place in the file; where there are neither, over the
+    subject and the region. Equal ids are told apart by `-2`, `-3` in order.
+
+    Args:
+        answers: The answers.
+        carriers: The rules that their numbers mean, if there are any; then others
+            whose terms may be concerned as well.
+        curves: What terms are in truth whose shape is another.
+    """
+    shapes: dict[tuple[str, str], object] = {}
+    for carrier in reversed(carriers):
+        shapes |= shapes_of(carrier.variables)
+    shapes |= curves or {}
+    rules = carriers[0].rules if carriers else ()
+    counts: dict[str, int] = {}
+    for answer in answers:
+        known = [_rule_facts(rules[k - 1], shapes) for k in answer.rules]
+        known += [_label_facts(label, shapes) for label in answer.terms]
+        other = [] if known else [answer.subject, answer.region]
+        content = msgspec.json.encode([answer.code, known, other])
+        name = f"{answer.code}-{hashlib.sha256(content).hexdigest()[:8]}"
+        counts[name] = counts.get(name, 0) + 1
+        if counts[name] > 1:
+            name = f"{name}-{counts[name]}"
+        yield msgspec.structs.replace(answer, id=name)
+
+
+def _rule_facts(rule: Rule, shapes: Mapping[tuple[str, str], object]) -> list[object]:
+    """Return what a rule says, with its clauses in an order of their own."""
+    curves = [
+        [
+            clause.variable,
+            clause.negated,
+            sorted(
+                msgspec.json.encode(shapes[clause.variable, term]).decode()
+                for term in clause.terms
+            ),
+        ]
+        for clause in rule.when
+    ]
+    text = sentence(
+        msgspec.structs.replace(rule, when=tuple(sorted(rule.when, key=str)))
+    )
+    return [text, sorted(curves, key=str)]
+
+
+def _label_facts(
+    label: Label, shapes: Mapping[tuple[str, str], object]
+) -> list[object]:
+    return [label.variable, label.term, shapes.get((label.variable, label.term))]

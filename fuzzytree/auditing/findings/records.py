@@ -1,0 +1,229 @@
+"""An audit as frozen values: what was asked, what the answer is, how it is known."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Final, Literal
+
+import msgspec
+
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.states import Span, State
+from fuzzytree.model.rulebase import Value, summary
+
+FORMAT: Final = "fuzzytree-audit/1"
+INTERRUPTED: Final = "interrupted"
+"""How a sentence of `Audit.unasked` ends where Ctrl-C is the reason."""
+
+Severity = Literal["error", "warning", "info"]
+
+
+class Place(Value, frozen=True):
+    """Where something stands in the model's file."""
+
+    file: str
+    line: int
+    column: int
+
+
+class Label(Value, frozen=True):
+    """A term of a variable."""
+
+    variable: str
+    term: str
+
+
+class Measure(Value, frozen=True):
+    """A number that belongs to an answer.
+
+    Attributes:
+        name: What it is, such as `largest lead`.
+        value: The number, as a double or a count.
+        exact: The same as `p/q`, where it is known.
+        unit: Its unit; empty for degrees, shares and counts.
+    """
+
+    name: str
+    value: float
+    exact: str | None = None
+    unit: str = ""
+
+
+class Answer(Value, frozen=True):
+    """One question about a model, and what is known.
+
+    Attributes:
+        code: The kind of question, such as `FT101`; see
+            `fuzzytree.auditing.findings.codes`.
+        subject: What was asked about, short, such as `rule 3`.
+        sentence: The answer as one sentence without its code.
+        state: How it is known.
+        is_finding: Whether it is something that a reader should see; the others show
+            that it was asked.
+        severity: Of the finding.
+        rules: The numbers of the rules concerned, from 1, the most concerned first.
+        terms: The terms concerned.
+        region: Where it holds, as a box of only the variables that matter.
+        measures: Numbers that belong to it.
+        places: Where the rules and terms stand in the file, in that order.
+        repeat: The command that finds it again.
+        id: Names the finding across releases: the code and a hash of what the rules
+            and terms concerned say, whatever their order in the file is.
+    """
+
+    code: str
+    subject: str
+    sentence: str
+    state: State
+    is_finding: bool
+    severity: Severity = "info"
+    rules: tuple[int, ...] = ()
+    terms: tuple[Label, ...] = ()
+    region: tuple[Span, ...] = ()
+    measures: tuple[Measure, ...] = ()
+    places: tuple[Place, ...] = ()
+    repeat: str = ""
+    id: str = ""
+
+
+class Settings(Value, frozen=True):
+    """What an audit takes for small, and how long it may take.
+
+    Attributes:
+        epsilon: An input is covered if some rule is at least as strong as this.
+        margin: Two classes are close if their strengths differ by at most this.
+        lead: A rule that never leads by this much is marginal.
+        level: Two rules of different classes conflict where both reach this.
+        overlap: Two terms of a variable are hard to tell apart from this share on.
+        rows: How many rows a sampled share looks at.
+        seed: Of what is drawn.
+        budget_s: After so many seconds nothing new is begun; above 0.
+    """
+
+    epsilon: float = 0.1
+    margin: float = 0.01
+    lead: float = 0.01
+    level: float = 0.5
+    overlap: float = 0.75
+    rows: int = 20_000
+    seed: int = 0
+    budget_s: float = 60.0
+
+
+class Source(Value, frozen=True):
+    """A file: its name, and the SHA-256 of its bytes."""
+
+    name: str
+    sha256: str
+
+
+class Result(Value, frozen=True):
+    """What another verb found of the same model, as the user gave it.
+
+    Attributes:
+        verb: Which verb.
+        file: Where it was read from.
+        parts: How many comparisons and bounds, or criteria, it is of.
+        wrong: How many of them disagree, or fail.
+    """
+
+    verb: Literal["check", "stability"]
+    file: Source
+    parts: int
+    wrong: int
+
+
+class Policy(Value, frozen=True):
+    """How the audited rules decide, which says which questions apply.
+
+    Attributes:
+        conjunction: The AND: `min`, `product`, or another norm's name.
+        decision: `strongest` (the class of the first of the strongest rules) or `all`
+            (every rule that fires takes part in the answer).
+        uncovered: The answer where no rule fires; None is no class.
+        missing: The answer where a value is missing; None is no class.
+    """
+
+    conjunction: str
+    decision: Literal["strongest", "all"]
+    uncovered: str | None = None
+    missing: str | None = None
+
+
+class Audit(Value, frozen=True):
+    """The result of an audit.
+
+    Attributes:
+        version: Of fuzzytree.
+        model: The model's name.
+        form: What was audited: `tree`, `relative rules`, `raw rules`, `rules` or
+            `system`.
+        fingerprint: The SHA-256 of the model's content.
+        file: Where it was read from, None if from memory.
+        data: The table that was given, if one was.
+        rows: How many rows it has.
+        policy: How the rules decide.
+        domain: Where everything was asked.
+        settings: What was taken for small.
+        answers: Everything that was asked, findings and not, in order of their codes.
+        unasked: What was not asked and why, in sentences: left out by the user, or
+            by the budget, or by an interruption.
+        limits: What this audit does not establish: fixed sentences.
+        is_complete: Whether nothing was cut short.
+        accepted: The ids of findings that the user's baseline accepts.
+        results: What other verbs found of the same model, if that was given.
+        numbers: Of a fuzzy system the number in the file, over all blocks, of each rule
+            that answers and claims count; empty where the two are the same.
+        digest: The SHA-256 of all else, as canonical JSON; see `digest_of`.
+    """
+
+    version: str
+    model: str
+    form: str
+    fingerprint: str
+    file: Source | None
+    data: Source | None
+    rows: int
+    policy: Policy
+    domain: Domain
+    settings: Settings
+    answers: tuple[Answer, ...]
+    unasked: tuple[str, ...]
+    limits: tuple[str, ...]
+    is_complete: bool
+    accepted: tuple[str, ...] = ()
+    results: tuple[Result, ...] = ()
+    numbers: tuple[int, ...] = ()
+    digest: str = ""
+    format: Literal["fuzzytree-audit/1"] = FORMAT
+
+    @property
+    def findings(self) -> tuple[Answer, ...]:
+        """The answers that a reader should see."""
+        return tuple(answer for answer in self.answers if answer.is_finding)
+
+    @property
+    def open_findings(self) -> tuple[Answer, ...]:
+        """The findings that no baseline accepts."""
+        known = set(self.accepted)
+        return tuple(answer for answer in self.findings if answer.id not in known)
+
+    def __repr__(self) -> str:
+        """Show how many answers there are, and how many of them are findings."""
+        findings = len(self.open_findings)
+        return summary("Audit", answers=len(self.answers), findings=findings)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.audit_html(self)
+        return shown
+
+    def to_json(self) -> str:
+        """Return the audit for programs, and for `recheck`, as indented JSON."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=2).decode()
+
+    @property
+    def was_interrupted(self) -> bool:
+        """Whether Ctrl-C cut it short."""
+        return any(text.endswith(INTERRUPTED) for text in self.unasked)

@@ -1,0 +1,149 @@
+"""What other verbs found of the same model: results that an audit is read beside."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import msgspec
+from msgspec import inspect
+
+from fuzzytree.auditing.findings.limits import digest_of
+from fuzzytree.auditing.findings.places import writable
+from fuzzytree.auditing.findings.records import Audit, Result, Source
+from fuzzytree.checking.stability.results import Stability
+from fuzzytree.errors import ReadError
+from fuzzytree.files import PathLike, read_bounded
+from fuzzytree.model.agreement import Agreement, version
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import fingerprint
+
+_MOST_BYTES = 64 * 2**20
+_KINDS: dict[str, type[Agreement] | type[Stability]] = {
+    kind.FORMAT: kind for kind in (Agreement, Stability)
+}
+
+
+class Given(NamedTuple):
+    """A result that a user gave.
+
+    Attributes:
+        result: What an audit tells of it.
+        found: All of it.
+    """
+
+    result: Result
+    found: Agreement | Stability
+
+
+def with_results(audit: Audit, given: Iterable[Given]) -> Audit:
+    """Return an audit that names the results that it is read beside."""
+    results = tuple(one.result for one in given)
+    told = msgspec.structs.replace(audit, results=results)
+    return msgspec.structs.replace(told, digest=digest_of(told))
+
+
+def read_results(paths: Iterable[PathLike], model: Document) -> tuple[Given, ...]:
+    """Return what `fuzzytree check --json` and `stability --json` wrote of a model.
+
+    Args:
+        paths: Their files, at most one of each verb.
+        model: The model that they must be about.
+
+    Raises:
+        ReadError: If a file is none of these, was changed by hand, is about another
+            model or of another version, or another one is of the same verb.
+    """
+    found: dict[str, Given] = {}
+    for path in paths:
+        one = _read(path, model)
+        verb = one.result.verb
+        if verb in found:
+            raise ReadError(
+                f"{os.fspath(path)}: is a result of {verb}, and so is "
+                f"{found[verb].result.file.name}; give one of them"
+            )
+        found[verb] = one
+    return tuple(found.values())
+
+
+def _read(path: PathLike, model: Document) -> Given:
+    """Return one result.
+
+    Raises:
+        ReadError: As `read_results`.
+    """
+    name = os.fspath(path)
+    content = read_bounded(path, _MOST_BYTES)
+    found = _decoded(content, name)
+    result = _result(found, Source(writable(name), hashlib.sha256(content).hexdigest()))
+    wanted = fingerprint(model)
+    if found.fingerprint != wanted:
+        raise ReadError(
+            f"{name}: is a result of another model: its fingerprint is "
+            f"{found.fingerprint[:12]}..., and that of {model.name[:60]!r} is "
+            f"{wanted[:12]}...; run `fuzzytree {result.verb}` again"
+        )
+    return Given(result, found)
+
+
+def _result(found: Agreement | Stability, file: Source) -> Result:
+    """Return what an audit tells of a result."""
+    if isinstance(found, Stability):
+        verdicts = [one.verdict for one in found.criteria]
+        return Result("stability", file, len(verdicts), verdicts.count("FAILS"))
+    count = len(found.comparisons) + len(found.certificates)
+    return Result("check", file, count, len(found.wrong))
+
+
+def _decoded(content: bytes, name: str) -> Agreement | Stability:
+    """Return the record that a file holds.
+
+    Raises:
+        ReadError: If it holds none, or it was not written by this version.
+    """
+    lead = f"{name}: is no result that `fuzzytree check` or `stability` --json wrote"
+    try:
+        facts = msgspec.json.decode(content, type=dict[str, object])
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ReadError(f"{lead}: {_quoted(error)}") from error
+    form, made_by = facts.get("format"), facts.get("version")
+    kind = _KINDS.get(form) if isinstance(form, str) else None
+    if kind is None:
+        raise ReadError(f"{lead}: its format is none of {', '.join(_KINDS)}")
+    if made_by != version():
+        raise ReadError(
+            f"{name}: is a result of fuzzytree {str(made_by)[:40]}, and this is "
+            f"{version()}; run it again"
+        )
+    try:
+        found = msgspec.convert(_whole(facts, inspect.type_info(kind)), kind)
+    except msgspec.ValidationError as error:
+        raise ReadError(f"{lead}: {_quoted(error)}") from error
+    if msgspec.json.decode(found.to_json()) != facts:
+        raise ReadError(f"{lead}: what it says does not fit together")
+    return found
+
+
+def _quoted(error: Exception) -> str:
+    return str(error).replace("`", "'")
+
+
+def _whole(facts: object, kind: inspect.Type) -> object:
+    """Return facts with infinity where a number must be and JSON could hold none."""
+    match kind:
+        case inspect.FloatType() if facts is None:
+            return math.inf
+        case inspect.StructType(fields=fields) if isinstance(facts, dict):
+            known = {one.name: one.type for one in fields}
+            return {
+                key: _whole(value, known[key]) if key in known else value
+                for key, value in facts.items()
+            }
+        case inspect.VarTupleType(item_type=item) if isinstance(facts, list):
+            return [_whole(one, item) for one in facts]
+        case _:
+            return facts

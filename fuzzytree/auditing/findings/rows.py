@@ -1,0 +1,242 @@
+"""The user's rows as exact points, and how far they are from a box."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.polytopes import Polytope, Polytopes, polytope_of
+from fuzzytree.auditing.engine.states import Span, Witness, point_of
+from fuzzytree.auditing.engine.variables import contains
+from fuzzytree.auditing.engine.variables import span as ends_on
+from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.model.rulebase import Variable
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics.oracle import decide
+
+OF_RANGES = "of each input's range"
+"""The unit of distances: the largest difference of an input, in its range's width."""
+
+_MOST_DIGITS = 80  # of an exact number beside a double
+
+
+class Points(msgspec.Struct, frozen=True, eq=False):
+    """Rows that lie in the domain.
+
+    Attributes:
+        at: The row's number, from 1, and its values; equal rows stand once, close
+            calls first.
+        left_out: How many different ones have a value that is missing, or outside the
+            domain.
+        total: How many rows there are.
+    """
+
+    at: tuple[tuple[int, dict[str, Fraction]], ...]
+    left_out: int
+    total: int
+
+    @property
+    def text(self) -> str:
+        """Which rows these are, as sentences show it."""
+        text = f"{self.total} rows"
+        if self.left_out:
+            text += f" ({self.left_out} incomplete or outside the domain)"
+        return text
+
+
+def points_of(subject: Subject, rows: Rows) -> Points:
+    """Return the user's rows as points of the domain, close calls first.
+
+    A call is close where the margin of the rules is small: there another decision tends
+    to be near.
+
+    Args:
+        subject: The model.
+        rows: The rows.
+    """
+    names = subject.rules.inputs
+    total = rows.values.shape[1]
+    margins = decide(subject.rules, rows.values, with_strengths=False).margin
+    seen: dict[tuple[float, ...], int] = {}
+    for row in np.argsort(margins, kind="stable").tolist():
+        seen.setdefault(tuple(rows.values[:, row].tolist()), row + 1)
+    complete = [
+        (number, dict(zip(names, map(Fraction, values), strict=True)))
+        for values, number in seen.items()
+        if all(map(math.isfinite, values))
+    ]
+    at = tuple(
+        (number, point)
+        for number, point in complete
+        if contains(subject.domain, subject.rules.variables, point)
+    )
+    return Points(at, len(seen) - len(at), total)
+
+
+def distance_measure(name: str, value: Fraction) -> Measure:
+    """Return a distance as a number of an answer, with the exact one if it is short.
+
+    Where it is not, the double is at most the distance.
+
+    Args:
+        name: What it is, without the unit, which is added.
+        value: In widths of the inputs' ranges.
+    """
+    exact = str(value)
+    if len(exact) <= _MOST_DIGITS:
+        return Measure(f"{name}, in ranges", float(value), exact)
+    return Measure(f"{name}, in ranges", outwards(value)[0])
+
+
+def ranked(
+    gaps: Sequence[Answer],
+    rows: Rows,
+    domain: Domain,
+    inputs: Sequence[str],
+    variables: Sequence[Variable] = (),
+) -> tuple[Answer, ...]:
+    """Return answers in order of how near they are to a row, with the distance.
+
+    A gap far from all that was ever seen matters less than one among the rows. Answers
+    that name no place stand last, as they are.
+
+    Args:
+        gaps: Answers about places: with a region, or else the point of a witness.
+        rows: The rows.
+        domain: In whose widths distance is measured.
+        inputs: The names of the rows' values.
+        variables: The combinations that regions may name; where one of another name
+            is met, the point of the witness counts.
+
+    Example:
+        >>> from fuzzytree.auditing.engine.domain import Side
+        >>> from fuzzytree.auditing.engine.states import Proved
+        >>> box = Domain((Side("x", 0.0, 4.0),))
+        >>> where = (Span("x", 3.0, 4.0),)
+        >>> gap = Answer("FT301", "gap", "", Proved(""), True, region=where)
+        >>> rows = Rows("rows", np.array([[0.0, 1.0]]))
+        >>> ranked([gap], rows, box, ["x"])[0].measures[0].exact
+        '1/2'
+    """
+    known: list[tuple[Fraction, int, Answer]] = []
+    unknown: list[Answer] = []
+    for place, gap in enumerate(gaps):
+        part = _part(gap, domain, inputs, variables)
+        if part is None:
+            found = _nearest_row(_spans(gap, inputs), rows, domain, inputs)
+        else:
+            found = _nearest_to_part(part, rows, domain, inputs)
+        if found is None:
+            unknown.append(gap)
+            continue
+        away, number = found
+        added = (
+            distance_measure("distance to the nearest row", away),
+            Measure("nearest row", number),
+        )
+        measures = (*gap.measures, *added)
+        known.append((away, place, msgspec.structs.replace(gap, measures=measures)))
+    ordered = sorted(known, key=lambda one: one[:2])
+    return (*(gap for _, _, gap in ordered), *unknown)
+
+
+def _part(
+    gap: Answer,
+    domain: Domain,
+    inputs: Sequence[str],
+    variables: Sequence[Variable],
+) -> Polytope | None:
+    """Return the region of a gap whose combinations are known; None of any other."""
+    combined = {one.name: one for one in variables if one.parts}
+    asked = {span.variable for span in gap.region}
+    if not asked & set(combined) or not asked <= {*combined, *inputs}:
+        return None
+    sides = {side.variable: side for side in domain.sides}
+    for one in gap.region:
+        name = one.variable
+        if name not in sides:
+            low, high = ends_on(combined[name], domain)
+            sides[name] = Side(name, outwards(low)[0], outwards(high)[1])
+        whole = sides[name]
+        low_end = whole.low if one.low is None else max(whole.low, one.low)
+        high_end = whole.high if one.high is None else min(whole.high, one.high)
+        sides[name] = Side(name, low_end, high_end)
+    return polytope_of(Domain(tuple(sides.values())), inputs, combined)
+
+
+def _nearest_to_part(
+    part: Polytope, rows: Rows, domain: Domain, inputs: Sequence[str]
+) -> tuple[Fraction, int] | None:
+    """Return how near a row is to a part of the inputs, at least, and which is it."""
+    asked = Polytopes(domain, inputs, [part])
+    near: list[tuple[float, int, dict[str, Fraction]]] = []
+    for row, values in enumerate(rows.values.T.tolist()):
+        if all(map(math.isfinite, values)):
+            point = dict(zip(inputs, map(Fraction, values), strict=True))
+            near.append((asked.bounds(point)[0], row, point))
+    best: tuple[Fraction, int] | None = None
+    for bound, row, point in sorted(near, key=lambda one: one[:2]):
+        if best is not None and bound > best[0]:
+            break
+        found = asked.nearest(point, [0])
+        if not found.is_none and (best is None or found.low < best[0]):
+            best = found.low, row + 1
+    return best
+
+
+def _spans(gap: Answer, inputs: Sequence[str]) -> tuple[Span, ...]:
+    """Return where a gap is: its region, or the point where that needs more."""
+    if gap.region and all(span.variable in inputs for span in gap.region):
+        return gap.region
+    if not isinstance(gap.state, Witness):
+        return ()
+    point = point_of(gap.state.point)
+    return tuple(Span(name, *outwards(value)) for name, value in point.items())
+
+
+def _nearest_row(
+    spans: Sequence[Span], rows: Rows, domain: Domain, inputs: Sequence[str]
+) -> tuple[Fraction, int] | None:
+    """Return the least distance of a row from a box, and the row's number."""
+    column = {name: place for place, name in enumerate(inputs)}
+    away = np.zeros(rows.values.shape[1])
+    for span in spans:
+        side = domain.side(span.variable)
+        if side is None or side.low == side.high:
+            continue
+        x = rows.values[column[span.variable]]
+        below = -np.inf if span.low is None else span.low
+        above = np.inf if span.high is None else span.high
+        width = side.high - side.low
+        away = np.maximum(away, np.maximum(below - x, x - above) / width)
+    away[~np.isfinite(rows.values).all(axis=0)] = np.inf
+    if not spans or not np.isfinite(away).any():
+        return None
+    row = int(np.argmin(away))
+    values = {
+        name: Fraction(float(rows.values[at, row])) for name, at in column.items()
+    }
+    return box_distance(spans, values, domain), row + 1
+
+
+def box_distance(
+    spans: Sequence[Span], point: Mapping[str, Fraction], domain: Domain
+) -> Fraction:
+    """Return how far a point is from a box, in shares of the domain's widths."""
+    away = Fraction(0)
+    for span in spans:
+        side = domain.side(span.variable)
+        if side is None or side.low == side.high:
+            continue
+        width, x = Fraction(side.high) - Fraction(side.low), point[span.variable]
+        if span.low is not None:
+            away = max(away, (Fraction(span.low) - x) / width)
+        if span.high is not None:
+            away = max(away, (x - Fraction(span.high)) / width)
+    return away

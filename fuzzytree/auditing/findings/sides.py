@@ -1,0 +1,318 @@
+"""Questions about rules that are known from below and from above.
+
+What a rule does somewhere is asked of the lower rules, what it never does of the upper
+ones; what neither decides lies between. Rules without a held curve or a weight are the
+same in both, and everything is asked once.
+
+Where two rules share a clause, its degree v is one number for both. If one rule is
+nowhere weaker than the other with the upper degree u in both, it is so with v <= u too:
+`min(u, a) >= min(w u, b)` makes `a >= min(w u, b) >= min(w v, b)` for a weight w of at
+most 1, and `u a >= u b` makes `a >= b` where u is above 0. So a shared clause is taken
+from above in both.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Final
+
+import msgspec
+import numpy as np
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.dominance import Compared, Verdict
+from fuzzytree.auditing.engine.factors import Distance, distance
+from fuzzytree.auditing.engine.ground import Ground, ground
+from fuzzytree.auditing.engine.measures import Bounds
+from fuzzytree.auditing.engine.meeting import Meeting, highest, meet
+from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
+from fuzzytree.auditing.engine.variables import span
+from fuzzytree.auditing.engine.wins import wins
+from fuzzytree.auditing.findings.held import Held
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.model.rulebase import (
+    Clause,
+    Points,
+    Rule,
+    RuleBase,
+    Term,
+    Variable,
+    shapes_of,
+)
+from fuzzytree.numerics.enclosures import (
+    Enclosure,
+    Value,
+    clause_enclosure,
+    degree_enclosure,
+    strength_enclosure,
+)
+from fuzzytree.numerics.exact import outwards
+
+if TYPE_CHECKING:
+    from fuzzytree.auditing.engine.ground import BoolArray
+    from fuzzytree.model.contracts import FloatArray
+
+_BELOW: Final = "from below: "
+_ROUNDING: Final = 1e-9
+"""What differences of degrees in doubles may be off by, and far more."""
+
+
+class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
+    """Rules from below and from above, on a box.
+
+    Attributes:
+        lower: The rules, none of which is stronger than in truth.
+        upper: The rules, none of which is weaker.
+        held: What is held between lines, None if nothing is.
+    """
+
+    lower: Ground
+    upper: Ground
+    held: Held | None = None
+
+    def is_held(self, *numbers: int) -> bool:
+        """Return whether one of some rules is not known exactly."""
+        return self.held is not None and not self.held.rules.isdisjoint(numbers)
+
+    @functools.cached_property
+    def from_below(self) -> Compared:
+        """The lower rules, to be compared."""
+        return Compared(self.lower)
+
+    @functools.cached_property
+    def from_above(self) -> Compared:
+        """The upper rules, to be compared."""
+        return self.from_below if self.upper is self.lower else Compared(self.upper)
+
+    @property
+    def is_product(self) -> bool:
+        """Whether degrees are multiplied."""
+        return self.from_below.is_product
+
+    @property
+    def fires(self) -> BoolArray:
+        """Whether each rule may fire anywhere, if axes are free."""
+        return self.from_above.fires
+
+    def firing(self, number: int, clock: Clock) -> State:
+        """Return whether a rule fires anywhere; see `wins`."""
+        found = wins(self.lower, number, (), clock)
+        if self.held is None or not self.is_held(number):
+            return found
+        if isinstance(found, Witness):
+            return self.held.certified(found)
+        most = wins(self.upper, number, (), clock)
+        if isinstance(most, Proved):
+            return most
+        # Where the lower strength is 0, a clause is, and its gap bounds the upper one.
+        high = self.held.gap if isinstance(found, Proved) else 1.0
+        return Bracket(f"the strength of rule {number}", 0.0, high, self.held.why)
+
+    def never_weaker(self, strong: int, weak: int) -> Verdict:
+        """Return whether a rule is nowhere weaker than another one."""
+        if not self.is_held(strong, weak):
+            return self.from_below.never_weaker(strong, weak)
+        if self._pair(strong, weak).never_weaker(1, 2) == "always":
+            return "always"
+        found = self._pair(weak, strong, shares=False).never_weaker(2, 1)
+        return "not" if found == "not" else "open"
+
+    def _pair(self, one: int, other: int, *, shares: bool = True) -> Compared:
+        """Return two rules, the first from below and the second from above.
+
+        Args:
+            one: The number of a rule.
+            other: The number of another.
+            shares: Whether clauses of both are taken from above in both.
+        """
+        below, above = self.lower.rules, self.upper.rules
+        mine, theirs = below.rules[one - 1], above.rules[other - 1]
+        known = [*theirs.when] if shares else []
+        when = [
+            clause if self._is_shared(clause, mine, known) else _renamed(clause)
+            for clause in mine.when
+        ]
+        variables = (
+            replace(v, terms=(*v.terms, *_terms(w)))
+            for v, w in zip(above.variables, below.variables, strict=True)
+        )
+        rules = replace(
+            above,
+            variables=tuple(variables),
+            rules=(replace(mine, when=tuple(when)), theirs),
+        )
+        return Compared(ground(rules, self.lower.domain))
+
+    def _is_shared(self, clause: Clause, rule: Rule, others: Sequence[Clause]) -> bool:
+        """Return whether other clauses ask what one of a rule does, perhaps for less.
+
+        Under the product they must do so as often: `v b` is not below `v v a`.
+        """
+        assert self.held is not None
+        if self.is_product:
+            return rule.when.count(clause) <= others.count(clause)
+        mine, weight, _ = self.held.asked(clause)
+        found = map(self.held.asked, others)
+        return any(theirs == mine and most <= weight for theirs, _, most in found)
+
+    def distance(self, one: int, other: int, most: Fraction) -> Distance | None:
+        """Return how far two rules are apart, None if more; see `factors.distance`.
+
+        Of rules that are held it is known only if they ask the same.
+        """
+        if self.is_held(one, other) and self._keys[one - 1] != self._keys[other - 1]:
+            return None
+        return distance(self.from_below.factored, one - 1, other - 1, most)
+
+    def is_near(self, one: int, other: int, most: Fraction) -> bool:
+        """Return whether it is open whether degrees of two rules differ by more.
+
+        That is so only of rules that are held.
+        """
+        limit = float(most) + _ROUNDING
+        return self.is_held(one, other) and not any(
+            bool((low[a - 1] - high[b - 1] > limit).any())
+            for low, high in self._degrees
+            for a, b in ((one, other), (other, one))
+        )
+
+    @functools.cached_property
+    def _keys(self) -> tuple[tuple[object, ...], ...]:
+        count = len(self.lower.rules.rules)
+        return tuple(self.held.key(n) for n in range(1, count + 1) if self.held)
+
+    @functools.cached_property
+    def _degrees(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """For each axis bounds of all rules' degrees at the places of its points.
+
+        Each of shape (rules, places), off by far less than `_ROUNDING`.
+        """
+        found: list[tuple[FloatArray, FloatArray]] = []
+        for variable in self.lower.rules.variables:
+            at = _places(variable, self.lower.domain)
+            if not at.size:
+                continue
+            low, high = (
+                _degrees(one.rules, variable.name, at)
+                for one in (self.lower, self.upper)
+            )
+            found.append((low[0], high[1]))
+        return tuple(found)
+
+    def uncovered(self, clock: Clock) -> State:
+        """Return whether every rule is somewhere exactly 0; see `cover`."""
+        found = uncovered(self.upper, clock)
+        if self.held is None or isinstance(found, Witness):
+            return found
+        least = uncovered(self.lower, clock)
+        if isinstance(least, Proved):
+            return least
+        return Bracket("how many rules fire at least", 0.0, 1.0, self.held.why)
+
+    def below(self, epsilon: Fraction, clock: Clock) -> State:
+        """Return whether all rules are somewhere weaker than a level; see `cover`."""
+        found = below(self.lower, epsilon, clock)
+        if self.held is None or isinstance(found, Proved):
+            return found
+        most = below(self.upper, epsilon, clock)
+        if isinstance(most, Witness):
+            return most
+        least = self.least_cover(clock)
+        return Bracket(least.of, least.low, least.high, self.held.why)
+
+    def least_cover(self, clock: Clock) -> Bracket:
+        """Return bounds of the least strength that the strongest rule has anywhere."""
+        found = least_cover(self.lower, clock)
+        if self.held is None:
+            return found
+        high = least_cover(self.upper, clock).high
+        return Bracket(found.of, found.low, max(high, found.low), self.held.why)
+
+    def highest(self, one: int) -> FloatArray:
+        """Return bounds of the levels that a rule reaches with each other one."""
+        return highest(self.from_above, one)
+
+    def meet(self, one: int, other: int, level: Fraction, clock: Clock) -> Meeting:
+        """Return the highest level that two rules reach at one point; see `meeting`."""
+        found = meet(self.from_below, one, other, level, clock)
+        if self.held is None or not self.is_held(one, other):
+            return found
+        above = meet(self.from_above, one, other, level, clock)
+        most = above.level.high
+        if isinstance(found.state, Witness):
+            state = self.held.certified(found.state)
+            return Meeting(Bounds(found.level.low, max(most, found.level.low)), state)
+        if most < level or isinstance(above.state, Proved):
+            state = above.state
+            if isinstance(state, Bracket):  # its point is one of the upper rules
+                state = replace(state, low=0.0, point=(), claims=())
+            return Meeting(Bounds(Fraction(0), most), state, above.is_touch)
+        # What is reached nearly is told, with its point.
+        easier = max(level - 4 * Fraction(self.held.gap), Fraction(0))
+        near = meet(self.from_below, one, other, easier, clock)
+        low = near.level.low if isinstance(near.state, Witness) else Fraction(0)
+        name = f"the highest level that rules {one} and {other} both reach"
+        ends = outwards(low)[0], outwards(most)[1]
+        state = Bracket(name, *ends, self.held.why)
+        if isinstance(near.state, Witness):
+            claim = Claim("reaches", rules=(one, other), level=str(Fraction(ends[0])))
+            state = replace(state, point=near.state.point, claims=(claim,))
+        return Meeting(Bounds(low, most), state)
+
+
+def sides_of(subject: Subject) -> Sides:
+    """Return a subject's rules from below and from above, on its domain."""
+    if subject.held is None:
+        given = ground(subject.rules, subject.domain)
+        return Sides(given, given)
+    lower, upper = subject.held.lower, subject.held.upper
+    return Sides(
+        ground(lower, subject.domain), ground(upper, subject.domain), subject.held
+    )
+
+
+def _renamed(clause: Clause) -> Clause:
+    return replace(clause, terms=tuple(f"{_BELOW}{term}" for term in clause.terms))
+
+
+def _terms(variable: Variable) -> Iterator[Term]:
+    """Yield the terms of a variable of the lower rules, under names of their own."""
+    for term in variable.terms:
+        yield replace(term, name=f"{_BELOW}{term.name}")
+
+
+def _places(variable: Variable, domain: Domain) -> FloatArray:
+    """Return the values of a variable at which its terms have points."""
+    low, high = span(variable, domain)
+    found = {
+        x
+        for term in variable.terms
+        if isinstance(term.shape, Points)
+        for x in term.shape.values
+        if low < x <= high
+    }
+    return np.array(sorted(found), np.float64)
+
+
+def _degrees(rules: RuleBase, name: str, at: FloatArray) -> tuple[FloatArray, ...]:
+    """Return bounds of what rules ask of a variable at some values of it."""
+    shapes, value = shapes_of(rules.variables), Value(at, None)
+    known: dict[Clause, Enclosure] = {}
+    low, high = (np.ones((len(rules.rules), len(at))) for _ in range(2))
+    is_product = rules.semantics.conjunction == "product"
+    for number, rule in enumerate(rules.rules):
+        whole = Enclosure(low[number], high[number])
+        for clause in rule.when:
+            if clause.variable != name:
+                continue
+            if clause not in known:
+                of = [degree_enclosure(shapes[name, t], value) for t in clause.terms]
+                known[clause] = clause_enclosure(clause, of)
+            whole = strength_enclosure(whole, known[clause], is_product=is_product)
+        low[number], high[number] = whole
+    return low, high

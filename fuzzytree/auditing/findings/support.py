@@ -1,0 +1,434 @@
+"""What rows say about rules, and which share of the domain something takes.
+
+Every answer to a row is the exact one (`fuzzytree.numerics.oracle.decide`): only which
+rows there are is left to chance, and the interval says how much that may change.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Final
+
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.states import Declined, Sampled
+from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.model.rulebase import Clause, RuleBase, shapes_of
+from fuzzytree.numerics.enclosures import (
+    Enclosure,
+    axis_value,
+    clause_enclosure,
+    degree_enclosure,
+)
+from fuzzytree.numerics.oracle import (
+    MISSING,
+    UNCOVERED,
+    Decided,
+    decide,
+    exact_answer,
+    exact_axis,
+    outwards,
+)
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.model.contracts import FloatArray, IntArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+CONFIDENCE: Final = 0.95
+"""Of every interval."""
+
+_STEP = 4096  # rows between two looks at the clock
+_MOST_DEGREES = 1 << 24  # of all clauses at points that are drawn
+_LEAST_ROWS = 1000  # that are drawn however many clauses there are
+
+
+def wilson(hits: int, rows: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Return Wilson's score interval of a share.
+
+    With z the quantile of the normal distribution and p = hits / rows its ends are
+    `(p + z^2 / 2n -+ z sqrt(p (1 - p) / n + z^2 / 4n^2)) / (1 + z^2 / n)`
+    (E. B. Wilson, 1927).
+
+    Args:
+        hits: In how many rows it holds.
+        rows: How many rows there are, at least 1.
+        confidence: In (0, 1).
+
+    Raises:
+        ValueError: If there is no such share.
+
+    Example:
+        >>> [round(end, 4) for end in wilson(0, 20)]
+        [0.0, 0.1611]
+    """
+    if not 0 <= hits <= rows or not rows:
+        raise ValueError(f"no share: {hits} of {rows}")
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"the confidence must lie in (0, 1), not {confidence!r}")
+    z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)
+    p, bottom = hits / rows, 1.0 + z * z / rows
+    middle = (p + z * z / (2.0 * rows)) / bottom
+    root = math.sqrt(p * (1.0 - p) / rows + z * z / (4.0 * rows * rows))
+    half = z * root / bottom
+    low = 0.0 if hits == 0 else max(middle - half, 0.0)
+    return low, 1.0 if hits == rows else min(middle + half, 1.0)
+
+
+def share(
+    of: str, hits: int, rows: int, how: str, confidence: float = CONFIDENCE
+) -> Sampled:
+    """Return a share that was counted in a sample, with its interval.
+
+    Args:
+        of: What was counted.
+        hits: In how many rows it holds.
+        rows: How many rows were looked at, at least 1.
+        how: Where they come from, with the seed if they were drawn.
+        confidence: Of the interval.
+
+    Raises:
+        ValueError: As `wilson`.
+    """
+    return Sampled(of, hits, rows, *wilson(hits, rows, confidence), confidence, how)
+
+
+def drawn(rules: RuleBase, domain: Domain, rows: int, seed: int) -> FloatArray:
+    """Return points drawn evenly from a domain.
+
+    Args:
+        rules: Whose inputs they are for.
+        domain: A side for each input. Points outside the side of a combination are
+            dropped.
+        rows: How many are drawn.
+        seed: The same seed gives the same points.
+
+    Returns:
+        Shape (inputs, points); fewer points than `rows`, perhaps none, where
+        combinations are limited.
+
+    Raises:
+        ValueError: If an input has no side.
+    """
+    chance = np.random.default_rng(seed)
+    table = np.empty((len(rules.inputs), rows))
+    for position, name in enumerate(rules.inputs):
+        side = domain.side(name)
+        if side is None:
+            raise ValueError(f"input {name!r} has no side in the domain")
+        u = chance.random(rows)
+        table[position] = np.clip(
+            side.low * (1.0 - u) + side.high * u, side.low, side.high
+        )
+    return table[:, ~outside(rules, domain, table)]
+
+
+def outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
+    """Return which rows have a finite value beyond a side; combinations exactly."""
+    beyond: BoolArray = np.zeros(values.shape[1], np.bool_)
+    known = np.isfinite(values).all(axis=0)
+    for variable in rules.variables:
+        side = domain.side(variable.name)
+        if side is None:
+            continue
+        if not variable.parts:
+            x = values[rules.inputs.index(variable.name)]
+            beyond |= (x < side.low) | (x > side.high)
+            continue
+        for row in np.flatnonzero(known & ~beyond).tolist():
+            named = dict(zip(rules.inputs, values[:, row].tolist(), strict=True))
+            beyond[row] = not side.low <= exact_axis(variable, named) <= side.high
+    return beyond
+
+
+class Counted(msgspec.Struct, frozen=True, eq=False):
+    """What the rules say about some rows.
+
+    Attributes:
+        rows: How many rows there are.
+        missing: In how many a value is missing; nothing else is counted of them.
+        fired: On how many rows each rule fires.
+        won: How many it wins: it is the first of the strongest.
+        right: How many of those have its class; None if no classes are known.
+        uncovered: Rows on which no rule fires.
+        weak: Rows on which no rule is as strong as epsilon, uncovered ones too.
+        tied: Covered rows whose strongest classes are equally strong.
+        close: Covered rows whose strongest classes differ by at most the margin.
+        outside: Rows with a value outside the domain.
+    """
+
+    rows: int
+    missing: int
+    fired: IntArray
+    won: IntArray
+    right: IntArray | None
+    uncovered: int
+    weak: int
+    tied: int
+    close: int
+    outside: int
+
+    @property
+    def known(self) -> int:
+        """The rows without a missing value."""
+        return self.rows - self.missing
+
+
+def counted(
+    subject: Subject, values: FloatArray, codes: IntArray | None = None
+) -> Counted:
+    """Count what the rules say about some rows.
+
+    Args:
+        subject: The rules, and what is taken for small.
+        values: Shape (inputs, rows).
+        codes: The number of each row's class, -1 if it has none of the model's.
+
+    Raises:
+        OutOfTimeError: If the budget is spent.
+    """
+    rules, settings = subject.rules, subject.settings
+    totals = dict.fromkeys(("missing", "uncovered", "weak", "tied", "close"), 0)
+    count = len(rules.rules)
+    fired, won, right = (np.zeros(count, np.int64) for _ in range(3))
+    owner = np.array([rules.classes.index(rule.then) for rule in rules.rules])
+    for start in range(0, values.shape[1], _STEP):
+        subject.clock.check()
+        part = values[:, start : start + _STEP]
+        found = decide(rules, part)
+        fires, is_weak, margin = _settled(subject, part, found)
+        is_known = found.status != MISSING
+        is_covered = is_known & (found.status != UNCOVERED)
+        fired += (fires & is_known).sum(axis=1)
+        won += np.bincount(found.rule, minlength=count + 1)[1:]
+        if codes is not None:
+            is_won = found.rule > 0
+            own = found.rule[is_won] - 1
+            is_right = codes[start : start + _STEP][is_won] == owner[own]
+            right += np.bincount(own[is_right], minlength=count)
+        totals["missing"] += int((~is_known).sum())
+        totals["uncovered"] += int((found.status == UNCOVERED).sum())
+        totals["weak"] += int((is_known & is_weak).sum())
+        totals["tied"] += int((is_covered & (margin == 0.0)).sum())
+        totals["close"] += int((is_covered & (margin <= settings.margin)).sum())
+    return Counted(
+        rows=values.shape[1],
+        fired=fired,
+        won=won,
+        right=None if codes is None else right,
+        outside=int(outside(rules, subject.domain, values).sum()),
+        **totals,
+    )
+
+
+def _settled(
+    subject: Subject, values: FloatArray, found: Decided
+) -> tuple[BoolArray, BoolArray, FloatArray]:
+    """Settle by fractions what the doubts of some answers leave open.
+
+    Returns:
+        Shape (rules, rows): whether a rule is above 0. Shape (rows,): whether all of
+        them are below epsilon. Shape (rows,): a margin that is 0 only where the exact
+        one is, and on the same side of the settings' margin.
+    """
+    rules, settings = subject.rules, subject.settings
+    assert found.strengths is not None  # it was asked for
+    best = found.strengths.max(axis=0)
+    fires, may_fire = _firing(rules, values)
+    is_weak = best < settings.epsilon
+    margin = found.margin.copy()
+    is_open = (fires != may_fire).any(axis=0)
+    is_open |= np.abs(best - settings.epsilon) <= found.doubt
+    for limit in (0.0, settings.margin):
+        is_open |= (found.margin <= limit) & (found.margin_high > limit)
+    is_open &= found.status != MISSING
+    for row in np.flatnonzero(is_open).tolist():
+        subject.clock.check()
+        named = dict(zip(rules.inputs, values[:, row].tolist(), strict=True))
+        answer = exact_answer(rules, named)
+        fires[:, row] = [strength > 0 for strength in answer.strengths]
+        is_weak[row] = max(answer.strengths) < Fraction(settings.epsilon)
+        low, high = outwards(answer.margin)
+        is_within = answer.margin <= Fraction(settings.margin)
+        margin[row] = low if is_within and (low or not answer.margin) else high
+    return fires, is_weak, margin
+
+
+def _firing(rules: RuleBase, values: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Return which rules are above 0 for sure, and which may be: all clauses are."""
+    named = dict(zip(rules.inputs, values, strict=True))
+    shapes = shapes_of(rules.variables)
+    known: dict[Clause, Enclosure] = {}
+    fires: BoolArray = np.ones((len(rules.rules), values.shape[1]), np.bool_)
+    may_fire = fires.copy()
+    with np.errstate(all="ignore"):
+        axes = {v.name: axis_value(v, named) for v in rules.variables}
+        for position, rule in enumerate(rules.rules):
+            for clause in rule.when:
+                if clause not in known:
+                    x = axes[clause.variable]
+                    found = [
+                        degree_enclosure(shapes[clause.variable, term], x)
+                        for term in clause.terms
+                    ]
+                    known[clause] = clause_enclosure(clause, found)
+                fires[position] &= known[clause].low > 0.0
+                may_fire[position] &= known[clause].high > 0.0
+    return fires, may_fire
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Ask what the rows say about each rule, and which shares of the domain are weak.
+
+    Raises:
+        OutOfTimeError: If the budget is spent.
+    """
+    if subject.rows is None:
+        reason = "rows are needed (--data TABLE)"
+        text = f"what rows say about the rules is not known: {reason}"
+        yield Answer("FT701", "rows", text, Declined("FTD06", reason), is_finding=False)
+    else:
+        yield from _of_rows(subject, subject.rows)
+    yield from _of_domain(subject)
+
+
+def _of_rows(subject: Subject, rows: Rows) -> Iterator[Answer]:
+    """Yield what the user's rows say, of all rules together and of each."""
+    codes = None if subject.system else rows.codes  # a view has classes of its own
+    found, most = _both(subject, rows.values, codes)
+    how = f"every row of {rows.name}"
+    total = found.rows
+    for name, hits, text in (
+        ("rows with a missing value", found.missing, "a value is missing"),
+        ("rows outside the domain", found.outside, "a value is outside the domain"),
+    ):
+        state = share(name, hits, total, how)
+        sentence = f"on {hits} of {total} rows {text}"
+        yield Answer("FT701", name, sentence, state, is_finding=hits > 0)
+    if not found.known:
+        return
+    if found.missing:
+        how += " without a missing value"
+    for answer in _shares(subject, (found, most), "rows", how):
+        is_finding = isinstance(answer.state, Sampled) and answer.state.hits > 0
+        yield msgspec.structs.replace(answer, is_finding=is_finding)
+    for number in range(1, len(subject.rules.rules) + 1):
+        fired = int(most.fired[number - 1])
+        if fired > found.fired[number - 1]:
+            yield _nearly_fired(subject, found, number, fired)
+            continue
+        yield _of_rule(subject, found, number, how)
+
+
+def _of_domain(subject: Subject) -> Iterator[Answer]:
+    """Yield which shares of the domain's volume are uncovered, weak, tied, close."""
+    settings = subject.settings
+    clauses = sum(len(rule.when) for rule in subject.rules.rules)
+    rows = min(settings.rows, max(_MOST_DEGREES // max(clauses, 1), _LEAST_ROWS))
+    points = drawn(subject.rules, subject.domain, rows, settings.seed)
+    if not points.shape[1]:
+        reason = "no drawn point lies within the sides of the combinations"
+        text = f"shares of the domain are not known: {reason}"
+        yield Answer("FT701", "domain", text, Declined("FTD04", reason), False)
+        return
+    found, most = _both(subject, points)
+    how = f"points drawn evenly from the domain, seed {settings.seed}"
+    if found.known:  # a combination may overflow everywhere
+        yield from _shares(subject, (found, most), "points", how)
+
+
+def _both(
+    subject: Subject, values: FloatArray, codes: IntArray | None = None
+) -> tuple[Counted, Counted]:
+    """Count what the rules say from below, and from above; see `counted`."""
+    if subject.held is None:
+        found = counted(subject, values, codes)
+        return found, found
+    lower, upper = (
+        msgspec.structs.replace(subject, rules=rules)
+        for rules in (subject.held.lower, subject.held.upper)
+    )
+    return counted(lower, values, codes), counted(upper, values, codes)
+
+
+def _nearly_fired(subject: Subject, found: Counted, number: int, most: int) -> Answer:
+    """Return on how many rows a rule fires, as far as its curves are known."""
+    name, least = subject.rule_name(number), int(found.fired[number - 1])
+    reason = f"it fires on {least} of {found.known} at least, and on {most} at most"
+    sentence = f"on how many rows {name} fires is not decided: {reason}"
+    return Answer("FT701", name, sentence, Declined("FTD02", reason), is_finding=False)
+
+
+def _shares(
+    subject: Subject, counts: tuple[Counted, Counted], noun: str, how: str
+) -> Iterator[Answer]:
+    """Yield in which share of some rows or points the rules are weak or undecided."""
+    found, most = counts
+    settings, total = subject.settings, found.known
+    questions = [
+        ("uncovered", found.uncovered, "no rule fires"),
+        ("weak", found.weak, f"no rule reaches {settings.epsilon!r}"),
+    ]
+    for name, fewest in (("uncovered", most.uncovered), ("weak", most.weak)):
+        hits = next(h for n, h, _ in questions if n == name)
+        if fewest < hits and subject.is_whole:
+            reason = f"there are {fewest} at least, and {hits} at most"
+            text = f"how many {noun} are {name} is not decided: {reason}"
+            unknown = Declined("FTD02", reason)
+            yield Answer("FT701", f"{name} {noun}", text, unknown, False)
+            questions = [one for one in questions if one[0] != name]
+    if not subject.is_whole:
+        reason = "rules are left out, and they may cover what the others do not"
+        text = f"how many {noun} are covered is not known: {reason}"
+        name = f"covered {noun}"
+        yield Answer("FT701", name, text, Declined("FTD07", reason), False)
+        questions.clear()
+    if subject.policy.decision == "strongest":
+        margin = f"the two strongest classes are at most {settings.margin!r} apart"
+        questions += [
+            ("tied", found.tied, "rules of two classes tie"),
+            ("close", found.close, margin),
+        ]
+    for name, hits, text in questions:
+        state = share(f"{name} {noun}", hits, total, how)
+        sentence = f"on {hits} of {total} {noun} {text}"
+        yield Answer("FT701", f"{name} {noun}", sentence, state, is_finding=False)
+
+
+def _of_rule(subject: Subject, found: Counted, number: int, how: str) -> Answer:
+    """Return on how many rows a rule fires, how many it wins, and how many rightly."""
+    name, total = subject.rule_name(number), found.known
+    fired, won = int(found.fired[number - 1]), int(found.won[number - 1])
+    label = subject.rules.rules[number - 1].then
+    sentence = f"{name} fires on {fired or 'none'} of {total} rows"
+    measures = [Measure("rows fired", fired)]
+    state = share(f"rows on which {name} fires", fired, total, how)
+    is_finding = not fired
+    if subject.policy.decision == "strongest":
+        is_finding = not won
+        measures.append(Measure("rows won", won))
+        state = share(f"rows that {name} wins", won, total, how)
+        sentence += f" and wins {won or 'none'}" if fired else ""
+        if found.right is not None and won:
+            right = int(found.right[number - 1])
+            measures.append(Measure("rows won rightly", right))
+            of = f"rows that {name} wins and that have its class"
+            state = share(of, right, won, f"of {how}, those that it wins")
+            sentence += f"; {right} of these have its class {label!r}"
+    return Answer(
+        "FT701",
+        name,
+        sentence,
+        state,
+        is_finding=is_finding,
+        rules=(number,),
+        measures=tuple(measures),
+    )

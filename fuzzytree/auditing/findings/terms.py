@@ -1,0 +1,206 @@
+"""Questions about terms: are they reached, and used?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+
+from fuzzytree.auditing.engine.curves import pieces
+from fuzzytree.auditing.engine.elements import Element
+from fuzzytree.auditing.engine.measures import Bounds, heights
+from fuzzytree.auditing.engine.states import Bracket, Proved
+from fuzzytree.auditing.engine.wording import counted, short
+from fuzzytree.auditing.findings.ranges import (
+    Range,
+    labels_of,
+    measure,
+    term_name,
+    whole_ranges,
+)
+from fuzzytree.auditing.findings.records import Answer, Label, Measure
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.model.rulebase import Term
+from fuzzytree.model.system import questions
+from fuzzytree.numerics.exact import outwards
+
+
+def answers(subject: Subject) -> Iterator[Answer]:
+    """Answer whether terms are reached, and used."""
+    yield from _unused(subject)
+    yield from _heights(subject, whole_ranges(subject))
+
+
+# --- FT401: is the term reached?
+
+
+def _heights(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
+    level = Fraction(subject.settings.level)
+    held = subject.held.terms if subject.held else {}
+    clean, lowest = 0, Fraction(1)
+    for of in whole:
+        for term in of.variable.terms:
+            subject.clock.check()
+            lines = held.get((of.variable.name, term.name))
+            if lines is None and _is_full(of, term):
+                clean += 1
+                continue
+            made = of.line(term)
+            ((height, at),) = heights(made)
+            if lines is not None:
+                upper = of.line(Term(term.name, lines.upper))
+                height = Bounds(height.low, heights(upper)[0][0].high)
+            if height.low >= level:
+                clean, lowest = clean + 1, min(lowest, height.low)
+            elif lines is not None and height.high:
+                yield _low_curve(of, term, height, is_low=height.high < level)
+            else:
+                yield _low_term(of, term, height, at, len(made.cells.rank))
+    if clean:
+        terms = "1 term reaches" if clean == 1 else f"{clean} terms reach"
+        yield Answer(
+            "FT401",
+            "terms",
+            f"{terms} a degree of {short(level)} or more",
+            Proved(f"the height of {clean} terms was found"),
+            is_finding=False,
+            measures=(Measure("lowest height", float(lowest), str(lowest)),),
+        )
+
+
+def _is_full(of: Range, term: Term) -> bool:
+    """Return whether a curve is 1 where one of its pieces ends, or the range does."""
+    curve = Element(term.shape)
+    ends = {of.low, of.high}
+    for piece in pieces(term.shape):
+        ends.update(end for end in (piece.low, piece.high) if end is not None)
+    return any(
+        curve.degree(end) == 1
+        for end in ends
+        if of.low <= end <= of.high and not (of.is_open and end == of.low)
+    )
+
+
+def _low_term(
+    of: Range, term: Term, height: Bounds, at: Fraction, cells: int
+) -> Answer:
+    name = term_name(of.variable, term)
+    where = f"from {short(of.low)} to {short(of.high)}"
+    text = f"its largest degree {where} is {short(height.nearest)}, at {short(at)}"
+    sentence = f"{name} is hardly reached: {text}"
+    if not height.high:
+        sentence = f"{name} is empty: its degree is 0 {where}"
+    return Answer(
+        "FT401",
+        name,
+        sentence,
+        Proved(
+            f"its curve was visited in {counted(cells, 'stretch', 'stretches')}, in "
+            "each of which it is monotone"
+        ),
+        is_finding=True,
+        severity="warning" if height.high else "error",
+        terms=labels_of(of, term),
+        measures=(measure("height", height),),
+    )
+
+
+def _low_curve(of: Range, term: Term, height: Bounds, *, is_low: bool) -> Answer:
+    """Return that a curve that is held between lines is hardly reached, or may be."""
+    name = term_name(of.variable, term)
+    low, high = outwards(height.low)[0], outwards(height.high)[1]
+    where = f"from {short(of.low)} to {short(of.high)}"
+    begins = "is hardly reached" if is_low else "may hardly be reached"
+    largest = f"its largest degree {where}"
+    why = "its curve was held between two lines of points"
+    return Answer(
+        "FT401",
+        name,
+        f"{name} {begins}: {largest} lies between {short(low)} and {short(high)}",
+        Bracket(f"the largest degree of {name}", low, high, why),
+        is_finding=is_low,
+        severity="warning",
+        terms=labels_of(of, term),
+        measures=(Measure("height at least", low), Measure("height at most", high)),
+    )
+
+
+# --- FT404: is it used?
+
+
+def _unused(subject: Subject) -> Iterator[Answer]:
+    terms, variables, clauses = _inventory(subject)
+    asked = set(clauses)
+    needed = {variable for variable, _ in asked}
+    for variable in subject.rules.variables:
+        if variable.name in needed:
+            needed.update(part.input for part in variable.parts)
+    proof = Proved(f"{counted(len(clauses), 'question')} of all rules read")
+    for name in variables:
+        if name not in needed:
+            yield Answer(
+                "FT404",
+                f"variable {name!r}",
+                f"no rule asks variable {name!r}",
+                proof,
+                is_finding=True,
+                severity="info",
+                terms=tuple(Label(name, term) for of, term in terms if of == name),
+            )
+    idle = [one for one in terms if one[0] in needed and one not in asked]
+    for name, term in idle:
+        yield Answer(
+            "FT404",
+            f"term {term!r} of {name!r}",
+            f"no rule asks term {term!r} of {name!r}",
+            proof,
+            is_finding=True,
+            severity="info",
+            terms=(Label(name, term),),
+        )
+    counts = (
+        sum(name in needed for name in variables),
+        sum(one in asked for one in terms),
+    )
+    yield Answer(
+        "FT404",
+        "terms and variables",
+        f"rules ask {counted(counts[0], 'variable')} and {counted(counts[1], 'term')}",
+        proof,
+        is_finding=False,
+        measures=(
+            Measure("variables in use", counts[0]),
+            Measure("terms in use", counts[1]),
+        ),
+    )
+
+
+def _inventory(
+    subject: Subject,
+) -> tuple[list[tuple[str, str]], list[str], list[tuple[str, str]]]:
+    """Return all terms, all variables, and what rules ask, question by question.
+
+    Of a system whose rules all take part the system itself is read: its view may lack
+    rules and terms.
+    """
+    system = subject.system
+    if system is not None and subject.policy.decision == "all":
+        return (
+            [(one.name, label.name) for one in system.inputs for label in one.labels],
+            [one.name for one in system.inputs],
+            [
+                (question.variable, question.label or "")
+                for block in system.blocks
+                for rule in block.rules
+                for question in questions(rule.when)
+            ],
+        )
+    return (
+        [(v.name, term.name) for v in subject.rules.variables for term in v.terms],
+        [v.name for v in subject.rules.variables],
+        [
+            (clause.variable, term)
+            for rule in subject.rules.rules
+            for clause in rule.when
+            for term in clause.terms
+        ],
+    )

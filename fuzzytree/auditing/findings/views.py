@@ -1,0 +1,288 @@
+"""What an audit asks about: a model's rules, as a rule base with all its meaning.
+
+Rule bases and trees are asked as they are. A fuzzy system that only stands for a rule
+base of ours is asked as that one. Of any other system a *view* is made: its conditions
+as rules whose classes are the texts of what they conclude. A rule that asks `a and (b
+or c)` becomes two rules, one for each way in which it can hold: under minimum or
+product, and maximum, its strength is that of the stronger one, exactly. A curve
+without an exact counterpart is held between two lines of points, and a weight is part
+of a rule (`fuzzytree.auditing.findings.held`). What has no place here is left out, and
+an answer says so for each term and each rule.
+
+A view tells how strongly conditions hold, at every double. What outputs make of it,
+their curves and numbers, is not part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import msgspec
+
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import Declined, Proved
+from fuzzytree.auditing.findings.conditions import (
+    MOST_QUESTIONS,
+    NORMS,
+    Conditions,
+    DecliningError,
+    Way,
+    decline,
+)
+from fuzzytree.auditing.findings.held import Held, held
+from fuzzytree.auditing.findings.records import Answer, Policy
+from fuzzytree.auditing.findings.system_terms import Terms, ranges_of, terms_of
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import Conjunction, Rule, RuleBase, Semantics
+from fuzzytree.model.system import (
+    And,
+    Conclusion,
+    FuzzySystem,
+    RuleBlock,
+    SystemInput,
+    SystemRule,
+    joints,
+    questions,
+)
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.conversion import as_rules
+from fuzzytree.semantics.lowering import rules_from_tree
+
+
+class View(msgspec.Struct, frozen=True, eq=False):
+    """A model's rules as they are audited.
+
+    Attributes:
+        rules: The rules as people read them, without weights, each curve that is held
+            between lines as the lower one; None if not one rule of a system could be
+            taken over.
+        policy: How they decide.
+        domain: Where they are asked: where inputs are moved into their range, not
+            beyond it.
+        tree: The tree they come from.
+        raw: Its raw rules, if it has fitted sets.
+        system: The system they come from.
+        places: What to call each rule, such as `rule 2 of block 1`; empty where rules
+            are simply numbered.
+        numbers: The number in the model of each rule, from 1, over all blocks.
+        declined: What was left out, and why; and rules that can never fire.
+        left_out: The number in the model of each rule that is named there.
+        is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
+            the view fires another one may.
+        held: The rules from below and from above; None if they are plain.
+    """
+
+    rules: RuleBase | None
+    policy: Policy
+    domain: Domain
+    tree: FuzzyTree | None = None
+    raw: RuleBase | None = None
+    system: FuzzySystem | None = None
+    places: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
+    declined: tuple[Answer, ...] = ()
+    is_whole: bool = True
+    held: Held | None = None
+    left_out: Mapping[str, int] = {}
+
+
+def view(model: Document, domain: Domain) -> View:
+    """Return the rules of a model as they are audited.
+
+    Args:
+        model: A tree: its relative rules, which decide as it does. A rule base: itself.
+            A system: the rule base it stands for, or a view of it.
+        domain: Where everything is to be asked.
+
+    Example:
+        >>> from fuzzytree.testing import random_system
+        >>> found = view(random_system(3), Domain(()))
+        >>> found.policy.decision, found.rules is None or len(found.numbers) > 0
+        ('all', True)
+    """
+    match model:
+        case RuleBase():
+            return _of_rules(model, domain)
+        case FuzzyTree():
+            raw = rules_from_tree(model, "raw") if model.sets else None
+            whole = _of_rules(rules_from_tree(model), domain)
+            return msgspec.structs.replace(whole, tree=model, raw=raw)
+        case FuzzySystem():
+            rules = as_rules(model)
+            if rules is None:
+                return _of_system(model, domain)
+            return msgspec.structs.replace(_of_rules(rules, domain), system=model)
+
+
+def _of_rules(rules: RuleBase, domain: Domain) -> View:
+    meant = rules.semantics
+    policy = Policy(meant.conjunction, "strongest", meant.uncovered, meant.missing)
+    numbers = tuple(range(1, len(rules.rules) + 1))
+    return View(rules, policy, domain, numbers=numbers)
+
+
+# --- systems
+
+
+def _of_system(system: FuzzySystem, domain: Domain) -> View:
+    conjunction = _conjunction(system)
+    sides, moved = _within(system, domain)
+    ranges = ranges_of(system, sides)
+    terms, declined = terms_of(system, ranges)
+    taken = _Taken(conjunction, terms, [*moved, *declined])
+    number = 0
+    for position, block in enumerate(system.blocks, 1):
+        if block.activation.method != "general":
+            taken.note_activation(position, block)
+        for index, rule in enumerate(block.rules, 1):
+            number += 1
+            of_block = f" of block {position}" if len(system.blocks) > 1 else ""
+            taken.take(f"rule {index}{of_block}", number, rule, block)
+    rules = both = None
+    if taken.rules:
+        rules = RuleBase(
+            system.name,
+            tuple(dict.fromkeys(rule.then for rule in taken.rules)),
+            tuple(terms.variable(one) for one in system.inputs),
+            tuple(taken.rules),
+            Semantics(conjunction),
+        )
+        both = held(rules, taken.weights, {**terms.held, **terms.made}, ranges)
+    return View(
+        rules,
+        Policy(conjunction, "all"),
+        sides,
+        system=system,
+        places=tuple(taken.places),
+        numbers=tuple(taken.numbers),
+        declined=tuple(taken.answers),
+        left_out=taken.left_out,
+        is_whole=taken.is_whole,
+        held=both,
+    )
+
+
+def _conjunction(system: FuzzySystem) -> Conjunction:
+    """Return the AND of most rules that have one, of those with an exact method."""
+    counts: dict[Conjunction, int] = {"min": 0, "product": 0}
+    for block in system.blocks:
+        norm = NORMS.get(block.conjunction)
+        if norm:
+            counts[norm] += sum(And in joints(rule.when) for rule in block.rules)
+    return "product" if counts["product"] > counts["min"] else "min"
+
+
+def _within(system: FuzzySystem, domain: Domain) -> tuple[Domain, list[Answer]]:
+    """Return the domain within the ranges that inputs are moved into."""
+    clipped = {one.name: one for one in system.inputs if one.clips and not one.parts}
+    sides: list[Side] = []
+    answers: list[Answer] = []
+    for side in domain.sides:
+        one = clipped.get(side.variable)
+        low, high = side.low, side.high
+        if one is not None:
+            low, high = _moved(one, low), _moved(one, high)
+        if (low, high) != (side.low, side.high):
+            answers.append(
+                _declined(
+                    "FTD07",
+                    f"input {side.variable!r}",
+                    f"values outside its range are moved to its ends, so it is asked "
+                    f"from {low!r} to {high!r}",
+                )
+            )
+            side = msgspec.structs.replace(side, low=low, high=high)
+        sides.append(side)
+    return Domain(tuple(sides)), answers
+
+
+def _moved(one: SystemInput, value: float) -> float:
+    value = value if one.low is None else max(value, one.low)
+    return value if one.high is None else min(value, one.high)
+
+
+def _declined(code: str, subject: str, reason: str) -> Answer:
+    sentence = f"{subject} is not taken over: {reason}"
+    return Answer(code, subject, sentence, Declined(code, reason), is_finding=False)
+
+
+class _Taken:
+    """The rules that were taken over so far, and what was left out."""
+
+    def __init__(
+        self, conjunction: Conjunction, terms: Terms, answers: list[Answer]
+    ) -> None:
+        self.conjunction: Conjunction = conjunction
+        self.terms = terms
+        self.answers = answers
+        self.rules: list[Rule] = []
+        self.weights: list[float] = []
+        self.places: list[str] = []
+        self.numbers: list[int] = []
+        self.left_out: dict[str, int] = {}
+        self.is_whole = True
+
+    def note_activation(self, position: int, block: RuleBlock) -> None:
+        """Note that a block activates only some of the rules that fire."""
+        subject = f"the activation of block {position}"
+        reason = f"it is {block.activation.method!r}; only conditions are asked"
+        self.answers.append(_declined("FTD07", subject, reason))
+
+    def take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
+        """Take over a rule, or note why not."""
+        taken = len(self.rules)
+        self._take(name, number, rule, block)
+        if len(self.rules) == taken:
+            self.left_out[name] = number
+
+    def _take(self, name: str, number: int, rule: SystemRule, block: RuleBlock) -> None:
+        if rule.weight == 0.0:
+            self._never(name, "its weight is 0")
+            return
+        try:
+            if sum(1 for _ in questions(rule.when)) > MOST_QUESTIONS:
+                decline("FTD05", f"it asks more than {MOST_QUESTIONS} questions")
+            if rule.weight != 1.0 and not self.terms.plain:
+                decline("FTD07", "there is no input that its weight could stand for")
+            ways = Conditions(self.conjunction, self.terms, block).ways(rule.when)
+            if rule.weight != 1.0 and self.conjunction == "min":
+                self._check_weight(ways)
+        except DecliningError as error:
+            self.is_whole = False
+            self.answers.append(_declined(error.code, name, error.reason))
+            return
+        if not ways:
+            self._never(name, "its condition is never true")
+        for position, way in enumerate(ways, 1):
+            self.rules.append(Rule(way, _text(rule.then)))
+            self.weights.append(rule.weight)
+            self.places.append(name if len(ways) == 1 else f"way {position} of {name}")
+            self.numbers.append(number)
+
+    def _check_weight(self, ways: Iterable[Way]) -> None:
+        """Refuse a weight on a curve that has no points in its place.
+
+        Raises:
+            DecliningError: If there is one.
+        """
+        for clause in dict.fromkeys(clause for way in ways for clause in way):
+            for term in clause.terms:
+                if self.terms.pointed(clause.variable, term) is None:
+                    text = (
+                        f"{term!r} of {clause.variable!r} has no points to be weighted"
+                    )
+                    decline("FTD07", f"the curve of {text}")
+
+    def _never(self, name: str, why: str) -> None:
+        sentence = f"{name} never fires: {why}"
+        proof = Proved("read off the rule; no input was needed")
+        self.answers.append(
+            Answer("FT101", name, sentence, proof, is_finding=True, severity="error")
+        )
+
+
+def _text(then: Iterable[Conclusion]) -> str:
+    """Return what a rule concludes, as people read it."""
+    return " and ".join(
+        " ".join((one.output, "is", *one.hedges, one.label)) for one in then
+    )

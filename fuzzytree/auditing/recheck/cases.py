@@ -1,0 +1,293 @@
+"""An audit beside its model, and what every question about the two needs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+
+from fuzzytree.auditing.recheck.areas import height, shared
+from fuzzytree.auditing.recheck.audit_records import (
+    Answer,
+    Audit,
+    Label,
+    Measure,
+    fraction,
+)
+from fuzzytree.auditing.recheck.cells import Line
+from fuzzytree.auditing.recheck.enclosing import Between
+from fuzzytree.auditing.recheck.grid import Asked, Grid
+from fuzzytree.auditing.recheck.meaning import Point, strengths
+from fuzzytree.auditing.recheck.model_records import (
+    Model,
+    Rules,
+    System,
+    Tree,
+    Variable,
+)
+from fuzzytree.auditing.recheck.outcomes import (
+    DoesNotHoldError,
+    UndecidedError,
+    require,
+)
+from fuzzytree.auditing.recheck.places import Place, Places
+from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
+from fuzzytree.auditing.recheck.ties import Ties
+from fuzzytree.auditing.recheck.trees import Steps, paths, rules_of
+from fuzzytree.auditing.recheck.views import View
+
+NEAR = Fraction(1, 10**6)
+"""How far a highest common level that is told as one number may be above it."""
+
+LEVELS = (
+    *("highest common level", "highest common level at most"),
+    *("strength where it is least, at least", "strength where it is least, at most"),
+)
+"""The measures that are degrees which rules reach, or do not."""
+
+
+def level_of(measure: Measure) -> Fraction:
+    """Return the number of a measure."""
+    return Fraction(measure.value) if measure.exact is None else fraction(measure.exact)
+
+
+def end_of(measure: Measure) -> Fraction:
+    """Return the most that a measure can mean: one that is not exact is near."""
+    is_near = measure.name == "highest common level" and measure.exact is None
+    return level_of(measure) + (NEAR if is_near else 0)
+
+
+class Case:
+    """An audit and its model in every form.
+
+    Attributes:
+        rules: The rules of the model; of a tree, its relative ones; of a system, the
+            ways of its conditions.
+        view: A system as it is audited; None for what is none.
+        weights: What the strength of each rule is multiplied by.
+        terms: The terms that are asked about.
+        carriers: Everything that a claim can be of, by name.
+        variables: The variables of the model by name.
+        sides: The sides of the domain by name.
+        is_free: Whether no variable is a combination of others.
+        numbers: The numbers of the rules, from 1.
+    """
+
+    def __init__(
+        self, audit: Audit, model: Model | System, places: Places | None = None
+    ) -> None:
+        self.places = places or Places({})
+        self.has_places = places is not None and any(a.places for a in audit.answers)
+        self.view: View | None = None
+        if isinstance(model, System):
+            self.view = View(model, audit)
+            model = self.view.rules
+        self.audit, self.model = audit, model
+        self.carriers: dict[str, Model] = {}
+        if isinstance(model, Tree):
+            self.rules = rules_of(model, "relative")
+            self.carriers = {"tree": model}
+            if model.sets:
+                self.carriers["raw rules"] = rules_of(model, "raw")
+        else:
+            self.rules = model
+        self.carriers["rules"] = self.rules
+        self.variables = {v.name: v for v in model.variables}
+        self.sides = {side.variable: side for side in audit.domain.sides}
+        self.is_free = not any(v.parts for v in model.variables)
+        self.numbers = range(1, len(self.rules.rules) + 1)
+        self.weights = [ONE] * len(self.numbers)
+        self.terms = [
+            Label(v.name, t.name) for v in self.rules.variables for t in v.terms
+        ]
+        if self.view is not None:
+            self.weights = [owner.weight for owner in self.view.owners]
+            self.terms = self.view.labels
+
+    @property
+    def grid(self) -> Grid:
+        """The rules in cells.
+
+        Raises:
+            UndecidedError: If these are too many, or a rule is not made of clauses.
+        """
+        if isinstance(self._grid, UndecidedError):
+            raise self._grid
+        return self._grid
+
+    @cached_property
+    def ties(self) -> Ties:
+        """The pairs of rules that tie."""
+        if self.rules.semantics.conjunction != "min":
+            raise UndecidedError("ties under product are not decided again here")
+        return Ties(self.grid)
+
+    @cached_property
+    def _grid(self) -> Grid | UndecidedError:
+        try:
+            return self._made()
+        except UndecidedError as error:  # known once, for every question
+            return error
+
+    def _made(self) -> Grid:
+        when = zip(self.rules.rules, self.weights, strict=True)
+        if not all(weight == 1 or rule.when for rule, weight in when):
+            raise UndecidedError("a rule without clauses is not weighted here")
+        if self.view is not None and not self.view.is_plain:
+            raise UndecidedError("a condition does not hold by its ways")
+        settings = self.audit.settings
+        lines = {v.name: self.line(v) for v in self.rules.variables}
+        levels = [Fraction(settings.epsilon), Fraction(settings.level)]
+        asked = (*self.coded("FT201"), *self.coded("FT301"))
+        told = (one for answer in asked for one in answer.measures)
+        levels += [end_of(m) for m in told if m.name in LEVELS and 0 <= m.value <= 1]
+        return Grid(self.rules, lines, levels, self.weights)
+
+    @cached_property
+    def paths(self) -> dict[int, Steps]:
+        """The path to each leaf."""
+        return dict(paths(self.model)) if isinstance(self.model, Tree) else {}
+
+    @cached_property
+    def heights(self) -> dict[Label, Fraction]:
+        """The largest degree of each term on the domain."""
+        level = Fraction(self.audit.settings.level)
+        return {
+            Label(v.name, term.name): height(term.shape, self.line(v), level)
+            for v in self.rules.variables
+            for term in v.terms
+            if Label(v.name, term.name) in self.terms
+        }
+
+    @cached_property
+    def shares(self) -> dict[tuple[Label, ...], tuple[Fraction, Fraction] | None]:
+        """The shared area of each pair of terms of a variable; None without area."""
+        return {
+            (Label(v.name, a.name), Label(v.name, b.name)): shared(
+                a.shape, b.shape, self.line(v)
+            )
+            for v in self.rules.variables
+            for a, b in itertools.combinations(v.terms, 2)
+            if {Label(v.name, a.name), Label(v.name, b.name)} <= {*self.terms}
+        }
+
+    def line(self, variable: Variable) -> Line:
+        """Return a variable's values in the domain; of a combination, at most these."""
+        side = self.sides.get(variable.name)
+        if not variable.parts and side is not None:
+            return Line(Fraction(side.low), Fraction(side.high))
+        low = high = ZERO
+        weights = dict.fromkeys((part.input for part in variable.parts), ZERO)
+        for part in variable.parts:  # an input may stand several times
+            weight = Fraction(part.weight)
+            weights[part.input] += weight
+            low, high = (end - weight * Fraction(part.centre) for end in (low, high))
+        for name, weight in weights.items():
+            one = self.sides.get(name)
+            if one is None:
+                text = f"the domain has no side {name!r}, which {variable.name!r} needs"
+                raise DoesNotHoldError(text)
+            ends = [weight * Fraction(end) for end in (one.low, one.high)]
+            low, high = low + min(ends), high + max(ends)
+        if side is not None:
+            low, high = max(low, Fraction(side.low)), min(high, Fraction(side.high))
+        return Line(low, high)
+
+    def coded(self, code: str) -> list[Answer]:
+        """Return the answers of a code."""
+        return [one for one in self.audit.answers if one.code == code]
+
+    def then(self, number: int) -> str:
+        """Return the class of a rule."""
+        return self.rules.rules[number - 1].then
+
+    @property
+    def default(self) -> str:
+        """How sentences call the answer where no rule fires."""
+        if self.view is not None:
+            return "what the outputs have by default"
+        label = self.rules.semantics.uncovered
+        return "no class" if label is None else repr(label)
+
+    def placed(self, answer: Answer) -> list[Place]:
+        """Return where the rules and terms of an answer stand, in that order."""
+        owners = self.view.owners if self.view else ()
+        numbers = [owners[n - 1].number if owners else n - 1 for n in answer.rules]
+        if self.view and not numbers:
+            numbers = self.view.absent(answer.subject)
+        found = [self.places.rules[number] for number in numbers]
+        found += [self.places.terms[label] for label in answer.terms]
+        return [*dict.fromkeys(found)]
+
+    def name(self, number: int) -> str:
+        """Return what answers call a rule."""
+        return self.view.names[number - 1] if self.view else f"rule {number}"
+
+    def asked(self, number: int) -> Asked:
+        """Return what a rule asks of each axis."""
+        return self.grid.of[number - 1]
+
+    def differ(self, numbers: Sequence[int]) -> None:
+        """Refuse rules that are not of two classes."""
+        classes = {self.then(number) for number in numbers}
+        require(len(classes) == 2, "the rules are of one class")
+
+    def pairs(self, *, alike: bool) -> list[tuple[int, int]]:
+        """Return the pairs of rules of one class, or of two."""
+        every = itertools.combinations(self.numbers, 2)
+        found = [p for p in every if (self.then(p[0]) == self.then(p[1])) is alike]
+        return [p for p in found if not self.is_one(*p)]
+
+    def is_one(self, one: int, other: int) -> bool:
+        """Return whether two rules are ways of one rule of a system."""
+        owners = self.view.owners if self.view else ()
+        return bool(owners) and owners[one - 1] is owners[other - 1]
+
+    def strengths(
+        self, rules: Rules, point: Point, numbers: Iterable[int]
+    ) -> dict[int, Between]:
+        """Return between which numbers the strengths of some rules lie."""
+        if self.view is not None:
+            return self.view.strengths(point, numbers)
+        known = [*dict.fromkeys(numbers)]
+        some = tuple(rules.rules[number - 1] for number in known)
+        found = strengths(rules._replace(rules=some), point)
+        return {n: (one, one) for n, one in zip(known, found, strict=True)}
+
+    def fire(self, *numbers: int) -> bool:
+        """Return whether each of some rules fires somewhere."""
+        return all(self.grid.fires(self.asked(n)) for n in numbers)
+
+    def beats(self, mine: Asked, rivals: Sequence[Asked]) -> bool:
+        """Return whether a rule is somewhere stronger than each rival.
+
+        Raises:
+            UndecidedError: If that cannot be told here.
+        """
+        if self.rules.semantics.conjunction == "min":
+            return self.grid.wins(mine, rivals)
+        if any(self.grid.is_below(mine, rival) for rival in rivals):
+            return False
+        text = "under product only one rule that hides another is seen here"
+        raise UndecidedError(text)
+
+    def tie(self, one: int, other: int) -> bool:
+        """Return whether two rules tie as the strongest, on more than a surface."""
+        rivals = [self.asked(n) for n in self.numbers if n not in (one, other)]
+        return self.ties.tie(self.asked(one), self.asked(other), rivals)
+
+    def never(self, is_so: bool, otherwise: str) -> None:
+        """Refuse what was found although it should never happen, if inputs are free."""
+        if is_so and not self.is_free:
+            text = "combinations share inputs, which needs more than cells"
+            raise UndecidedError(text)
+        require(not is_so, otherwise)
+
+
+def counted(answer: Answer, counts: Mapping[str, float], number: int) -> None:
+    """Refuse an answer that counts otherwise, or not so many things."""
+    told = {m.name: m.value for m in answer.measures if m.name in counts}
+    require(len(told) == number, "a count is missing")
+    wrong = [name for name, value in told.items() if value != counts[name]]
+    require(not wrong, f"counted otherwise here: {', '.join(wrong)}")

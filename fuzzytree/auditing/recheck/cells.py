@@ -1,0 +1,183 @@
+"""An axis cut into cells: how a `never` is decided again, under the minimum.
+
+A rule is stronger than some rivals at a point exactly if, at some level t, all of its
+clauses are at t or above and each rival has a clause below t. An axis is cut where a
+piece ends, where two degrees cross, and where one turns: in a cell between two cuts
+all are monotone and in one order. Their values at cuts are the critical levels;
+between two of these the picture stays the same, so one level there decides for all.
+Which clauses can be at t or above together is told per axis, and combined in `grid`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.auditing.recheck.curves import Piece, piece_at, pieces
+from fuzzytree.auditing.recheck.model_records import Shape
+from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.auditing.recheck.polynomials import (
+    ONE,
+    ZERO,
+    Poly,
+    at,
+    derivative,
+    plus,
+    times,
+)
+from fuzzytree.auditing.recheck.roots import Root, is_same, roots
+
+MOST_ROOTS, MOST_CRITICAL = 4_000, 4_000
+FINE = Fraction(1, 2**50)
+
+End = Root | Fraction
+Function = tuple[tuple[Shape, ...], bool, Fraction]
+"""The largest of some degrees, or 1 minus it; and what that is multiplied by."""
+
+
+class Cell(NamedTuple):
+    """A part of an axis where functions are in one order: per function, by number."""
+
+    rank: list[int]
+    left: list[int]  # the level at its left end
+    right: list[int]
+
+
+class Line(NamedTuple):
+    """The values of a variable that are asked about."""
+
+    low: Fraction
+    high: Fraction
+
+
+class Levels:
+    """The critical levels, numbered as they come, and later by bands."""
+
+    def __init__(self) -> None:
+        self.numbers: dict[object, int] = {}
+        self.known: list[tuple[Poly, End]] = []
+        self.band: list[int] = []
+        self.bands: list[tuple[Fraction, Fraction]] = []
+
+    def add(self, poly: Poly, end: End) -> int:
+        """Return the number of the level that a polynomial has at an end."""
+        if isinstance(end, Root) and end.low == end.high:
+            end = end.low
+        if isinstance(end, Fraction) or len(poly) < 2:
+            value = at(poly, end if isinstance(end, Fraction) else ZERO)
+            poly, end = (value,), ZERO
+        number = self.numbers.setdefault((poly, end), len(self.known))
+        if number == len(self.known):
+            self.known.append((poly, end))
+        if number > MOST_CRITICAL:
+            raise UndecidedError(f"more than {MOST_CRITICAL} critical levels")
+        return number
+
+    def sort(self) -> None:
+        """Give every level its band: levels that cannot be told apart share one."""
+        order = sorted((*self._bounds(n), n) for n in range(len(self.known)))
+        self.band = [0] * len(order)
+        for low, high, number in order:
+            if not self.bands or low > self.bands[-1][1]:
+                self.bands.append((low, high))
+            else:
+                self.bands[-1] = (self.bands[-1][0], max(high, self.bands[-1][1]))
+            self.band[number] = len(self.bands) - 1
+
+    def _bounds(self, number: int) -> tuple[Fraction, Fraction]:
+        poly, end = self.known[number]
+        if isinstance(end, Fraction):
+            return poly[0], poly[0]
+        low, high = end.value(poly)
+        width = end.high - end.low
+        while high - low > FINE:
+            width = min(width, end.high - end.low) / 2**16
+            end.narrow(width)
+            low, high = end.value(poly)
+        return low, high
+
+
+def cells(functions: Sequence[Function], line: Line, levels: Levels) -> list[Cell]:
+    """Return the cells of a line, and its lower end as a cell of its own."""
+    found: list[Cell] = []
+    is_wide = line.low < line.high
+    for left, right, polys in stretches(functions, line) if is_wide else ():
+        inside = between(left, right)
+        ends = [[levels.add(poly, end) for poly in polys] for end in (left, right)]
+        found.append(Cell(_ranks([at(poly, inside) for poly in polys]), *ends))
+    here = {s: piece_at(s, line.low) for group, *_ in functions for s in group}
+    values = [at(_chosen(f, here, line.low), line.low) for f in functions]
+    lowest = [levels.add((value,), ZERO) for value in values]
+    return [*found, Cell(_ranks(values), lowest, lowest)]
+
+
+def _ranks(values: Sequence[Fraction]) -> list[int]:
+    """Return the place of each value in their order; equal ones share it."""
+    order = {value: place for place, value in enumerate(sorted(set(values)))}
+    return [order[value] for value in values]
+
+
+def stretches(
+    functions: Sequence[Function], line: Line
+) -> Iterator[tuple[End, End, list[Poly]]]:
+    """Yield the parts of an axis, from left to right, and what functions are there."""
+    shapes = dict.fromkeys(shape for group, *_ in functions for shape in group)
+    ends = {e for s in shapes for p in pieces(s) for e in p[:2] if e is not None}
+    inner = sorted(end for end in ends if line.low < end < line.high)
+    cuts = [line.low, *inner, line.high]
+    for a, b in itertools.pairwise(cuts):
+        here = {shape: piece_at(shape, (a + b) / 2) for shape in shapes}
+        met: list[End] = [a, *crossings(_curves(functions, here), a, b), b]
+        for left, right in itertools.pairwise(met):
+            inside = between(left, right)
+            yield left, right, [_chosen(one, here, inside) for one in functions]
+
+
+def between(left: End, right: End) -> Fraction:
+    """Return a fraction between two ends."""
+    low = left.high if isinstance(left, Root) else left
+    return (low + (right.low if isinstance(right, Root) else right)) / 2
+
+
+def _chosen(function: Function, here: Mapping[Shape, Piece], x: Fraction) -> Poly:
+    """Return the polynomial that a function is around x."""
+    best: tuple[Fraction, Poly] = (-ONE, ())
+    for shape in function[0]:
+        piece = here[shape]
+        value = at(piece.poly, x)
+        part = () if value <= 0 else piece.poly if value < piece.cap else (piece.cap,)
+        best = max(best, (at(part, x), part), key=lambda pair: pair[0])
+    found = plus((ONE,), best[1], -1) if function[1] else best[1]
+    return found if function[2] == 1 else times(found, (function[2],))
+
+
+def _curves(functions: Sequence[Function], here: Mapping[Shape, Piece]) -> list[Poly]:
+    """Return every polynomial that a function can be in a part of the axis."""
+    found: dict[Poly, None] = {}
+    for group, negated, weight in functions:
+        for shape in group:
+            for part in (here[shape].poly, (here[shape].cap,), ()):
+                one = plus((ONE,), part, -1) if negated else part
+                found[one if weight == 1 else times(one, (weight,))] = None
+    return list(found)
+
+
+def crossings(curves: Sequence[Poly], a: Fraction, b: Fraction) -> list[Root]:
+    """Return where two of some polynomials cross or one turns, in order."""
+    asked = dict.fromkeys(derivative(poly) for poly in curves)
+    pairs = itertools.combinations(curves, 2)
+    asked |= dict.fromkeys(plus(one, other, -1) for one, other in pairs)
+    if len(asked) > MOST_ROOTS:
+        raise UndecidedError(
+            f"more than {MOST_ROOTS} crossings to look for in one place"
+        )
+    met: list[Root] = []
+    for poly in asked:
+        for root in roots(poly, a, b):
+            while root.low <= a or root.high >= b:
+                root.halve()
+            if not any(is_same(root, other) for other in met):
+                met.append(root)
+    return sorted(met, key=lambda root: root.low)

@@ -1,0 +1,385 @@
+"""What an answer of each code can say, and in which state: the forms of sentences.
+
+A sentence is read only to hold it against the facts beside it. One of no form below is
+not taken for wrong, for words may change; it is told as not checked.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import string
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from fuzzytree.auditing.recheck.audit_records import Answer, Bracket, Declined, Sampled
+from fuzzytree.auditing.recheck.cases import Case
+from fuzzytree.auditing.recheck.model_records import Clause
+
+TABLE = """
+FT101 W -info | {1}
+  {1} wins somewhere
+FT101 W -error | {1}
+  {1} fires
+FT101 P +error | {1}
+  {1} never <fires on the domain|wins: wherever it fires, a rule of another class is at
+  least as strong|fires: no value of the domain makes its condition hold>
+FT101 W +warning | {1}
+  {1} decides by its place in the list alone: where it is strongest, a rule of another
+  class further down is exactly as strong
+FT101 P +warning | {1}
+  {1} never wins: wherever it fires, a rule of another class is at least as strong;
+  whether it decides by its place in the list is open
+FT101 P +error | {subject}
+  {subject} never fires: {...}
+FT101 BD -info | {1}
+  it is open whether {1} ever wins
+FT101 BD -error | {1}
+  it is open whether {1} ever fires
+FT101 P -info | leaves
+  {live} of {rules} leaves are reached
+FT101 P +error | leaf {n1}
+  leaf {n1} (rule {n1}) is never reached: {...}
+FT101 D -info | {...}
+  whether they ever {...} is not known of {_} <rule|rules>: {reason}
+FT102 W -info | {1} | largest lead, at least
+  {1} leads by {largest lead, at least:.4g} at least somewhere
+FT102 B +warning | {1} | largest lead, at least; largest lead, at most
+  {1} never leads by {lead:g}: at most by {largest lead, at most:.3g}
+FT102 B -warning | {1} | largest lead, at least; largest lead, at most
+  no lead of {1} above {largest lead, at least:.3g} was found, and one above
+  {largest lead, at most:.3g} is excluded
+FT102 BD -info | {1}
+  how far {1} leads is open, for it is open whether it wins
+FT102 D -info | {...}
+  how far they lead is not known of {_} <rule|rules>: {reason}
+FT103 W -info | {1}
+  {1} is somewhere stronger than every other rule
+FT103 WBD -info | {1}
+  {1} is nowhere stronger than all others, and where it ties with another class it may
+  decide by its place
+FT103 P +info | {1}
+  {1} is superfluous: nowhere is it stronger than all other rules, and without it no
+  decision changes[, but where strengths only touch]
+FT103 BD -info | {1}
+  it is open whether {1} is needed
+FT104 P +warning | {1} | rules that subsume it
+  {1} is subsumed by {2}: wherever it fires, {2} of the same {noun} is at least as
+  strong
+FT105 P +error | {1} | rules that mask it
+  {1} is never answered: wherever it fires, {2} of class {then2} is <at least as strong
+  and stands before it|stronger>
+FT104 P -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+  no [other ]rule is subsumed, among {pairs:n pair} of one {noun}
+FT104 D -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+  no [other ]rule is shown to be subsumed, among {pairs:n pair} of one {noun}: {reason}
+FT105 P -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+  no [other ]rule is masked, among {pairs:n pair} of two classes
+FT105 D -info | pairs of rules | pairs; pairs too near to tell; rules that never fire
+  no [other ]rule is shown to be masked, among {pairs:n pair} of two classes: {reason}
+FT106 P +warning | {1} and {2} | largest distance; place of it
+  {1} and {2} have [nearly ]the same antecedent and the same {noun} {then1}[; degrees
+  differ by at most {largest distance:s}, at {...} = {place of it:s}]
+FT106 P +error | {1} and {2} | largest distance; place of it
+  {1} and {2} have [nearly ]the same antecedent and contradict each other: {then1} and
+  {then2}[; degrees differ by at most {largest distance:s}, at {...} = {place of it:s}]
+FT106 P +info | {1} and {2} | largest distance; place of it
+  {1} and {2} have [nearly ]the same antecedent and different conclusions: {then1} and
+  {then2}[; degrees differ by at most {largest distance:s}, at {...} = {place of it:s}]
+FT106 P -info | pairs of rules | pairs
+  no [other ]two rules have nearly the same antecedent, among {pairs:n pair}
+FT106 D -info | pairs of rules | pairs
+  no [other ]two rules are shown to have nearly the same antecedent, among
+  {pairs:n pair}: {reason}
+FT107 W -info | {1}, {clause}
+  {1} needs {clause}: without it {...} becomes {then1} at some input
+FT107 P +info | {1}, {clause}
+  {1} decides the same without {clause}
+FT107 BD -info | {1}, {clause}
+  whether {1} needs {clause} is open
+FT107 P -info | {1}
+  {1} never fires, so that its clauses are not asked one by one
+FT107 P -info | clauses | clauses
+  {clauses:d} more <clause matters: it decides|clauses matter: each decides> some input
+FT201 W +info | {1} and {2} | highest common level; * at least; * at most
+  {1} and {2} conflict: both reach [nearly ]{_} at one input, and say {then1} and
+  {then2}
+FT201 B -info | {1} and {2} | highest common level at most
+  {1} and {2} may conflict, on {then1} and {then2}: no more than
+  {highest common level at most:s} is reached by both
+FT201 P -info | pairs of rules | pairs that never do; pairs not told one by one
+  {pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
+  {level:s} together[; {...}]
+FT201 P +info | pairs of rules | pairs that never do; pairs not told one by one
+  [{pairs that never do:n pair} of rules of different {nouns} never <reaches|reach>
+  {level:s} together; [{...}; ]]{pairs not told one by one:n more pair} of rules may
+  reach {level:s}, not told one by one
+FT202 W +warning | {1} and {2}
+  {1} and {2} are equally strong, and the strongest, on more than a surface: the order
+  of the rules alone decides there
+FT202 PBD -info | pairs of rules | pairs; * that tie; * told one by one; * left open
+  of {pairs:d} pairs of rules of different classes, {pairs that tie:d} tie as the
+  strongest on more than a surface
+FT203 W +warning | leaf {n1}
+  in leaf {n1} the tree answers {then1}, and somewhere there the raw rules answer {...}
+FT203 BD -info | leaf {n1}
+  whether the raw rules decide otherwise in leaf {n1} is left open
+FT203 P -info | leaves
+  in {_} of {rules} leaves the raw rules decide as the tree does
+FT203 WB -info | rows | rows that differ already; rows asked; * in ranges; row
+  of {rows of the audit:d} rows[ ({_} incomplete or outside the domain)]
+  {rows that differ already:d} differ already; around {rows asked:d}[ of {_}] others the
+  nearest disagreement is {distance of the witness, in ranges:p} of each input's range
+  from row {row:d}
+FT204 WB -info | rows | rows asked; * certified radius, in ranges; row
+  of {rows of the audit:d} rows[ ({_} incomplete or outside the domain)] {rows asked:d}
+  different ones [with the smallest margins ]were asked: each keeps its decision within
+  at least {smallest certified radius, in ranges:p} of each input's range, half of them
+  within {median certified radius, in ranges:p}[, {...}]
+FT204 WB -info | row[ {_}] | * in ranges
+  [the ]{subject} stays {...} within {certified radius, in ranges:p} of each input's
+  range[, {...}]; where {...} it is {...}
+FT204 D -info | row
+  the nearest other decision is not sought
+FT204 D -info | rows | rows asked
+  the nearest other decision is not sought
+FT205 W -info | {subject} | share of the domain
+  {subject} decides {then1} {...}
+FT301 P -info | cover
+  some rule fires everywhere on the domain
+FT301 BD -info | cover
+  it is open whether some rule fires everywhere
+FT301 D -info | cover
+  whether an input is covered by no rule is not decided
+FT301 P -info | cover of {epsilon:g} | strength where it is least, *
+  some rule has a strength of at least {epsilon:g} everywhere
+FT301 W +warning | cover of {epsilon:g} | strength where it is least, *
+  no rule has a strength of {epsilon:g} {...}; where it is least, the strongest rule has
+  {strength where it is least, at most:.3g}
+FT301 BD -info | cover of {epsilon:g} | strength where it is least, *
+  it is open whether some rule reaches {epsilon:g} everywhere
+FT301 W +{gap} | gap {_} | *
+  no rule fires {...}: the answer is {default}
+FT301 D -info | more gaps
+  there may be more gaps than the {_} that are told
+FT401 P -info | terms | lowest height
+  {_} <term reaches|terms reach> a degree of {level:s} or more
+FT401 P +warning | {term1} | height
+  {term1} is hardly reached: its largest degree from {_} to {_} is {height:s}, at {_}
+FT401 P +error | {term1} | height
+  {term1} is empty: its degree is 0 from {_} to {_}
+FT401 B +warning | {term1} | height at *
+  {term1} is hardly reached: its largest degree from {_} to {_} lies between {_} and {_}
+FT402 P -info | terms | smaller excesses and dips
+  {_} <term has|terms have> no defect of shape of {_} or more
+FT402 P +warning | {term1} | excess; place of the excess
+  {term1} is clipped: its polynomial goes {excess:s} {...} between {_} and {_}
+FT402 P +warning | {term1} | peaks; depth of the deepest dip; place of the deepest dip
+  {term1} has {peaks:d} peaks: between {_} and {_} its degree falls to {_}, at
+  {place of the deepest dip:s}
+FT402 P +warning | {term1} | largest degree
+  {term1} has no point of degree 1: its largest degree anywhere is {largest degree:s}
+FT402 P +warning | {term1} | share of its area on the domain
+  {term1} lies outside of the domain for the most part:
+  {share of its area on the domain:s} of its area is from {_} to {_}
+FT403 PB +info | {terms} | shared area by joined area; possibility; crossing*
+  {terms} are hard to tell apart: they share {...} of their area[; {...}]
+FT403 D -info | {terms}
+  {terms} were not compared: {reason}
+FT403 P -info | pairs of terms | pairs apart; * not told one by one; * without area
+  {pairs apart:n pair} of terms share less than {overlap:s} of their
+  area[; {pairs without area:n pair} have no area on the domain]
+FT403 P +info | pairs of terms | pairs apart; * not told one by one; * without area
+  {pairs apart:n pair} of terms share less than {overlap:s} of their
+  area; {pairs not told one by one:n pair} besides those told share
+  more[; {pairs without area:n pair} have no area on the domain]
+FT404 P +info | {subject}
+  no rule asks {subject}
+FT404 P -info | terms and variables | variables in use; terms in use
+  rules ask {variables in use:n variable} and {terms in use:n term}
+FT501 P -info | the rule base | *
+  [audited as ]{rules:n rule} with {clauses:n clause}[, index of Nauck
+  {index of Nauck:s}]
+FT701 S {seen}info | <rows with a missing value|rows outside the domain>
+  on {hits:d} of {rows:d} rows a value is <missing|outside the domain>
+FT701 S {seen}info | <uncovered|weak|tied|close> rows
+  on {hits:d} of {rows:d} rows {...}
+FT701 S -info | <uncovered|weak|tied|close> points
+  on {hits:d} of {rows:d} points {...}
+FT701 S {idle}info | {1} | rows fired; rows won; rows won rightly
+  {1} fires on <none|{rows fired:d}> of {_} rows[ and wins <none|{rows won:d}>[;
+  {rows won rightly:d} of these have its class {then1}]]
+FT701 D -info | rows
+  what rows say about the rules is not known: {reason}
+FT701 D -info | domain
+  shares of the domain are not known: {reason}
+FT701 D -info | covered <rows|points>
+  how many {...} are covered is not known: {reason}
+FTD D -info | {subject}
+  {subject} is <not taken over|asked {...}>: {reason}
+"""
+"""A form: its code, the states it is told in by their first letters, the severity of a
+finding (+) or of none (-); the subject; the measures. Then the sentence.
+
+`{_}` stands for any number and `{...}` for any words; all else in braces is a fact. A
+format `s` shows four digits, `p` a share in percent, `n pair` a count with its noun.
+`[...]` may be missing, `<a|b>` is one of the two, `*` in a measure any words.
+"""
+
+
+class Form(NamedTuple):
+    """A form of a sentence."""
+
+    code: str
+    states: str
+    grades: tuple[str, ...]
+    subject: str
+    measures: str
+    sentence: str
+
+
+@functools.cache
+def forms() -> tuple[Form, ...]:
+    """Return every form."""
+    found: list[Form] = []
+    for entry in re.split(r"\n(?=FT)", TABLE.strip()):
+        head, *lines = entry.split("\n")
+        start, subject, *measures = head.split(" | ")
+        code, states, grades = start.split(" ")
+        names = "|".join(_escaped(name) for name in ";".join(measures).split(";"))
+        sentence = " ".join(line.strip() for line in lines)
+        whole = Form(code, states, tuple(grades.split("/")), subject, names, sentence)
+        found.append(whole)
+    return tuple(found)
+
+
+def _escaped(measure: str) -> str:
+    return re.escape(measure.strip()).replace(r"\*", ".*")
+
+
+_ANY = {"_": r"[-+0-9.e,]+", "...": r".*"}
+_SIGNS = {"[": "(?:", "]": ")?", "<": "(?:", ">": ")", "|": "|"}
+
+
+class _Shown:
+    """A fact, as a sentence shows it."""
+
+    def __init__(self, value: float | str) -> None:
+        self.value = value
+
+    def shown(self, spec: str) -> str:
+        """Return the fact in a format."""
+        if isinstance(self.value, str):
+            return self.value
+        if spec == "s":
+            return f"{self.value:.4g}"
+        if spec == "p":
+            return f"{100.0 * self.value:.3g} %"
+        if spec[:2] == "n ":
+            noun = spec[2:] if self.value == 1 else f"{spec[2:]}s"
+            return f"{self.value:.0f} {noun}"
+        return f"{self.value:.0f}" if spec == "d" else format(self.value, spec)
+
+
+def _pattern(text: str, facts: Mapping[str, _Shown] | None) -> str:
+    """Return a form as a pattern: with the facts, or with anything in their places."""
+    found = ""
+    for literal, name, spec, _ in string.Formatter().parse(text):
+        for sign in literal:
+            found += _SIGNS.get(sign, re.escape(sign))
+        if name is None:
+            continue
+        if name in _ANY or facts is None:
+            found += _ANY.get(name, r".+")
+        elif name in facts:
+            found += re.escape(facts[name].shown(spec or ""))
+        else:
+            found += "(?!)"  # no such fact: it must be missing
+    return found
+
+
+def clause_text(clause: Clause) -> str:
+    """Return a clause as sentences show it."""
+    verb = "is not" if clause.negated else "is"
+    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
+
+
+def _facts(case: Case, answer: Answer) -> dict[str, _Shown]:
+    """Return what a sentence about an answer can show."""
+    settings, state = case.audit.settings, answer.state
+    found: dict[str, float | str] = {
+        "epsilon": settings.epsilon,
+        "margin": settings.margin,
+        "lead": settings.lead,
+        "level": settings.level,
+        "overlap": settings.overlap,
+        "subject": answer.subject,
+        "rows of the audit": case.audit.rows,
+        "rules": len(case.numbers),
+        "live": len(case.numbers)
+        - sum(one.is_finding for one in case.coded("FT101") if one.rules),
+        "noun": "class" if case.view is None else "conclusion",
+        "nouns": "classes" if case.view is None else "conclusions",
+        "default": case.default,
+        "gap": "warning" if case.rules.semantics.uncovered is None else "info",
+    }
+    for place, number in enumerate(answer.rules[:2], 1):
+        found |= {str(place): case.name(number), f"n{place}": number}
+        found[f"then{place}"] = repr(case.then(number))
+    for place, label in enumerate(answer.terms[:2], 1):
+        found[f"term{place}"] = f"term {label.term!r} of {label.variable!r}"
+    if len(answer.terms) == 2:
+        one, other = answer.terms
+        found["terms"] = f"terms {one.term!r} and {other.term!r} of {one.variable!r}"
+    for measure in answer.measures:
+        found[measure.name] = measure.value
+    if isinstance(state, Declined):
+        found["reason"] = state.reason
+    if isinstance(state, Sampled):
+        found |= {"hits": state.hits, "rows": state.rows}
+        won = found.get("rows won", found.get("rows fired"))
+        found |= {"seen": "+" if state.hits else "-", "idle": "-" if won else "+"}
+    if isinstance(state, Bracket):
+        found |= {"low": state.low, "high": state.high}
+    return {name: _Shown(value) for name, value in found.items()}
+
+
+def _fits(form: Form, answer: Answer, facts: Mapping[str, _Shown]) -> bool:
+    """Return whether everything else of an answer is as its sentence says."""
+    grade = f"{'+' if answer.is_finding else '-'}{answer.severity}"
+    subject = _pattern(form.subject, facts)
+    return (
+        type(answer.state).__name__[0] in form.states
+        and any(re.fullmatch(_pattern(one, facts), grade) for one in form.grades)
+        and re.fullmatch(subject, answer.subject) is not None
+        and all(re.fullmatch(form.measures, one.name) for one in answer.measures)
+    )
+
+
+def _clauses(case: Case, answer: Answer) -> Iterator[str]:
+    """Yield the clauses that a sentence can be about."""
+    for number in answer.rules[:1]:
+        for clause in case.rules.rules[number - 1].when:
+            if tuple((clause.variable, term) for term in clause.terms) == answer.terms:
+                yield repr(clause_text(clause))
+
+
+def is_as_told(case: Case, answer: Answer) -> bool | None:
+    """Return whether a sentence says what stands beside it; None if nobody can tell."""
+    facts = _facts(case, answer)
+    ways = [facts]
+    if answer.code == "FT107" and answer.terms:
+        ways = [facts | {"clause": _Shown(text)} for text in _clauses(case, answer)]
+    is_known = False
+    for form in forms():
+        loose = _pattern(form.sentence, None)
+        is_one = answer.code == form.code or answer.code[:3] == form.code
+        if not is_one or not re.fullmatch(loose, answer.sentence, re.DOTALL):
+            continue
+        is_known = True
+        for known in ways:
+            strict = _pattern(form.sentence, known)
+            is_same = re.fullmatch(strict, answer.sentence, re.DOTALL)
+            if is_same and _fits(form, answer, known):
+                return True
+    return False if is_known else None

@@ -1,0 +1,275 @@
+"""The rules of a model on a box, cut into cells: what can be together at a level."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from fuzzytree.auditing.recheck.cells import Cell, Function, Levels, Line, cells
+from fuzzytree.auditing.recheck.model_records import Clause, Rules, Variable
+from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
+
+MOST_SETS = 50_000
+Asked = tuple[int, ...]
+"""What a rule asks of each axis, its functions as bits; and how many stand again."""
+
+
+Span = list[tuple[int, int, int, int]]
+"""Of a cell the rank of each function, the highest first; its bands; its bit."""
+
+
+class Cuts(NamedTuple):
+    """The bands of a cell's own levels, and the sets between two of them."""
+
+    bands: list[int]
+    known: dict[int, list[int]]
+
+
+class Axis(NamedTuple):
+    """A variable: the numbers of the functions that rules ask, and its cells."""
+
+    numbers: dict[tuple[Clause, Fraction], int]
+    cells: list[Cell]
+    spans: list[Span]
+    cuts: list[Cuts]
+
+
+class Grid:
+    """Rules on a box, cut into cells, with their critical levels in order."""
+
+    def __init__(
+        self,
+        rules: Rules,
+        lines: Mapping[str, Line],
+        extra: Iterable[Fraction],
+        weights: Sequence[Fraction],
+    ) -> None:
+        self.is_product = rules.semantics.conjunction == "product"
+        self.levels = Levels()
+        self.marks = {one: self.levels.add((one,), ZERO) for one in (ZERO, ONE, *extra)}
+        self.axes: list[Axis] = []
+        pairs = zip(rules.rules, weights, strict=True)
+        every = [
+            one for rule, weight in pairs for one in self._weighted(rule.when, weight)
+        ]
+        for variable in rules.variables:
+            clauses = [
+                c for c in dict.fromkeys(every) if c[0].variable == variable.name
+            ]
+            if clauses:
+                functions = _functions(variable, clauses)
+                known = {
+                    one: number for number, one in enumerate(dict.fromkeys(functions))
+                }
+                numbers = {c: known[f] for c, f in zip(clauses, functions, strict=True)}
+                found = cells([*known], lines[variable.name], self.levels)
+                self.axes.append(Axis(numbers, found, [], []))
+        self.levels.sort()
+        for axis in self.axes:
+            axis.spans.extend(map(self._spans, axis.cells))
+            for span in axis.spans:
+                bands = {band for _, least, most, _ in span for band in (least, most)}
+                axis.cuts.append(Cuts(sorted(bands), {}))
+        pairs = zip(rules.rules, weights, strict=True)
+        self.of = [self.asked(rule.when, weight) for rule, weight in pairs]
+        self.patterns: dict[tuple[int, bool], list[set[int]]] = {}
+
+    def _weighted(
+        self, when: Iterable[Clause], weight: Fraction
+    ) -> list[tuple[Clause, Fraction]]:
+        """Return clauses with their weights: all of a minimum, one of a product."""
+        return [
+            (clause, ONE if place and self.is_product else weight)
+            for place, clause in enumerate(when)
+        ]
+
+    def asked(self, when: Iterable[Clause], weight: Fraction = ONE) -> Asked:
+        """Return what clauses ask of each axis; every one must be of some rule."""
+        bits, again = [0] * len(self.axes), 0
+        for clause in self._weighted(when, weight):
+            for place, axis in enumerate(self.axes):
+                if clause in axis.numbers:
+                    bit = 1 << axis.numbers[clause]
+                    again += bool(bits[place] & bit)
+                    bits[place] |= bit
+        return (*bits, again)
+
+    def _spans(self, cell: Cell) -> Span:
+        band, found = self.levels.band, list[tuple[int, int, int, int]]()
+        for number, rank in enumerate(cell.rank):
+            one, other = band[cell.left[number]], band[cell.right[number]]
+            found.append((rank, min(one, other), max(one, other), 1 << number))
+        return sorted(found, key=lambda span: -span[0])
+
+    def sets(self, band: int, *, is_gap: bool) -> list[set[int]]:
+        """Return per axis which sets of functions can be at a level or above.
+
+        The level is any between a band and the next one, or any within the band.
+        """
+        key = (band, is_gap)
+        if key not in self.patterns:
+            self.patterns[key] = [
+                self._of_axis(axis, band, is_gap) for axis in self.axes
+            ]
+        return self.patterns[key]
+
+    def _of_axis(self, axis: Axis, band: int, is_gap: bool) -> set[int]:
+        found: set[int] = set()
+        for cell, cuts in zip(axis.spans, axis.cuts, strict=True):
+            if not is_gap:
+                found.update(_of_cell(cell, band, is_gap))
+                continue
+            # Between two levels of its own a cell has the same sets at every band.
+            place = bisect_right(cuts.bands, band)
+            if place not in cuts.known:
+                cuts.known[place] = _of_cell(cell, band, is_gap)
+            found.update(cuts.known[place])
+        return found
+
+    def wins(self, mine: Asked, rivals: Sequence[Asked]) -> bool:
+        """Return whether a rule is somewhere stronger than each rival.
+
+        Variables are free of each other.
+
+        Raises:
+            UndecidedError: If it is too much, or levels are too near to tell apart.
+        """
+        bands = self.levels.bands
+        work = len(bands) * sum(len(a.cells) for a in self.axes) * (1 + len(rivals))
+        if work > 6_000_000:
+            raise UndecidedError(f"too large to decide again here: {work:,} steps")
+        if any(self.leaves(mine, rivals, band) for band in range(len(bands) - 1)):
+            return True
+        for band, (low, high) in enumerate(bands):
+            if low < high and self.leaves(mine, rivals, band, is_gap=False):
+                raise UndecidedError("two critical levels are too near to tell apart")
+        return False
+
+    def fires(self, mine: Asked) -> bool:
+        """Return whether a rule is above 0 somewhere: on each axis in some cell."""
+        asked = zip(self.axes, mine[:-1], strict=True)
+        every = ((self._zeros(axis, is_vague=False), own) for axis, own in asked)
+        return all(any(not own & zeros for zeros in sets) for sets, own in every)
+
+    def is_bare(self, rules: Sequence[Asked]) -> bool | None:
+        """Return whether all rules are somewhere exactly 0; None if it is not known."""
+        found: list[bool] = []
+        for is_vague in (False, True):
+            every = [self._zeros(axis, is_vague=is_vague) for axis in self.axes]
+            axes = [
+                {bits(of[place] & zeros for of in rules) for zeros in sets}
+                for place, sets in enumerate(every)
+            ]
+            found.append(reach(axes, len(rules)))
+        return found[0] if found[0] == found[1] else None
+
+    def _zeros(self, axis: Axis, *, is_vague: bool) -> set[int]:
+        """Return which functions are 0 together: in a cell, or at its right end."""
+        bands, zero = self.levels.bands, self.marks[ZERO]
+        lowest = self.levels.band[zero]
+        is_sharp = bands[lowest][0] == bands[lowest][1]
+        found: set[int] = set()
+        for cell in axis.cells:
+            pairs = zip(cell.left, cell.right, strict=True)
+            found.add(bits(ends == (zero, zero) for ends in pairs))
+            right = [self.levels.band[end] == lowest for end in cell.right]
+            if not is_vague and not is_sharp:
+                right = [end == zero for end in cell.right]
+            found.add(bits(right))
+        return found
+
+    def gap(self, level: Fraction, *, is_above: bool) -> int:
+        """Return the band whose gap is just above or just below an extra level."""
+        return self.levels.band[self.marks[level]] - (not is_above)
+
+    def is_below(self, mine: Asked, theirs: Asked) -> bool:
+        """Return whether a rule's degree is nowhere above a rival's, on every axis.
+
+        That suffices for min and product alike. A rule of several clauses on one
+        variable is not looked at.
+        """
+        if mine[-1] or theirs[-1]:
+            return False
+        for axis, own, other in zip(self.axes, mine[:-1], theirs[:-1], strict=True):
+            if max(own.bit_count(), other.bit_count()) > 1:
+                return False
+            one, two = own.bit_length() - 1, other.bit_length() - 1
+            for cell in axis.cells if other else ():
+                ends = [self.levels.known[end[two]] for end in (cell.left, cell.right)]
+                is_one = ends == [((ONE,), ZERO)] * 2
+                if not is_one and (not own or cell.rank[one] > cell.rank[two]):
+                    return False
+        return True
+
+    def leaves(
+        self,
+        mine: Asked | None,
+        rivals: Sequence[Asked],
+        band: int,
+        *,
+        is_gap: bool = True,
+    ) -> bool:
+        """Return whether at a level a rule can be there and each rival below."""
+        axes: list[set[int]] = []
+        for place, sets in enumerate(self.sets(band, is_gap=is_gap)):
+            own = mine[place] if mine else 0
+            met = [reached for reached in sets if reached & own == own]
+            axes.append(
+                {bits(of[place] & ~reached for of in rivals) for reached in met}
+            )
+        return reach(axes, len(rivals))
+
+
+def _of_cell(cell: Span, band: int, is_gap: bool) -> list[int]:
+    """Return which functions can be at a level or above in parts of a cell."""
+    base, crossing, last = 0, 0, -1
+    every: list[int] = []
+    for rank, least, most, bit in cell:
+        if least > band:
+            base |= bit
+        elif most > band or (most == band and not is_gap):
+            if rank != last and crossing:
+                every.append(crossing)
+            crossing, last = crossing | bit, rank
+    return [base, *(base | one for one in every), base | crossing]
+
+
+def _functions(
+    variable: Variable, clauses: Iterable[tuple[Clause, Fraction]]
+) -> list[Function]:
+    shapes = {term.name: term.shape for term in variable.terms}
+    return [
+        (tuple(shapes[term] for term in clause.terms), clause.negated, weight)
+        for clause, weight in clauses
+    ]
+
+
+def bits(flags: Iterable[int]) -> int:
+    """Return a number whose n-th bit tells whether the n-th flag is set."""
+    return sum(1 << place for place, flag in enumerate(flags) if flag)
+
+
+def reach(axes: Iterable[set[int]], count: int) -> bool:
+    """Return whether a set of each axis, taken together, can hold all of `count`.
+
+    Raises:
+        UndecidedError: If there are too many ways to take them.
+    """
+    live = {0}
+    for sets in axes:
+        live = _largest(a | b for a in live for b in _largest(sets))
+        if len(live) > MOST_SETS:
+            raise UndecidedError(f"more than {MOST_SETS} sets of rivals")
+    return (1 << count) - 1 in live
+
+
+def _largest(sets: Iterable[int]) -> set[int]:
+    """Return the sets, as bits, that no other one contains."""
+    kept: list[int] = []
+    for one in sorted(set(sets), key=lambda bits: -bits.bit_count()):
+        if all(one | other != other for other in kept):
+            kept.append(one)
+    return set(kept)

@@ -1,0 +1,210 @@
+"""What an audit says of itself: files, settings, domain, completeness, ids."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from fuzzytree.auditing.recheck.audit_records import Answer, Policy
+from fuzzytree.auditing.recheck.cases import Case
+from fuzzytree.auditing.recheck.fingerprints import (
+    compact,
+    digest_of,
+    fingerprint,
+    said,
+)
+from fuzzytree.auditing.recheck.fixed import LIMITS, SEVERITIES
+from fuzzytree.auditing.recheck.model_records import Rules, Shape, System, Tree
+from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.auditing.recheck.report import Report
+from fuzzytree.auditing.recheck.systems import has_formula
+
+
+def check_files(
+    case: Case, report: Report, facts: Mapping[str, Any], model: bytes, name: str
+) -> None:
+    """Check the digest of an audit's facts, and the SHA-256 of the model's file."""
+    digest = digest_of(facts)
+    report.expect(case.audit.digest == digest, f"the digest is {digest}")
+    sha = hashlib.sha256(model).hexdigest()
+    if case.audit.file is not None:
+        text = f"the SHA-256 of {name} is {sha}, and not that of the audited file"
+        report.expect(case.audit.file.sha256 == sha, text)
+
+
+def check_head(case: Case, report: Report) -> None:
+    """Check what stands before the answers, and what they are as a whole."""
+    audit, model, expect = case.audit, case.model, report.expect
+    form = "tree" if isinstance(model, Tree) else "rules"
+    if isinstance(model, Rules) and model.kind:
+        form = f"{model.kind} rules"
+    form = form if case.view is None else "system"
+    expect(audit.form == form, f"the form of the model is {form!r}")
+    expect(audit.model == model.name, f"the model's name is {model.name!r}")
+    _content(case, report)
+    meant = model.semantics
+    decides: Literal["strongest", "all"] = "all" if case.view else "strongest"
+    policy = Policy(meant.conjunction, decides, meant.uncovered, meant.missing)
+    expect(audit.policy == policy, "the policy is not the model's")
+    expect(audit.limits == LIMITS, "the panel of limits is not the fixed one")
+    _settings(case, report)
+    _domain(case, report)
+    ids = [one.id for one in audit.answers if one.is_finding]
+    known = sorted(set(ids).intersection(audit.accepted))
+    expect(list(audit.accepted) == known, "a finding is accepted that there is not")
+    numbers = tuple(one.number + 1 for one in case.view.owners) if case.view else ()
+    is_plain = numbers == tuple(range(1, len(numbers) + 1))
+    text = "the numbers of rules in the file are not those of the system"
+    expect(audit.numbers == (() if is_plain else numbers), text)
+    expect(audit.rows > 0 or audit.data is None, "a table is told without rows")
+    report.counts["facts about the audit"] += 12
+    _asked(case, report)
+    _complete(case, report)
+    _ids(case, report)
+
+
+def _content(case: Case, report: Report) -> None:
+    """Check the hash of what the model holds, if all of it is known here."""
+    whole = case.model if case.view is None else case.view.system
+    if isinstance(whole, System) and has_formula(whole):
+        report.undecided["FACT", "the hash of a system with formulas"].append("head")
+        return
+    print_ = fingerprint(whole)
+    is_one = case.audit.fingerprint == print_
+    report.expect(is_one, f"the model's fingerprint is {print_}")
+
+
+def _settings(case: Case, report: Report) -> None:
+    given, expect = case.audit.settings, report.expect
+    for name in ("epsilon", "margin", "lead", "level", "overlap"):
+        is_share = 0 < getattr(given, name) <= 1
+        expect(is_share, f"the setting {name} is not in (0, 1]")
+    expect(1 <= given.rows <= 10**7, "the setting rows is not in 1 to 10,000,000")
+    expect(0 <= given.seed < 2**32, "the setting seed is not in 0 to 2**32 - 1")
+    expect(0 < given.budget_s <= 1e9, "the budget is not in (0, 1e9] seconds")
+
+
+def _domain(case: Case, report: Report) -> None:
+    expect = report.expect
+    order = [name for name in case.variables if name in case.sides]
+    is_plain = [side.variable for side in case.audit.domain.sides] == order
+    expect(is_plain, "the domain's sides are not those of variables, in order")
+    for name, side in case.sides.items():
+        text = f"the side of {name!r}"
+        expect(name in case.variables, f"{text} is of no variable")
+        expect(side.low <= side.high, f"{text} has swapped ends")
+        expect(not side.is_open, f"{text} is open, as no audit's is")
+        variable = case.variables.get(name)
+        if variable is not None and side.origin == "model":
+            is_range = (side.low, side.high) == (variable.low, variable.high)
+            expect(is_range, f"{text} is not the model's range")
+        moved = case.view.inputs.get(name) if case.view else None
+        if moved is not None and moved.clips and not moved.parts:
+            low, high = moved.low, moved.high
+            is_in = (low is None or low <= side.low) and (
+                high is None or side.high <= high
+            )
+            expect(is_in, f"{text} goes beyond the range that values are moved into")
+    for name, variable in case.variables.items():
+        expect(bool(variable.parts) or name in case.sides, f"{name!r} has no side")
+
+
+def _asked(case: Case, report: Report) -> None:
+    """Check that every question was asked or is told to be left out."""
+    audit, expect = case.audit, report.expect
+    codes = [one.code for one in audit.answers]
+    is_sorted = codes == sorted(codes)
+    expect(is_sorted, "the answers are not in the order of their codes")
+    ends = [(one.repeat, f" --select {one.code}") for one in audit.answers]
+    starts = {text.removesuffix(end) for text, end in ends}
+    is_one = starts <= {""} or all(text.endswith(end) for text, end in ends)
+    expect(is_one and len(starts) < 2, "the commands that find it again differ")
+    told = [text.split(" ")[0] for text in audit.unasked]
+    expect(told == sorted(set(told)), "what was not asked is not in order")
+    is_cut = any(
+        ": cut short: " in text or text.endswith(("is spent", "interrupted"))
+        for text in audit.unasked
+    )
+    text = "is_complete is not what was left out says"
+    expect(audit.is_complete == (not is_cut), text)
+    for code in SEVERITIES:
+        is_told = code.startswith("FTD") or code in codes or code in told
+        expect(is_told, f"{code} was neither asked nor told to be left out")
+    for code, text in zip(told, audit.unasked, strict=True):
+        is_left = text.endswith(("left out by the user", "to ask it of"))
+        is_both = code in codes and (is_left or ": not asked: " in text)
+        expect(not is_both, f"{code} was asked, and told to be left out")
+
+
+def _complete(case: Case, report: Report) -> None:
+    """Check that each rule and clause was asked about, if the code was not cut."""
+    told = {text.split(" ")[0] for text in case.audit.unasked}
+    by = {code: case.coded(code) for code in SEVERITIES}
+    every = {*case.numbers}
+    dead = {one.rules[0] for one in by["FT101"] if one.is_finding and one.rules}
+    wanted = {"FT101": every, "FT102": every - dead, "FT103": every}
+    if isinstance(case.model, Tree):
+        wanted["FT101"] = dead
+        wanted["FT205"] = every - dead
+        told_of = {one.rules[0] for one in by["FT102"] if one.rules}
+        wanted["FT102"] = {n for n in every if n in told_of or _wins(case, n)}
+    if len(every) == 1:
+        del wanted["FT103"]
+    if case.view is not None:
+        told_silent = sorted(one.subject for one in by["FT101"] if not one.rules)
+        is_all = told_silent == sorted(case.view.silent) or not by["FT101"]
+        report.expect(is_all, "other rules never fire, as their text says")
+        wanted = {"FT101": every}
+    for code, numbers in wanted.items():
+        found = {one.rules[0] for one in by[code] if one.rules}
+        if code == "FT102" and "FT101" in told:
+            continue  # of which rules it is to be asked is not known
+        if code not in told and by[code] and found != numbers:
+            report.wrong.append(f"{code} was not asked of each rule, or twice")
+    clauses = sum(len(rule.when) for rule in case.rules.rules)
+    asked = sum(_clauses(case, one) for one in by["FT107"])
+    is_all = "FT107" in told or not by["FT107"] or asked == clauses
+    report.expect(is_all, "FT107 was not asked of each clause")
+
+
+def _wins(case: Case, number: int) -> bool:
+    """Return whether a rule is known to beat those of other classes somewhere."""
+    rivals = [case.asked(n) for n in case.numbers if case.then(n) != case.then(number)]
+    try:
+        return case.is_free and case.beats(case.asked(number), rivals)
+    except UndecidedError:
+        return False
+
+
+def _clauses(case: Case, answer: Answer) -> float:
+    """Return of how many clauses an answer is: one, some more, all of a rule."""
+    if not answer.rules:
+        return sum(one.value for one in answer.measures)
+    is_one = answer.terms or answer.rules[0] not in case.numbers
+    return 1 if is_one else len(case.rules.rules[answer.rules[0] - 1].when)
+
+
+def _ids(case: Case, report: Report) -> None:
+    """Check each id: its code and a hash of what the rules and terms say."""
+    carriers = [c for c in case.carriers.values() if isinstance(c, Rules)]
+    shapes: dict[tuple[str, str], Shape] = {}
+    for one in carriers:  # the rules' own terms come last
+        shapes |= {(v.name, t.name): t.shape for v in one.variables for t in v.terms}
+    counts = Counter[str]()
+    for number, answer in enumerate(case.audit.answers, 1):
+        if any(k not in case.numbers for k in answer.rules):
+            continue
+        if case.view is not None and (answer.rules or answer.terms):
+            text = "ids of findings in systems are not worked out here"
+            report.undecided["ID", text].append(answer.code)
+            continue
+        known = [said(case.rules.rules[k - 1], shapes) for k in answer.rules]
+        known += [[*label, shapes.get((label[0], label[1]))] for label in answer.terms]
+        other = [] if known else [answer.subject, answer.region]
+        content = compact([answer.code, known, other]).encode()
+        name = f"{answer.code}-{hashlib.sha256(content).hexdigest()[:8]}"
+        counts[name] += 1
+        name += f"-{counts[name]}" if counts[name] > 1 else ""
+        report.expect(answer.id == name, f"the id of answer {number} is {name}")

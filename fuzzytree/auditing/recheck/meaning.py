@@ -1,0 +1,67 @@
+"""What a model means, in fractions: strengths and answers at a point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+
+from fuzzytree.auditing.recheck.curves import degree
+from fuzzytree.auditing.recheck.model_records import (
+    Branch,
+    Clause,
+    Model,
+    Rules,
+    Tree,
+    Variable,
+)
+from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
+
+Point = Mapping[str, Fraction]
+
+
+def value_of(variable: Variable, point: Point) -> Fraction:
+    """Return the value of an input or a combination at a point."""
+    if not variable.parts:
+        return point[variable.name]
+    parts = variable.parts
+    terms = (Fraction(p.weight) * (point[p.input] - Fraction(p.centre)) for p in parts)
+    return sum(terms, start=ZERO)
+
+
+def strengths(rules: Rules, point: Point) -> list[Fraction]:
+    """Return the strength of every rule at a point."""
+    variables = {v.name: v for v in rules.variables}
+    shapes = {(v.name, t.name): t.shape for v in rules.variables for t in v.terms}
+    clauses = dict.fromkeys(clause for rule in rules.rules for clause in rule.when)
+    degrees: dict[Clause, Fraction] = {}
+    for clause in clauses:
+        x = value_of(variables[clause.variable], point)
+        highest = max(degree(shapes[clause.variable, term], x) for term in clause.terms)
+        degrees[clause] = 1 - highest if clause.negated else highest
+    found = [[degrees[clause] for clause in rule.when] for rule in rules.rules]
+    if rules.semantics.conjunction == "product":
+        return [math.prod(one, start=ONE) for one in found]
+    return [min(one, default=ONE) for one in found]
+
+
+def answer_of(model: Model, point: Point) -> str | None:
+    """Return the class that a model gives a point; None is no class."""
+    if isinstance(model, Rules):
+        found = strengths(model, point)
+        best = max(found)
+        if best == 0:
+            return model.semantics.uncovered
+        return model.rules[found.index(best)].then
+    return model.leaves[leaf_of(model, point) - 1].label
+
+
+def leaf_of(tree: Tree, point: Point) -> int:
+    """Return the number of the leaf that a point reaches."""
+    variables = {v.name: v for v in tree.variables}
+    branch = Branch((), (), 1, None) if tree.nodes else Branch((), (), None, 1)
+    while branch.node is not None:
+        node = tree.nodes[branch.node - 1]
+        x = value_of(variables[node.variable], point)
+        branch = node.branches[node.owners[sum(x > cut for cut in node.cuts)]]
+    return branch.leaf or 0

@@ -1,0 +1,229 @@
+"""A model from its file: a rule base, a tree or a fuzzy system."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+from fuzzytree.auditing.recheck.building import built
+from fuzzytree.auditing.recheck.facts import keys_of, term_facts, variable_facts
+from fuzzytree.auditing.recheck.model_records import Clause, Model, Rules, System, Tree
+from fuzzytree.auditing.recheck.outcomes import CannotRunError
+from fuzzytree.auditing.recheck.places import Places
+from fuzzytree.auditing.recheck.systems import read_system
+from fuzzytree.auditing.recheck.yaml import read_yaml
+
+_HEAD = "format, kind, name, classes, semantics"
+
+
+def read_file(content: bytes, name: str) -> tuple[Model | System, Places]:
+    """Return the model of a YAML file, and where its rules and terms stand.
+
+    Raises:
+        CannotRunError: If it is something else, or holds what is not known here.
+    """
+    try:
+        top = read_yaml(content, name)
+    except CannotRunError as error:
+        if name.lower().endswith((".yaml", ".yml")):
+            raise
+        text = "only YAML is read here: convert it (fuzzytree convert), and audit that"
+        raise CannotRunError(f"{error}; {text}") from error
+    kind = top.get("kind") if isinstance(top, dict) else None
+    if not isinstance(top, dict) or kind not in ("rule base", "tree", "system"):
+        text = f"{name}: rule bases, trees and systems are checked, not {kind!r:.60}"
+        raise CannotRunError(text)
+    found: Model | System
+    try:
+        if kind == "system":
+            found = read_system(top, name)
+        elif kind == "tree":
+            found = built(Tree, _tree_facts(top), name)
+        else:
+            found = built(Rules, _rule_facts(top), name)
+        if isinstance(found, Tree):
+            _check_numbers(found, name)
+        if not isinstance(found, System):
+            _check_names(found, name)
+        return found, Places(top)
+    except CannotRunError as error:
+        if str(error).startswith(name):
+            raise
+        raise CannotRunError(f"{name}: {error}") from error
+    except (TypeError, AttributeError, KeyError, ValueError) as error:
+        raise CannotRunError(f"{name}: not a {kind} that fuzzytree writes") from error
+
+
+def _rule_facts(found: Any) -> dict[str, Any]:
+    top = keys_of(found, f"{_HEAD}, rules", "columns, variables, terms")
+    facts = _head(
+        top, {"or": "max", "not": "1 - degree"}, "first of the strongest rules"
+    )
+    known = {v["name"]: [t["name"] for t in v["terms"]] for v in facts["variables"]}
+    rules = [keys_of(one, "if, then", "support") for one in top["rules"]]
+    facts["rules"] = [
+        {
+            "when": [_clause(one, known) for one in rule["if"]],
+            "then": rule["then"],
+            "support": rule.get("support"),
+        }
+        for rule in rules
+    ]
+    return facts | {"kind": top.get("terms")}
+
+
+def _tree_facts(found: Any) -> dict[str, Any]:
+    top = keys_of(found, f"{_HEAD}, leaves", "columns, variables, nodes, sets")
+    cuts = {"cuts": "a value equal to a cut lies below it"}
+    facts = _head(top, cuts, "leaf that the nodes lead to")
+    facts["nodes"] = [_node(n, one) for n, one in enumerate(top.get("nodes", []), 1)]
+    facts["leaves"] = [_leaf(n, one) for n, one in enumerate(top["leaves"], 1)]
+    groups = [keys_of(one, "variable, terms") for one in top.get("sets", [])]
+    facts["sets"] = [
+        {"variable": one["variable"], "terms": [*map(term_facts, one["terms"])]}
+        for one in groups
+    ]
+    return facts
+
+
+def _head(top: dict[str, Any], fixed: dict[str, str], decides: str) -> dict[str, Any]:
+    needed = f"and, uncovered, missing, answer, {', '.join(fixed)}"
+    meant = keys_of(top["semantics"], needed, "label type")
+    fixed["answer"] = f"the class of the {decides}"
+    wrong = [key for key, text in fixed.items() if meant[key] != text]
+    if wrong or top["format"] != "fuzzytree/1":
+        raise CannotRunError(
+            f"its meaning is not known: {', '.join(wrong or ['format'])}"
+        )
+    answers: list[str | None] = []
+    for text in (meant["uncovered"], meant["missing"]):
+        if text != "no class" and not text.startswith("class "):
+            raise CannotRunError(f"not an answer: {text!r:.60}")
+        answers.append(None if text == "no class" else text.removeprefix("class "))
+    semantics = {"conjunction": meant["and"], "label_type": meant.get("label type")}
+    return {
+        "name": top["name"],
+        "classes": top["classes"],
+        "columns": top.get("columns", []),
+        "variables": [*map(variable_facts, top.get("variables", []))],
+        "semantics": semantics | {"uncovered": answers[0], "missing": answers[1]},
+    }
+
+
+def _clause(found: Any, known: Mapping[str, Collection[str]]) -> dict[str, Any]:
+    if isinstance(found, dict):
+        verb = "is not" if "is not" in found else "is"
+        one = keys_of(found, f"variable, {verb}")
+        return Clause(one["variable"], one[verb], verb == "is not")._asdict()
+    read = [*itertools.islice(readings(found, known), 2)]
+    if len(read) != 1:
+        raise CannotRunError(f"{len(read)} readings of {found!r:.200}")
+    return read[0]._asdict()
+
+
+def readings(text: str, known: Mapping[str, Collection[str]]) -> Iterator[Clause]:
+    """Yield every clause that a sentence can mean.
+
+    Example:
+        >>> list(readings("grip is not firm", {"grip": ["soft", "firm"]}))
+        [Clause(variable='grip', terms=('firm',), negated=True)]
+    """
+    for place in re.finditer("(?= is )", text):
+        variable, rest = text[: place.start()], text[place.start() + 4 :]
+        if variable in known:
+            for terms in _lists(rest, known[variable]):
+                yield Clause(variable, terms)
+            if rest.startswith("not "):
+                for terms in _lists(rest[4:], known[variable]):
+                    yield Clause(variable, terms, negated=True)
+
+
+def _lists(text: str, known: Collection[str]) -> Iterator[tuple[str, ...]]:
+    """Yield every list of terms, joined by ` or `, that a text can mean."""
+    words = text.split(" or ")
+    if len(words) > 1 and not any(" or " in f" {name} " for name in known):
+        yield from [tuple(words)] if set(words) <= set(known) else []
+        return
+    todo: list[tuple[int, tuple[str, ...]]] = [(0, ())]
+    while todo:
+        start, terms = todo.pop()
+        for name in known:
+            end = start + len(name)
+            if text.startswith(name, start) and end == len(text):
+                yield (*terms, name)
+            elif text.startswith(name, start) and text.startswith(" or ", end):
+                todo.append((end + 4, (*terms, name)))
+
+
+def _node(number: int, found: Any) -> dict[str, Any]:
+    one = keys_of(found, "node, ask, cuts, branches", "interval owners")
+    ways = [keys_of(way, "is, go to", "sets") for way in one["branches"]]
+    owners = [owner - 1 for owner in one.get("interval owners", [])]
+    if one["node"] != number:
+        raise CannotRunError(f"node {number} has another number")
+    branches = [
+        {"terms": way["is"], "sets": way.get("sets", []), **_target(way["go to"])}
+        for way in ways
+    ]
+    whole = {"variable": one["ask"], "cuts": one["cuts"], "branches": branches}
+    return whole | {"owners": owners or [*range(len(ways))]}
+
+
+def _target(text: str) -> dict[str, int | None]:
+    kind, _, number = text.partition(" ")
+    if kind not in ("node", "leaf") or not re.fullmatch("[1-9][0-9]{0,8}", number):
+        raise CannotRunError(f"a branch cannot lead to {text!r:.60}")
+    return {"node": None, "leaf": None, kind: int(number)}
+
+
+def _leaf(number: int, found: Any) -> dict[str, Any]:
+    one = keys_of(found, "leaf, class", "pattern, support")
+    if one["leaf"] != number:
+        raise CannotRunError(f"leaf {number} has another number")
+    rest = {"pattern": one.get("pattern", ""), "support": one.get("support")}
+    return {"label": one["class"], **rest}
+
+
+def _check_names(model: Model, name: str) -> None:
+    """Refuse a model that uses what it does not declare, or declares it twice."""
+    groups = [model.classes, [v.name for v in model.variables]]
+    groups += [[t.name for t in v.terms] for v in model.variables]
+    if any(len(set(group)) < len(group) for group in groups):
+        raise CannotRunError(f"{name}: a name stands twice")
+    known = {(v.name, t.name) for v in model.variables for t in v.terms}
+    used, labels = set[tuple[str, str]](), set[str]()
+    if isinstance(model, Rules):
+        clauses = [clause for rule in model.rules for clause in rule.when]
+        used = {(c.variable, term) for c in clauses for term in c.terms}
+        labels = {rule.then for rule in model.rules}
+        is_empty = not model.rules or not all(c.terms for c in clauses)
+    else:
+        labels = {leaf.label for leaf in model.leaves}
+        is_empty = not model.leaves
+        used = {
+            (n.variable, t) for n in model.nodes for b in n.branches for t in b.terms
+        }
+    if is_empty or not used <= known or not labels <= set(model.classes):
+        raise CannotRunError(
+            f"{name}: a rule or leaf that is empty, or uses unknown names"
+        )
+
+
+def _check_numbers(tree: Tree, name: str) -> None:
+    """Refuse a tree whose branches do not meet every node and leaf once, in order."""
+    nodes = [b.node for node in tree.nodes for b in node.branches if b.leaf is None]
+    leaves = [
+        b.leaf for node in tree.nodes for b in node.branches if b.leaf is not None
+    ]
+    is_once = sorted(nodes, key=str) == sorted(range(2, len(tree.nodes) + 1), key=str)
+    is_once &= sorted(leaves) == [*range(1, len(tree.leaves) + 1)] or not tree.nodes
+    for number, node in enumerate(tree.nodes, 1):
+        is_once &= all(b.node is None or b.node > number for b in node.branches)
+        is_once &= len(node.owners) == len(node.cuts) + 1 and list(node.cuts) == sorted(
+            node.cuts
+        )
+        is_once &= set(node.owners) == set(range(len(node.branches)))
+    if not is_once:
+        raise CannotRunError(f"{name}: nodes, leaves or intervals that lead nowhere")

@@ -1,0 +1,242 @@
+"""Who is worth using: the front of error against run time, and advice in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from fuzzytree.benchmarking.candidates import DEFAULT, title
+from fuzzytree.benchmarking.clock import CONFIDENCE, times_faster
+from fuzzytree.benchmarking.records import Front, Point, Question, Timing
+
+_LEVELS = (0.0, *(10.0**power for power in range(-16, 1)))
+
+
+class Entry(msgspec.Struct, frozen=True):
+    """A point at one number of rows and threads, with the one error that counts."""
+
+    point: Point
+    timing: Timing
+    error: float
+
+    @property
+    def name(self) -> str:
+        """The name of the candidate."""
+        return self.point.name
+
+    @property
+    def short(self) -> str:
+        """Its name without the question."""
+        return self.point.name.removesuffix(f": {self.point.question}")
+
+
+def error_of(point: Point) -> float | None:
+    """Return the one number by which a point's error is judged.
+
+    For a tree it is the share of rows whose class differs from the exact one. For
+    rules it is the certified bound of a strength where there is one, and the largest
+    error that was observed where there is none. None: a floor, or a peer that tells
+    classes alone, whose strengths nobody knows.
+
+    Example:
+        >>> from fuzzytree.benchmarking.records import Error
+        >>> error = Error(rows=10, largest=None, bound=None, origin="", flips=1)
+        >>> error_of(Point("a", "tree", "peer", error, (), 0.0))
+        0.1
+    """
+    error = point.error
+    if error is None or not error.rows:
+        return None
+    if point.question == "tree":
+        return error.flips / error.rows
+    return error.largest if error.bound is None else error.bound
+
+
+def entries(
+    points: Sequence[Point], question: Question, rows: int, threads: int
+) -> list[Entry]:
+    """Return the points that can be compared, the fastest first."""
+    found = [
+        Entry(point, timing, error)
+        for point in points
+        if point.question == question and point.kind != "floor"
+        if (error := error_of(point)) is not None
+        for timing in point.timings
+        if (timing.rows, timing.threads) == (rows, threads)
+    ]
+    return sorted(found, key=lambda one: (one.timing.median_ns, one.error, one.name))
+
+
+def front(found: Sequence[Entry]) -> list[Entry]:
+    """Return whom nobody beats: each is slower than the one before, and more exact.
+
+    Args:
+        found: As from `entries`, the fastest first.
+    """
+    kept: list[Entry] = []
+    for one in found:
+        if not kept or one.error < kept[-1].error:
+            kept.append(one)
+    return kept
+
+
+def fronts(points: Sequence[Point]) -> tuple[Front, ...]:
+    """Return the front of each question, number of rows and number of threads."""
+    found: list[Front] = []
+    for question, rows, threads in settings(points):
+        best = front(entries(points, question, rows, threads))
+        if best:
+            names = tuple(one.name for one in best)
+            found.append(Front(question, rows, threads, names))
+    return tuple(found)
+
+
+def settings(points: Sequence[Point]) -> list[tuple[Question, int, int]]:
+    """Return what was measured: questions in their order, then rows, then threads."""
+    asked: dict[Question, None] = {point.question: None for point in points}
+    sizes = sorted(
+        {(one.rows, one.threads) for point in points for one in point.timings}
+    )
+    return [(question, rows, threads) for question in asked for rows, threads in sizes]
+
+
+def advice(points: Sequence[Point], most: float | None = None) -> tuple[str, ...]:
+    """Return what to use, a sentence for each question and number of rows.
+
+    Without a wanted error there is a sentence for the strictest level that anything
+    keeps, and one for each coarser power of ten at which something else is faster for
+    sure: the interval of the quotient lies above 1.
+
+    Args:
+        points: Of a study.
+        most: The largest error of a strength that is allowed. A tree's answer is
+            right or wrong, so there the classes must all be right whatever is allowed.
+
+    Returns:
+        Sentences, those for most rows last; the last one is the one to remember.
+    """
+    found: list[str] = []
+    fewest = min((t.threads for point in points for t in point.timings), default=1)
+    sizes: list[tuple[Question, int]] = [
+        (question, rows)
+        for question, rows, threads in reversed(settings(points))
+        if threads == fewest
+    ]
+    for question, rows in sorted(sizes, key=lambda size: size[1]):
+        known = entries(points, question, rows, fewest)
+        wanted = None if question == "tree" else most
+        found += reversed([*_sentences(known, question, rows, wanted)])
+    return tuple(found)
+
+
+def _sentences(
+    known: Sequence[Entry], question: Question, rows: int, most: float | None
+) -> Iterator[str]:
+    if not known:
+        return
+    smallest = min(one.error for one in known)
+    if most is not None:
+        if smallest <= most:
+            yield _sentence(known, question, rows, most)
+        else:
+            nearest = min(known, key=lambda one: one.error)
+            yield (
+                f"{_where(question, rows)}: nothing measured keeps "
+                f"{_level(nearest, most)}; the nearest is {nearest.short} "
+                f"with {smallest:.2g}"
+            )
+        return
+    before: Entry | None = None
+    for level in (level for level in _LEVELS if level >= smallest):
+        best = _choice(known, question, level)
+        if before is None or _is_surely_faster(best, before):
+            yield _sentence(known, question, rows, level)
+            before = best
+        if question == "tree":
+            return
+
+
+def _is_surely_faster(one: Entry, other: Entry) -> bool:
+    ratio = times_faster(other.timing, one.timing)
+    if one.name == other.name or ratio is None:
+        return False
+    return ratio.low > 1.0 and ratio.confidence >= CONFIDENCE
+
+
+def _choice(known: Sequence[Entry], question: Question, level: float) -> Entry:
+    """Return the fastest within a level, or the default if nothing is surely faster."""
+    within = [one for one in known if one.error <= level]
+    default = _default(within, question)
+    if default is not None and not _is_surely_faster(within[0], default):
+        return default
+    return within[0]
+
+
+def _default(known: Sequence[Entry], question: Question) -> Entry | None:
+    name = title(DEFAULT, question)
+    return next((one for one in known if one.name == name), None)
+
+
+def _sentence(
+    known: Sequence[Entry], question: Question, rows: int, level: float
+) -> str:
+    """Say what to use within a level, and against what.
+
+    That is the default; or, for the default, the fastest of the others.
+    """
+    best = _choice(known, question, level)
+    others = [one for one in known if one.error <= level and one.name != best.name]
+    head = f"{_where(question, rows)}: for {_level(best, level)}, use {_what(best)}"
+    other = _default(known, question)
+    if other is None or best.name == other.name:
+        other = others[0] if others else None
+    if other is None:
+        return f"{head}, the only one"
+    ratio = times_faster(other.timing, best.timing)
+    if ratio is None:
+        return f"{head}; {other.short} shares no round with it"
+    sure = f"95 % CI {_times(ratio.low)} to {_times(ratio.high)}"
+    if ratio.confidence < CONFIDENCE:
+        sure = "in too few rounds to be sure"
+    elif ratio.low > 1.0:
+        times = f"{_times(ratio.median)} times faster than {other.short}"
+        return f"{head}: {times} ({sure})"
+    took = f"{other.short} takes {_times(ratio.median)} times as long"
+    return f"{head}: nothing is surely faster ({took}, {sure})"
+
+
+def _what(best: Entry) -> str:
+    """Name a candidate, and what it leaves out of the answer to its question."""
+    error = best.point.error
+    is_mute = error is not None and error.largest is None
+    if best.point.question != "tree" and is_mute:
+        return f"{best.short} (which tells no strengths)"
+    return best.short
+
+
+def _where(question: Question, rows: int) -> str:
+    return f"{question}, {rows:,} row{'' if rows == 1 else 's'}"
+
+
+def _level(best: Entry, level: float) -> str:
+    """Say what is demanded, and for a tree on how many rows it was seen."""
+    error = best.point.error
+    if best.point.question != "tree" or error is None:
+        return f"an error of at most {level:g}"
+    seen = f"in {error.rows:,} row{'' if error.rows == 1 else 's'}"
+    edges = best.point.probes
+    if edges is not None and edges.flips:
+        seen += f" (but {edges.flips} of {edges.rows} probes at its cuts)"
+    changed = "no class" if level == 0.0 else f"at most {level:.2%} of classes"
+    return f"{changed} changed {seen}"
+
+
+def _times(ratio: float) -> str:
+    return (
+        f"{ratio:.2f}"
+        if ratio < 2
+        else f"{ratio:.1f}"
+        if ratio < 100
+        else f"{ratio:.0f}"
+    )

@@ -1,0 +1,180 @@
+"""How far a candidate's answers are from the exact ones, on data and on edges apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.benchmarking.clock import Clock
+from fuzzytree.benchmarking.records import Candidate, Error, Found, Loaded, Question
+from fuzzytree.benchmarking.rows import repeated
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.numerics.oracle import (
+    Decided,
+    Observed,
+    decide,
+    error_against_exact,
+    strength_errors,
+)
+from fuzzytree.semantics.probing import probe_values
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+MOST_ROWS = 2_000
+"""Rows on which errors are observed, of those that are timed."""
+
+MOST_PROBES = 500
+"""Rows aimed at edges; nearly each of them costs the oracle rational arithmetic."""
+
+_PATIENCE_NS = 3e8  # for the answers of one candidate to one set of rows
+_BATCH = 1 << 15  # rows in which a call's own cost no longer counts
+_MOST_STRENGTHS = 200_000  # for each candidate, in intervals: half a second or so
+
+
+class Judged(msgspec.Struct, frozen=True):
+    """What is known of a candidate before it is timed.
+
+    Attributes:
+        error: On the rows of the study; None for a floor.
+        probes: On rows aimed at edges and cuts.
+        row_ns: About what a row takes it, in nanoseconds.
+    """
+
+    error: Error | None
+    probes: Error | None
+    row_ns: float
+
+
+class _Sample(msgspec.Struct, frozen=True):
+    """Rows to judge on, and the exact answers to them."""
+
+    model: Model
+    values: FloatArray
+    exact: Decided
+
+
+class Judge:
+    """Holds answers against the exact ones; it makes the rows for that once."""
+
+    def __init__(
+        self, asked: Mapping[Question, Model], values: FloatArray, clock: Clock
+    ) -> None:
+        self.asked, self.clock = asked, clock
+        most = min(map(_most_rows, asked.values()))
+        self.values = np.ascontiguousarray(values[:, :most])
+        self.samples: dict[Question, tuple[_Sample, _Sample]] = {}
+
+    def judged(self, candidate: Candidate, loaded: Loaded) -> Judged:
+        """Return how far a candidate is from exact, and about what a row costs it.
+
+        A slow one answers fewer rows, in even steps through all of them.
+
+        Raises:
+            Exception: Whatever the candidate raises.
+        """
+        one = np.ascontiguousarray(self.values[:, :1])
+        loaded.answer(one)  # the first call of many a library does more than others
+        call = loaded.call(one)
+        start = self.clock.wall()
+        call()
+        row_ns = float(max(self.clock.wall() - start, 1))
+        if candidate.kind == "floor":
+            return Judged(None, None, self._row_ns(loaded, row_ns))
+        most = max(int(_PATIENCE_NS // row_ns), 1)
+        rows, edges = self._samples(candidate.question)
+        certify = loaded.bound or candidate.bound
+        certified = certify() if certify else None
+        bound, origin = certified or (None, "nothing is certified")
+        beyond = "the bound holds on the rows, and these may lie beyond them"
+        return Judged(
+            _error(loaded, _part(rows, most), bound, origin),
+            _error(loaded, _part(edges, most), None, beyond),
+            self._row_ns(loaded, row_ns),
+        )
+
+    def _row_ns(self, loaded: Loaded, row_ns: float) -> float:
+        """Return what a row takes in a batch as large as there is patience for."""
+        count = max(min(int(_PATIENCE_NS // row_ns), _BATCH), 1)
+        call = loaded.call(repeated(self.values, count))
+        start = self.clock.wall()
+        call()
+        return min(row_ns, max(self.clock.wall() - start, 1) / count)
+
+    def _samples(self, question: Question) -> tuple[_Sample, _Sample]:
+        """Return the rows of the study, and rows aimed at the model's edges."""
+        if question not in self.samples:
+            model = self.asked[question]
+            edges = _edges(model)
+            self.samples[question] = (
+                _Sample(model, self.values, decide(model, self.values)),
+                _Sample(model, edges, decide(model, edges)),
+            )
+        return self.samples[question]
+
+
+def _edges(model: Model) -> FloatArray:
+    return probe_values(model, min(MOST_PROBES, _most_rows(model)))
+
+
+def _error(loaded: Loaded, sample: _Sample, bound: float | None, origin: str) -> Error:
+    found = loaded.answer(sample.values)
+    facts = error_against_exact(
+        sample.model,
+        sample.values,
+        found.labels,
+        found.strengths,
+        bound=bound,
+        origin=origin,
+        exact=sample.exact,
+    )
+    error = Error(**facts._asdict())
+    return msgspec.structs.replace(error, largest=_largest(facts, found, sample))
+
+
+def _largest(facts: Observed, found: Found, sample: _Sample) -> float | None:
+    """Return the largest error, not above the bound where only the oracle is in doubt.
+
+    What was observed is an upper end. Where it is above the bound and the lower end is
+    not, the bound is the better upper end.
+    """
+    largest, bound = facts.largest, facts.bound
+    if largest is None or bound is None or largest <= bound:
+        return largest
+    if not isinstance(sample.model, RuleBase) or found.strengths is None:
+        return largest
+    least, _ = strength_errors(sample.model, sample.values, found.strengths)
+    return largest if least.max() > bound else bound
+
+
+def _part(sample: _Sample, most: int) -> _Sample:
+    """Return at most so many rows, in even steps."""
+    step = -(-sample.values.shape[1] // most)
+    if step <= 1:
+        return sample
+    values = np.ascontiguousarray(sample.values[:, ::step])
+    return _Sample(sample.model, values, _thinned(sample.exact, step))
+
+
+def _thinned(exact: Decided, step: int) -> Decided:
+    """Return the exact answers to every so many rows."""
+    strengths = exact.strengths
+    return Decided(
+        exact.rule[::step],
+        exact.label[::step],
+        exact.status[::step],
+        None if strengths is None else strengths[:, ::step],
+        exact.doubt[::step],
+        exact.margin[::step],
+        exact.margin_high[::step],
+        exact.by_fractions,
+    )
+
+
+def _most_rows(model: Model) -> int:
+    rules = len(model.rules) if isinstance(model, RuleBase) else 1
+    return max(min(MOST_ROWS, _MOST_STRENGTHS // rules), 1)

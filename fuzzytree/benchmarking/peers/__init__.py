@@ -1,0 +1,235 @@
+"""Peers beside ours: what others would run for the same question, in the same study.
+
+A tree's cuts are carried over to trees of other libraries, a rule base's terms to
+fuzzy engines. Every peer answers rows with missing values, and those beyond its number
+type, without being asked; its own code sees the others.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from collections.abc import Callable
+from functools import partial
+
+import msgspec
+
+from fuzzytree.benchmarking.candidates import Bounds, questions, title
+from fuzzytree.benchmarking.peers import engines, evaluator, trees
+from fuzzytree.benchmarking.records import Bound, Candidate, Loaded, Omission, Question
+from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.runtimes.sampling import lines_bound
+
+_PYTHON = "one row after another"
+_SINGLE = "compares values rounded to float32 with cuts in double"
+_BARE = "missing values are not looked for within the call"
+_LINES = f"the strongest rule is taken by us: it has no word for ties; {_BARE}"
+
+
+class TreePeer(msgspec.Struct, frozen=True):
+    """A peer that follows a tree's path.
+
+    Attributes:
+        name: As in the candidate's name.
+        modules: What must be importable.
+        load: Prepares a tree for a number of threads.
+        note: What a reader must know to compare it fairly.
+        program: A program that it needs, if any.
+        is_parallel: Whether a second thread can make it faster.
+    """
+
+    name: str
+    modules: tuple[str, ...]
+    load: Callable[[FuzzyTree, int], Loaded]
+    note: str
+    program: str | None = None
+    is_parallel: bool = False
+
+
+TREE_PEERS = (
+    TreePeer("scikit-learn", ("sklearn",), trees.load_scikit_learn, _SINGLE),
+    TreePeer(
+        "scikit-learn core",
+        ("sklearn",),
+        trees.load_scikit_learn_core,
+        f"what predict calls behind its checks; {_SINGLE}; {_BARE}",
+    ),
+    TreePeer(
+        "skl2onnx",
+        ("sklearn", "skl2onnx", "onnx", "onnxruntime"),
+        trees.load_skl2onnx,
+        "from the scikit-learn tree, in onnxruntime, all in float32, without zipmap; "
+        f"{_BARE}",
+        is_parallel=True,
+    ),
+    TreePeer(
+        "treelite",
+        ("treelite",),
+        trees.load_treelite,
+        f"its interpreter GTIL, in double; {_BARE}",
+        is_parallel=True,
+    ),
+    TreePeer(
+        "m2cgen python",
+        ("sklearn", "m2cgen"),
+        trees.load_m2cgen_python,
+        f"its generated Python, in double; {_PYTHON}; {_BARE}",
+    ),
+    TreePeer(
+        "m2cgen c",
+        ("sklearn", "m2cgen"),
+        trees.load_m2cgen_c,
+        f"its generated C, in double, by gcc -O3, in a loop of ours; {_BARE}",
+        program="gcc",
+    ),
+)
+"""Peers for the question `tree`."""
+
+_PACKAGES = {"sklearn": "scikit-learn", "fuzzylite": "--no-deps pyfuzzylite"}
+"""What pip calls the modules that have another name there."""
+
+
+def _uncertified(rules: RuleBase, dtype: Dtype) -> None:
+    """Certify nothing."""
+
+
+def peers(
+    model: Model, bounds: Bounds = _uncertified
+) -> tuple[list[Candidate], list[Omission]]:
+    """Return a candidate for each peer and each question that it can answer.
+
+    Args:
+        model: A tree or a rule base.
+        bounds: Certifies the strengths of a rule base in a number type.
+
+    Returns:
+        The candidates, and the peers that are not installed or have no use here.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> found, omitted = peers(random_tree(1))
+        >>> {candidate.kind for candidate in found}
+        {'peer'}
+    """
+    found: list[Candidate] = []
+    omitted: dict[str, Omission] = {}
+    for question, form in questions(model).items():
+        if isinstance(form, RuleBase):
+            made, left = _of_rules(form, question, bounds)
+        else:
+            made, left = _of_tree(form)
+        for one in made:
+            name = title(one.name, question)
+            found.append(msgspec.structs.replace(one, name=name, question=question))
+        omitted |= {one.name: one for one in left}
+    return found, [*omitted.values()]
+
+
+def _of_tree(tree: FuzzyTree) -> tuple[list[Candidate], list[Omission]]:
+    found: list[Candidate] = []
+    omitted: list[Omission] = []
+    for peer in TREE_PEERS:
+        why = _absent(peer.modules, peer.program)
+        if why or not tree.nodes:
+            omitted.append(Omission(peer.name, why or "the tree asks nothing"))
+            continue
+        note = peer.note
+        if any(variable.parts for variable in tree.variables):
+            note += "; combinations are computed by numpy within the call"
+        one = Candidate(
+            peer.name,
+            "tree",
+            "peer",
+            partial(peer.load, tree),
+            note=note,
+            is_foreign=True,
+            is_parallel=peer.is_parallel,
+        )
+        found.append(one)
+    return _with_evaluator(tree, lambda: None, found, omitted)
+
+
+def _of_rules(
+    rules: RuleBase, question: Question, bounds: Bounds
+) -> tuple[list[Candidate], list[Omission]]:
+    found: list[Candidate] = []
+    omitted: list[Omission] = []
+    count = len(engines.names_of(rules))
+    for name, module, load, points in (
+        ("pyfuzzylite", "fuzzylite", engines.load_fuzzylite, engines.FINE),
+        ("simpful", "simpful", engines.load_simpful, engines.COARSE),
+    ):
+        why = _absent((module,))
+        if why:
+            omitted.append(Omission(name, why))
+            continue
+        if count > engines.MOST_TERMS:
+            most = f"{engines.MOST_TERMS:,}"
+            why = f"{count:,} terms, and {most} are the most to make points of"
+            omitted.append(Omission(title(name, question), why))
+            continue
+        is_rowwise = name == "simpful"
+        note = f"each curved piece as {points} lines; {_LINES}"
+        bound = partial(_lines, rules, points, bounds, is_rowwise=is_rowwise)
+        one = Candidate(
+            name,
+            "rules",
+            "peer",
+            partial(load, rules),
+            bound=bound,
+            note=f"{_PYTHON}; {note}" if is_rowwise else note,
+            is_foreign=True,
+        )
+        found.append(one)
+    return _with_evaluator(rules, partial(bounds, rules, "float64"), found, omitted)
+
+
+def _with_evaluator(
+    model: Model,
+    bound: Callable[[], Bound | None],
+    found: list[Candidate],
+    omitted: list[Omission],
+) -> tuple[list[Candidate], list[Omission]]:
+    """Add the reference evaluator of onnx to what there is."""
+    name = "onnx evaluator"
+    why = _absent(("onnx", "onnxruntime"))
+    if why:
+        return found, [*omitted, Omission(name, why)]
+    note = "the readable graph" if isinstance(model, RuleBase) else "the plain graph"
+    one = Candidate(
+        name,
+        "rules",
+        "peer",
+        partial(evaluator.load_evaluator, model),
+        bound=bound,
+        note=f"{note} in double, its operators one by one in numpy",
+        is_foreign=True,
+    )
+    return [*found, one], omitted
+
+
+def _lines(
+    rules: RuleBase, points: int, bounds: Bounds, *, is_rowwise: bool
+) -> Bound | None:
+    """Return the certified bound of an engine that joins points by lines."""
+    certified = bounds(rules, "float64")
+    if certified is None:
+        return None
+    terms = engines.asked_terms(rules, points)
+    if is_rowwise and engines.is_steep(terms):
+        return None
+    errors = {key: one.error for key, one in terms.items()}
+    more, origin = lines_bound(rules, errors)
+    return min(certified[0] + more, 1.0), f"{certified[1]}, and {origin}"
+
+
+def _absent(modules: tuple[str, ...], program: str | None = None) -> str:
+    """Return what is not installed, and how to get it; nothing if all is there."""
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            return f"not installed (pip install {_PACKAGES.get(module, module)})"
+    if program and shutil.which(program) is None:
+        return f"the program {program!r} is not installed"
+    return ""

@@ -1,0 +1,253 @@
+"""What a study of run times consists of, as frozen values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
+
+import msgspec
+
+from fuzzytree.semantics.lowering import Form
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray, IntArray
+
+Question = Form
+"""What a candidate computes. Errors are measured against the exact answer to it."""
+
+Kind = Literal["runtime", "variant", "peer", "floor"]
+
+Bound = tuple[float, str]
+"""The certified largest error of a strength, and where it comes from."""
+
+
+class Found(msgspec.Struct, frozen=True):
+    """What a candidate answered.
+
+    Attributes:
+        labels: The class number of each row, -1 for no class.
+        strengths: Shape (rules, rows), or None where the candidate tells none.
+    """
+
+    labels: IntArray
+    strengths: FloatArray | None = None
+
+
+class Loaded(msgspec.Struct, frozen=True):
+    """A candidate that is ready.
+
+    Attributes:
+        answer: Answers values of shape (inputs, rows), in the order of the model's
+            inputs; not timed.
+        call: Lays out the same values as the candidate wants them, outside the timed
+            part, and returns the call that is timed.
+        bytes: The size of the file or code that runs, if there is one.
+        bound: As of a candidate, where it is known only once that is loaded.
+    """
+
+    answer: Callable[[FloatArray], Found]
+    call: Callable[[FloatArray], Callable[[], object]]
+    bytes: int | None = None
+    bound: Callable[[], Bound | None] | None = None
+
+
+class Candidate(msgspec.Struct, frozen=True):
+    """One way of running a model: a point of a study, once measured.
+
+    Attributes:
+        name: Unique in a study, as people read it.
+        question: What it computes.
+        kind: A runtime of ours, a variant of the model, a peer, or a floor.
+        load: Prepare it for a number of threads. Raises a FuzzyTreeError, or what the
+            foreign library raises; the study lists it among the omissions.
+        bound: Certifies the largest error of a strength against the exact one, which
+            takes its time and is asked for once the candidate has answered; it gives
+            None, or is None, where nothing is certified.
+        note: What a reader must know to compare it fairly.
+        is_foreign: Whether code of others runs, which may crash or hang the process;
+            a child process tries it before the study does. A peer always is.
+        is_parallel: Whether a second thread can make it faster; if not, it is timed
+            with one only.
+    """
+
+    name: str
+    question: Question
+    kind: Kind
+    load: Callable[[int], Loaded]
+    bound: Callable[[], Bound | None] | None = None
+    note: str = ""
+    is_foreign: bool = False
+    is_parallel: bool = False
+
+
+class Omission(msgspec.Struct, frozen=True):
+    """What was left out of a study, and why."""
+
+    name: str
+    why: str
+
+
+class Timing(msgspec.Struct, frozen=True):
+    """How long calls of a candidate took, on so many rows.
+
+    Attributes:
+        rows: Rows in each call.
+        threads: Threads it was allowed.
+        samples_ns: Every measured time of one call, in the order of measuring.
+        median_ns: Their median.
+        low_ns: Lower end of the 95 % confidence interval of the median, from order
+            statistics (binomial); no assumption on the distribution.
+        high_ns: Upper end of it.
+        confidence: How surely the median lies in the interval, exactly: at least 0.95,
+            or less where fewer than six samples could be taken.
+        calls: Calls in each sample; its time is divided by them.
+        rounds: The round of each sample. Samples of two candidates that share a round
+            were taken one after the other.
+        stolen: Share of the time in which the process did not run; None where the
+            clocks cannot tell.
+    """
+
+    rows: int
+    threads: int
+    samples_ns: tuple[float, ...]
+    median_ns: float
+    low_ns: float
+    high_ns: float
+    confidence: float = 0.95
+    calls: int = 1
+    rounds: tuple[int, ...] = ()
+    stolen: float | None = None
+
+
+class Error(msgspec.Struct, frozen=True):
+    """How far a candidate is from the exact answer to its question.
+
+    Attributes:
+        rows: Rows on which it was observed.
+        largest: The largest observed difference of a strength from the exact one; None
+            where the candidate tells no strengths.
+        bound: The certified bound of it; None where there is none.
+        origin: Where the bound comes from, or why there is none.
+        flips: Rows whose class differs from the exact one.
+        largest_flip_margin: The largest exact margin of such a row.
+        in_band: Share of rows whose exact margin is at most twice the bound.
+        cover_lost: Rows that a rule covers exactly and none in the candidate.
+        cover_gained: Rows that none covers exactly and one in the candidate.
+    """
+
+    rows: int
+    largest: float | None
+    bound: float | None
+    origin: str
+    flips: int
+    largest_flip_margin: float | None = None
+    in_band: float | None = None
+    cover_lost: int = 0
+    cover_gained: int = 0
+
+
+class Point(msgspec.Struct, frozen=True):
+    """A candidate, measured: run time against error.
+
+    Attributes:
+        name: Unique in a study.
+        question: What it computes.
+        kind: As of the candidate.
+        error: On rows of the study; None for a floor, which answers nothing.
+        timings: One for each number of rows and threads.
+        load_ms: What it took to prepare it, in milliseconds, once.
+        bytes: The size of the file or code that runs, if there is one.
+        note: What a reader must know to compare it fairly.
+        probes: The error on rows aimed at edges and cuts, where carriers part; it says
+            nothing about how often that happens in use.
+    """
+
+    name: str
+    question: Question
+    kind: Kind
+    error: Error | None
+    timings: tuple[Timing, ...]
+    load_ms: float
+    bytes: int | None = None
+    note: str = ""
+    probes: Error | None = None
+
+
+class Machine(msgspec.Struct, frozen=True):
+    """Where and with what it was measured.
+
+    Attributes:
+        processor: As the system names it.
+        cores: How many the process may use.
+        system: Operating system and its version.
+        python: Its version.
+        versions: Of each package that took part.
+        load_before: Load averages of 1, 5 and 15 minutes, where the system tells them.
+        load_after: The same at the end.
+        stolen: Share of the wall time in which the process was ready and did not run,
+            as far as the clocks tell; None where they do not.
+    """
+
+    processor: str
+    cores: int
+    system: str
+    python: str
+    versions: dict[str, str]
+    load_before: tuple[float, ...] = ()
+    load_after: tuple[float, ...] = ()
+    stolen: float | None = None
+
+
+class Front(msgspec.Struct, frozen=True):
+    """Whom nobody beats in both run time and error, for one question.
+
+    Attributes:
+        question: What they compute.
+        rows: Rows in each call.
+        threads: Threads they were allowed.
+        names: From the fastest to the one with the smallest error.
+    """
+
+    question: Question
+    rows: int
+    threads: int
+    names: tuple[str, ...]
+
+
+class Study(msgspec.Struct, frozen=True):
+    """Error against run time for one model.
+
+    Attributes:
+        model: The model's name.
+        fingerprint: The SHA-256 of its content.
+        data: What the rows are: a file's name, or how they were made.
+        machine: Where it was measured.
+        points: What was measured, floors among it.
+        omissions: What was left out and why.
+        warnings: What makes the numbers doubtful, such as a noisy machine.
+        advice: For an error of at most E, what to use, and how much faster than what.
+        is_complete: False if the budget or the user ended it early.
+        fronts: Of each question, number of rows and number of threads.
+        seed: Of made rows and of the order of the rounds.
+        seconds: What the whole study took.
+        is_interrupted: Whether the user ended it early.
+    """
+
+    model: str
+    fingerprint: str
+    data: str
+    machine: Machine
+    points: tuple[Point, ...]
+    omissions: tuple[Omission, ...]
+    warnings: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ()
+    is_complete: bool = True
+    fronts: tuple[Front, ...] = ()
+    seed: int = 0
+    seconds: float = 0.0
+    is_interrupted: bool = False
+
+    def to_json(self) -> str:
+        """Return the same facts for programs, every raw timing included."""
+        raw = msgspec.json.encode(self)
+        return msgspec.json.format(raw, indent=2).decode()

@@ -1,0 +1,363 @@
+"""What leaving out saves, measured on the same model in three stages.
+
+*all columns* looks at every column of the table that it was learnt from, as a model
+does that declares them all; *as it is* is the model; *pruned* is what is left of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from msgspec.structs import replace
+
+from fuzzytree.benchmarking.clock import time_calls
+from fuzzytree.benchmarking.records import Timing
+from fuzzytree.checking.dependencies import DTYPES, Needs, needs, prove
+from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
+from fuzzytree.exporters import find_format
+from fuzzytree.exporters.onnx import write as write_onnx
+from fuzzytree.exporters.onnx_contents import contents
+from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.contracts import Dtype, Model
+from fuzzytree.model.rulebase import Variable, summary
+from fuzzytree.model.tree import Use
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics.probing import probe_values
+from fuzzytree.semantics.simplification import Pruned, Removed
+from fuzzytree.tables import batches
+
+if TYPE_CHECKING:
+    from fuzzytree.benchmarking.clock import Call, Tell
+    from fuzzytree.model.contracts import FloatArray
+
+ALL_COLUMNS, AS_IT_IS, PRUNED = "all columns", "as it is", "pruned"
+
+BATCH = 10_000
+"""Rows of the larger of the two timed calls."""
+
+_LARGEST_VALUE = 1e30  # of a row that is timed: no overflow, no subnormal numbers
+
+
+class File(msgspec.Struct, frozen=True):
+    """One file that a model makes.
+
+    Attributes:
+        carrier: `tree`, `relative rules`, `raw rules` or `rules`.
+        format: Its name.
+        dtype: The number type; None where the format has none.
+        bytes: The size.
+        nodes: Of the graph; None if there is none.
+        constants: Of the graph; None if there is none.
+    """
+
+    carrier: str
+    format: str
+    dtype: Dtype | None
+    bytes: int
+    nodes: int | None = None
+    constants: int | None = None
+
+
+class Size(msgspec.Struct, frozen=True):
+    """How large a model is in one stage.
+
+    Attributes:
+        stage: `all columns`, `as it is` or `pruned`.
+        inputs: The columns that are read.
+        row_bytes: What a row of doubles takes.
+        terms: How many terms and fitted sets there are.
+        files: What it makes.
+    """
+
+    stage: str
+    inputs: int
+    row_bytes: int
+    terms: int
+    files: tuple[File, ...]
+
+
+class Cost(msgspec.Struct, frozen=True):
+    """How long one thing takes in one stage.
+
+    Attributes:
+        stage: As in `Size`.
+        carrier: As in `File`; empty for reading a table.
+        runtime: What ran; empty for reading a table.
+        what: `open`, `one row`, `10,000 rows` or `read the table`.
+        timing: Of one call.
+    """
+
+    stage: str
+    carrier: str
+    runtime: str
+    what: str
+    timing: Timing
+
+
+class Report(msgspec.Struct, frozen=True):
+    """What a model needs, what was left out, what that saves, and the proof.
+
+    Attributes:
+        needs: What the model needs.
+        removed: What was left out.
+        rules: For each rule that is left its number before.
+        sizes: Before and after.
+        costs: Before and after, where they were measured.
+        proof: The pruned model held against the model.
+        omissions: What could not be told, and why.
+    """
+
+    needs: Needs
+    removed: tuple[Removed, ...]
+    rules: tuple[int, ...]
+    sizes: tuple[Size, ...]
+    costs: tuple[Cost, ...]
+    proof: Agreement
+    omissions: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Show how many inputs are needed, and how many things were left out."""
+        return summary(
+            "Report", inputs=len(self.needs.inputs), removed=len(self.removed)
+        )
+
+    @property
+    def ok(self) -> bool:
+        """Whether the pruned model was proved to be the model."""
+        return self.proof.ok
+
+    def to_json(self) -> str:
+        """Return the same facts for programs, as indented JSON."""
+        facts = {"ok": self.ok, **msgspec.to_builtins(self)}
+        return msgspec.json.format(msgspec.json.encode(facts), indent=2).decode()
+
+
+def report(
+    model: Model,
+    found: Pruned,
+    *,
+    uses: Collection[Use] = ("tree", "relative"),
+    data: FloatArray | None = None,
+    table: str | None = None,
+    delimiter: str | None = None,
+    seconds: float = 0.0,
+    tell: Tell | None = None,
+) -> Report:
+    """Tell what a model needs, prove its pruned form, and say what that saves.
+
+    Args:
+        model: The model.
+        found: Its pruned form.
+        uses: What a tree serves, as when it was pruned.
+        data: Rows of one's own for the proof, in the order of the model's inputs.
+        table: The path of a table; reading it is timed.
+        delimiter: Of a CSV file, if its first line does not tell.
+        seconds: For all timings together; 0 for none.
+        tell: Told how far the timings are.
+    """
+    made = stages(model, found.model)
+    taken, omissions = sizes(made, uses)
+    timed, untimed = (
+        ((), ())
+        if seconds <= 0
+        else costs(
+            made, uses, table=table, delimiter=delimiter, seconds=seconds, tell=tell
+        )
+    )
+    return Report(
+        needs(model, uses=uses),
+        found.removed,
+        found.rules,
+        taken,
+        timed,
+        prove(model, found, uses=uses, data=data),
+        (*omissions, *untimed),
+    )
+
+
+def stages(model: Model, left: Model) -> dict[str, Model]:
+    """Return the model in its stages; without the first if it has no more columns."""
+    made = {AS_IT_IS: model, PRUNED: left}
+    if set(model.columns) > set(model.inputs):
+        return {ALL_COLUMNS: with_all_columns(model), **made}
+    return made
+
+
+def with_all_columns(model: Model) -> Model:
+    """Return a model that needs a value in every column of its training table.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> with_all_columns(random_tree(1, leaves=2, inputs=3)).inputs
+        ('x1', 'x2', 'x3')
+    """
+    known = {v.name: v for v in model.variables}
+    declared = [known.get(name, Variable(name)) for name in model.columns]
+    combined = [v for v in model.variables if v.parts]
+    return replace(model, variables=(*declared, *combined))
+
+
+# --- sizes
+
+
+def sizes(
+    made: Mapping[str, Model], uses: Collection[Use]
+) -> tuple[tuple[Size, ...], tuple[str, ...]]:
+    """Return how large each stage is, and what could not be written and why."""
+    omissions: list[str] = []
+    found = [
+        Size(
+            stage,
+            len(model.inputs),
+            8 * len(model.inputs),
+            _term_count(model),
+            tuple(_files(model, uses, omissions)),
+        )
+        for stage, model in made.items()
+    ]
+    return tuple(found), tuple(dict.fromkeys(omissions))
+
+
+def _term_count(model: Model) -> int:
+    groups = [v.terms for v in model.variables]
+    groups += [group.terms for group in getattr(model, "sets", ())]
+    return sum(map(len, groups))
+
+
+def _files(model: Model, uses: Collection[Use], omissions: list[str]) -> Iterator[File]:
+    yaml, python = find_format("yaml"), find_format("python")
+    for title, carrier in forms(model, uses).items():
+        for form in (yaml, python):
+            try:
+                written = form.write(carrier)
+            except LossError as error:
+                omissions.append(f"{title} as {form.name}: {error}")
+                continue
+            yield File(title, form.name, None, len(written.content))
+        for dtype in DTYPES:
+            if title == "tree" and dtype == "mixed":
+                continue  # a path has comparisons alone: it is float64
+            try:
+                content = write_onnx(carrier, dtype=dtype, verify=False).content
+            except (LossError, MissingExtraError) as error:
+                omissions.append(f"{title} as onnx {dtype}: {error}")
+                continue
+            inside = contents(content)
+            yield File(
+                title, "onnx", dtype, len(content), inside.nodes, inside.constants
+            )
+
+
+# --- costs
+
+_Key = tuple[str, str, str, str]  # stage, carrier, runtime, what
+
+
+def costs(
+    made: Mapping[str, Model],
+    uses: Collection[Use],
+    *,
+    table: str | None = None,
+    delimiter: str | None = None,
+    seconds: float = 20.0,
+    rounds: int = 15,
+    tell: Tell | None = None,
+) -> tuple[tuple[Cost, ...], tuple[str, ...]]:
+    """Time opening, answering and reading in every stage, interleaved.
+
+    Files are opened and run in onnxruntime, models run in the native runtime, both in
+    one thread.
+
+    Args:
+        made: The stages.
+        uses: What a tree serves.
+        table: The path of a table to read; none is read if None.
+        delimiter: Of a CSV file, if its first line does not tell.
+        seconds: For all of it.
+        rounds: The most samples of each call.
+        tell: Told how far it is.
+
+    Returns:
+        The costs, and what could not be timed and why.
+    """
+    omissions: list[str] = []
+    groups: dict[int, dict[_Key, Call]] = {1: {}, BATCH: {}}
+    for stage, model in made.items():
+        rows = _plain_rows(model, BATCH)
+        for title, carrier in forms(model, uses).items():
+            for rows_of, key, call in _calls(stage, title, carrier, rows, omissions):
+                groups[rows_of][key] = call
+        if table is not None:
+            reading = _reading(table, model, delimiter)
+            try:
+                reading()
+            except FuzzyTreeError as error:
+                omissions.append(f"reading {table}, {stage}: {error}")
+            else:
+                groups[1][stage, "", "", "read the table"] = reading
+    found: list[Cost] = []
+    for size, calls in groups.items():
+        named = {" ".join(filter(None, key)): key for key in calls}
+        timed = time_calls(
+            {name: calls[key] for name, key in named.items()},
+            rows=size,
+            rounds=rounds,
+            seconds=seconds / len(groups),
+            tell=tell,
+        )
+        for failure in timed.failures.values():
+            raise failure
+        if timed.is_interrupted:
+            raise KeyboardInterrupt
+        found += [Cost(*named[name], one) for name, one in timed.timings.items()]
+        omissions += [
+            f"{name}: the time was over" for name in named if name not in timed.timings
+        ]
+    return tuple(found), tuple(dict.fromkeys(omissions))
+
+
+def _calls(
+    stage: str, title: str, model: Model, rows: FloatArray, omissions: list[str]
+) -> Iterator[tuple[int, _Key, Call]]:
+    """Yield the calls of one carrier, each with the number of rows it answers."""
+    runs = {"native": find_runtime("native").load(model)}
+    try:
+        content = write_onnx(model, verify=False).content
+        runs["onnxruntime"] = open_onnx(content, title).run
+    except (LossError, MissingExtraError) as error:
+        omissions.append(f"{title} in onnxruntime: {error}")
+    else:
+        key = (stage, title, "onnxruntime", "open")
+        yield 1, key, lambda: open_onnx(content, title)
+    for name, run in runs.items():
+        for count, what in ((1, "one row"), (BATCH, f"{BATCH:,} rows")):
+            values = np.ascontiguousarray(rows[:, :count])
+            yield count, (stage, title, name, what), _bound(run, values)
+
+
+def _bound(run: Callable[[FloatArray], object], values: FloatArray) -> Call:
+    return lambda: run(values)
+
+
+def _reading(table: str, model: Model, delimiter: str | None) -> Call:
+    def read() -> int:
+        found = batches(table, model.inputs, trained=model.columns, delimiter=delimiter)
+        return sum(batch.values.shape[1] for batch in found)
+
+    return read
+
+
+def _plain_rows(model: Model, count: int) -> FloatArray:
+    """Return probes without extremes, again and again; shape (inputs, count)."""
+    values = probe_values(model, 500)
+    size = np.abs(values)
+    is_plain = (size > 1.0 / _LARGEST_VALUE) & (size < _LARGEST_VALUE) | (size == 0.0)
+    kept = values[:, is_plain.all(axis=0)]
+    if not kept.shape[1]:
+        kept = np.zeros((len(values), 1))
+    return np.ascontiguousarray(kept[:, np.arange(count) % kept.shape[1]])

@@ -1,0 +1,529 @@
+"""A study: every candidate tried, judged against the exact answer, and timed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from fuzzytree.benchmarking import trial
+from fuzzytree.benchmarking.candidates import DEFAULT, questions, title
+from fuzzytree.benchmarking.clock import (
+    SURE,
+    Call,
+    Clock,
+    Tell,
+    Timed,
+    system_clock,
+    time_calls,
+)
+from fuzzytree.benchmarking.front import advice, fronts
+from fuzzytree.benchmarking.gather import chosen, gather
+from fuzzytree.benchmarking.judging import Judge
+from fuzzytree.benchmarking.machine import after, machine, noise
+from fuzzytree.benchmarking.records import (
+    Candidate,
+    Error,
+    Loaded,
+    Machine,
+    Omission,
+    Point,
+    Study,
+    Timing,
+)
+from fuzzytree.benchmarking.rows import made_rows, repeated
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.interrupts import noticed
+from fuzzytree.model.naming import as_names
+from fuzzytree.model.rulebase import fingerprint
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+ROWS = (1, 1_000, 1_000_000)
+THREADS = (1, 2)
+BUDGET_S = 300.0
+
+_MADE = 100_000  # rows that are made where there is no table; more are these again
+_TRIED = 16  # rows that a child process answers
+_MOST_BYTES = 6 * 2**30  # for all layouts of the rows of a study
+_MOST_THREADS = 256  # thousands of them do nothing but wait for each other
+_SHARE = 0.1  # of the time: what a single candidate may take at most
+_PACKAGES = (
+    *("onnx", "onnxruntime", "scikit-fuzzy", "scipy"),
+    *("m2cgen", "pyfuzzylite", "scikit-learn", "simpful", "skl2onnx", "treelite"),
+)
+
+
+class Plan(msgspec.Struct, frozen=True):
+    """What a study shall do.
+
+    Attributes:
+        rows: Rows in a call, each a column of the study.
+        threads: Threads that a candidate is allowed, one number after another.
+        most: The largest error of a strength that the user allows, if any.
+        budget_s: The time for the study; see `bench`.
+        rounds: The most samples of each timing.
+        seed: Of made rows, and of the order of the rounds.
+
+    Raises:
+        ValueError: If one of them cannot be.
+    """
+
+    rows: tuple[int, ...] = ROWS
+    threads: tuple[int, ...] = THREADS
+    most: float | None = None
+    budget_s: float = BUDGET_S
+    rounds: int = 15
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be done, before any work."""
+        for name, values in (("rows", self.rows), ("threads", self.threads)):
+            if not values:
+                raise ValueError(f"{name}: name at least one number")
+            for value in values:
+                if value < 1:
+                    raise ValueError(f"{name}: 1 is the least, not {value}")
+        if max(self.threads) > _MOST_THREADS:
+            raise ValueError(
+                f"threads: {_MOST_THREADS} is the most, not {max(self.threads)}"
+            )
+        if not 0 < self.budget_s < math.inf:
+            raise ValueError(
+                f"the budget must be a number of seconds above 0, not {self.budget_s:g}"
+            )
+        if self.most is not None and not 0 <= self.most <= 1:
+            raise ValueError(
+                f"an error of a strength lies in [0, 1], not at {self.most:g}"
+            )
+        for name, value, least in (("rounds", self.rounds, 1), ("seed", self.seed, 0)):
+            if value < least:
+                raise ValueError(f"{name}: {least} is the least, not {value}")
+
+
+def bench(
+    model: Model,
+    *,
+    values: FloatArray | None = None,
+    data: str = "",
+    only: Sequence[str] = (),
+    skip: Sequence[str] = (),
+    plan: Plan | None = None,
+    tell: Tell | None = None,
+) -> Study:
+    """Measure error against run time for every way of running a model.
+
+    Args:
+        model: A tree or a rule base.
+        values: Rows of shape (inputs, rows), in the order of `model.inputs`; repeated
+            where more are asked for. Rows are made of the declared ranges if None.
+        data: What to call them.
+        only: Names of candidates, or the part before the colon, or a question, or a
+            kind (`runtime`, `variant`, `peer`, `floor`): the others are left out.
+        skip: The same, for what is left out.
+        plan: How many rows, threads, seconds.
+        tell: Told what is being done and which share of the whole is.
+
+    Returns:
+        The study. What cannot be run is among its omissions. Ctrl-C ends it early and
+        keeps what was measured.
+
+    Raises:
+        ValueError: If the values have no row or another shape, or a name is unknown.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> few = Plan(rows=(10,), threads=(1,), rounds=6, budget_s=5.0)
+        >>> study = bench(random_tree(1), only=["native"], plan=few)
+        >>> [point.name for point in study.points]
+        ['native: tree', 'native: relative rules', 'native: raw rules']
+    """
+    plan = plan or Plan()
+    if values is None:
+        count = min(max(plan.rows), _MADE)
+        values, made = made_rows(model, count, seed=plan.seed)
+        text = _data_text(f"{_rows(count)} {made}", count, plan)
+    else:
+        _check(model, values)
+        count = values.shape[1]
+        text = _data_text(f"{data or 'a table'}, {_rows(count)}", count, plan)
+    found, omitted = gather(model, values)
+    kept, left = chosen(found, as_names(only), as_names(skip))
+    return run_study(
+        model,
+        kept,
+        values=values,
+        data=text,
+        omissions=[*omitted, *left],
+        plan=plan,
+        tell=tell,
+    )
+
+
+def _check(model: Model, values: FloatArray) -> None:
+    width = len(model.inputs)
+    if values.ndim != 2 or values.shape[0] != width:
+        raise ValueError(f"values must have shape ({width}, rows), not {values.shape}")
+    if not values.shape[1]:
+        raise ValueError("there are no rows to answer; give at least one")
+
+
+def _rows(count: int) -> str:
+    return f"{count:,} row{'' if count == 1 else 's'}"
+
+
+def _data_text(text: str, count: int, plan: Plan) -> str:
+    more = [f"{rows:,}" for rows in sorted(plan.rows) if rows > count]
+    return f"{text}, repeated to make {' and '.join(more)}" if more else text
+
+
+def run_study(
+    model: Model,
+    candidates: Sequence[Candidate],
+    *,
+    values: FloatArray,
+    data: str,
+    omissions: Sequence[Omission] = (),
+    plan: Plan | None = None,
+    tell: Tell | None = None,
+    clock: Clock | None = None,
+    maker: str = "fuzzytree.benchmarking.gather:foreign",
+) -> Study:
+    """Try, judge and time candidates; see `bench`, which finds them.
+
+    Args:
+        model: What they run.
+        candidates: Their names are unique.
+        values: At least one row, shape (inputs, rows).
+        data: What the rows are.
+        omissions: What was left out before.
+        plan: How many rows, threads, seconds.
+        tell: Told what is being done and which share of the whole is.
+        clock: Where the time comes from; the system unless given.
+        maker: Where a child process gets the foreign ones from; see `trial`.
+    """
+    with noticed() as check:
+
+        def step(text: str, share: float) -> None:
+            check()
+            if tell:
+                tell(text, share)
+
+        run = _Run(model, values, plan or Plan(), step, clock or system_clock())
+        run.omissions += omissions
+        before = machine(_PACKAGES)
+        try:
+            run.try_foreign(candidates, maker)
+            run.judge(candidates)
+            run.time()
+            check()
+        except KeyboardInterrupt:
+            run.is_complete, run.is_interrupted = False, True
+            run.warnings.append("interrupted: this is what was measured by then")
+    return run.study(data, before)
+
+
+class _Draft(msgspec.Struct):
+    """A point in the making."""
+
+    candidate: Candidate
+    loaded: Loaded
+    load_ms: float
+    error: Error | None
+    probes: Error | None
+    row_ns: float
+    timings: list[Timing] = []
+    threaded: dict[int, Loaded] = {}
+
+
+class _Run:
+    """A study while it runs: it must keep what it has when it is interrupted."""
+
+    def __init__(
+        self, model: Model, values: FloatArray, plan: Plan, tell: Tell, clock: Clock
+    ) -> None:
+        self.model, self.values, self.plan = model, values, plan
+        self.tell, self.clock = tell, clock
+        self.begin = clock.wall()
+        self.drafts: dict[str, _Draft] = {}
+        self.omissions: list[Omission] = []
+        self.warnings: list[str] = []
+        self.faulty: set[str] = set()
+        self.is_complete = True
+        self.is_interrupted = False
+
+    def spent_s(self) -> float:
+        """Return how long the study has been running."""
+        return (self.clock.wall() - self.begin) / 1e9
+
+    def omit(self, name: str, why: str) -> None:
+        """Leave a candidate out, or some rows of it."""
+        self.omissions.append(Omission(name, why))
+
+    def try_foreign(self, candidates: Sequence[Candidate], maker: str) -> None:
+        """Leave out what ends or blocks a child process."""
+        todo = [c for c in candidates if c.is_foreign or c.kind == "peer"]
+        faults = trial.tried(
+            self.model,
+            [c.name for c in sorted(todo, key=_rank)],
+            self.values[:, :_TRIED],
+            maker=maker,
+            left=lambda: self.plan.budget_s / 3 - self.spent_s(),
+            tell=_part(self.tell, 0.0, 0.1),
+        )
+        for name, why in faults.items():
+            self.omit(name, why)
+        self.faulty |= set(faults)
+
+    def judge(self, candidates: Sequence[Candidate]) -> None:
+        """Load each candidate and hold its answers against the exact ones."""
+        judge = Judge(questions(self.model), self.values, self.clock)
+        todo = [c for c in candidates if c.name not in self.faulty]
+        tell = _part(self.tell, 0.1, 0.3)
+        # If the time is short, what others are compared with is still there.
+        for position, one in enumerate(sorted(todo, key=_rank)):
+            tell(f"judging {one.name}", position / len(todo))
+            if self.spent_s() > self.plan.budget_s / 2 and _rank(one):
+                why = "half of the budget was over before it was judged"
+                self.omit(one.name, f"{why}; a larger one helps")
+                continue
+            start = self.clock.wall()
+            try:
+                loaded = one.load(min(self.plan.threads))
+                load_ms = (self.clock.wall() - start) / 1e6
+                found = judge.judged(one, loaded)
+            except Exception as error:  # whatever foreign code raises is a finding
+                self.omit(one.name, trial.error_text(error))
+                continue
+            self.drafts[one.name] = _Draft(
+                one, loaded, load_ms, found.error, found.probes, found.row_ns
+            )
+
+    def time(self) -> None:
+        """Time all candidates, few rows first: what they leave is for more rows."""
+        plan = self.plan
+        seconds = max(plan.budget_s / 2, plan.budget_s - self.spent_s())
+        end = self.spent_s() + seconds
+        blocks = [(r, t) for r in sorted({*plan.rows}) for t in sorted({*plan.threads})]
+        for number, (rows, threads) in enumerate(blocks):
+            left = max(end - self.spent_s(), 1e-3) / (len(blocks) - number)
+            first, last = (0.3 + 0.7 * k / len(blocks) for k in (number, number + 1))
+            self._block(rows, threads, left, _part(self.tell, first, last))
+
+    def _block(self, rows: int, threads: int, seconds: float, tell: Tell) -> None:
+        """Time whoever can answer so many rows with so many threads in time."""
+        names = [*self._members(rows, threads)]
+        if not names or self._is_too_large(rows, len(names)):
+            return
+        names = self._fitting(names, rows, seconds)
+        values = repeated(self.values, rows)
+        end = self.spent_s() + seconds
+        calls = dict(self._calls(names, values, threads, end))
+        found = time_calls(
+            calls,
+            rows=rows,
+            threads=threads,
+            rounds=self.plan.rounds,
+            seconds=max(end - self.spent_s(), 1e-3),
+            seed=self.plan.seed,
+            tell=tell,
+            clock=self.clock,
+        )
+        self._keep(found, rows, threads, len(calls))
+
+    def _members(self, rows: int, threads: int) -> Iterator[str]:
+        """Yield who takes part; more threads are for those who can use them."""
+        is_first = threads == min(self.plan.threads)
+        if not is_first and not any(
+            draft.candidate.is_parallel and draft.candidate.kind != "floor"
+            for draft in self.drafts.values()
+        ):
+            return
+        for name, draft in self.drafts.items():
+            one = draft.candidate
+            if not (is_first or one.is_parallel or _is_measure(one)):
+                continue
+            yield name
+
+    def _is_too_large(self, rows: int, count: int) -> bool:
+        peers = sum(d.candidate.kind == "peer" for d in self.drafts.values())
+        size = rows * len(self.model.inputs) * 8 * (4 + peers)
+        if size > _MOST_BYTES:
+            self.omit(
+                f"all {count} candidates",
+                f"{rows:,} rows: their layouts take about {size / 2**30:.0f} GiB, "
+                f"and {_MOST_BYTES >> 30} are the most",
+            )
+        return size > _MOST_BYTES
+
+    def _fitting(self, names: Sequence[str], rows: int, seconds: float) -> list[str]:
+        """Leave out who cannot have six samples in the time that is there."""
+        costs = {name: self.drafts[name].row_ns * rows for name in names}
+        ranks = {name: _rank(self.drafts[name].candidate) for name in names}
+        kept = fitting(costs, ranks, seconds * 1e9, min(SURE, self.plan.rounds))
+        for name in names:
+            if name not in kept:
+                why = f"{_rows(rows)}: too slow for the budget; a larger one helps"
+                self.omit(name, why)
+        return [name for name in names if name in kept]
+
+    def _calls(
+        self, names: Sequence[str], values: FloatArray, threads: int, end: float
+    ) -> Iterator[tuple[str, Call]]:
+        for name in names:
+            draft = self.drafts[name]
+            try:
+                loaded = self._threaded(draft, threads, end)
+                yield name, loaded.call(values)
+            except Exception as error:  # as above
+                why = trial.error_text(error)
+                self.omit(name, f"{_rows(values.shape[1])}: {why}")
+
+    def _threaded(self, draft: _Draft, threads: int, end: float) -> Loaded:
+        """Return a candidate as it is loaded for a number of threads.
+
+        Raises:
+            TimeoutError: If loading it again would take longer than there is time.
+        """
+        if threads == min(self.plan.threads) or not draft.candidate.is_parallel:
+            return draft.loaded
+        if threads not in draft.threaded:
+            if self.spent_s() + draft.load_ms / 1e3 > end:
+                why = f"loading it again for {threads} threads takes too long"
+                raise TimeoutError(f"{why} for the budget; a larger one helps")
+            draft.threaded[threads] = draft.candidate.load(threads)
+        return draft.threaded[threads]
+
+    def _keep(self, found: Timed, rows: int, threads: int, count: int) -> None:
+        """Take what was measured, whole or not."""
+        for name, error in found.failures.items():
+            self.omit(name, f"{rows:,} rows: {trial.error_text(error)}")
+        for name, timing in found.timings.items():
+            draft = self.drafts[name]
+            draft.timings.append(timing)
+            draft.row_ns = min(draft.row_ns, timing.median_ns / rows)
+        if found.is_interrupted:
+            raise KeyboardInterrupt
+        if len(found.timings) + len(found.failures) < count:
+            self.is_complete = False
+            self.warnings.append(
+                f"the time was over at {_rows(rows)}, {threads} "
+                f"thread{'' if threads == 1 else 's'}: {len(found.timings)} of {count} "
+                "candidates have a time there"
+            )
+
+    def study(self, data: str, before: Machine) -> Study:
+        """Return all that is known by now."""
+        drafts = [d for d in self.drafts.values() if d.timings]
+        points = tuple(map(_point, drafts))
+        timings = [timing for point in points for timing in point.timings]
+        found = after(before, timings)
+        return Study(
+            self.model.name,
+            fingerprint(self.model),
+            data,
+            found,
+            points,
+            tuple(self.omissions),
+            warnings=(
+                *self.warnings,
+                *noise(found, points),
+                *_unsure(points),
+                *faults(points),
+            ),
+            advice=advice(points, self.plan.most),
+            is_complete=self.is_complete,
+            fronts=fronts(points),
+            seed=self.plan.seed,
+            seconds=self.spent_s(),
+            is_interrupted=self.is_interrupted,
+        )
+
+
+def fitting(
+    costs: Mapping[str, float], ranks: Mapping[str, int], left: float, samples: int
+) -> set[str]:
+    """Return whose warm-up and first samples fit the time.
+
+    What all others are compared with comes first, then ours, then the others, the
+    faster ones before the slower ones. None of these may take more than a tenth of
+    the time.
+
+    Args:
+        costs: What one call of each is likely to cost.
+        ranks: Who comes first: the lowest.
+        left: The time for all of them, in the same unit.
+        samples: How many samples each needs, beside the warm-up.
+
+    Example:
+        >>> costs = {"native": 2.0, "fast": 1.0, "slow": 30.0}
+        >>> sorted(fitting(costs, {"native": 0, "fast": 1, "slow": 1}, 200.0, 6))
+        ['fast', 'native']
+    """
+    kept: set[str] = set()
+    whole = left
+    for name in sorted(costs, key=lambda one: (ranks[one], costs[one])):
+        needed = (1 + samples) * costs[name]
+        most = whole * _SHARE if ranks[name] else left
+        if needed <= min(most, left):
+            kept.add(name)
+            left -= needed
+    return kept
+
+
+def _rank(one: Candidate) -> int:
+    """Return 0 for what others are compared with, then ours, peers, variants."""
+    if _is_measure(one):
+        return 0
+    return {"floor": 0, "runtime": 1, "peer": 2, "variant": 3}[one.kind]
+
+
+def _is_measure(one: Candidate) -> bool:
+    return one.kind == "floor" or one.name == title(DEFAULT, one.question)
+
+
+def _part(tell: Tell, first: float, last: float) -> Tell:
+    """Return what tells a part of the work as a part of the whole."""
+    return lambda text, share: tell(text, first + share * (last - first))
+
+
+def _point(draft: _Draft) -> Point:
+    one = draft.candidate
+    return Point(
+        one.name,
+        one.question,
+        one.kind,
+        draft.error,
+        tuple(draft.timings),
+        draft.load_ms,
+        draft.loaded.bytes,
+        one.note,
+        draft.probes,
+    )
+
+
+def faults(points: Sequence[Point]) -> Iterator[str]:
+    """Yield where an error is larger than what was certified: that must not be.
+
+    Args:
+        points: Of a study.
+    """
+    for point in points:
+        error = point.error
+        if error is None or error.bound is None or error.largest is None:
+            continue
+        if error.largest > error.bound:
+            yield (
+                f"{point.name}: an error of {error.largest:.2g} is larger than the "
+                f"certified {error.bound:.2g}; this is a fault"
+            )
+
+
+def _unsure(points: Sequence[Point]) -> Iterator[str]:
+    few = sum(len(t.samples_ns) < SURE for point in points for t in point.timings)
+    if few:
+        verb = "time has" if few == 1 else "times have"
+        yield f"{few} {verb} fewer than {SURE} samples, and an interval below 95 %"

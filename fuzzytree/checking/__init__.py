@@ -1,0 +1,1 @@
+"""Whether all representations of a model agree, and how stable it is."""

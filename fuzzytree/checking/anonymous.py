@@ -1,0 +1,351 @@
+"""Models without what no answer depends on: names, units, notes, counts.
+
+Two models that are equal here give the same numbers and decide alike, whatever their
+variables and terms are called. A format that cannot hold a name, or has no place for
+a unit, still carries the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from msgspec.structs import replace
+
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import (
+    Band,
+    Clause,
+    Flank,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Shape,
+    Term,
+    Variable,
+)
+from fuzzytree.model.system import (
+    And,
+    Call,
+    Conclusion,
+    Condition,
+    Curve,
+    Expression,
+    Formula,
+    FuzzySystem,
+    Hedge,
+    Is,
+    Label,
+    Name,
+    Not,
+    Or,
+    RuleBlock,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    joints,
+)
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
+from fuzzytree.semantics.conversion.shapes import shape_of, stepped
+
+Names = Mapping[str, str]
+Labels = Mapping[str, Names]
+
+
+def anonymous(model: Document) -> Document:
+    """Return a model whose parts are called by their places: `v1`, `t1`, `c1`.
+
+    Units, notes, supports, training columns and the origin of terms are left out, and
+    ranges where no value is moved into them and no curve is looked at in them. Curves
+    with the same degrees at every double are alike, and so are conditions that min or
+    max joins in another order; norms that no rule uses are left out.
+
+    Args:
+        model: A tree, a rule base or a system.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import RuleBase, Rule, Variable
+        >>> one = RuleBase("a", ("x",), (Variable("p"),), (Rule((), "x"),))
+        >>> two = RuleBase("b", ("y",), (Variable("q", unit="mm"),), (Rule((), "y"),))
+        >>> anonymous(one) == anonymous(two)
+        True
+    """
+    match model:
+        case FuzzySystem():
+            return _system(model)
+        case RuleBase():
+            return _rules(model)
+        case FuzzyTree():
+            return _tree(model)
+
+
+def _numbered(letter: str, names: Iterable[str]) -> Names:
+    return {name: f"{letter}{k}" for k, name in enumerate(names, 1)}
+
+
+def _rules(rules: RuleBase) -> RuleBase:
+    names = _numbered("v", (v.name for v in rules.variables))
+    terms = {v.name: _numbered("t", (t.name for t in v.terms)) for v in rules.variables}
+    classes = _numbered("c", rules.classes)
+    return RuleBase(
+        name="m",
+        classes=tuple(classes.values()),
+        variables=_variables(rules.variables, names, terms),
+        rules=tuple(
+            Rule(_clauses(rule.when, names, terms), classes[rule.then])
+            for rule in rules.rules
+        ),
+        semantics=_semantics(rules.semantics, classes),
+    )
+
+
+def _tree(tree: FuzzyTree) -> FuzzyTree:
+    names = _numbered("v", (v.name for v in tree.variables))
+    terms = {v.name: _numbered("t", (t.name for t in v.terms)) for v in tree.variables}
+    sets = {s.variable: _numbered("t", (t.name for t in s.terms)) for s in tree.sets}
+    classes = _numbered("c", tree.classes)
+
+    def branch(one: Branch, variable: str) -> Branch:
+        asked = tuple(terms[variable][name] for name in one.terms)
+        fitted = tuple(sets[variable][name] for name in one.sets) if sets else ()
+        return replace(one, terms=asked, sets=fitted)
+
+    return FuzzyTree(
+        name="m",
+        classes=tuple(classes.values()),
+        variables=_variables(tree.variables, names, terms),
+        nodes=tuple(
+            Node(
+                names[node.variable],
+                node.cuts,
+                node.owners,
+                tuple(branch(one, node.variable) for one in node.branches),
+            )
+            for node in tree.nodes
+        ),
+        leaves=tuple(Leaf(classes[leaf.label]) for leaf in tree.leaves),
+        sets=tuple(
+            Sets(names[one.variable], _terms(one.terms, sets[one.variable]))
+            for one in tree.sets
+        ),
+        semantics=_semantics(tree.semantics, classes),
+    )
+
+
+def _variables(
+    variables: tuple[Variable, ...], names: Names, terms: Labels
+) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(
+            names[one.name],
+            _terms(one.terms, terms[one.name]),
+            parts=_parts(one.parts, names),
+        )
+        for one in variables
+    )
+
+
+def _terms(terms: tuple[Term, ...], names: Names) -> tuple[Term, ...]:
+    return tuple(Term(names[one.name], _shape(one.shape)) for one in terms)
+
+
+def _shape(shape: Shape) -> Shape:
+    if isinstance(shape, Band):
+        return replace(shape, left=_flank(shape.left), right=_flank(shape.right))
+    if isinstance(shape, Points):
+        return Points(stepped(shape.values), shape.degrees)
+    return shape
+
+
+def _flank(flank: Flank | None) -> Flank | None:
+    return None if flank is None else replace(flank, error=None)
+
+
+def _parts(parts: tuple[Part, ...], names: Names) -> tuple[Part, ...]:
+    return tuple(Part(names[one.input], one.weight, one.centre) for one in parts)
+
+
+def _clauses(
+    when: tuple[Clause, ...], names: Names, terms: Labels
+) -> tuple[Clause, ...]:
+    return tuple(
+        Clause(
+            names[one.variable],
+            tuple(terms[one.variable][name] for name in one.terms),
+            one.negated,
+        )
+        for one in when
+    )
+
+
+def _semantics(semantics: Semantics, classes: Names) -> Semantics:
+    uncovered, missing = semantics.uncovered, semantics.missing
+    return Semantics(
+        semantics.conjunction,
+        None if uncovered is None else classes[uncovered],
+        None if missing is None else classes[missing],
+    )
+
+
+def _system(system: FuzzySystem) -> FuzzySystem:
+    names = _numbered("v", (one.name for one in system.variables))
+    labels = {
+        one.name: _numbered("t", (label.name for label in one.labels))
+        for one in system.variables
+    }
+    return FuzzySystem(
+        name="m",
+        inputs=tuple(_input(one, names, labels) for one in system.inputs),
+        outputs=tuple(_output(one, names, labels) for one in system.outputs),
+        blocks=tuple(_block(one, system, names, labels) for one in system.blocks),
+    )
+
+
+def _input(one: SystemInput, names: Names, labels: Labels) -> SystemInput:
+    return SystemInput(
+        names[one.name],
+        _labels(one.labels, names, labels[one.name], are_numbers=False),
+        low=one.low if one.clips else None,
+        high=one.high if one.clips else None,
+        clips=one.clips,
+        parts=_parts(one.parts, names),
+    )
+
+
+def _output(one: SystemOutput, names: Names, labels: Labels) -> SystemOutput:
+    is_free = one.defuzzifier.is_weighted and not one.clips
+    how = one.defuzzifier
+    if how.is_weighted:
+        how = type(how)(how.method)
+    return replace(
+        one,
+        name=names[one.name],
+        labels=_labels(
+            one.labels, names, labels[one.name], are_numbers=how.is_weighted
+        ),
+        low=None if is_free else one.low,
+        high=None if is_free else one.high,
+        defuzzifier=how,
+        unit="",
+    )
+
+
+def _labels(
+    labels: tuple[Label, ...], variables: Names, names: Names, *, are_numbers: bool
+) -> tuple[Label, ...]:
+    return tuple(
+        replace(
+            one,
+            name=names[one.name],
+            curve=_curve(one.curve, variables, is_number=are_numbers),
+        )
+        for one in labels
+    )
+
+
+def _curve(curve: Curve, names: Names, *, is_number: bool) -> Curve:
+    if isinstance(curve, Formula):
+        return Formula(_expression(curve.expression, names))
+    shape = None if is_number else shape_of(curve)
+    return curve if shape is None else _shape(shape)
+
+
+def _expression(expression: Expression, names: Names) -> Expression:
+    match expression:
+        case Name(name=name):
+            return Name(name if name == "x" else names.get(name, name))
+        case Call(function=function, arguments=arguments):
+            return Call(function, tuple(_expression(one, names) for one in arguments))
+        case _:
+            return expression
+
+
+def _block(
+    block: RuleBlock, system: FuzzySystem, names: Names, labels: Labels
+) -> RuleBlock:
+    rules = tuple(
+        SystemRule(
+            None
+            if rule.when is None
+            else _ordered(_condition(rule.when, names, labels), block),
+            tuple(_conclusion(one, names, labels) for one in rule.then),
+            rule.weight,
+        )
+        for rule in block.rules
+    )
+    kinds = [one for rule in rules for one in joints(rule.when)]
+    looked_at = {o.name for o in system.outputs if not o.defuzzifier.is_weighted}
+    concluded = {one.output for rule in block.rules for one in rule.then}
+    return replace(
+        block,
+        rules=rules,
+        conjunction=block.conjunction if And in kinds else None,
+        disjunction=block.disjunction if Or in kinds else None,
+        implication=block.implication if looked_at & concluded else None,
+        name="",
+    )
+
+
+def _ordered(condition: Condition, block: RuleBlock) -> Condition:
+    """Return a condition whose parts stand in order where it changes no bit.
+
+    An AND at the beginning of an AND is one AND with it, under min anywhere; the same
+    holds for OR and max.
+    """
+    match condition:
+        case Not(part=part):
+            return Not(_ordered(part, block))
+        case And(parts=parts) | Or(parts=parts):
+            kind = type(condition)
+            is_free = (
+                block.conjunction == "minimum"
+                if kind is And
+                else block.disjunction == "maximum"
+            )
+            found = [_ordered(part, block) for part in parts]
+            if is_free:
+                found = sorted(
+                    (
+                        inner
+                        for part in found
+                        for inner in (part.parts if isinstance(part, kind) else (part,))
+                    ),
+                    key=repr,
+                )
+            elif isinstance(found[0], kind):
+                found[:1] = found[0].parts
+            return found[0] if len(found) == 1 else kind(tuple(found))
+        case _:
+            return condition
+
+
+def _condition(condition: Condition, names: Names, labels: Labels) -> Condition:
+    match condition:
+        case Is(variable=variable, label=label, hedges=hedges):
+            known = labels[variable]
+            name = None if label is None else known[label]
+            return Is(names[variable], name, _hedges(hedges))
+        case And(parts=parts):
+            return And(tuple(_condition(one, names, labels) for one in parts))
+        case Or(parts=parts):
+            return Or(tuple(_condition(one, names, labels) for one in parts))
+        case Not(part=Is() as part):
+            negated = replace(part, hedges=("not", *part.hedges))
+            return _condition(negated, names, labels)
+        case Not(part=part):
+            return Not(_condition(part, names, labels))
+
+
+def _conclusion(one: Conclusion, names: Names, labels: Labels) -> Conclusion:
+    label = labels[one.output][one.label]
+    return Conclusion(names[one.output], label, _hedges(one.hedges))
+
+
+def _hedges(hedges: tuple[Hedge, ...]) -> tuple[Hedge, ...]:
+    """Return hedges with `very very` as two: both are the square of the square."""
+    twice: tuple[Hedge, ...] = ("very", "very")
+    found: list[Hedge] = []
+    for hedge in hedges:
+        found.extend(twice if hedge == "very very" else (hedge,))
+    return tuple(found)

@@ -1,0 +1,487 @@
+"""Hold the answers of one carrier against those of another, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.model.agreement import Basis, Certified, Comparison, Verdict
+from fuzzytree.model.contracts import Dtype, Model, Outcome
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.numerics.bounds import certify, open_paths, strength_bounds
+from fuzzytree.numerics.oracle import Decided, strength_errors
+from fuzzytree.semantics.probing import probe_values
+from fuzzytree.semantics.reference import Status
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray, IntArray
+
+BoolArray = npt.NDArray[np.bool_]
+
+_TOLD = 5  # differing rows told for each comparison
+_LISTED = 20  # differences in the content of a file
+
+
+class Rows(msgspec.Struct, frozen=True):
+    """The rows that carriers answer: probes first, then the user's data.
+
+    Attributes:
+        inputs: The names of the inputs.
+        values: Shape (inputs, rows).
+        numbers: The number of each row in the whole, from 0.
+        probes: How many rows of the whole are probes.
+    """
+
+    inputs: tuple[str, ...]
+    values: FloatArray
+    numbers: IntArray
+    probes: int
+
+    def part(self, rows: slice | IntArray) -> Rows:
+        """Return some of the rows, which keep their numbers."""
+        return Rows(self.inputs, self.values[:, rows], self.numbers[rows], self.probes)
+
+    def name(self, row: int) -> str:
+        """Return what people call a row: `probe 3`, or `row 3` of the data."""
+        number = int(self.numbers[row])
+        if number < self.probes:
+            return f"probe {number + 1}"
+        return f"row {number - self.probes + 1}"
+
+
+def probed(model: Model, data: FloatArray | None, limit: int) -> Rows:
+    """Return probes of a model with the user's rows behind them.
+
+    Args:
+        model: A tree or a rule base.
+        data: Rows of one's own, shape (inputs, rows), in the order of `model.inputs`.
+        limit: The most probes.
+
+    Raises:
+        ValueError: If `data` has another shape.
+    """
+    values = probe_values(model, limit)
+    width, count = values.shape
+    if data is not None:
+        if data.ndim != 2 or data.shape[0] != width:
+            raise ValueError(f"data must have shape ({width}, rows), not {data.shape}")
+        values = np.ascontiguousarray(np.concatenate([values, data], axis=1))
+    return Rows(model.inputs, values, np.arange(values.shape[1]), count)
+
+
+class Answers(msgspec.Struct, frozen=True):
+    """What a carrier answered to some rows.
+
+    Attributes:
+        title: What to call the carrier.
+        model: What it executed.
+        outcome: Its answers, one for each of the rows.
+    """
+
+    title: str
+    model: Model
+    outcome: Outcome
+
+    def part(self, rows: slice | IntArray) -> Answers:
+        """Return some of the answers."""
+        return Answers(self.title, self.model, self.outcome.part(rows))
+
+
+def counted(
+    basis: Basis, carrier: str, against: str, rows: int, faults: Sequence[str]
+) -> Comparison:
+    """Return a comparison that disagrees in as many rows as there are faults."""
+    return Comparison(
+        carrier,
+        against,
+        basis,
+        rows,
+        "DISAGREES" if faults else "agrees",
+        differing=len(faults),
+        detail=tuple(faults[:_TOLD]),
+    )
+
+
+def judged(
+    name: str, against: str, faults: Sequence[str], rows: Sequence[Comparison]
+) -> Comparison:
+    """Compare the content of a file, in the light of what its rows gave.
+
+    Args:
+        name: What to call the file.
+        against: What its content should equal.
+        faults: How it differs.
+        rows: The comparisons of the file's rows.
+    """
+    more = [f"and {len(faults) - _LISTED} more"] if len(faults) > _LISTED else []
+    verdict: Verdict = "DISAGREES" if faults else "agrees"
+    if faults and rows and all(one.verdict == "agrees" for one in rows):
+        verdict = "rows only"
+    return Comparison(
+        name,
+        against,
+        "file",
+        1,
+        verdict,
+        differing=len(faults),
+        detail=(*faults[:_LISTED], *more),
+    )
+
+
+def compare_bits(found: Answers, expected: Answers, rows: Rows) -> Comparison:
+    """Demand equal rules, classes, statuses, and strengths where both have them.
+
+    Strengths are compared bit by bit: 0.0 is not -0.0, and NaN is one value.
+    """
+    gap = strength_gap(found.outcome, expected.outcome)
+    wrong = _unequal(found, expected) | (gap > 0)
+    one, two = found.outcome.strengths, expected.outcome.strengths
+    if one is not None and two is not None and one.shape == two.shape:
+        wrong |= ~same_bits(one, two).all(axis=0)
+    return _compared(found, expected, rows, wrong, gap)
+
+
+def same_bits(one: FloatArray, two: FloatArray) -> BoolArray:
+    """Return where two arrays of a shape have the same bits; NaN is one value.
+
+    Example:
+        >>> zeros, others = np.array([0.0, 0.0, np.nan]), np.array([0.0, -0.0, np.nan])
+        >>> same_bits(zeros, others).tolist()
+        [True, False, True]
+    """
+    same: BoolArray = (one == two) & (np.signbit(one) == np.signbit(two))
+    return same | (np.isnan(one) & np.isnan(two))
+
+
+def compare_within(
+    found: Answers, expected: Answers, rows: Rows, *, allowed: FloatArray, origin: str
+) -> Comparison:
+    """Allow a difference of strengths, and what must follow from it, and no more.
+
+    A class may differ only where the two strongest classes are at most twice the
+    allowed difference apart. Rows in which 1 is allowed prove nothing and are counted
+    as such.
+
+    Args:
+        found: The answers of the carrier examined.
+        expected: The answers of the carrier it is held against.
+        rows: The rows.
+        allowed: The largest difference of a strength, for each row. The result shows
+            that of the row that exceeds it most, or else of the largest difference.
+        origin: Where the allowed differences come from.
+    """
+    is_bound = allowed < 1.0
+    apart = strength_gap(found.outcome, expected.outcome)
+    gap = np.where(is_bound, apart, 0.0)
+    flips = labels(found) != labels(expected)
+    margin = margins(expected)
+    close = np.zeros_like(flips) if margin is None else margin <= 2 * allowed
+    wrong = is_bound & ((gap > allowed) | (flips & ~close))
+    excess = gap / np.maximum(allowed, 1e-300) if wrong.any() else gap
+    limit = float(allowed[np.argmax(excess)]) if gap.size else 0.0
+    return msgspec.structs.replace(
+        _compared(found, expected, rows, wrong, gap, limit, origin),
+        unbounded=int((~is_bound).sum()),
+        largest_unbounded=float(apart[~is_bound].max(initial=0.0)),
+    )
+
+
+def compare_answers(
+    found: Answers, expected: Answers, rows: Rows, *, by_design: bool = False
+) -> Comparison:
+    """Compare classes and missing rows alone.
+
+    Args:
+        found: The answers of the carrier examined.
+        expected: The answers of the carrier it is held against.
+        rows: The rows.
+        by_design: Whether the two are different functions, so that a difference is
+            told but no fault.
+    """
+    flips = labels(found) != labels(expected)
+    gap = np.zeros(flips.shape)
+    verdict: Verdict | None = "differs by design" if by_design and flips.any() else None
+    return _compared(
+        found, expected, rows, flips, gap, origin="equal classes", verdict=verdict
+    )
+
+
+def compare_excused(
+    found: Answers, expected: Answers, rows: Rows, *, excused: BoolArray, origin: str
+) -> Comparison:
+    """Demand equal answers in every row that is not excused."""
+    wrong = _unequal(found, expected) & ~excused
+    return _compared(found, expected, rows, wrong, np.zeros(wrong.shape), 0.0, origin)
+
+
+def without_status(answers: Answers) -> Answers:
+    """Keep of the statuses what a rule number tells."""
+    outcome = answers.outcome
+    status = np.where(outcome.rule > 0, Status.DECIDED, Status.UNCOVERED)
+    kept = msgspec.structs.replace(outcome, status=status.astype(np.int64))
+    return msgspec.structs.replace(answers, outcome=kept)
+
+
+def compare_labels(
+    title: str,
+    found: Sequence[str | None],
+    base: Answers,
+    rows: Rows,
+    excused: BoolArray,
+) -> Comparison:
+    """Compare the texts that a file answers with the classes of the model."""
+    classes = base.model.classes
+    right = [classes[n] if n >= 0 else None for n in labels(base).tolist()]
+    faults = [
+        f"{rows.name(row)}: label {given!r} where {label!r} is right"
+        for row, (given, label) in enumerate(zip(found, right, strict=True))
+        if given != label and not excused[row]
+    ]
+    return counted("rows", title, "the model's classes", len(right), faults)
+
+
+def strength_gap(found: Outcome, expected: Outcome) -> FloatArray:
+    """Return the largest difference of a strength in each row; NaN equals NaN.
+
+    Zeros where one of the two tells no strengths; infinite where one has a rule more.
+    """
+    one, two = found.strengths, expected.strengths
+    if one is None or two is None:
+        return np.zeros(found.rule.shape)
+    if one.shape != two.shape:
+        return np.full(found.rule.shape, np.inf)
+    gap = np.abs(one - two)
+    gap[np.isnan(one) & np.isnan(two)] = 0.0
+    gap[np.isnan(gap)] = np.inf
+    largest: FloatArray = gap.max(axis=0, initial=0.0)
+    return largest
+
+
+def labels(answers: Answers) -> IntArray:
+    """Return the class number of each answer; -1 for no class."""
+    model, outcome = answers.model, answers.outcome
+    classes = {label: number for number, label in enumerate(model.classes)}
+    if isinstance(model, RuleBase):
+        ends = [rule.then for rule in model.rules]
+    else:
+        ends = [leaf.label for leaf in model.leaves]
+    table = np.array([-1, *(classes[label] for label in ends)], np.int64)
+    found = table[outcome.rule]
+    for status, answer in (
+        (Status.UNCOVERED, model.semantics.uncovered),
+        (Status.MISSING, model.semantics.missing),
+    ):
+        found[outcome.status == status] = -1 if answer is None else classes[answer]
+    return found
+
+
+def margins(answers: Answers) -> FloatArray | None:
+    """Return how far the strongest class is ahead of the next, in each row."""
+    model, strengths = answers.model, answers.outcome.strengths
+    if strengths is None or isinstance(model, FuzzyTree):
+        return None
+    owners = np.array([model.classes.index(rule.then) for rule in model.rules])
+    best = np.zeros((len(model.classes) + 1, strengths.shape[1]))
+    for number in range(len(model.classes)):
+        best[number] = strengths[owners == number].max(axis=0, initial=0.0)
+    top = np.sort(best, axis=0)
+    apart: FloatArray = np.nan_to_num(top[-1] - top[-2], nan=0.0)
+    return apart
+
+
+def _unequal(found: Answers, expected: Answers) -> BoolArray:
+    one, two = found.outcome, expected.outcome
+    unequal: BoolArray = (one.rule != two.rule) | (one.status != two.status)
+    unequal |= labels(found) != labels(expected)
+    return unequal
+
+
+def _compared(
+    found: Answers,
+    expected: Answers,
+    rows: Rows,
+    wrong: BoolArray,
+    gap: FloatArray,
+    allowed: float = 0.0,
+    origin: str = "equal bits",
+    verdict: Verdict | None = None,
+) -> Comparison:
+    flips = labels(found) != labels(expected)
+    margin = margins(expected)
+    told = np.flatnonzero(wrong)
+    told = told[np.argsort(-gap[told], kind="stable")][:_TOLD]
+    detail = [_row_text(found, expected, rows, row) for row in told.tolist()]
+    if detail and gap.any() and not flips.any():
+        detail.insert(0, "only strengths differ: every row has the same class")
+    return Comparison(
+        found.title,
+        expected.title,
+        "rows",
+        int(wrong.size),
+        verdict or ("DISAGREES" if wrong.any() else "agrees"),
+        differing=int(wrong.sum()),
+        largest_difference=float(gap.max(initial=0.0)),
+        allowed=allowed,
+        origin=origin,
+        flips=int(flips.sum()),
+        largest_flip_margin=(
+            float(margin[flips].max()) if margin is not None and flips.any() else None
+        ),
+        detail=tuple(detail),
+        told=tuple(rows.numbers[told].tolist()),
+    )
+
+
+def _row_text(found: Answers, expected: Answers, rows: Rows, row: int) -> str:
+    values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
+    shown = ", ".join(f"{name} {value!r}" for name, value in values)
+    wanted, got = _answer_text(expected, row), _answer_text(found, row)
+    if wanted == got:
+        gap = _apart(found, expected, row)
+        return f"{rows.name(row)}: {shown}: both answer {got}{gap}"
+    return (
+        f"{rows.name(row)}: {shown}: {expected.title} answers {wanted}, "
+        f"{found.title} {got}"
+    )
+
+
+def _apart(found: Answers, expected: Answers, row: int) -> str:
+    """Return where the strengths of a row are furthest apart, in words."""
+    one, two = found.outcome.strengths, expected.outcome.strengths
+    if one is None or two is None or one.shape != two.shape:
+        return ""
+    gap = np.abs(one[:, row] - two[:, row])
+    gap = np.where(np.isnan(gap), np.inf, gap)
+    if not gap.any():  # they differ in the sign of a zero
+        gap = 1.0 - same_bits(one[:, row], two[:, row])
+    rule = int(np.argmax(gap))
+    right, other = float(two[rule, row]), float(one[rule, row])
+    return (
+        f"; the strength of rule {rule + 1} is {right!r} in {expected.title}, "
+        f"{other!r} in {found.title}"
+    )
+
+
+def _answer_text(answers: Answers, row: int) -> str:
+    outcome = answers.outcome
+    rule, status = int(outcome.rule[row]), Status(int(outcome.status[row]))
+    number = int(labels(answers)[row])
+    label = answers.model.classes[number] if number >= 0 else "no class"
+    text = f"{label} (rule {rule})" if rule else label
+    if outcome.strengths is not None and rule:
+        text += f" with {float(outcome.strengths[rule - 1, row])!r}"
+    return text if status is Status.DECIDED else f"{text} ({status.name.lower()})"
+
+
+# --- against exact arithmetic
+
+
+def compare_exact(
+    found: Answers, truth: Decided, rows: Rows, *, dtype: Dtype
+) -> Certified:
+    """Hold answers against the exact ones, within what a number type may change.
+
+    A strength may be off by its bound in that row; a class may differ where the exact
+    margin is at most twice that, or where a value lies within its rounding from a cut
+    of the tree, and nowhere else.
+
+    Args:
+        found: The answers of the carrier examined.
+        truth: The exact answers to the same rows.
+        rows: The rows; those of the data are counted if there are any.
+        dtype: The number type in which they were computed.
+    """
+    allowed, largest = _errors(found, rows, dtype)
+    flips = labels(found) != truth.label
+    close = allowed >= 1.0
+    if largest is not None:
+        close |= truth.margin <= 2.0 * allowed
+    wrong = flips & ~close
+    if largest is not None:
+        wrong |= (largest.low > allowed) & (allowed < 1.0)
+    is_data = len(rows.numbers) > rows.probes
+    own = rows.numbers >= (rows.probes if is_data else 0)
+    facts = certify(found.model, dtype, rows.values[:, own] if is_data else None)
+    if facts.reasons and not is_data:
+        facts = certify(found.model, dtype, rows.values)
+    lost, gained = _cover(found, truth)
+    flipped = truth.margin_high[own & flips]
+    bounded = own & (allowed < 1.0)
+    return Certified(
+        found.title,
+        dtype,
+        facts.sentence,
+        facts.delta,
+        facts.origin,
+        "data" if is_data else "probes",
+        int(own.sum()),
+        None if largest is None else float(largest.low[bounded].max(initial=0.0)),
+        int((own & close).sum()),
+        int((own & flips).sum()),
+        float(flipped.max()) if largest is not None and flipped.size else None,
+        int((lost & own).sum()),
+        int((gained & own).sum()),
+        int((own & (allowed >= 1.0)).sum()) if largest is not None else 0,
+        "DISAGREES" if wrong.any() else "agrees",
+        tuple(_exact_texts(found, truth, rows, wrong, allowed, largest)),
+    )
+
+
+class _Ends(NamedTuple):
+    """Between these ends the largest error of a strength lies, in each row."""
+
+    low: FloatArray
+    high: FloatArray
+
+
+def _errors(
+    found: Answers, rows: Rows, dtype: Dtype
+) -> tuple[FloatArray, _Ends | None]:
+    """Return what is allowed in each row (1: anything) and what was observed."""
+    if isinstance(found.model, FuzzyTree):
+        is_open = open_paths(found.model, dtype, rows.values)
+        return is_open.astype(np.float64), None
+    allowed, _ = strength_bounds(found.model, dtype, rows.values)
+    strengths = found.outcome.strengths
+    if strengths is None:
+        return allowed, None
+    return allowed, _Ends(*strength_errors(found.model, rows.values, strengths))
+
+
+def _cover(found: Answers, truth: Decided) -> tuple[BoolArray, BoolArray]:
+    """Return which rows lost and gained cover."""
+    weighed = (found.outcome.status != Status.MISSING) & (
+        truth.status != Status.MISSING
+    )
+    is_covered, should = found.outcome.rule > 0, truth.rule > 0
+    return should & ~is_covered & weighed, is_covered & ~should & weighed
+
+
+def _exact_texts(
+    found: Answers,
+    truth: Decided,
+    rows: Rows,
+    wrong: BoolArray,
+    allowed: FloatArray,
+    ends: _Ends | None,
+) -> Iterator[str]:
+    told = np.flatnonzero(wrong)
+    if ends is not None:
+        told = told[np.argsort(-ends.low[told], kind="stable")]
+    classes = found.model.classes
+    for row in told[:_TOLD].tolist():
+        values = zip(rows.inputs, rows.values[:, row].tolist(), strict=True)
+        shown = ", ".join(f"{name} {value!r}" for name, value in values)
+        number = int(truth.label[row])
+        label = classes[number] if number >= 0 else "no class"
+        text = f"{rows.name(row)}: {shown}: exactly {label} (rule {truth.rule[row]})"
+        text += f", {found.title} {_answer_text(found, row)}"
+        if ends is not None:
+            text += f"; a strength is off by {ends.low[row]:.2g}, and "
+            text += f"{allowed[row]:.2g} is allowed"
+        yield text

@@ -1,0 +1,648 @@
+"""From a file to a model, and from a model to a file, with a proof of what arrived."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, cast, get_args
+
+import msgspec
+
+from fuzzytree.checking.likeness import likeness
+from fuzzytree.errors import DisagreementError, LossError, ReadError
+from fuzzytree.exporters import all_formats, find_format
+from fuzzytree.files import read_bounded
+from fuzzytree.formats.simpful import from_simpful
+from fuzzytree.formats.skfuzzy import from_skfuzzy
+from fuzzytree.formats.sklearn import from_sklearn
+from fuzzytree.model.contracts import (
+    Carrier,
+    Document,
+    Dtype,
+    Format,
+    Loss,
+    Model,
+    ModelSource,
+    Reading,
+    Written,
+)
+from fuzzytree.model.losses import loss_text
+from fuzzytree.model.options import Option, check_options
+from fuzzytree.model.rulebase import Conjunction, Kind, RuleBase
+from fuzzytree.model.system import FuzzySystem, sampled_values
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.semantics.conversion import check_tolerance
+from fuzzytree.semantics.inference import unsampled_terms
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.probing import probes
+from fuzzytree.semantics.reference import evaluate
+
+if TYPE_CHECKING:
+    from fuzzytree.model.agreement import Coverage
+    from fuzzytree.numerics.bounds import Certificate
+
+_FEW = 200  # probes of a file that is run
+_TRIED = 1000  # probes of what a loss does to decisions
+
+_NOT_READ = "the file is not read back here; other programs run it"
+
+CALLED: dict[Carrier, str] = {
+    "tree": "tree",
+    "rules": "rule base",
+    "system": "fuzzy system",
+}
+"""What people call each carrier."""
+
+
+class Proof(msgspec.Struct, frozen=True):
+    """How a written file stands to the model that it was made of.
+
+    Attributes:
+        verdict: `equal`: read back, it is that model in every number and name.
+            `alike`: read back, it is that model but for names and notes, of which the
+            writer told; or run, it answers like that model.
+            `certified`: it computes, within the bound of the certificate.
+            `as listed`: it differs by the losses that were allowed.
+            `unproved`: the file is not read back.
+        sentence: The same for people.
+        certificate: What a number type can change, if the file computes.
+        coverage: Of a fuzzy system: which rules probes fire, and what is uncovered.
+    """
+
+    verdict: Literal["equal", "alike", "certified", "as listed", "unproved"]
+    sentence: str
+    certificate: Certificate | None = None
+    coverage: Coverage | None = None
+
+
+class Conversion(msgspec.Struct, frozen=True):
+    """A model that went from one file to another.
+
+    Attributes:
+        source: The file that was read, or the model's name.
+        read_as: The format that was read; empty for a model.
+        reading: What was read.
+        to: The format that was written.
+        model: What was written: the model that was read, or what it was turned into.
+        written: The file.
+        proof: How the file stands to the model.
+    """
+
+    source: str
+    read_as: str
+    reading: Reading
+    to: str
+    model: Document
+    written: Written
+    proof: Proof
+
+
+def carrier_of(model: Document) -> Carrier:
+    """Return which kind of model it is."""
+    match model:
+        case FuzzySystem():
+            return "system"
+        case RuleBase():
+            return "rules"
+        case FuzzyTree():
+            return "tree"
+
+
+def format_of(path: str | os.PathLike[str]) -> Format:
+    """Return the format that a file's suffix names.
+
+    Raises:
+        ReadError: If there is none.
+    """
+    suffix = Path(path).suffix
+    try:
+        return find_format(suffix or "no suffix")
+    except ValueError as error:
+        known = str(error).rpartition("; ")[2]
+        shown = f"no format of a model has the suffix {suffix!r}"
+        shown = shown if suffix else "has no suffix that names its format"
+        name = os.fspath(path) or "''"
+        raise ReadError(f"{name}: {shown}; {known}") from error
+
+
+def read(path: str | os.PathLike[str], *, format: str | None = None) -> Reading:
+    """Read a model from a file, with what the model cannot hold.
+
+    Args:
+        path: The file.
+        format: The name of its format; the one of its suffix unless given.
+
+    Raises:
+        ReadError: If the file cannot be read, or says something wrong; the message
+            lists all mistakes with their lines.
+        ValueError: If there is no such format.
+    """
+    form = find_format(format) if format else format_of(path)
+    refuse_unreadable(form, os.fspath(path))
+    return read_content(read_bounded(path), form, name=os.fspath(path))
+
+
+def refuse_unreadable(form: Format, name: str) -> None:
+    """Refuse a file in a format that only others read.
+
+    Raises:
+        ReadError: If the format has no reader.
+    """
+    if form.read is None:
+        raise ReadError(
+            f"{name}: a file in the format {form.name} is not read back as a model; "
+            "keep the file that it was made of"
+        )
+
+
+def read_content(content: bytes, form: Format, *, name: str) -> Reading:
+    """Read a model from the content of a file.
+
+    Raises:
+        ReadError: As `read`.
+    """
+    refuse_unreadable(form, name)
+    if not content:
+        raise ReadError(f"{name}:1:1: the file is empty")
+    assert form.read is not None  # refused above; for type checkers
+    found = form.read(content, name)
+    if not isinstance(found.model, FuzzySystem):
+        return found
+    narrow = [
+        f"term {label.name!r} of {output.name!r} is 0 at all "
+        f"{len(sampled_values(output))} values at which the range is sampled: rules "
+        "that conclude it change nothing"
+        for output, label in unsampled_terms(found.model)
+    ]
+    return msgspec.structs.replace(found, remarks=(*found.remarks, *narrow))
+
+
+def load(
+    path: str | os.PathLike[str], *, allow_loss: bool = False, format: str | None = None
+) -> Document:
+    """Read a model from a file: a tree, a rule base or a fuzzy system.
+
+    Args:
+        path: The file.
+        allow_loss: Whether to read what the model cannot hold as near as it can.
+        format: The name of its format; the one of its suffix unless given.
+
+    Raises:
+        ReadError: If the file cannot be read, or says something wrong; the message
+            lists all mistakes with their lines.
+        LossError: If the model cannot hold all that the file says, unless allowed;
+            the message lists all losses.
+        ValueError: If there is no such format.
+    """
+    return _whole(read(path, format=format), os.fspath(path), allow_loss=allow_loss)
+
+
+def load_content(content: bytes, name: str, *, allow_loss: bool = False) -> Document:
+    """Return the model of a file that was read already; its name tells the format.
+
+    Raises:
+        ReadError: As `load`.
+        LossError: As `load`.
+    """
+    found = read_content(content, format_of(name), name=name)
+    return _whole(found, name, allow_loss=allow_loss)
+
+
+def as_model(source: ModelSource, *, allow_loss: bool = False) -> Document:
+    """Return the model of whatever a public function was called with.
+
+    Args:
+        source: A tree, a rule base or a fuzzy system; a fitted `FuzzyTreeClassifier`
+            or `DecisionTreeClassifier`; a system of scikit-fuzzy or simpful; or the
+            path of a file.
+        allow_loss: As in `load`.
+
+    Raises:
+        TypeError: If it is something else.
+        NotFittedError: If it is a classifier that is not fitted.
+        ReadError: If a file cannot be read, or an object of another library holds what
+            no model can.
+        LossError: As `load`.
+    """
+    if isinstance(source, FuzzyTree | RuleBase | FuzzySystem):
+        return source
+    if isinstance(source, str | os.PathLike):
+        return load(source, allow_loss=allow_loss)
+    if hasattr(source, "__fuzzytree__") and not isinstance(source, type):
+        return source.__fuzzytree__()
+    for parent in inspect.getmro(type(source)):
+        reader = _OBJECT_READERS.get((parent.__module__, parent.__name__))
+        if reader is not None:
+            return reader(source)
+    raise TypeError(
+        "a model is a FuzzyTree, a RuleBase, a FuzzySystem, a fitted "
+        "FuzzyTreeClassifier or DecisionTreeClassifier, a ControlSystem of "
+        "scikit-fuzzy, a FuzzySystem of simpful, or the path of a file, and not "
+        f"a value of type {type(source).__name__}"
+    )
+
+
+_OBJECT_READERS: dict[tuple[str, str], Callable[[object], Document]] = {
+    ("sklearn.tree._classes", "DecisionTreeClassifier"): from_sklearn,
+    ("simpful.simpful", "FuzzySystem"): from_simpful,
+    ("skfuzzy.control.controlsystem", "ControlSystem"): from_skfuzzy,
+    ("skfuzzy.control.controlsystem", "ControlSystemSimulation"): from_skfuzzy,
+}
+"""The module and name of a class of another library, and what reads its objects."""
+
+
+def _whole(found: Reading, name: str, *, allow_loss: bool) -> Document:
+    """Return what was read.
+
+    Raises:
+        LossError: If the model cannot hold all of it, unless allowed.
+    """
+    if found.losses and not allow_loss:
+        raise LossError(losses_text(found.losses, name))
+    return found.model
+
+
+def deciding(model: Document, verb: str) -> Model:
+    """Return a model that decides for a class, as some verbs need.
+
+    Args:
+        model: Any model.
+        verb: What needs it.
+
+    Raises:
+        ReadError: If it is a fuzzy system, whose outputs are numbers.
+    """
+    if isinstance(model, FuzzySystem):
+        raise ReadError(
+            f"{model.name} is a fuzzy system, which decides for no class; "
+            f"{verb} takes a tree or a rule base"
+        )
+    return model
+
+
+def losses_text(losses: Sequence[Loss], name: str) -> str:
+    """Return a message that lists what a model cannot hold of a file."""
+    listed = "\n".join(f"  {loss_text(loss)}" for loss in losses)
+    return (
+        f"{name}: a model cannot hold all that the file says:\n{listed}\n"
+        "  pass allow_loss=True to read it as stated"
+    )
+
+
+def formed(
+    model: Document,
+    form: Format,
+    *,
+    carrier: Carrier | None = None,
+    kind: Kind | None = None,
+    conjunction: Conjunction | None = None,
+) -> Document:
+    """Return a model in the form that was asked for, or that a format carries.
+
+    Unless told otherwise a model stays what it is. Where the format does not carry
+    that, a tree becomes rules, rules become the system that decides alike, and a
+    system that decides as rules do becomes those rules.
+
+    Args:
+        model: A tree, a rule base or a system.
+        form: The format that it goes to.
+        carrier: What it shall be.
+        kind: The terms of rules made from a tree; relative unless given.
+        conjunction: The AND of rules made from a tree.
+
+    Raises:
+        LossError: If the format does not carry it in any form.
+        ValueError: If the model cannot be had in the form that was asked for.
+    """
+    asked_rules = kind is not None or conjunction is not None
+    if isinstance(model, FuzzyTree):
+        carries = carrier or ("rules" if asked_rules else _nearest("tree", form))
+        if carries == "tree":
+            return model
+        model = rules_from_tree(model, kind or "relative", conjunction=conjunction)
+        carrier = carrier or _nearest("rules", form)
+    elif isinstance(model, RuleBase):
+        _refuse_remaking(model, carrier, kind, conjunction)
+    if isinstance(model, RuleBase):
+        if (carrier or _nearest("rules", form)) != "system":
+            return model
+        from fuzzytree.semantics.conversion import as_system
+
+        return as_system(model, scores="winner")
+    return _formed_system(model, form, carrier, kind, conjunction)
+
+
+def _formed_system(
+    system: FuzzySystem,
+    form: Format,
+    carrier: Carrier | None,
+    kind: Kind | None,
+    conjunction: Conjunction | None,
+) -> FuzzySystem | RuleBase:
+    """Return a system as it is, or as the rules that it stands for.
+
+    Raises:
+        LossError: If the format carries rules alone, and it is none.
+        ValueError: If it cannot be had in the form that was asked for.
+    """
+    if carrier == "tree":
+        raise ValueError(
+            f"as tree: {system.name} is a fuzzy system, and no tree can be made of it"
+        )
+    for option, wanted in (("terms", kind), ("conjunction", conjunction)):
+        if wanted is not None:
+            raise ValueError(
+                f"{option} {wanted}: {system.name} is a fuzzy system; "
+                "such rules are made from a tree"
+            )
+    if (carrier or _nearest("system", form)) == "system":
+        return system
+    from fuzzytree.semantics.conversion import as_rules
+
+    found = as_rules(system, None)
+    if found is not None:
+        return found
+    if carrier == "rules":
+        raise ValueError(
+            f"as rules: {system.name} is a fuzzy system whose outputs are numbers, "
+            "and no rules that decide for a class can be made of it"
+        )
+    raise LossError(
+        f"cannot write {system.name} as {form.name}: it carries "
+        f"{' or '.join(form.carries)}, and this is a fuzzy system whose outputs "
+        f"are numbers; {', '.join(_carriers('system'))} carry one"
+    )
+
+
+def _way_out(carrier: Carrier, form: Format) -> str:
+    """Return what to do with a model that a format does not carry."""
+    nearest = _nearest(carrier, form)
+    if nearest != carrier:
+        return f"fuzzytree.convert makes {_FEW_OF[nearest]} of it"
+    return f"{', '.join(_carriers(carrier))} carry one"
+
+
+_FEW_OF: dict[Carrier, str] = {
+    "tree": "a tree",
+    "rules": "rules",
+    "system": "a fuzzy system",
+}
+
+
+def _carriers(carrier: Carrier) -> list[str]:
+    """Return the names of the formats that carry a kind of model."""
+    return [form.name for form in all_formats() if carrier in form.carries]
+
+
+_FORMS: dict[Carrier, tuple[Carrier, ...]] = {
+    "tree": ("tree", "rules", "system"),
+    "rules": ("rules", "system"),
+    "system": ("system", "rules"),
+}
+"""What each kind of model can be turned into, the nearest first."""
+
+
+def _nearest(carrier: Carrier, form: Format) -> Carrier:
+    """Return the nearest kind of model that a format carries, or else the same."""
+    for one in _FORMS[carrier]:
+        if one in form.carries:
+            return one
+    return carrier
+
+
+def _refuse_remaking(
+    rules: RuleBase,
+    carrier: Carrier | None,
+    kind: Kind | None,
+    conjunction: Conjunction | None,
+) -> None:
+    if carrier == "tree":
+        raise ValueError(
+            f"as tree: {rules.name} is a rule base, and no tree can be made of it"
+        )
+    for option, wanted, found in (
+        ("terms", kind, rules.kind),
+        ("conjunction", conjunction, rules.semantics.conjunction),
+    ):
+        if wanted is not None and wanted != found:
+            raise ValueError(
+                f"{option} {wanted}: {rules.name} is a rule base with "
+                f"{found or 'other'}; other rules are made from the tree"
+            )
+
+
+def export(
+    model: ModelSource,
+    to: str = "yaml",
+    *,
+    allow_loss: bool = False,
+    **options: Option,
+) -> Written:
+    """Write a model in a format, as bytes.
+
+    Args:
+        model: A tree, a rule base or a fuzzy system; see `as_model`.
+        to: The name of a format, or a suffix such as `.onnx`.
+        allow_loss: Whether to write what the format cannot hold as near as it can.
+        options: The writer's own options, such as `dtype` for onnx.
+
+    Returns:
+        The content and what was lost.
+
+    Raises:
+        LossError: If something would be lost, unless allowed.
+        MissingExtraError: If a package is missing; the message names the extra.
+        ValueError: If there is no such format or option.
+    """
+    model = as_model(model, allow_loss=allow_loss)
+    form = find_format(to)
+    carrier = carrier_of(model)
+    if carrier not in form.carries:
+        carried = " or ".join(form.carries)
+        raise LossError(
+            f"cannot write {model.name} as {form.name}: it carries {carried}, "
+            f"and this is a {CALLED[carrier]}; {_way_out(carrier, form)}"
+        )
+    check_options(form, options)
+    if isinstance(tolerance := options.get("tolerance"), int | float):
+        check_tolerance(tolerance)
+    # Each writer checks its own options; the protocol knows the common one alone.
+    write = cast("Callable[..., Written]", form.write)
+    return write(model, allow_loss=allow_loss, **options)
+
+
+def proved(
+    model: Document, form: Format, written: Written, *, dtype: object = None
+) -> Proof:
+    """Read a file back, or derive what it can change, and tell how it stands.
+
+    Args:
+        model: What was written.
+        form: The format.
+        written: The file.
+        dtype: The number type that the writer was asked for, if any.
+
+    Raises:
+        DisagreementError: If the file is read back as another model, though the writer
+            and the reader told of nothing.
+    """
+    if not isinstance(model, FuzzySystem):
+        return _proved(model, form, written, dtype=dtype)
+    if form.read is None and form.name == "onnx" and not written.losses:
+        return _run(model, written)
+    from fuzzytree.checking.systems import coverage_of
+
+    proof = _proved(model, form, written, dtype=dtype)
+    return msgspec.structs.replace(proof, coverage=coverage_of(model))
+
+
+def _proved(model: Document, form: Format, written: Written, *, dtype: object) -> Proof:
+    if form.read is None:
+        if isinstance(model, FuzzySystem):
+            return Proof("unproved", _NOT_READ)
+        if form.dtype is not None:
+            return _certified(model, form, dtype)
+        return Proof("unproved", _NOT_READ)
+    try:
+        again = form.read(written.content, form.name)
+    except ReadError as error:
+        raise DisagreementError(
+            f"{model.name} as {form.name} cannot be read back, and is not written:\n"
+            f"{error}"
+        ) from error
+    match likeness(model, written, again):
+        case "equal":
+            what = CALLED[carrier_of(model)]
+            text = f"read back from the file, the {what} is equal in every number"
+            return Proof("equal", text, _exact(model, text))
+        case "alike":
+            text = (
+                "read back from the file, it is equal but for names and notes, "
+                "or lines that became points"
+            )
+            return Proof("alike", text)
+        case "other" if written.losses or again.losses:
+            text = "read back from the file, it differs by what was lost"
+            return Proof("as listed", f"{text}{_decided(model, again.model)}")
+        case _:
+            raise DisagreementError(
+                f"{model.name} as {form.name} is read back as another model; "
+                "nothing is written"
+            )
+
+
+def _decided(model: Document, other: Document) -> str:
+    """Return what a loss did to the decisions of rules, in words; empty for others.
+
+    Relative rules that became points decide alike everywhere, by the proof in
+    `fuzzytree.numerics.approximation`; here it is tried as well.
+    """
+    if not (isinstance(model, RuleBase) and isinstance(other, RuleBase)):
+        return ""
+    if len(model.rules) != len(other.rules) or model.inputs != other.inputs:
+        return ""
+    rows = probes(model, limit=_TRIED)
+    changed = [r for r in rows if evaluate(model, r).rule != evaluate(other, r).rule]
+    if changed:
+        return f"; another rule wins in {len(changed)} of {len(rows)} probes"
+    proof = ", as it must for relative terms" if model.kind == "relative" else ""
+    return f"; the same rule wins in all of {len(rows)} probes{proof}"
+
+
+def _certified(model: Model, form: Format, dtype: object) -> Proof:
+    from fuzzytree.numerics.bounds import certify
+
+    asked = [name for name in get_args(Dtype) if name == dtype]
+    known = asked or [name for name in get_args(Dtype) if name == form.dtype]
+    certificate = certify(model, known[0], None)
+    return Proof("certified", certificate.sentence, certificate)
+
+
+def _run(system: FuzzySystem, written: Written) -> Proof:
+    """Run the ONNX file of a system, and compare its numbers.
+
+    Raises:
+        DisagreementError: If it answers other numbers, though no loss was told.
+    """
+    from fuzzytree.checking.systems import check_system
+    from fuzzytree.runtimes.onnxruntime import open_onnx
+
+    model = open_onnx(written.content, "the file")
+    found = check_system(system, model, runtimes=[], limit=_FEW)
+    found.raise_if_not_ok()
+    text = f"run by onnxruntime, it answers {found.probes} probes like the system"
+    if found.coverage is not None and found.coverage.unfired:
+        count = found.coverage.rules
+        text += (
+            f", in which {count - len(found.coverage.unfired)} of {count} rules fire"
+        )
+    return Proof("alike", text, coverage=found.coverage)
+
+
+def _exact(model: Document, origin: str) -> Certificate | None:
+    """Return the certificate of a file that holds a deciding model and changes none."""
+    if isinstance(model, FuzzySystem):
+        return None
+    from fuzzytree.numerics.bounds import Certificate
+
+    return Certificate(None, carrier_of(model), 0.0, origin)
+
+
+def convert(
+    source: ModelSource | Reading,
+    to: str,
+    *,
+    format: str | None = None,
+    allow_loss: bool = False,
+    carrier: Carrier | None = None,
+    terms: Kind | None = None,
+    conjunction: Conjunction | None = None,
+    **options: Option,
+) -> Conversion:
+    """Bring a model from one format to another, and prove what arrived.
+
+    Args:
+        source: The path of a file, a model as in `as_model`, or what was read.
+        to: The name of a format, or a suffix such as `.fll`.
+        format: Of the file; the one of its suffix unless given.
+        allow_loss: Whether to read and write what has no place as near as it can.
+        carrier: `tree`, `rules` or `system`; what the format carries unless given.
+        terms: Of rules made from a tree: `relative`, which equal it, or `raw`.
+        conjunction: Of rules made from a tree.
+        options: The writer's own.
+
+    Returns:
+        What was read, what was written, and how the file stands to the model.
+
+    Raises:
+        ReadError: As `read`.
+        LossError: If something would be lost, unless allowed.
+        DisagreementError: If the file is read back as another model without a word.
+        ValueError: If there is no such format, form or option.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> convert(random_tree(1), "yaml", carrier="rules").proof.verdict
+        'equal'
+    """
+    form = find_format(to)
+    name, read_as = "", ""
+    if isinstance(source, Reading):
+        found = source
+    elif isinstance(source, str | os.PathLike):
+        found = read(source, format=format)
+        name = os.fspath(source)
+        read_as = (find_format(format) if format else format_of(source)).name
+    else:
+        found = Reading(as_model(source))
+    name = name or found.model.name
+    if found.losses and not allow_loss:
+        raise LossError(losses_text(found.losses, name))
+    model = formed(
+        found.model, form, carrier=carrier, kind=terms, conjunction=conjunction
+    )
+    written = export(model, form.name, allow_loss=allow_loss, **options)
+    proof = proved(model, form, written, dtype=options.get("dtype"))
+    return Conversion(name, read_as, found, form.name, model, written, proof)

@@ -1,0 +1,411 @@
+"""What a model needs, what the rest costs, and the proof that it may go.
+
+A graph's operators are told with what they are there for. Nothing of that is written
+down by hand: the model is written once more without the thing, a negation say, and
+what is missing from that graph was there because of it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from msgspec.structs import replace
+
+from fuzzytree.checking.comparing import Answers, BoolArray, Rows, compare_bits, probed
+from fuzzytree.errors import LossError, MissingExtraError
+from fuzzytree.exporters.onnx import write as write_onnx
+from fuzzytree.exporters.onnx_contents import Contents, contents
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.contracts import Carrier, Dtype, Model, Outcome
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Points,
+    RuleBase,
+    Shape,
+    fingerprint,
+)
+from fuzzytree.model.tree import FuzzyTree, Use
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.axes import axis_lines, plan_axes
+from fuzzytree.semantics.cells import free_axes
+from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics.simplification import (
+    Pruned,
+    Removed,
+    proof_faults,
+    pruned,
+    unguarded,
+)
+
+if TYPE_CHECKING:
+    from fuzzytree.exporters.onnx import Output
+    from fuzzytree.model.contracts import FloatArray
+    from fuzzytree.runtimes.axes import Real
+
+DTYPES: tuple[Dtype, ...] = ("float64", "mixed", "float32")
+
+
+class Because(msgspec.Struct, frozen=True):
+    """What a graph holds on account of one thing.
+
+    Attributes:
+        what: The thing, as people name it.
+        operators: How many nodes of each operator fewer there are without it; below 0
+            where there are more.
+        bytes: How many bytes fewer.
+    """
+
+    what: str
+    operators: dict[str, int]
+    bytes: int
+
+
+class Graph(msgspec.Struct, frozen=True):
+    """The ONNX graph of one carrier in one number type, with label and rule number.
+
+    What is in it for what is told for `float64`; the other types differ by a cast.
+
+    Attributes:
+        carrier: `tree`, `relative rules`, `raw rules` or `rules`.
+        dtype: The number type.
+        contents: How large it is.
+        because: What of it is there on account of what the model has.
+        on_request: What further outputs would add, counted alike.
+        left_out: What the model does not have, of which the graph holds nothing.
+    """
+
+    carrier: str
+    dtype: Dtype
+    contents: Contents
+    because: tuple[Because, ...] = ()
+    on_request: tuple[Because, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+
+class Needs(msgspec.Struct, frozen=True):
+    """What a model needs and what it does not.
+
+    Attributes:
+        model: Its name.
+        fingerprint: The SHA-256 of its content.
+        carrier: Whether it is a tree or a rule base.
+        columns: How many columns the training table had; None if unknown.
+        inputs: The inputs that an answer depends on.
+        idle_inputs: The inputs that matter only where their value is missing.
+        combinations: The combinations that are asked.
+        terms: How many terms there are.
+        sets: How many fitted sets there are; 0 in a rule base.
+        rules: How many rules or leaves there are.
+        idle: All that could go; what that would change is said with it.
+        graphs: Its ONNX graphs, and what is in them for what.
+        omissions: Why there is no graph, where there is none.
+    """
+
+    model: str
+    fingerprint: str
+    carrier: Carrier
+    columns: int | None
+    inputs: tuple[str, ...]
+    idle_inputs: tuple[str, ...]
+    combinations: tuple[str, ...]
+    terms: int
+    sets: int
+    rules: int
+    idle: tuple[Removed, ...]
+    graphs: tuple[Graph, ...] = ()
+    omissions: tuple[str, ...] = ()
+
+
+def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Needs:
+    """Tell what a model needs, and all that could be left out of it.
+
+    Args:
+        model: A tree or a rule base.
+        uses: As in `pruned`.
+
+    Raises:
+        ValueError: As `pruned`.
+    """
+    asked = pruned(model, uses=uses, inputs=True).model
+    left = pruned(model, uses=uses, inputs=True, rules=True)
+    graphs, omissions = _graphs(model)
+    is_tree = isinstance(model, FuzzyTree)
+    groups = model.sets if isinstance(model, FuzzyTree) else ()
+    return Needs(
+        model=model.name,
+        fingerprint=fingerprint(model),
+        carrier="tree" if is_tree else "rules",
+        columns=len(model.columns) or None,
+        inputs=asked.inputs,
+        idle_inputs=tuple(n for n in model.inputs if n not in asked.inputs),
+        combinations=tuple(v.name for v in asked.variables if v.parts),
+        terms=sum(len(v.terms) for v in model.variables),
+        sets=sum(len(group.terms) for group in groups),
+        rules=len(model.leaves if isinstance(model, FuzzyTree) else model.rules),
+        idle=left.removed,
+        graphs=graphs,
+        omissions=omissions,
+    )
+
+
+# --- graphs
+
+
+def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
+    found: list[Graph] = []
+    omissions: list[str] = []
+    for title, carrier in forms(model).items():
+        for dtype in DTYPES:
+            if title == "tree" and dtype == "mixed":
+                continue  # a path has comparisons alone: it is float64
+            try:
+                found.append(_graph(title, carrier, dtype))
+            except (LossError, MissingExtraError) as error:
+                omissions.append(f"{title} in {dtype}: {error}")
+    return tuple(found), tuple(omissions)
+
+
+def _graph(title: str, model: Model, dtype: Dtype) -> Graph:
+    usual: tuple[Output, ...] = ("label", "rule")
+    whole = _written(model, dtype, usual)
+    if dtype != "float64":
+        return Graph(title, dtype, whole)
+    more: tuple[Output, ...] = ("status",)
+    if isinstance(model, RuleBase):
+        more = ("status", "strengths")
+    on_request = [
+        _because(f"output {one}", _written(model, dtype, (*usual, one)), whole)
+        for one in more
+    ]
+    because: list[Because] = []
+    left_out: list[str] = []
+    for what, without in _FEATURES.items():
+        other = without(model)
+        if other is not None:
+            because.append(_because(what, whole, _written(other, dtype, usual)))
+        elif isinstance(model, RuleBase) or what == COMBINATIONS:
+            left_out.append(what)
+    return Graph(
+        title, dtype, whole, tuple(because), tuple(on_request), tuple(left_out)
+    )
+
+
+def _written(model: Model, dtype: Dtype, outputs: Sequence[Output]) -> Contents:
+    written = write_onnx(model, dtype=dtype, outputs=outputs, verify=False)
+    return contents(written.content)
+
+
+def _because(what: str, whole: Contents, without: Contents) -> Because:
+    fewer = Counter(whole.operators)
+    fewer.subtract(without.operators)
+    operators = {name: count for name, count in sorted(fewer.items()) if count}
+    return Because(what, operators, whole.bytes - without.bytes)
+
+
+def _without_combinations(model: Model) -> Model | None:
+    if not any(variable.parts for variable in model.variables):
+        return None
+    return free_axes(model)
+
+
+def _with_rules(model: Model, change: Callable[[Clause], Clause]) -> RuleBase | None:
+    """Return a rule base with other clauses; None for a tree, or if all are alike."""
+    if isinstance(model, FuzzyTree):
+        return None
+    rules = tuple(
+        replace(rule, when=tuple(change(clause) for clause in rule.when))
+        for rule in model.rules
+    )
+    return None if rules == model.rules else replace(model, rules=rules)
+
+
+def _without_negation(model: Model) -> Model | None:
+    return _with_rules(model, lambda clause: replace(clause, negated=False))
+
+
+def _without_or(model: Model) -> Model | None:
+    return _with_rules(model, lambda clause: replace(clause, terms=clause.terms[:1]))
+
+
+def _without_product(model: Model) -> Model | None:
+    semantics = model.semantics
+    if isinstance(model, FuzzyTree) or semantics.conjunction == "min":
+        return None
+    return replace(model, semantics=replace(semantics, conjunction="min"))
+
+
+def _without_missing_answer(model: Model) -> Model | None:
+    semantics = model.semantics
+    if isinstance(model, FuzzyTree) or semantics.missing == semantics.uncovered:
+        return None
+    return replace(model, semantics=replace(semantics, missing=semantics.uncovered))
+
+
+def _without_curves(model: Model) -> Model | None:
+    """Return a rule base whose flanks are lines and whose sides have one number."""
+    if isinstance(model, FuzzyTree):
+        return None
+    variables = tuple(
+        replace(v, terms=tuple(replace(t, shape=_straight(t.shape)) for t in v.terms))
+        for v in model.variables
+    )
+    if variables == model.variables:
+        return None
+    return replace(model, variables=variables)
+
+
+def _straight(shape: Shape) -> Shape:
+    match shape:
+        case Band(left=left, right=right):
+            lines = [f and replace(f, curve=(1.0,)) for f in (left, right)]
+            return replace(shape, left=lines[0], right=lines[1])
+        case LR(left=below, right=above):
+            sides = [replace(side, curve=side.curve[:1]) for side in (below, above)]
+            return replace(shape, left=sides[0], right=sides[1])
+        case Points():
+            return shape
+
+
+COMBINATIONS = "combinations"
+
+_FEATURES: Mapping[str, Callable[[Model], Model | None]] = MappingProxyType(
+    {
+        COMBINATIONS: _without_combinations,
+        "negation": _without_negation,
+        "OR of terms": _without_or,
+        "product as AND": _without_product,
+        "an answer of its own for missing values": _without_missing_answer,
+        "curves": _without_curves,
+    }
+)
+"""What a model may have, and the model without it; None where it has none."""
+
+
+# --- the proof
+
+
+def prove(
+    model: Model,
+    found: Pruned,
+    *,
+    uses: Collection[Use] = ("tree", "relative"),
+    data: FloatArray | None = None,
+    runtimes: Sequence[str] = ("native",),
+    limit: int = 5_000,
+) -> Agreement:
+    """Hold a pruned model against the model: by proof, and by running both.
+
+    Strengths are compared bit for bit, those of rules that are gone with 0. Rows in
+    which a value is missing that only the whole model looks at are answered by the
+    pruned one; they are counted, and differ by design.
+
+    Args:
+        model: The model before.
+        found: What `pruned` made of it, or what somebody says it did.
+        uses: What a tree serves, as when it was pruned.
+        data: Rows of one's own, of shape (inputs, rows), in the order of the inputs
+            of `model`.
+        runtimes: What runs both.
+        limit: The most probes.
+
+    Raises:
+        ValueError: If a runtime is unknown, or `data` has another shape.
+    """
+    whole, left = forms(model, uses), forms(found.model, uses)
+    faults = [*proof_faults(model, found.model, uses=uses, rules=found.rules)]
+    comparisons = [_proof(model, faults)]
+    rows = probed(model, data, limit)
+    kinds: dict[str, Dtype] = {name: find_runtime(name).dtype for name in runtimes}
+    types: set[Dtype] = set(kinds.values())
+    seen = {dtype: _is_seen(model, found.model, rows, dtype) for dtype in types}
+    for title, carrier in whole.items():
+        other = left.get(title)
+        if other is None or not set(other.inputs) <= set(model.inputs):
+            continue
+        for name in runtimes:
+            comparisons += _compared(
+                title, name, carrier, other, found, rows, seen[kinds[name]]
+            )
+    return Agreement(
+        model.name, fingerprint(model), tuple(comparisons), probes=rows.probes
+    )
+
+
+def _proof(model: Model, faults: Sequence[str]) -> Comparison:
+    size = len(model.nodes if isinstance(model, FuzzyTree) else model.rules)
+    return Comparison(
+        "pruned",
+        "the model",
+        "proof",
+        size,
+        "DISAGREES" if faults else "agrees",
+        differing=len(faults),
+        origin="equal operations on equal numbers",
+        detail=tuple(faults[:5]),
+    )
+
+
+def _is_seen(model: Model, left: Model, rows: Rows, dtype: Dtype) -> BoolArray:
+    """Return the rows in which nothing is missing that only the whole model sees."""
+    seen: BoolArray = np.ones(rows.numbers.shape, np.bool_)
+    gone = unguarded(model, left)
+    kind: Real = np.dtype(np.float64)
+    if dtype == "float32":
+        kind = np.dtype(np.float32)
+    plan = plan_axes(model.variables, kind)
+    with np.errstate(invalid="ignore", over="ignore"):
+        lines = axis_lines(plan, rows.values)
+    for name in gone:
+        seen &= np.isfinite(lines[plan.line[name]])
+    return seen
+
+
+def _compared(
+    title: str,
+    name: str,
+    model: Model,
+    left: Model,
+    found: Pruned,
+    rows: Rows,
+    is_seen: BoolArray,
+) -> Iterator[Comparison]:
+    runtime = find_runtime(name)
+    kind: Carrier = "tree" if isinstance(model, FuzzyTree) else "rules"
+    if kind not in runtime.runs:
+        return
+    order = [model.inputs.index(one) for one in left.inputs]
+    outcome = runtime.load(left)(np.ascontiguousarray(rows.values[order]))
+    numbered = _in_old_numbers(outcome, model, found.rules)
+    pair = [
+        Answers(f"pruned {title} in {name}", model, numbered),
+        Answers(title, model, runtime.load(model)(rows.values)),
+    ]
+    parts = [(is_seen, False), (~is_seen, True)]
+    for chosen, is_by_design in parts:
+        numbers = np.flatnonzero(chosen)
+        if not is_by_design or numbers.size:
+            one, two = (answers.part(numbers) for answers in pair)
+            compared = compare_bits(one, two, rows.part(numbers))
+            if is_by_design and compared.differing:
+                compared = replace(compared, verdict="differs by design", detail=())
+            yield compared
+
+
+def _in_old_numbers(outcome: Outcome, model: Model, numbers: Sequence[int]) -> Outcome:
+    """Return an outcome as if the rules that are gone were there, with strength 0."""
+    if isinstance(model, FuzzyTree) or not numbers:
+        return outcome
+    old = np.array([0, *numbers], np.int64)[outcome.rule]
+    strengths = None
+    if outcome.strengths is not None:
+        zeros = np.zeros((len(model.rules), outcome.rule.size))
+        strengths = np.where(np.isnan(outcome.strengths[:1]), np.nan, zeros)
+        strengths[np.array(numbers) - 1] = outcome.strengths
+    return Outcome(old, outcome.status, strengths)

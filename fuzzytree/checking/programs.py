@@ -1,0 +1,210 @@
+"""Programs that were written of a model: their text, and then their answers.
+
+To run a file is to execute what stands in it. So a program runs only if its text is
+what this version writes of the model, or if the user says so.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from typing import Final, NamedTuple, cast
+
+import msgspec
+import numpy as np
+
+from fuzzytree.checking.comparing import (
+    Answers,
+    Rows,
+    compare_bits,
+    compare_excused,
+    compare_labels,
+    counted,
+    judged,
+    without_status,
+)
+from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
+from fuzzytree.exporters import find_format
+from fuzzytree.model.agreement import Comparison
+from fuzzytree.model.contracts import Document, Format, Model, Written
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.numerics.bounds import open_paths
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.written import ENGINES, Options
+from fuzzytree.semantics.lowering import forms, rules_from_tree
+
+_MOST_ROWS: Final = 2_000  # that a program answers
+_LONGEST: Final = 80  # characters of a line
+_FLOAT32: Final = {"dtype": "float32"}
+_OPTIONS: Final[Mapping[str, tuple[Options, ...]]] = {
+    "c": ({}, _FLOAT32),
+    "javascript": ({}, {"module": "script"}),
+    "pmml": ({}, {"curves": "points"}),
+    "sql": tuple(
+        {"dialect": dialect, "strengths": has_strengths}
+        for dialect in ("sqlite", "duckdb", "postgresql", "spark")
+        for has_strengths in (False, True)
+    ),
+    "structured-text": ({}, _FLOAT32),
+}
+"""The options with which a file is written for comparison, the usual ones first."""
+
+
+class ProgramFile(msgspec.Struct, frozen=True):
+    """A file that is run and not read back.
+
+    Attributes:
+        format: The name of its format.
+        content: The file.
+        may_run: Whether it runs whatever its text is.
+    """
+
+    format: str
+    content: bytes
+    may_run: bool = False
+
+
+class _Text(NamedTuple):
+    """What this version writes of a form of a model.
+
+    Attributes:
+        form: The form.
+        options: The writer's.
+        lines: The text.
+    """
+
+    form: Document
+    options: Options
+    lines: list[bytes]
+
+
+def check_program(
+    title: str, program: ProgramFile, model: Document, rows: Rows
+) -> Iterator[Comparison | str]:
+    """Compare a program with what is written now; run it if they are equal.
+
+    Raises:
+        MissingExtraError: If an engine is missing.
+    """
+    form = find_format(program.format)
+    lines = program.content.splitlines(keepends=True)
+    nearest = _nearest(form, model, lines)
+    if nearest is None:
+        fault = f"the model cannot be written as {form.name}"
+        yield counted("file", title, "a freshly written file", 1, (fault,))
+        return
+    faults = tuple(_faults(nearest.lines, lines))
+    why = _why_not(nearest, form)
+    found: list[Comparison] = []
+    if not faults or program.may_run:
+        if why is None:
+            found = [*_run(title, program, nearest, rows)]
+        else:
+            yield f"{title}: its answers: {why}"
+    elif why is None:
+        yield f"{title}: its answers: only --run-code runs a file with another text"
+    yield judged(title, "a freshly written file", faults, found)
+    yield from found
+
+
+def _nearest(form: Format, model: Document, lines: list[bytes]) -> _Text | None:
+    """Return the text that a file equals, or else that shares the most first lines."""
+    write = cast("Callable[..., Written]", form.write)  # the options are its own
+    best, most = None, -1
+    for document, options in itertools.product(
+        _documents(model), _OPTIONS.get(form.name, ({},))
+    ):
+        try:
+            written = write(document, allow_loss=True, **options)
+        except (LossError, ValueError):
+            continue
+        text = written.content.splitlines(keepends=True)
+        same = (one == two for one, two in zip(text, lines, strict=False))
+        shared = sum(1 for _ in itertools.takewhile(bool, same))
+        if text == lines:
+            return _Text(document, options, text)
+        if shared > most:
+            best, most = _Text(document, options, text), shared
+    return best
+
+
+def _documents(model: Document) -> Iterator[Document]:
+    """Yield what a file may have been written of: a model, or rules made from it."""
+    if isinstance(model, FuzzySystem):
+        yield model
+        return
+    yield from forms(model).values()
+    if isinstance(model, FuzzyTree):
+        own = model.semantics.conjunction
+        for kind in ("relative", "raw") if model.sets else ("relative",):
+            for conjunction in ("min", "product"):
+                if conjunction != own:
+                    yield rules_from_tree(model, kind, conjunction=conjunction)
+
+
+def _faults(right: list[bytes], lines: list[bytes]) -> Iterator[str]:
+    """Yield the first line that differs."""
+    for number, (one, two) in enumerate(
+        itertools.zip_longest(right, lines, fillvalue=b""), 1
+    ):
+        if one != two:
+            yield f"line {number}: {_shown(two)} where {_shown(one)} is right"
+            return
+
+
+def _shown(line: bytes) -> str:
+    text = line.decode("utf-8", "replace").rstrip("\n")
+    return repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}...")
+
+
+def _why_not(text: _Text, form: Format) -> str | None:
+    """Return why no engine runs a program here; None if one does."""
+    if isinstance(text.form, FuzzySystem):
+        return f"programs of fuzzy systems in {form.name} are compared by their text"
+    if form.name not in ENGINES:
+        return f"no engine for {form.name} is known here"
+    dialect = text.options.get("dialect", "sqlite")
+    if dialect not in ("sqlite", "duckdb"):
+        return f"no engine for SQL of the dialect {dialect} is known here"
+    if text.options.get("module") == "script":
+        return "only JavaScript modules are run"
+    if text.options.get("curves") == "points":
+        return "PMML whose curves became points is another function"
+    return None
+
+
+def _run(
+    title: str, program: ProgramFile, text: _Text, rows: Rows
+) -> Iterator[Comparison]:
+    """Run a program, and compare its answers with those of the form it was made of."""
+    model = cast("Model", text.form)  # no system: see `_why_not`
+    some = rows.part(slice(None, None, -(-len(rows.numbers) // _MOST_ROWS)))
+    is_single = text.options == _FLOAT32
+    dtype = "native float32" if is_single and isinstance(model, RuleBase) else "native"
+    base = Answers("the model", model, find_runtime(dtype).load(model)(some.values))
+    try:
+        result = ENGINES[program.format](
+            program.content, model, text.options, some.values
+        )
+    except MissingExtraError as error:
+        raise MissingExtraError(f"{title}: {error}") from error
+    except FuzzyTreeError as error:
+        faults = ("; ".join(str(error).splitlines()),)
+        yield counted("rows", title, "the model", len(some.numbers), faults)
+        return
+    found = Answers(title, model, result.outcome)
+    right = base
+    if not result.has_status:
+        found, right = without_status(found), without_status(base)
+    excused = np.full(some.numbers.shape, fill_value=False)
+    if is_single and isinstance(model, FuzzyTree):
+        excused = open_paths(model, "float32", some.values)
+        yield compare_excused(
+            found, right, some, excused=excused, origin="equal but within float32"
+        )
+    else:
+        yield compare_bits(found, right, some)
+    if result.labels is not None:
+        yield compare_labels(title, result.labels, base, some, excused)

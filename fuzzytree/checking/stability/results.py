@@ -1,0 +1,236 @@
+"""What a stability study found, as frozen values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Literal
+
+import msgspec
+
+from fuzzytree.model.agreement import version
+
+Verdict = Literal["holds", "FAILS", "not applicable"]
+
+_TOLD = 5  # faults told of each criterion; the others are counted
+
+
+class Criterion(msgspec.Struct, frozen=True):
+    """One criterion, applied to one model.
+
+    Attributes:
+        code: N1 to N10.
+        title: What is demanded, in a few words.
+        verdict: The result; `not applicable` where nothing could be tried.
+        cases: How many answers were held against what they must be.
+        worst: The largest difference found, of a degree or strength; None where the
+            criterion measures none.
+        detail: What failed, worst first; or what was measured, in sentences.
+        advice: What to do about it; empty if there is nothing to do.
+        skipped: What was not tried and why.
+    """
+
+    code: str
+    title: str
+    verdict: Verdict
+    cases: int = 0
+    worst: float | None = None
+    detail: tuple[str, ...] = ()
+    advice: str = ""
+    skipped: tuple[str, ...] = ()
+
+
+class Usable(msgspec.Struct, frozen=True):
+    """Powers of two by which all inputs can be multiplied without changing an answer.
+
+    Attributes:
+        carrier: Which form of the model.
+        dtype: In which number type.
+        lowest: The smallest exponent at which every number of the model is normal.
+        highest: The largest.
+    """
+
+    carrier: str
+    dtype: str
+    lowest: int
+    highest: int
+
+
+class OffsetCost(msgspec.Struct, frozen=True):
+    """What a distance from zero costs, for one form of the model.
+
+    Attributes:
+        carrier: Which form.
+        ratio: The spread of the narrowest term over the distance, for every input.
+        float32: The largest error of a strength in float32; None where float32
+            cannot hold the model.
+        mixed: The same in mixed numbers.
+        float64: The same in double.
+        flips: Rows whose class differs from the exact one in float32, of `rows`.
+        rows: How many rows were asked.
+    """
+
+    carrier: str
+    ratio: float
+    float32: float | None
+    mixed: float | None
+    float64: float | None
+    flips: int
+    rows: int
+
+
+class Stiff(msgspec.Struct, frozen=True):
+    """How stiff an input is, and what giving it in float32 would cost.
+
+    Attributes:
+        input: Its name.
+        spread: The shortest distance over which a degree changes fully, in its unit;
+            None where degrees only step.
+        location: The largest absolute value in its range.
+        ratio: spread / location: small is stiff. None where one of them is missing.
+        predicted: The largest error of a degree that rounding this input alone to
+            float32 can cause, from the slopes of the terms; at most 1.
+        observed: The largest change of a strength that it did cause, on the rows.
+        flips: Rows whose exact class changes with it.
+        rows: How many rows were tried.
+        offset: A value to subtract before rounding that would help, if one would.
+        advice: `float32 is safe`, `use mixed`, `use double`, and what to subtract.
+    """
+
+    input: str
+    spread: float | None
+    location: float
+    ratio: float | None
+    predicted: float
+    observed: float
+    flips: int
+    rows: int
+    offset: float | None
+    advice: str
+
+
+class CurveFault(msgspec.Struct, frozen=True):
+    """A term whose curve is ill-conditioned, leaves [0, 1], or rises.
+
+    Attributes:
+        variable: Its variable.
+        term: Its name, with the side of it.
+        form: In which form of the model it stands.
+        condition: How many roundings of the largest degree evaluating it can cost.
+        overshoot: By how much the polynomial leaves [0, 1] before it is clipped.
+        rise: By how much the clipped degree rises on its way out.
+        where: Where it rises most, in the variable's unit; None if it does not.
+        fails: Whether a stated limit is exceeded.
+        advice: What to do.
+    """
+
+    variable: str
+    term: str
+    form: str
+    condition: float
+    overshoot: float
+    rise: float
+    where: tuple[float, float] | None
+    fails: bool
+    advice: str
+
+
+class Stability(msgspec.Struct, frozen=True):
+    """Is a model numerically stable: the result of all criteria.
+
+    Attributes:
+        model: The model's name.
+        fingerprint: The SHA-256 of its content.
+        probes: How many rows were made for it.
+        rows: How many rows of data were given beside them.
+        tried: How many of those were tried, evenly drawn; the others are too many.
+        runtimes: What was run.
+        criteria: In the order of their codes.
+        stiff: Every input, the costliest in float32 first.
+        curves: Terms with something to know about, worst first.
+        usable: By what the inputs can be multiplied.
+        offsets: What a distance from zero costs.
+    """
+
+    FORMAT: ClassVar[str] = "fuzzytree-stability/1"
+
+    model: str
+    fingerprint: str
+    probes: int
+    rows: int
+    tried: int
+    runtimes: tuple[str, ...]
+    criteria: tuple[Criterion, ...]
+    stiff: tuple[Stiff, ...] = ()
+    curves: tuple[CurveFault, ...] = ()
+    usable: tuple[Usable, ...] = ()
+    offsets: tuple[OffsetCost, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether no criterion fails."""
+        return all(one.verdict != "FAILS" for one in self.criteria)
+
+    def to_json(self) -> str:
+        """Return the same facts for programs, as indented JSON."""
+        head = {"format": self.FORMAT, "version": version(), "ok": self.ok}
+        raw = msgspec.json.encode({**head, **msgspec.to_builtins(self)})
+        return msgspec.json.format(raw, indent=2).decode()
+
+
+TITLES = {
+    "N1": "powers of two change no bit",
+    "N2": "offsets cost what the bound says",
+    "N2b": "features 20 decades apart",
+    "N3": "order, copies and batches change no bit",
+    "N4": "degenerate terms and batches",
+    "N5": "edges are exact",
+    "N6": "special values as declared",
+    "N7": "curves: condition, overshoot, rise",
+    "N8": "within the certified bound",
+    "N9": "files come back",
+    "N10": "error against run time",
+}
+"""What each criterion demands."""
+
+
+def judged(
+    code: str,
+    cases: int,
+    faults: Sequence[str],
+    *,
+    worst: float | None = None,
+    facts: Sequence[str] = (),
+    advice: str = "",
+    skipped: Sequence[str] = (),
+) -> Criterion:
+    """Return a criterion with the verdict that its faults give.
+
+    Args:
+        code: A key of `TITLES`.
+        cases: How many answers were examined; none makes it `not applicable`.
+        faults: What failed, worst first.
+        worst: The largest difference found.
+        facts: What was measured; told where nothing failed, and after the faults.
+        advice: What to do about faults; told only if there are any.
+        skipped: What was not tried; each sentence is kept once.
+
+    Example:
+        >>> judged("N3", 12, ()).verdict
+        'holds'
+    """
+    told = [*faults[:_TOLD]]
+    if len(faults) > _TOLD:
+        told.append(f"and {len(faults) - _TOLD} more")
+    verdict: Verdict = "holds" if cases else "not applicable"
+    if faults:
+        verdict = "FAILS"
+    return Criterion(
+        code,
+        TITLES[code],
+        verdict,
+        cases,
+        worst,
+        (*told, *facts),
+        advice if faults else "",
+        tuple(dict.fromkeys(skipped)),
+    )

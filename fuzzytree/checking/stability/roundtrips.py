@@ -1,0 +1,171 @@
+"""N9: what is written and read again, or run from the file, is still the model."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, cast, get_args
+
+from fuzzytree.checking.comparing import strength_gap
+from fuzzytree.checking.likeness import is_alike
+from fuzzytree.checking.stability.carriers import first_line, unequal
+from fuzzytree.checking.stability.results import Criterion, judged
+from fuzzytree.errors import LossError, MissingExtraError, ReadError
+from fuzzytree.model.contracts import Dtype, Format, Model, Outcome, Run, Written
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.onnxruntime import open_onnx
+from fuzzytree.runtimes.python import load_content
+from fuzzytree.semantics.conversion.points import EXACT
+from fuzzytree.semantics.lowering import forms
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+_NATIVE: dict[Dtype, str] = {
+    "float64": "native",
+    "mixed": "native mixed",
+    "float32": "native float32",
+}
+_ADVICE = "keep the YAML file as the model, and do not ship the file that failed"
+
+
+def roundtrips(
+    model: Model, formats: Sequence[Format], values: FloatArray
+) -> Criterion:
+    """Write every form of a model in every format, take it back and compare (N9).
+
+    A format that is read must give back an equal model, and the same bytes when that
+    is written again; lines may come back as points, within 2^-52. One that only runs
+    must answer like the native runtime of its number type, bit for bit.
+
+    Args:
+        model: A tree or a rule base.
+        formats: The formats.
+        values: Shape (inputs, rows): what files that run are asked.
+    """
+    faults: list[str] = []
+    skipped: list[str] = []
+    cases = 0
+    worst = 0.0
+    for carrier, form in forms(model).items():
+        kind = "rules" if isinstance(form, RuleBase) else "tree"
+        for one in formats:
+            if kind not in one.carries:
+                continue
+            try:
+                for count, gap, fault in _tried(one, carrier, form, values, skipped):
+                    cases += count
+                    worst = max(worst, gap)
+                    faults += [fault] if fault else []
+            except (LossError, MissingExtraError) as error:
+                skipped.append(f"{one.name}: {carrier}: {first_line(error)}")
+    return judged("N9", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped)
+
+
+def _tried(
+    one: Format, carrier: str, form: Model, values: FloatArray, skipped: list[str]
+) -> Iterator[tuple[int, float, str | None]]:
+    """Yield, for each variant, how much was compared, its gap, and its fault."""
+    if one.read is not None:
+        yield _read_again(one, carrier, form, values)
+        return
+    opener = _OPENERS.get(one.name)
+    if opener is None:
+        skipped.append(f"{one.name}: there is no way back from it")
+        return
+    for dtype in _dtypes(one):
+        title = f"{one.name} {dtype}: {carrier}"
+        # Every writer knows allow_loss; those with number types know dtype as well.
+        write = cast("Callable[..., Written]", one.write)
+        options: dict[str, object] = {}
+        if "dtype" in _options(one):
+            options["dtype"] = dtype
+        if "outputs" in _options(one):
+            told = ("label", "rule", "status", "strengths")
+            options["outputs"] = told if isinstance(form, RuleBase) else told[:3]
+        try:
+            run = opener(write(form, **options).content, form)
+            base = find_runtime(_NATIVE[dtype]).load(form)
+        except LossError as error:
+            skipped.append(f"{title}: {first_line(error)}")
+            continue
+        yield _compared(title, run(values), base(values))
+
+
+def _read_again(
+    one: Format, carrier: str, form: Model, values: FloatArray
+) -> tuple[int, float, str | None]:
+    title = f"{one.name}: {carrier}"
+    if one.read is None:
+        raise ValueError(f"{one.name} is not read")
+    content = one.write(form).content
+    try:
+        back = one.read(content, title).model
+    except ReadError as error:
+        return 1, 1.0, f"{title}: it cannot be read again: {first_line(error)}"
+    if isinstance(back, FuzzySystem):
+        is_same = isinstance(form, RuleBase) and is_alike(form, back)
+        return 1, 0.0, None if is_same else f"{title}: another model comes back"
+    if back != form and isinstance(form, RuleBase) and is_alike(form, back):
+        return _straight(title, back, form, values)
+    if back != form:
+        native = find_runtime("native").load
+        if back.inputs != form.inputs or type(back) is not type(form):
+            return 1, 1.0, f"{title}: another model comes back"
+        count, gap, fault = _compared(title, native(back)(values), native(form)(values))
+        said = fault or f"{title}: numbers differ, though no row tells"
+        return count, gap, f"{said}; the model that comes back is not equal"
+    if one.write(back).content != content:
+        return 1, 0.0, f"{title}: written again it has other bytes"
+    return 2, 0.0, None
+
+
+def _straight(
+    title: str, back: Model, form: RuleBase, values: FloatArray
+) -> tuple[int, float, str | None]:
+    """Compare rules with those whose lines became points, as some formats need.
+
+    Each degree moved by at most 2^-52, so strengths may by as much for each clause.
+    """
+    native = find_runtime("native").load
+    found, expected = native(back)(values), native(form)(values)
+    gap = float(strength_gap(found, expected).max(initial=0.0))
+    clauses = max((len(rule.when) for rule in form.rules), default=0)
+    if gap <= EXACT * max(clauses, 1) * 2:
+        return values.shape[1], gap, None
+    return values.shape[1], gap, f"{title}: strengths differ by up to {gap:.3g}"
+
+
+def _compared(
+    title: str, found: Outcome, expected: Outcome
+) -> tuple[int, float, str | None]:
+    wrong = unequal(found, expected)
+    gap = float(strength_gap(found, expected).max(initial=0.0))
+    if not wrong.any():
+        return wrong.size, gap, None
+    fault = (
+        f"{title}: {int(wrong.sum())} of {wrong.size} rows are answered differently, "
+        f"strengths by up to {gap:.3g}"
+    )
+    return wrong.size, gap, fault
+
+
+def _options(one: Format) -> tuple[str, ...]:
+    return tuple(inspect.signature(one.write).parameters)
+
+
+def _dtypes(one: Format) -> tuple[Dtype, ...]:
+    return get_args(Dtype) if "dtype" in _options(one) else ("float64",)
+
+
+def _from_onnx(content: bytes, _: Model) -> Run:
+    return open_onnx(content, "the written file").run
+
+
+_OPENERS: dict[str, Callable[[bytes, Model], Run]] = {
+    "onnx": _from_onnx,
+    "python": load_content,
+}
+"""How a file that is not read as a model is run again, by the name of its format."""

@@ -1,0 +1,240 @@
+"""How stiff each input is, and what giving it in float32 would cost.
+
+An input is stiff if degrees change over a distance that is small beside its values:
+float32 keeps 24 bits, so a value x is wrong by up to |x| 2**-24, and a degree by that
+times its steepest slope. Whether it happens is tried: one input at a time is rounded to
+float32, and the exact answers to the rows before and after are compared.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from fuzzytree.checking.stability.results import Stiff
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import LR, Band, Points, RuleBase, Shape, Variable
+from fuzzytree.numerics.bounds import UNIT, degree_bound
+from fuzzytree.numerics.oracle import Decided, decide
+from fuzzytree.semantics.lowering import forms
+from fuzzytree.semantics.probing import landmarks
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+SAFE = 1e-4
+"""The error of a degree up to which a number type is called safe."""
+
+_DOUBLE = 2.0**-29  # a rounding of double, in roundings of float32
+_OFFSET_HELPS = 16.0  # times the range of the values, at least, are they from zero
+_ROWS = 4_000  # rows tried for each input
+
+
+class Scale(NamedTuple):
+    """The scale of an input.
+
+    Attributes:
+        spread: The shortest distance over which a degree changes fully; infinite if
+            none does.
+        slope: The steepest slope of a degree, per unit.
+        low: The smallest value in its range.
+        high: The largest.
+        curves: What evaluating curves in float32 costs, wherever the value is found.
+    """
+
+    spread: float
+    slope: float
+    low: float
+    high: float
+    curves: float
+
+    @property
+    def location(self) -> float:
+        """The largest absolute value in the range."""
+        return max(abs(self.low), abs(self.high))
+
+
+def stiffness(model: Model, values: FloatArray, *, is_data: bool) -> tuple[Stiff, ...]:
+    """Return what float32 costs each input of a model, the costliest first.
+
+    Args:
+        model: A tree or a rule base.
+        values: Rows to try it on, shape (inputs, rows).
+        is_data: Whether the rows are data, of which no class should change; probes lie
+            on edges, where some must.
+    """
+    rule_bases = [form for form in forms(model).values() if isinstance(form, RuleBase)]
+    step = max(-(-values.shape[1] // _ROWS), 1)
+    rows = values[:, ::step]
+    scales = input_scales(model, rows)
+    near = _near(model, rows, scales)
+    exact = [decide(form, near) for form in rule_bases]
+    found: list[Stiff] = []
+    for line, name in enumerate(model.inputs):
+        scale = scales[name]
+        changed = near.copy()
+        with np.errstate(over="ignore"):  # beyond float32 is missing
+            changed[line] = near[line].astype(np.float32)
+        gap, flips = 0.0, 0
+        for form, before in zip(rule_bases, exact, strict=True):
+            after = decide(form, changed)
+            flips = max(flips, int((after.label != before.label).sum()))
+            gap = max(gap, _gap(before, after))
+        predicted = scale.slope * scale.location * UNIT
+        offset = _offset(scale)
+        is_safe = max(predicted, scale.curves) <= SAFE and not (is_data and flips)
+        spread = scale.spread if math.isfinite(scale.spread) else None
+        is_known = spread is not None and scale.location > 0.0
+        found.append(
+            Stiff(
+                name,
+                spread,
+                scale.location,
+                scale.spread / scale.location if is_known else None,
+                min(predicted, 1.0),
+                gap,
+                flips,
+                near.shape[1],
+                None if is_safe else offset,
+                _advice(scale, predicted, offset, is_safe=is_safe),
+            )
+        )
+    return tuple(sorted(found, key=lambda one: (-one.predicted, -one.observed)))
+
+
+def input_scales(model: Model, values: FloatArray) -> dict[str, Scale]:
+    """Return the scale of each input, over all forms of a model.
+
+    A combination passes its terms' widths on to its inputs, divided by their weights.
+    Where no range is declared, it is that of the landmarks and of finite values.
+    """
+    widths: dict[str, list[float]] = {name: [] for name in model.inputs}
+    slopes: dict[str, list[float]] = {name: [] for name in model.inputs}
+    places: dict[str, list[float]] = {name: [] for name in model.inputs}
+    curves = dict.fromkeys(model.inputs, 0.0)
+    for form in forms(model).values():
+        for variable in form.variables:
+            shapes = [term.shape for term in variable.terms]
+            steep = max((_slope(shape) for shape in shapes), default=0.0)
+            width = min(map(_width, shapes), default=math.inf)
+            fixed = max((_mixed_cost(shape) for shape in shapes), default=0.0)
+            for name, weight in _inputs_of(variable):
+                curves[name] = max(curves[name], fixed)
+                widths[name].append(width / abs(weight))
+                slopes[name].append(steep * abs(weight))
+            if not variable.parts:
+                places[variable.name] += _places(variable, shapes)
+            for part in variable.parts:
+                places[part.input].append(part.centre)
+    lines = dict(zip(model.inputs, values, strict=True))
+    return {
+        name: Scale(
+            min(widths[name], default=math.inf),
+            max(slopes[name], default=0.0),
+            *_range(model, name, places[name], lines[name]),
+            curves[name],
+        )
+        for name in model.inputs
+    }
+
+
+def _inputs_of(variable: Variable) -> Iterator[tuple[str, float]]:
+    if not variable.parts:
+        yield variable.name, 1.0
+    for part in variable.parts:
+        yield part.input, part.weight
+
+
+def _places(variable: Variable, shapes: Sequence[Shape]) -> list[float]:
+    return [mark for shape in shapes for mark in landmarks(shape)]
+
+
+def _range(
+    model: Model, name: str, places: Sequence[float], line: FloatArray
+) -> tuple[float, float]:
+    """Return the declared range of an input, or one that holds what is known of it."""
+    declared = next(v for v in model.variables if v.name == name)
+    if declared.low is not None and declared.high is not None:
+        return declared.low, declared.high
+    if places:
+        return min(places), max(places)
+    finite = line[np.isfinite(line) & (np.abs(line) < 1e30)]
+    if not finite.size:
+        return 0.0, 0.0
+    return float(finite.min()), float(finite.max())
+
+
+def _slope(shape: Shape) -> float:
+    """Return a bound of the slope of a degree; steps are told by flips alone."""
+    return degree_bound(shape, "float32").per_unit
+
+
+def _mixed_cost(shape: Shape) -> float:
+    """Return the largest error of a degree whose place on the curve is double."""
+    return degree_bound(shape, "mixed").fixed
+
+
+def _width(shape: Shape) -> float:
+    """Return the shortest distance over which a degree goes all the way."""
+    match shape:
+        case Band(left=left, right=right):
+            flanks = [flank for flank in (left, right) if flank is not None]
+            return min((abs(f.start - f.end) for f in flanks), default=math.inf)
+        case LR(left=below, right=above):
+            return min(below.spread, above.spread)
+        case Points():
+            slope = _slope(shape)
+            return 1.0 / slope if slope else math.inf
+
+
+def _near(model: Model, values: FloatArray, scales: dict[str, Scale]) -> FloatArray:
+    """Return the rows that lie within twice the range of every input."""
+    inside = np.isfinite(values).all(axis=0)
+    for line, name in enumerate(model.inputs):
+        scale = scales[name]
+        reach = (scale.high - scale.low) or scale.location or 1.0
+        with np.errstate(all="ignore"):
+            inside &= values[line] >= scale.low - reach
+            inside &= values[line] <= scale.high + reach
+    return values[:, inside]
+
+
+def _gap(before: Decided, after: Decided) -> float:
+    """Return by how much an exact strength changed at most, as far as it is known."""
+    if before.strengths is None or after.strengths is None:
+        return 0.0
+    gaps = np.abs(before.strengths - after.strengths).max(axis=0, initial=0.0)
+    known = np.nan_to_num(gaps - before.doubt - after.doubt, nan=0.0)
+    return max(float(known.max(initial=0.0)), 0.0)
+
+
+def _offset(scale: Scale) -> float | None:
+    """Return a short value within the range whose subtraction keeps more digits."""
+    span = scale.high - scale.low
+    if not 0.0 < span < math.inf or scale.location < _OFFSET_HELPS * span:
+        return None
+    unit = 2.0 ** math.floor(math.log2(span))
+    return round((0.5 * scale.low + 0.5 * scale.high) / unit) * unit
+
+
+def _advice(
+    scale: Scale, predicted: float, offset: float | None, *, is_safe: bool
+) -> str:
+    if is_safe:
+        return "float32 is safe"
+    use = "use double" if scale.curves > SAFE else "use mixed"
+    if predicted * _DOUBLE > SAFE:
+        if offset is None:
+            return "use double, and even that is coarse"
+        return f"{use}, and subtract {_short(offset)} where the values are made"
+    if offset is None or use == "use double":
+        return use
+    return f"use mixed, or subtract {_short(offset)} first"
+
+
+def _short(value: float) -> str:
+    text = f"{value:g}"
+    return text if float(text) == value else repr(value)

@@ -1,0 +1,280 @@
+"""The terms of a model one by one, and what must hold for each without any tolerance.
+
+A rule base with one rule for each term, whose inputs are the variables themselves,
+makes every runtime tell the degree of each term: it is the strength of its rule.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import struct
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Literal, NamedTuple, assert_never
+
+import msgspec
+import numpy as np
+
+from fuzzytree.checking.stability.carriers import Ready, answered
+from fuzzytree.model.contracts import Dtype
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    Rule,
+    RuleBase,
+    Shape,
+    Side,
+    Term,
+    Variable,
+)
+from fuzzytree.semantics.probing import landmarks, neighbours
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+Demand = Literal["one", "below one", "zero"]
+
+MOST_TERMS = 240
+"""Terms that are asked one by one; of more, evenly drawn ones."""
+
+_END_SLACK: dict[Dtype, float] = {
+    "float64": 2.0**-50,
+    "mixed": 2.0**-22,
+    "float32": 2.0**-20,
+}
+"""Relative to the end of an LR set: within it the tail is 0 up to the fourth power."""
+
+
+class Asked(msgspec.Struct, frozen=True):
+    """A rule base that tells degrees, and values to ask it.
+
+    Attributes:
+        rules: One rule for each term.
+        values: Shape (variables, rows).
+        places: For each rule: its variable's line, its shape, and the rows that hold
+            its own edges.
+        left_out: How many terms are not asked, for there are too many.
+    """
+
+    rules: RuleBase
+    values: FloatArray
+    places: tuple[tuple[int, Shape, slice], ...]
+    left_out: int
+
+
+class Held(NamedTuple):
+    """How a runtime's degrees stood what is demanded of them.
+
+    Attributes:
+        cases: How many degrees.
+        worst: The largest difference from the exact one, where that was asked.
+        faults: What broke.
+    """
+
+    cases: int
+    worst: float
+    faults: list[str]
+
+
+def asked(
+    rules: RuleBase,
+    *,
+    shape: Callable[[Shape], Shape] = lambda shape: shape,
+    near: Callable[[float], Iterable[float]] = neighbours,
+) -> Asked | None:
+    """Return the terms of a rule base as rules, and their edges as rows.
+
+    Args:
+        rules: The rule base.
+        shape: What to ask in place of each shape.
+        near: Which values to ask around a landmark.
+
+    Returns:
+        What to ask; None if no variable has a term.
+    """
+    total = sum(len(v.terms) for v in rules.variables)
+    step = -(-total // MOST_TERMS) or 1
+    numbers = itertools.count()
+    variables = [
+        Variable(v.name, kept)
+        for v in rules.variables
+        if (
+            kept := tuple(
+                Term(t.name, shape(t.shape))
+                for t in v.terms
+                if next(numbers) % step == 0
+            )
+        )
+    ]
+    if not variables:
+        return None
+    found = [
+        Rule((Clause(v.name, (t.name,)),), "true") for v in variables for t in v.terms
+    ]
+    lines: list[list[float]] = [[] for _ in variables]
+    places: list[tuple[int, Shape, slice]] = []
+    for number, v in enumerate(variables):
+        for term in v.terms:
+            start = len(lines[number])
+            lines[number] += _edges(term.shape, near)
+            places.append((number, term.shape, slice(start, len(lines[number]))))
+    longest = max(map(len, lines))
+    values = np.array([(line * longest)[:longest] for line in lines], np.float64)
+    whole = RuleBase(rules.name, ("true",), tuple(variables), tuple(found))
+    return Asked(whole, values, tuple(places), total - len(found))
+
+
+def _edges(shape: Shape, near: Callable[[float], Iterable[float]]) -> list[float]:
+    found = [value for mark in landmarks(shape) for value in near(mark)]
+    return list(dict.fromkeys(found)) or [0.0]
+
+
+def collapsed(shape: Shape) -> Shape:
+    """Return the narrowest shape at the same place: what one sample would leave.
+
+    Plateaus that are closed on both sides hold one double, flanks end at the next
+    double, spreads are one unit in the last place of the mean.
+    """
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            if low is not None and high is not None:
+                high = math.nextafter(low, math.inf)
+            return Band(low, high, _narrow(left, low), _narrow(right, high))
+        case LR(mean=mean, left=below, right=above):
+            return LR(mean, _thin(below, mean), _thin(above, mean))
+        case Points():
+            return shape
+    assert_never(shape)
+
+
+def _narrow(flank: Flank | None, edge: float | None) -> Flank | None:
+    if flank is None or edge is None:
+        return flank
+    end = math.nextafter(edge, math.copysign(math.inf, flank.end - flank.start))
+    return msgspec.structs.replace(flank, start=edge, end=end)
+
+
+def _thin(side: Side, mean: float) -> Side:
+    return msgspec.structs.replace(side, spread=max(math.ulp(mean), 2.0**-1000))
+
+
+def demanded(shape: Shape, value: float, dtype: Dtype) -> Demand | None:
+    """Return what a degree must be exactly; None where a bound is all there is.
+
+    float32 rounds the value and every stored number once; the demand is on those.
+
+    Example:
+        >>> demanded(Band(high=1.0, right=Flank(1.0, 2.0)), 1.0, "float64")
+        'one'
+        >>> demanded(Band(high=1.0, right=Flank(1.0, 2.0)), 2.0, "float64")
+        'zero'
+    """
+    to = _single if dtype == "float32" else _same
+    x = to(value)
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            if low is not None and x <= to(low):
+                is_out = left is None or x <= to(left.end)
+            elif high is not None and x > to(high):
+                is_out = right is None or x >= to(right.end)
+            else:
+                return "one"
+            return "zero" if is_out else "below one"
+        case LR(mean=mean, left=below, right=above):
+            if x == to(mean):
+                return "one"
+            side = below if x < to(mean) else above
+            end = side.reach * side.spread
+            rounding = _END_SLACK[dtype] * (end + abs(mean))
+            return "zero" if abs(x - to(mean)) > end + rounding else None
+        case Points(values=values, degrees=degrees):
+            place = next((k for k, v in enumerate(values) if x <= to(v)), None)
+            known = degrees[-1] if place is None else None
+            if place is not None and (place == 0 or x == to(values[place])):
+                known = degrees[place]
+            return "one" if known == 1.0 else "zero" if known == 0.0 else None
+    assert_never(shape)
+
+
+def broken(demand: Demand | None, degree: float) -> bool:
+    """Return whether a degree is not what is demanded of it, or no degree at all."""
+    match demand:
+        case "one":
+            return degree != 1.0
+        case "below one":
+            return not 0.0 <= degree < 1.0
+        case "zero":
+            return degree != 0.0
+        case None:
+            return not 0.0 <= degree <= 1.0
+    assert_never(demand)
+
+
+def held(
+    one: Ready,
+    question: Asked,
+    skipped: list[str],
+    *,
+    difference: Callable[[int, float, float], tuple[float, float]] | None = None,
+) -> Held:
+    """Hold the degrees that a runtime tells against what is demanded of them.
+
+    Args:
+        one: The runtime, with the rules of the question.
+        question: What to ask.
+        skipped: Gets a sentence if the runtime tells no degrees.
+        difference: For the number of a term, a value and its degree: the difference
+            from the exact degree, and the largest that is allowed.
+    """
+    found, warning = answered(one, question.values)
+    faults = [f"{one.title}: it warns: {warning}"] if warning else []
+    if question.left_out:
+        skipped.append(f"{question.left_out} of the terms: there are too many")
+    if found.strengths is None:
+        skipped.append(f"{one.runtime.name} tells no degrees")
+        return Held(0, 0.0, faults)
+    if one.runtime.bound is not None:  # it promises nothing at a single value
+        skipped.append(f"{one.runtime.name} promises a bound, and no edge")
+        return Held(0, 0.0, faults)
+    cases, worst = 0, 0.0
+    for number, (line, shape, rows) in enumerate(question.places):
+        clause = question.rules.rules[number].when[0]
+        name = f"{one.title}: {clause.variable} is {clause.terms[0]}"
+        pairs = zip(
+            question.values[line, rows].tolist(),
+            found.strengths[number, rows].tolist(),
+            strict=True,
+        )
+        for value, degree in pairs:
+            cases += 1
+            demand = demanded(shape, value, one.runtime.dtype)
+            if broken(demand, degree):
+                faults.append(
+                    f"{name} at {value!r}: degree {degree!r}, not "
+                    f"{demand or 'between 0 and 1'}"
+                )
+            elif difference is not None:
+                gap, allowed = difference(number, value, degree)
+                worst = max(worst, gap) if allowed < 1.0 else worst
+                if not gap <= allowed:
+                    faults.append(
+                        f"{name} at {value!r}: degree {degree!r} is {gap:.3g} from "
+                        f"the exact one, and {allowed:.3g} is allowed"
+                    )
+    return Held(cases, worst, faults)
+
+
+def _same(value: float) -> float:
+    return value
+
+
+def _single(value: float) -> float:
+    """Return a value as float32 holds it; infinite beyond its range."""
+    try:
+        single: float = struct.unpack("f", struct.pack("f", value))[0]
+    except OverflowError:
+        return math.copysign(math.inf, value)
+    return single

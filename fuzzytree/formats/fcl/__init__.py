@@ -1,0 +1,1 @@
+"""Fuzzy Control Language (IEC 61131-7)."""

@@ -1,0 +1,314 @@
+"""Which dialect of FCL a file is written in, and what its words mean there."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Final, Literal, NamedTuple, TypeVar
+
+from lark import Token
+
+from fuzzytree.formats.fcl.fcl_blocks import Block
+from fuzzytree.formats.fcl.fcl_statements import (
+    Asked,
+    Condition,
+    Declaration,
+    Header,
+    Joined,
+    Negated,
+    RuleText,
+    Setting,
+    TermText,
+    place,
+)
+from fuzzytree.formats.fcl.fcl_text import FclText
+from fuzzytree.formats.fll.fll_terms import CLASSES
+from fuzzytree.formats.fll.fll_words import METHODS, S_NORMS, T_NORMS, Method, Notes
+from fuzzytree.model.rulebase import name_choice
+from fuzzytree.model.system import Defuzzifier, SNorm, TNorm
+
+_Norm = TypeVar("_Norm")
+
+Dialect = Literal["portable", "iec", "fuzzylite", "jfuzzylogic", "pyit2fls"]
+
+MARK: Final = " FCL, dialect "
+"""How a file that was written here begins, behind `//` or `(*`."""
+
+SHOWN: Mapping[Dialect, str] = MappingProxyType(
+    {
+        "portable": "portable",
+        "iec": "IEC 61131-7",
+        "fuzzylite": "fuzzylite",
+        "jfuzzylogic": "jFuzzyLogic",
+        "pyit2fls": "PyIT2FLS",
+    }
+)
+
+DEFUZZIFIERS: Mapping[Dialect, Defuzzifier] = MappingProxyType(
+    {
+        "portable": Defuzzifier("centroid", 1000),
+        "iec": Defuzzifier("centroid", 1000),
+        "fuzzylite": Defuzzifier("centroid", 100),
+        "jfuzzylogic": Defuzzifier("centroid", 1000),
+        "pyit2fls": Defuzzifier("centroid", 100, "ends"),
+    }
+)
+"""At how many values an engine of each dialect looks; a file does not say it."""
+
+T_WORDS: Mapping[str, TNorm] = MappingProxyType(
+    {
+        "MIN": "minimum",
+        "PROD": "product",
+        "BDIF": "bounded difference",
+        "DPROD": "drastic product",
+        "DMIN": "drastic product",
+        "EPROD": "einstein product",
+        "HPROD": "hamacher product",
+        "HAMACHER": "hamacher product",
+        "NMIN": "nilpotent minimum",
+        "NIPMIN": "nilpotent minimum",
+        **{name.upper(): norm for name, norm in T_NORMS.items()},
+    }
+)
+S_WORDS: Mapping[str, SNorm] = MappingProxyType(
+    {
+        "MAX": "maximum",
+        "ASUM": "algebraic sum",
+        "PROBOR": "algebraic sum",
+        "BSUM": "bounded sum",
+        "NSUM": "normalized sum",
+        "DSUM": "drastic sum",
+        "DMAX": "drastic sum",
+        "ESUM": "einstein sum",
+        "EINSTEIN": "einstein sum",
+        "HSUM": "hamacher sum",
+        "NMAX": "nilpotent maximum",
+        "NIPMAX": "nilpotent maximum",
+        "SUM": "sum",
+        **{name.upper(): norm for name, norm in S_NORMS.items()},
+    }
+)
+METHOD_WORDS: Mapping[str, Method] = MappingProxyType(
+    {
+        "COG": "centroid",
+        "COGS": "weighted average",
+        "COGF": "weighted average",
+        "COGSS": "weighted sum",
+        "COA": "bisector",
+        "BIS": "bisector",
+        "LM": "smallest of maximum",
+        "SOM": "smallest of maximum",
+        "RM": "largest of maximum",
+        "LOM": "largest of maximum",
+        "MM": "mean of maximum",
+        "MOM": "mean of maximum",
+        **{name.upper(): method for name, method in METHODS.items()},
+    }
+)
+PAIRS: Mapping[TNorm, SNorm] = MappingProxyType(
+    {
+        "minimum": "maximum",
+        "product": "algebraic sum",
+        "bounded difference": "bounded sum",
+        "drastic product": "drastic sum",
+        "nilpotent minimum": "nilpotent maximum",
+        "einstein product": "einstein sum",
+        "hamacher product": "hamacher sum",
+    }
+)
+"""The OR that an AND brings with it."""
+
+JFUZZYLOGIC_PAIRS: Mapping[TNorm, SNorm] = MappingProxyType(
+    {**PAIRS, "hamacher product": "einstein sum"}
+)
+
+_OF_JFUZZYLOGIC = frozenset(
+    {"TRIAN", "TRAPE", "GAUSS", "GAUSS2", "GBELL", "SIGM", "DSIGM", "COSINE"}
+    | {"SINGLETONS", "COGF", "DMIN", "DMAX", "NIPMIN", "NIPMAX", "HAMACHER"}
+    | {"EINSTEIN", "PROBOR", "SUM"}
+)
+_OF_FUZZYLITE = frozenset(
+    {"DPROD", "DSUM", "EPROD", "ESUM", "HPROD", "HSUM", "NMIN", "NMAX", "COGSS"}
+    | {"NONE"}
+)
+_ORDER: Final[list[Dialect]] = ["fuzzylite", "jfuzzylogic", "pyit2fls", "iec"]
+
+
+class Evidence(NamedTuple):
+    """Something that a dialect has; the more it weighs the fewer others have it too."""
+
+    dialect: Dialect
+    what: str
+    line: int
+    weight: int = 2
+
+
+def detected(text: FclText) -> tuple[Dialect, str]:
+    """Return the dialect of a file, and a sentence that says why."""
+    named = _first_line(text.text)
+    if named is not None:
+        return named, f"the dialect is {SHOWN[named]}: the first line says so"
+    found = list(_evidence(text))
+    counts: Counter[Dialect] = Counter()
+    for one in {(one.dialect, one.what): one for one in found}.values():
+        counts[one.dialect] += one.weight
+    best: Dialect = max(_ORDER, key=lambda one: (counts[one], -_ORDER.index(one)))
+    if not counts[best]:
+        return "iec", "the dialect is IEC 61131-7: nothing speaks for another one"
+    sentence = f"the dialect is {SHOWN[best]}: {_listed(found, best)}"
+    for other in _ORDER:
+        if other == best or not counts[other]:
+            continue
+        sentence += f"; {SHOWN[other]} would have {_listed(found, other)}"
+    return best, sentence
+
+
+def is_marked(text: str) -> bool:
+    """Return whether a file says that it was written here."""
+    return _first_line(text) is not None
+
+
+def _first_line(text: str) -> Dialect | None:
+    line, _, _ = text.partition("\n")
+    if line[:2] not in ("//", "(*") or not line[2:].startswith(MARK):
+        return None
+    word = line[2:].removeprefix(MARK).removesuffix("*)").strip()
+    match word:
+        case "portable" | "iec" | "fuzzylite" | "jfuzzylogic":
+            return word
+        case _:
+            return None
+
+
+def _listed(found: list[Evidence], dialect: Dialect) -> str:
+    first: dict[str, int] = {}
+    for one in found:
+        if one.dialect == dialect:
+            first.setdefault(one.what, one.line)
+    shown = [f"{what} (line {line})" for what, line in first.items()]
+    return ", ".join(shown[:4]) + (", ..." if len(shown) > 4 else "")
+
+
+def _evidence(text: FclText) -> Iterator[Evidence]:
+    block = ""
+    for one in text.statements:
+        match one:
+            case Header(keyword=keyword):
+                block = keyword.type
+            case TermText(kind="shape", tokens=tokens):
+                yield from _of_shape(tokens[0])
+            case RuleText():
+                yield from _of_rule(one)
+            case Setting(keyword=keyword, words=words):
+                yield from _of_setting(keyword, words, block)
+            case Declaration():
+                pass
+            case _:
+                if block.startswith("VAR") and getattr(one, "low", None) is not None:
+                    line = getattr(one, "keyword", None)
+                    yield Evidence(
+                        "jfuzzylogic",
+                        "RANGE among the variables",
+                        line.line if isinstance(line, Token) and line.line else 1,
+                    )
+    for sign, dialect in _COMMENTS.items():
+        before, found, _ = text.text.partition(sign)
+        if found:
+            line = before.count("\n") + 1
+            yield Evidence(dialect, f"comments {sign}", line, 1)
+    if text.text.startswith("//Code automatically generated with fuzzylite"):
+        yield Evidence("fuzzylite", "its first line", 1)
+
+
+_COMMENTS: Mapping[str, Dialect] = MappingProxyType({"(*": "iec", "/*": "jfuzzylogic"})
+
+
+def _of_shape(word: Token) -> Iterator[Evidence]:
+    if str(word) in CLASSES:
+        yield Evidence("fuzzylite", f"the term class {word}", word.line or 1, 4)
+    elif word.upper() in _OF_JFUZZYLOGIC or word.upper() == "FUNCTION":
+        yield Evidence("jfuzzylogic", f"the shape {word}", word.line or 1, 4)
+
+
+def _of_setting(
+    keyword: Token, words: tuple[Token, ...], block: str
+) -> Iterator[Evidence]:
+    line = keyword.line or 1
+    for word in words:
+        if word.upper() in _OF_JFUZZYLOGIC:
+            yield Evidence("jfuzzylogic", f"{keyword.upper()} {word}", line)
+        elif word.upper() in _OF_FUZZYLITE:
+            yield Evidence("fuzzylite", f"{keyword.upper()} {word}", line)
+    if keyword.type in ("ENABLED", "LOCK"):
+        yield Evidence("fuzzylite", keyword.upper(), line)
+    if keyword.type == "ACCU" and block == "DEFUZZIFY":
+        yield Evidence("fuzzylite", "ACCU in DEFUZZIFY", line)
+    elif keyword.type == "ACCU":  # fuzzylite refuses it there
+        yield Evidence("iec", "ACCU in RULEBLOCK", line)
+        yield Evidence("jfuzzylogic", "ACCU in RULEBLOCK", line, 1)
+    is_default = keyword.type == "DEFAULT"
+    if is_default and (words[0].upper() == "NAN" or len(words) > 1):
+        shown = " | ".join(map(str, words))
+        yield Evidence("fuzzylite", f"DEFAULT {shown}", line)
+
+
+_HEDGES = frozenset({"ANY", "VERY", "SOMEWHAT", "EXTREMELY", "SELDOM"})
+
+
+def _of_rule(rule: RuleText) -> Iterator[Evidence]:
+    line = rule.keyword.line or 1
+    asked = list(clauses(rule.condition))
+    words = [word for one in asked for word in one.words[:-1]]
+    is_any = any(one.words[-1].upper() == "ANY" for one in asked)
+    if is_any or any(word.upper() in _HEDGES for word in words):
+        yield Evidence("fuzzylite", "hedges", line)
+    if is_lower(rule):
+        yield Evidence("fuzzylite", "rules in lower case", line, 1)
+    elif len(rule.conclusions) > 1:
+        if rule.has_comma:
+            yield Evidence("iec", "conclusions with ','", line, 1)
+            yield Evidence("jfuzzylogic", "conclusions with ','", line, 1)
+        else:
+            yield Evidence("pyit2fls", "conclusions with AND", line)
+    elif rule.is_grouped:
+        yield Evidence("pyit2fls", "brackets behind THEN", line)
+
+
+def is_lower(rule: RuleText) -> bool:
+    """Return whether the word behind a rule's variable is `is`."""
+    return str(next(iter(clauses(rule.condition))).verb) == "is"
+
+
+def clauses(condition: Condition) -> Iterator[Asked]:
+    """Yield what a condition asks, from left to right."""
+    match condition:
+        case Asked():
+            yield condition
+        case Negated(part=part):
+            yield from clauses(part)
+        case Joined(parts=parts):
+            for part in parts:
+                yield from clauses(part)
+
+
+def norm_of(block: Block, keyword: str, notes: Notes) -> SNorm | None:
+    """Return the OR or ACCU of a block; None if it says none."""
+    return _named(block, keyword, S_WORDS, notes)
+
+
+def t_norm_of(block: Block, keyword: str, notes: Notes) -> TNorm | None:
+    """Return the AND or ACT of a block; None if it says none."""
+    return _named(block, keyword, T_WORDS, notes)
+
+
+def _named(
+    block: Block, keyword: str, words: Mapping[str, _Norm], notes: Notes
+) -> _Norm | None:
+    for word in block.words(keyword):
+        if word.upper() != "NONE" and word.upper() not in words:
+            choice = name_choice(word.upper()[:99], words)
+            sentence = f"no {keyword} {str(word)!r}; {choice}"
+            notes.found.append((*place(word), sentence))
+        return words.get(word.upper())
+    return None

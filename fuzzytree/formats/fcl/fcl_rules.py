@@ -1,0 +1,336 @@
+"""Rules of FCL, with the operators of their block."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+import msgspec
+from lark import Token
+from msgspec.structs import replace
+
+from fuzzytree.formats.fcl.fcl_blocks import Block, raw
+from fuzzytree.formats.fcl.fcl_dialects import (
+    JFUZZYLOGIC_PAIRS,
+    PAIRS,
+    Dialect,
+    norm_of,
+    t_norm_of,
+)
+from fuzzytree.formats.fcl.fcl_statements import (
+    Asked,
+    Condition,
+    Joined,
+    Negated,
+    RuleText,
+    place,
+)
+from fuzzytree.formats.fll.fll_words import Notes
+from fuzzytree.formats.lines import number_of
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import Points, name_choice
+from fuzzytree.model.system import (
+    And,
+    Conclusion,
+    FuzzySystem,
+    Hedge,
+    Is,
+    Not,
+    Or,
+    RuleBlock,
+    SNorm,
+    SystemRule,
+    TNorm,
+    questions,
+)
+from fuzzytree.model.system import Condition as Meant
+
+_HEDGES: Mapping[str, Hedge] = MappingProxyType(
+    {
+        "any": "any",
+        "not": "not",
+        "very": "very",
+        "somewhat": "somewhat",
+        "extremely": "extremely",
+        "seldom": "seldom",
+    }
+)
+
+
+class Scope(msgspec.Struct, frozen=True):
+    """What rules can speak of.
+
+    Attributes:
+        terms: The names of the terms of each variable.
+        outputs: The names of the outputs.
+        curved: The names of those that look at curves.
+        dialect: The dialect of the file.
+        notes: What is found on the way.
+    """
+
+    terms: Mapping[str, Collection[str]]
+    outputs: Collection[str]
+    curved: Collection[str]
+    dialect: Dialect
+    notes: Notes
+
+
+def _read(text: RuleText, number: int, scope: Scope) -> SystemRule:
+    """Return a rule; its mistakes are noted.
+
+    Args:
+        text: The statement.
+        number: Its place in the block, from 1.
+        scope: What it can speak of.
+    """
+    when = _condition(text.condition, scope)
+    if scope.dialect == "jfuzzylogic" and _is_ambiguous(text.condition):
+        line = text.keyword.line
+        scope.notes.remarks.append(
+            f"line {line}: AND binds closer than OR, as in the standard; jFuzzyLogic "
+            "reads from left to right, write parentheses"
+        )
+    then = tuple(_conclusion(one, scope) for one in text.conclusions)
+    label = "".join(map(str, text.label))
+    weight = 1.0 if text.weight is None else _weight(text.weight, scope)
+    return SystemRule(when, then, weight, "" if label == str(number) else label)
+
+
+def _weight(token: Token, scope: Scope) -> float:
+    value = number_of(str(token))
+    if value is None or not 0.0 <= value <= 1.0:
+        sentence = f"the weight must lie in [0, 1], not {token}"
+        scope.notes.found.append((*place(token), sentence))
+        return 1.0
+    return value
+
+
+def _condition(condition: Condition, scope: Scope) -> Meant:
+    match condition:
+        case Asked():
+            return _asked(condition, scope)
+        case Negated(part=part):
+            return Not(_condition(part, scope))
+        case Joined(connective=connective, parts=parts):
+            made = tuple(_condition(part, scope) for part in parts)
+            return And(made) if connective == "and" else Or(made)
+
+
+def _asked(asked: Asked, scope: Scope) -> Is:
+    variable = str(asked.variable)
+    if variable in scope.outputs and scope.dialect not in ("fuzzylite", "portable"):
+        what = (
+            "asked in a condition: how far rules before have concluded it counts, as "
+            "in fuzzylite, and not its value"
+        )
+        loss = Loss(f"output {variable!r}", what)
+        if loss not in scope.notes.losses:
+            scope.notes.losses.append(loss)
+    if asked.words[-1].lower() == "any" and "any" not in scope.terms.get(variable, ()):
+        _known_variable(asked.variable, scope.terms, scope.notes)
+        return Is(variable, None, _hedges(asked.words, scope))
+    label = _known(asked, scope.terms, scope.notes)
+    return Is(variable, label, _hedges(asked.words[:-1], scope))
+
+
+def _conclusion(asked: Asked, scope: Scope) -> Conclusion:
+    known = {name: scope.terms[name] for name in scope.outputs}
+    label = _known(asked, known, scope.notes)
+    return Conclusion(str(asked.variable), label, _hedges(asked.words[:-1], scope))
+
+
+def _hedges(words: Sequence[Token], scope: Scope) -> tuple[Hedge, ...]:
+    found: list[Hedge] = []
+    for word in words:
+        hedge = _HEDGES.get(word.lower())
+        if hedge is None:
+            sentence = f"no hedge {str(word)!r}; {name_choice(word[:99], _HEDGES)}"
+            scope.notes.found.append((*place(word), sentence))
+        else:
+            found.append(hedge)
+    return tuple(found)
+
+
+def _known_variable(
+    token: Token, terms: Mapping[str, Collection[str]], notes: Notes
+) -> bool:
+    if str(token) in terms or notes.is_full:
+        return True
+    sentence = f"no variable {str(token)!r}; {name_choice(token[:99], terms)}"
+    notes.found.append((*place(token), sentence))
+    return False
+
+
+def _known(asked: Asked, terms: Mapping[str, Collection[str]], notes: Notes) -> str:
+    label = asked.words[-1]
+    if _known_variable(asked.variable, terms, notes):
+        known = terms.get(str(asked.variable), ())
+        if str(label) not in known and not notes.is_full:
+            choice = name_choice(label[:99], known)
+            whose = repr(str(asked.variable))
+            sentence = f"{whose} has no term {str(label)!r}; {choice}"
+            notes.found.append((*place(label), sentence))
+    return str(label)
+
+
+def _is_ambiguous(condition: Condition) -> bool:
+    """Return whether `a OR b AND c` stands somewhere without parentheses."""
+    match condition:
+        case Asked():
+            return False
+        case Negated(part=part):
+            return _is_ambiguous(part)
+        case Joined(connective=connective, parts=parts):
+            return any(map(_is_ambiguous, parts)) or (
+                connective == "or"
+                and any(
+                    isinstance(part, Joined)
+                    and part.connective == "and"
+                    and not part.is_grouped
+                    for part in parts[1:]
+                )
+            )
+
+
+class ReadBlock(msgspec.Struct, frozen=True):
+    """A block of rules, where it and each rule begins, what it says about ACCU."""
+
+    block: RuleBlock
+    head: Token
+    tokens: tuple[Token, ...]
+    accu: SNorm | None
+
+    @property
+    def concluded(self) -> set[str]:
+        """The outputs that its rules conclude."""
+        return {one.output for rule in self.block.rules for one in rule.then}
+
+
+def read_block(block: Block, scope: Scope) -> ReadBlock:
+    """Return a block of rules; mistakes are noted."""
+    rules: list[SystemRule] = []
+    tokens: list[Token] = []
+    last: str | None = None
+    for text in block.rules:
+        rule = _read(text, len(rules) + 1, scope)
+        label = raw(text.label)
+        is_portable = scope.dialect == "portable"
+        if is_portable and label == last and _is_same_but_then(rules[-1], rule):
+            # One conclusion per rule: one rule was written as several.
+            rules[-1] = replace(rules[-1], then=(*rules[-1].then, *rule.then))
+            continue
+        rules.append(rule)
+        tokens.append(text.keyword)
+        last = label
+    conjunction, disjunction = _norms(block, rules, scope)
+    made = RuleBlock(
+        rules=tuple(rules),
+        conjunction=conjunction,
+        disjunction=disjunction,
+        implication=_implication(block, rules, scope),
+        name=raw(block.head.words),
+    )
+    accu = norm_of(block, "ACCU", scope.notes)
+    return ReadBlock(made, block.head.keyword, tuple(tokens), accu)
+
+
+def _is_same_but_then(one: SystemRule, other: SystemRule) -> bool:
+    return one.when == other.when and one.weight == other.weight
+
+
+def _implication(
+    block: Block, rules: Sequence[SystemRule], scope: Scope
+) -> TNorm | None:
+    stated = t_norm_of(block, "ACT", scope.notes)
+    is_needed = any(one.output in scope.curved for rule in rules for one in rule.then)
+    if stated is not None or not is_needed:
+        return stated
+    scope.notes.remarks.append(f"line {block.line}: ACT is missing; MIN is taken")
+    return "minimum"
+
+
+def _norms(
+    block: Block, rules: Sequence[SystemRule], scope: Scope
+) -> tuple[TNorm | None, SNorm | None]:
+    """Return AND and OR; one that is missing and needed comes with the other one."""
+    conjunction = t_norm_of(block, "AND", scope.notes)
+    disjunction = norm_of(block, "OR", scope.notes)
+    is_jfuzzylogic = scope.dialect == "jfuzzylogic"
+    pairs = JFUZZYLOGIC_PAIRS if is_jfuzzylogic else PAIRS
+    if conjunction is None and any(_uses(rule.when, And) for rule in rules):
+        conjunction = _partner(disjunction, pairs)
+        text = f"line {block.line}: AND is missing; {conjunction} is taken"
+        scope.notes.remarks.append(text)
+    if disjunction is None and any(_uses(rule.when, Or) for rule in rules):
+        disjunction = pairs.get(conjunction or "minimum", "maximum")
+        text = f"line {block.line}: OR is missing; {disjunction} is taken"
+        scope.notes.remarks.append(text)
+    if is_jfuzzylogic and conjunction is not None and disjunction is not None:
+        _check_pair(block, pairs[conjunction], disjunction, scope)
+    return conjunction, disjunction
+
+
+def _partner(disjunction: SNorm | None, pairs: Mapping[TNorm, SNorm]) -> TNorm:
+    """Return the AND that an OR brings with it."""
+    for t_norm, s_norm in pairs.items():
+        if s_norm == disjunction:
+            return t_norm
+    return "minimum"
+
+
+def _check_pair(block: Block, wanted: SNorm, given: SNorm, scope: Scope) -> None:
+    if wanted != given:
+        what = (
+            "AND and OR are taken as they are written; jFuzzyLogic takes the last of "
+            "the two lines and the operator that belongs to it"
+        )
+        scope.notes.losses.append(Loss(f"line {block.line}", what))
+
+
+def _uses(condition: Meant | None, kind: type[And] | type[Or]) -> bool:
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            return isinstance(condition, kind) or any(_uses(p, kind) for p in parts)
+        case Not(part=part):
+            return _uses(part, kind)
+        case _:
+            return False
+
+
+ALWAYS: Final = Points((0.0,), (1.0,))
+"""The curve of a term that rules without a condition ask, where they must ask."""
+
+
+def without_questions(system: FuzzySystem) -> FuzzySystem:
+    """Return a system that was written here, with rules that have no condition again.
+
+    The writer lets them ask whether the first input is `any`, or its last term, which
+    it adds.
+    """
+    if not system.inputs:
+        return system
+    first = system.inputs[0]
+    asked: Meant = Is(first.name, None, ("any",))
+    if first.labels and first.labels[-1].curve == ALWAYS:
+        asked = Is(first.name, first.labels[-1].name)
+        first = replace(first, labels=first.labels[:-1])
+    others = [
+        one
+        for rule in system.rules
+        if rule.when is not None and rule.when != asked
+        for one in questions(rule.when)
+    ]
+    if asked in others or all(rule.when != asked for rule in system.rules):
+        return system
+    blocks = tuple(
+        replace(
+            block,
+            rules=tuple(
+                replace(rule, when=None) if rule.when == asked else rule
+                for rule in block.rules
+            ),
+        )
+        for block in system.blocks
+    )
+    return replace(system, inputs=(first, *system.inputs[1:]), blocks=blocks)

@@ -1,0 +1,202 @@
+"""Terms of FCL: numbers, lists of points, and the curves that dialects add."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+import msgspec
+from lark import Token
+
+from fuzzytree.formats.fcl.fcl_dialects import Dialect
+from fuzzytree.formats.fcl.fcl_statements import TermText, place
+from fuzzytree.formats.fll.fll_terms import CLASSES, Place, Term, TermError, read_term
+from fuzzytree.formats.lines import Word, number_of
+from fuzzytree.model.rulebase import LR, Band, Points, name_choice
+from fuzzytree.model.system import (
+    Bell,
+    Cosine,
+    Curve,
+    Gaussian,
+    Label,
+    PiCurve,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Trapezoid,
+    TwoGaussians,
+    curve_mistakes,
+)
+
+_FORMULA = "FUNCTION"
+
+
+class Made(msgspec.Struct, frozen=True):
+    """A term that was read, and what its curve cannot hold of the file."""
+
+    term: Term
+    loss: str = ""
+
+
+def read(text: TermText, where: Place, dialect: Dialect) -> Made:
+    """Return the term of a statement.
+
+    Raises:
+        TermError: With the mistakes of the term.
+    """
+    name = str(text.name)
+    first = text.tokens[0]
+    if text.kind == "number":
+        kind = Word("Constant", *place(first))
+        if dialect == "fuzzylite" or where.is_weighted:
+            return Made(read_term(name, kind, _words(text.tokens), where))
+        return Made(_checked(first, name, Singleton(_number(first)), where))
+    if text.kind == "points":
+        numbers = [_number(one) for one in text.tokens]
+        points = Points(tuple(numbers[::2]), tuple(numbers[1::2]))
+        return Made(_checked(first, name, points, where))
+    if first.upper() == _FORMULA:
+        kind = Word("Function", *place(first))
+        words = _formula_words(text, dialect)
+        formula = ""
+        for word in words:
+            formula = formula.ljust(word.column - words[0].column) + word.text
+        return Made(read_term(name, kind, words, where, formula))
+    if str(first) not in CLASSES and first.upper() in _SHAPES:
+        return _shape(text, where)
+    exact = next((one for one in CLASSES if one.upper() == first.upper()), "")
+    if not exact:
+        known = ["FUNCTION", *_SHAPES, *CLASSES]
+        sentence = f"no shape {str(first)!r}; {name_choice(str(first)[:99], known)}"
+        raise TermError((*place(first), sentence))
+    kind = Word(exact, *place(first))
+    plain = [one for one in text.tokens[1:] if one.type not in ("LPAR", "RPAR")]
+    rest = [one for one in plain if one.type != "COMMA"]
+    return Made(read_term(name, kind, _words(rest), where))
+
+
+def _words(tokens: Sequence[Token]) -> list[Word]:
+    return [Word(str(one), *place(one)) for one in tokens]
+
+
+def _number(token: Token) -> float:
+    value = number_of(str(token))
+    if value is None or not math.isfinite(value):
+        sentence = (
+            f"{str(token)!r} where a number must stand; curves that depend on "
+            "variables are not held"
+        )
+        raise TermError((*place(token), sentence))
+    return value
+
+
+def _checked(token: Token, name: str, curve: Curve, where: Place) -> Term:
+    for sentence in curve_mistakes(curve):
+        whose = f"term {name!r} of {where.variable!r}"
+        raise TermError((*place(token), f"{whose}: {sentence}"))
+    return Term(Label(name, curve), "")
+
+
+_FUNCTIONS = MappingProxyType({"LN": "log", "LOG": "log10"})
+"""Functions of jFuzzyLogic that fuzzylite calls otherwise."""
+
+
+def _formula_words(text: TermText, dialect: Dialect) -> list[Word]:
+    """Return a formula's words as fuzzylite writes them, on one line."""
+    found: list[Word] = []
+    column = place(text.tokens[0])[1]
+    tokens = text.tokens[1:]
+    for index, one in enumerate(tokens):
+        after = tokens[index + 1].type if index + 1 < len(tokens) else ""
+        shown = str(one)
+        if one.type == "WORD" and after == "LPAR" and dialect != "fuzzylite":
+            shown = _FUNCTIONS.get(shown.upper(), shown.lower())
+        line, start = place(one)
+        is_far = line != place(text.tokens[0])[0]
+        column = max(column + 1, 0 if is_far else start)
+        found.append(Word(shown, place(text.tokens[0])[0], column))
+        column += len(shown)
+    return found
+
+
+def _shape(text: TermText, where: Place) -> Made:
+    first, *rest = text.tokens
+    count, make = _SHAPES[first.upper()]
+    numbers = [_number(one) for one in rest]
+    if len(numbers) != count:
+        sentence = f"{first} takes {count} numbers, not {len(numbers)}"
+        raise TermError((*place(first), sentence))
+    try:
+        curve = make(numbers)
+    except ValueError as error:
+        raise TermError((*place(first), str(error))) from error
+    loss = ""
+    if isinstance(curve, SigmoidDifference):
+        one, two = curve.first, curve.second
+        is_plain = one.slope == two.slope > 0 and one.inflection <= two.inflection
+        if not is_plain:
+            loss = "where the first sigmoid is below the second one, the difference "
+            loss += "counts and not 0, as jFuzzyLogic has it"
+    return Made(_checked(first, str(text.name), curve, where), loss)
+
+
+def _two_gaussians(n: Sequence[float]) -> Curve:
+    if n[0] > n[2]:
+        raise ValueError(f"the first mean {n[0]!r} must not lie above {n[2]!r}")
+    return TwoGaussians(*n)
+
+
+_SHAPES: Final[Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]]] = (
+    MappingProxyType(
+        {
+            "TRIAN": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
+            "TRAPE": (4, lambda n: Trapezoid(*n)),
+            "GAUSS": (2, lambda n: Gaussian(*n)),
+            "GAUSS2": (4, _two_gaussians),
+            "GBELL": (3, lambda n: Bell(n[2], n[0], n[1])),
+            "SIGM": (2, lambda n: Sigmoid(n[1], n[0])),
+            "DSIGM": (
+                4,
+                lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
+            ),
+            "COSINE": (2, lambda n: Cosine(n[1], 2.0 * n[0])),
+        }
+    )
+)
+
+
+def extent(curve: Curve) -> tuple[float, float] | None:
+    """Return the range that jFuzzyLogic takes for a term; None if there is none."""
+    match curve:
+        case Points(values=values):
+            return values[0], values[-1]
+        case Trapezoid(a=a, d=d):
+            return None if a is None or d is None else (a, d)
+        case Gaussian(mean=mean, deviation=deviation):
+            return mean - 4.0 * deviation, mean + 4.0 * deviation
+        case TwoGaussians():
+            low = curve.left - 4.0 * curve.left_deviation
+            return low, curve.right + 4.0 * curve.right_deviation
+        case Bell(center=center, width=width, slope=slope):
+            reach = abs(width) * 999.0 ** (1.0 / (2.0 * slope)) if slope > 0 else 0.0
+            return center - reach, center + reach
+        case Sigmoid(inflection=inflection, slope=slope):
+            reach = 9.0 / abs(slope) if slope else 0.0
+            return inflection - reach, inflection + reach
+        case (
+            SigmoidDifference(first=first, second=second)
+            | SigmoidProduct(first=first, second=second)
+        ):
+            ends = [one for one in (extent(first), extent(second)) if one is not None]
+            return min(low for low, _ in ends), max(high for _, high in ends)
+        case Cosine(center=center, width=width):
+            return center - width / 2.0, center + width / 2.0
+        case PiCurve(a=a, d=d):
+            return a, d
+        case Singleton(value=value):
+            return value, value
+        case Band() | LR() | _:
+            return None

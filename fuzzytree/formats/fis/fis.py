@@ -1,0 +1,480 @@
+"""FIS files of MATLAB, Octave and fuzzylite as systems.
+
+`docs/fis.md` describes the file and says where the three mean other things by it. What
+a file does not say itself (its dialect) is found out from words that only one of them
+has; MATLAB's meaning is the default.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePath
+from typing import Final, NamedTuple
+
+import msgspec
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.formats.engines import fuzzylite_losses
+from fuzzytree.formats.fis import fis_text as text
+from fuzzytree.formats.fis import fis_words as words
+from fuzzytree.formats.fis.fis_rules import rules_of
+from fuzzytree.formats.fis.fis_terms import labels_of
+from fuzzytree.formats.fis.fis_text import Entry, Notes, Section
+from fuzzytree.formats.fis.fis_words import Dialect
+from fuzzytree.formats.yaml.nodes import report
+from fuzzytree.formats.yaml.spots import Spots
+from fuzzytree.model.contracts import Locate, Loss, Reading
+from fuzzytree.model.naming import numbered, printable
+from fuzzytree.model.rulebase import name_choice
+from fuzzytree.model.system import (
+    Defuzzifier,
+    FuzzySystem,
+    RuleBlock,
+    SNorm,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+)
+from fuzzytree.semantics.conversion import as_written, joined_by_number
+
+DIALECT: Final = "dialect: "
+
+_SYSTEM_KEYS: Final = (
+    "Name",
+    "Type",
+    "Version",
+    "NumInputs",
+    "NumOutputs",
+    "NumRules",
+    "AndMethod",
+    "OrMethod",
+    "ImpMethod",
+    "AggMethod",
+    "DefuzzMethod",
+)
+_VARIABLE_KEYS: Final = ("Name", "Range", "NumMFs", "MF1")
+_PRIVATE_KEYS: Final = frozenset({"Enabled", "Default", "LockPrevious", "LockRange"})
+DEFAULTS: Final = {
+    "matlab": Defuzzifier("centroid", 101, "ends"),
+    "octave": Defuzzifier("centroid", 101, "half ends"),
+    "fuzzylite": Defuzzifier("centroid", 100, "middle"),
+}
+
+
+class _Methods(msgspec.Struct, frozen=True):
+    """What [System] says."""
+
+    name: str
+    conjunction: TNorm | None
+    disjunction: SNorm | None
+    implication: TNorm | None
+    aggregation: SNorm | None
+    defuzzifier: Defuzzifier
+    counts: Mapping[str, Entry]
+
+
+def reading(content: bytes, name: str, *, dialect: Dialect | None = None) -> Reading:
+    r"""Return what a FIS file says.
+
+    Args:
+        content: The file.
+        name: What messages call it.
+        dialect: Whose meaning counts; None finds it out.
+
+    Raises:
+        ReadError: With every mistake of the file.
+
+    Example:
+        >>> lines = ["[System]", "Name='tip'", "Type='sugeno'", "DefuzzMethod='wtaver'",
+        ...          "[Input1]", "Name='food'", "Range=[0 10]", "NumMFs=1",
+        ...          "MF1='good':'linsmf',[0 10]", "[Output1]", "Name='tip %'",
+        ...          "Range=[0 30]", "NumMFs=1", "MF1='much':'constant',[25]",
+        ...          "[Rules]", "1, 1 (1) : 1"]
+        >>> reading("\n".join(lines).encode(), "tip.fis").model.columns
+        ('food',)
+    """
+    return _read(content, name, dialect)[0]
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of a FIS file stand.
+
+    A rule stands where its line begins, a term and a variable behind their `=`.
+
+    Raises:
+        ReadError: With every mistake of the file.
+    """
+    _, parts, facts = _read(content, name, None)
+    return parts.spots().of_facts(facts).find
+
+
+class _Parts(NamedTuple):
+    """A system, and what its parts were made of."""
+
+    system: FuzzySystem
+    inputs: Sequence[Section]
+    outputs: Sequence[Section]
+    rules: Sequence[Entry]
+
+    def spots(self) -> Spots:
+        return text.spots_of(self.inputs, self.outputs, self.rules)
+
+
+def _read(
+    content: bytes, name: str, dialect: Dialect | None
+) -> tuple[Reading, _Parts, str | None]:
+    """Return what a file says, what of, and the facts of a rule base if it is one."""
+    notes = Notes([], [], [])
+    page = text.read_page(content, name, notes.found)
+    notes.remarks.extend(page.remarks)
+    meant = dialect or _dialect(page, notes)
+    parts = _system(page, name, meant, notes)
+    if notes.found or parts is None:
+        raise report(name, notes.found)
+    model, facts = as_written(parts.system, page.comments)
+    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
+    return reading, parts, facts
+
+
+def _dialect(page: text.Page, notes: Notes) -> Dialect:
+    """Return whose file it is, by its comments and words, and say why."""
+    for known in words.DIALECTS:
+        if f"{DIALECT}{known}" in page.comments:
+            notes.remarks.append(f"read as {known}'s, as the file says")
+            return known
+    found, why = _signs(page)
+    notes.remarks.append(f"read as {found}'s: {why}")
+    return found
+
+
+def _signs(page: text.Page) -> tuple[Dialect, str]:
+    comments = " ".join(page.comments).lower()
+    entries = [entry for section in page.sections for entry in section.entries]
+    for entry in entries:
+        kind = entry.value.rpartition("[")[0].rstrip(" ,").rpartition(":")[2]
+        private = kind.strip(" '")
+        if entry.key in _PRIVATE_KEYS:
+            return "fuzzylite", f"{entry.key} in line {entry.line} is only fuzzylite's"
+        if text.TERM.fullmatch(entry.key) and private in words.PRIVATE:
+            return "fuzzylite", f"{private} in line {entry.line} is only fuzzylite's"
+    if "fuzzylite" in comments:
+        return "fuzzylite", "a comment names it"
+    if "fuzzy-logic-toolkit" in comments:
+        return "octave", "a comment names its fuzzy-logic-toolkit"
+    for entry in entries:
+        if entry.key.endswith("Method") and "_" in entry.value:
+            return "octave", f"{entry.value} in line {entry.line} is no word of MATLAB"
+        if not entry.key and any(
+            number % 1 for number in text.numbers_of(_indices(entry.value), 0, 0, [])
+        ):
+            return "octave", f"line {entry.line} has hedges, which MATLAB has not"
+    return "matlab", "nothing says otherwise"
+
+
+def _indices(rule: str) -> str:
+    return rule.partition("(")[0]
+
+
+def _system(
+    page: text.Page, name: str, dialect: Dialect, notes: Notes
+) -> _Parts | None:
+    parts: dict[str, list[Section]] = {"input": [], "output": []}
+    single: dict[str, Section] = {}
+    for section in page.sections:
+        if section.kind in parts:
+            parts[section.kind].append(section)
+        else:
+            single.setdefault(section.kind, section)
+    for kind, sections in parts.items():
+        sections.sort(key=lambda section: section.number)
+        for place, section in enumerate(sections, 1):
+            if section.number != place and not notes.found:
+                what = f"[{kind.capitalize()}{place}] is missing before this one"
+                notes.found.append((section.line, 1, what))
+    if "system" not in single or not parts["output"]:
+        missing = "[Output1]" if "system" in single else "[System]"
+        notes.found.append((1, 1, f"the file has no section {missing}"))
+        return None
+    methods = _methods(single["system"], name, dialect, notes)
+    taken: dict[str, int] = {}
+    inputs = tuple(_input(one, dialect, taken, notes) for one in parts["input"])
+    outputs = tuple(
+        _output(one, methods, dialect, (inputs, taken), notes)
+        for one in parts["output"]
+    )
+    lines = single["rules"].entries if "rules" in single else []
+    found = rules_of(lines, (inputs, outputs), dialect, notes)
+    _check_counts(methods, (len(inputs), len(outputs), len(lines)), dialect, notes)
+    if notes.found:
+        return None
+    is_weighted = methods.defuzzifier.is_weighted
+    block = RuleBlock(
+        tuple(rule for _, rule in found),
+        methods.conjunction,
+        methods.disjunction,
+        None if is_weighted else methods.implication,
+    )
+    if dialect == "matlab":
+        outputs = _with_middles(outputs, block.rules, notes)
+    _compare(outputs, block, methods, dialect, notes)
+    if dialect == "fuzzylite":
+        for output in outputs:
+            notes.losses.extend(fuzzylite_losses(output))
+    given = parts["input"], parts["output"], [entry for entry, _ in found]
+    try:
+        system = FuzzySystem(methods.name, inputs, outputs, (block,))
+    except InvalidModelError as error:
+        notes.found.extend(text.spots_of(*given).placed(error.mistakes))
+        return None
+    return _Parts(joined_by_number(system), *given)
+
+
+def _keyed(
+    section: Section, known: Sequence[str], notes: Notes
+) -> tuple[dict[str, Entry], list[Entry]]:
+    """Return the entries by key, and those of terms."""
+    found: dict[str, Entry] = {}
+    terms: list[Entry] = []
+    for entry in section.entries:
+        if section.kind != "system" and text.TERM.fullmatch(entry.key):
+            terms.append(entry)
+        elif entry.key not in known and entry.key not in _PRIVATE_KEYS:
+            what = f"no key {entry.key[:40]!r}; {name_choice(entry.key[:40], known)}"
+            notes.found.append((entry.line, 1, what))
+        elif entry.key in found:
+            what = f"{entry.key} stands twice; the first is in line"
+            notes.found.append((entry.line, 1, f"{what} {found[entry.key].line}"))
+        else:
+            found[entry.key] = entry
+    return found, terms
+
+
+def _methods(section: Section, name: str, dialect: Dialect, notes: Notes) -> _Methods:
+    entries, _ = _keyed(section, _SYSTEM_KEYS, notes)
+
+    def word(key: str) -> str:
+        return text.unquoted(entries[key], notes.found) if key in entries else ""
+
+    def norm(key: str, known: Mapping[str, str]) -> str | None:
+        given = word(key)
+        if given and given not in known:
+            entry = entries[key]
+            what = f"no {key} {given[:40]!r}; {name_choice(given[:40], known)}"
+            notes.found.append((entry.line, entry.column, what))
+        return known.get(given)
+
+    title = word("Name")
+    if not title:
+        title = printable(PurePath(name).stem) or "system"
+        notes.remarks.append(f"the system has no name; {title!r} stands for it")
+    method = norm("DefuzzMethod", words.METHODS)
+    is_sugeno = word("Type").lower() == "sugeno"
+    if method is None:
+        method = "weighted average" if is_sugeno else "centroid"
+        if "DefuzzMethod" not in entries:
+            notes.remarks.append(f"the file has no DefuzzMethod; read as {method}")
+    how = msgspec.structs.replace(DEFAULTS[dialect], method=method)
+    if how.is_weighted:
+        how = Defuzzifier(how.method)
+    else:
+        notes.remarks.append(
+            f"FIS has no resolution: curves are looked at in {how.samples} places, "
+            f"as {dialect} does unless told otherwise"
+        )
+    if is_sugeno != how.is_weighted and dialect != "fuzzylite" and "Type" in entries:
+        entry = entries["Type"]
+        what = f"a {word('Type')!r} system cannot have the DefuzzMethod {method!r}"
+        notes.found.append((entry.line, entry.column, what))
+    if how.method == "bisector" and dialect == "octave":
+        notes.remarks.append(
+            "Octave's bisector answers the number of a sample and not its value; "
+            "this is read as the value"
+        )
+    return _Methods(
+        title,
+        norm("AndMethod", words.TNORMS),  # type: ignore[arg-type]  # its values
+        norm("OrMethod", words.SNORMS),  # type: ignore[arg-type]
+        norm("ImpMethod", words.TNORMS),  # type: ignore[arg-type]
+        norm("AggMethod", words.SNORMS),  # type: ignore[arg-type]
+        how,
+        entries,
+    )
+
+
+def _check_counts(
+    methods: _Methods, found: tuple[int, int, int], dialect: Dialect, notes: Notes
+) -> None:
+    for key, count in zip(("NumInputs", "NumOutputs", "NumRules"), found, strict=True):
+        entry = methods.counts.get(key)
+        if entry is None or entry.value.split("%")[0].strip() == str(count):
+            continue
+        what = f"{key} says {entry.value[:20]}, and there are {count}"
+        if key == "NumRules" and dialect == "fuzzylite":
+            notes.remarks.append(f"{what}: fuzzylite reads them all")
+        else:
+            notes.found.append((entry.line, entry.column, what))
+
+
+def _range(
+    entries: Mapping[str, Entry], notes: Notes
+) -> tuple[float | None, float | None]:
+    entry = entries.get("Range")
+    if entry is None:
+        return None, None
+    inside = entry.value.partition("[")[2].partition("]")[0]
+    start = entry.column + entry.value.find("[") + 1
+    ends = text.numbers_of(inside, entry.line, start, notes.found)
+    if len(ends) != 2 or not ends[0] <= ends[1]:
+        what = f"the Range must be two rising numbers, [0 1], not {entry.value[:40]!r}"
+        notes.found.append((entry.line, entry.column, what))
+        return None, None
+    low, high = (end if abs(end) < words.FAR else None for end in ends)
+    return low, high
+
+
+def _name(
+    section: Section, entries: Mapping[str, Entry], taken: dict[str, int], notes: Notes
+) -> str:
+    entry = entries.get("Name")
+    name = text.unquoted(entry, notes.found) if entry else ""
+    if not name:
+        name = f"{section.kind} {section.number}"
+        notes.remarks.append(f"{name} has no name of its own")
+    found = numbered(name, taken)
+    if found != name:
+        what = f"{section.kind} {section.number} is called {name!r} like another"
+        notes.remarks.append(f"{what}; here it is {found!r}")
+    return found
+
+
+def _input(
+    section: Section, dialect: Dialect, taken: dict[str, int], notes: Notes
+) -> SystemInput:
+    entries, terms = _keyed(section, _VARIABLE_KEYS, notes)
+    name = _name(section, entries, taken, notes)
+    low, high = _range(entries, notes)
+    _note_enabled(entries, name, notes)
+    labels = labels_of(terms, entries.get("NumMFs"), (name, dialect, None), notes)
+    return SystemInput(name, labels, low, high, clips=_is_set(entries, "LockRange"))
+
+
+def _output(
+    section: Section,
+    methods: _Methods,
+    dialect: Dialect,
+    known: tuple[tuple[SystemInput, ...], dict[str, int]],
+    notes: Notes,
+) -> SystemOutput:
+    inputs, taken = known
+    entries, terms = _keyed(section, _VARIABLE_KEYS, notes)
+    name = _name(section, entries, taken, notes)
+    low, high = _range(entries, notes)
+    _note_enabled(entries, name, notes)
+    how = methods.defuzzifier
+    about = (name, dialect, (how.is_weighted, len(inputs)))
+    labels = labels_of(terms, entries.get("NumMFs"), about, notes)
+    if _is_set(entries, "LockPrevious"):
+        what = "where no rule fires, fuzzylite answers as for the row before"
+        notes.losses.append(Loss(f"output {name!r}", f"{what}; here it is no number"))
+    default: float | None = None
+    if "Default" in entries:
+        default = text.number_of(entries["Default"].value)
+        if default is None or math.isinf(default):
+            entry = entries["Default"]
+            what = f"the Default must be a number or nan, not {entry.value[:40]!r}"
+            notes.found.append((entry.line, entry.column, what))
+    is_joined = not how.is_weighted or (
+        dialect == "octave" and methods.aggregation != "sum"
+    )
+    return SystemOutput(
+        name,
+        labels,
+        low,
+        high,
+        how,
+        methods.aggregation if is_joined else None,
+        None if default is None or math.isnan(default) else default,
+        clips=_is_set(entries, "LockRange"),
+    )
+
+
+def _is_set(entries: Mapping[str, Entry], key: str) -> bool:
+    return key in entries and entries[key].value.lower() in ("1", "true")
+
+
+def _note_enabled(entries: Mapping[str, Entry], name: str, notes: Notes) -> None:
+    if "Enabled" in entries and not _is_set(entries, "Enabled"):
+        what = "it is not enabled in the file, and takes part here"
+        notes.losses.append(Loss(f"variable {name!r}", what))
+
+
+def _with_middles(
+    outputs: Iterable[SystemOutput], rules: Sequence[SystemRule], notes: Notes
+) -> tuple[SystemOutput, ...]:
+    """Return outputs with what MATLAB answers where no rule fires."""
+    found = []
+    always = always_concluded(rules)
+    for one in outputs:
+        default = one.default
+        if default is None and one.name not in always:
+            default = middle(one.low, one.high)
+        found.append(msgspec.structs.replace(one, default=default))
+    if any(one.default is not None for one in found):
+        notes.remarks.append(
+            "where no rule fires, an output is the middle of its range, as in MATLAB"
+        )
+    return tuple(found)
+
+
+def always_concluded(rules: Iterable[SystemRule]) -> set[str]:
+    """Return the outputs that a rule without a condition concludes in every row.
+
+    Example:
+        >>> from fuzzytree.model.system import Conclusion
+        >>> always_concluded([SystemRule(None, (Conclusion("tip", "small"),))])
+        {'tip'}
+    """
+    return {
+        one.output
+        for rule in rules
+        if rule.when is None and rule.weight > 0.0
+        for one in rule.then
+    }
+
+
+def middle(low: float | None, high: float | None) -> float | None:
+    """Return what MATLAB answers where no rule fires, if the range is known.
+
+    Example:
+        >>> middle(0.0, 30.0)
+        15.0
+    """
+    return None if low is None or high is None else low / 2 + high / 2
+
+
+def _compare(
+    outputs: Sequence[SystemOutput],
+    block: RuleBlock,
+    methods: _Methods,
+    dialect: Dialect,
+    notes: Notes,
+) -> None:
+    """Say where Octave would answer otherwise than the others."""
+    is_weighted = methods.defuzzifier.is_weighted
+    if not is_weighted or methods.aggregation in (None, "sum") or dialect == "octave":
+        return
+    for output in outputs:
+        concluded = [
+            one.label
+            for r in block.rules
+            for one in r.then
+            if one.output == output.name
+        ]
+        if len(set(concluded)) < len(concluded):
+            notes.remarks.append(
+                f"output {output.name!r}: several rules conclude one term, and their "
+                f"degrees are summed, as {dialect} does; Octave would join them by "
+                f"{methods.aggregation}"
+            )

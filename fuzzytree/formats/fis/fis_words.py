@@ -1,0 +1,250 @@
+"""The words of FIS files, for the reader and for the writer.
+
+MATLAB wrote the format down; Octave's fuzzy-logic-toolkit and fuzzylite have words of
+their own, and mean some of the shared ones otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, Literal, get_args
+
+import msgspec
+
+from fuzzytree.model.rulebase import MOST_POINTS, Points
+from fuzzytree.model.system import (
+    Bell,
+    Binary,
+    Concave,
+    Cosine,
+    Curve,
+    Gaussian,
+    Hedge,
+    PiCurve,
+    SCurve,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    SNorm,
+    Spike,
+    TNorm,
+    Trapezoid,
+    TwoGaussians,
+    curve_mistakes,
+)
+
+Dialect = Literal["matlab", "octave", "fuzzylite"]
+DIALECTS: Final[tuple[Dialect, ...]] = get_args(Dialect)
+
+FAR: Final = 1e300
+"""Corners beyond it stand for none: a trapezoid has no way to say `1 up to here`."""
+
+TNORMS: Final[Mapping[str, TNorm]] = MappingProxyType(
+    {
+        "min": "minimum",
+        "prod": "product",
+        "algebraic_product": "product",
+        "bounded_difference": "bounded difference",
+        "drastic_product": "drastic product",
+        "einstein_product": "einstein product",
+        "hamacher_product": "hamacher product",
+        "nilpotent_minimum": "nilpotent minimum",
+    }
+)
+SNORMS: Final[Mapping[str, SNorm]] = MappingProxyType(
+    {
+        "max": "maximum",
+        "probor": "algebraic sum",
+        "algebraic_sum": "algebraic sum",
+        "bounded_sum": "bounded sum",
+        "drastic_sum": "drastic sum",
+        "einstein_sum": "einstein sum",
+        "hamacher_sum": "hamacher sum",
+        "nilpotent_maximum": "nilpotent maximum",
+        "normalized_sum": "normalized sum",
+        "sum": "sum",
+    }
+)
+METHODS: Final = MappingProxyType(
+    {
+        "centroid": "centroid",
+        "bisector": "bisector",
+        "som": "smallest of maximum",
+        "lom": "largest of maximum",
+        "mom": "mean of maximum",
+        "wtaver": "weighted average",
+        "wtsum": "weighted sum",
+    }
+)
+
+_BASIC_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
+    0: (),
+    5: ("somewhat",),
+    20: ("very",),
+    40: ("very very",),
+}
+HEDGES: Final[Mapping[Dialect, Mapping[int, tuple[Hedge, ...]]]] = MappingProxyType(
+    {
+        "matlab": {0: ()},
+        "octave": {**_BASIC_HEDGES, 10: (), 30: ("cubed",)},
+        "fuzzylite": {
+            **_BASIC_HEDGES,
+            1: ("seldom",),
+            30: ("extremely",),
+            99: ("any",),
+        },
+    }
+)
+"""What the hundredths of a term's number do to its degree."""
+
+CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = MappingProxyType(
+    {
+        0: (),
+        10: (),
+        5: ("very",),
+        20: ("somewhat",),
+        30: ("cube root",),
+        40: ("somewhat", "somewhat"),
+    }
+)
+"""The same behind the comma of a Sugeno rule in Octave, which takes the root there."""
+
+
+class Kind(msgspec.Struct, frozen=True):
+    """A kind of curve: the names of its numbers, and how they make one."""
+
+    numbers: str
+    make: Callable[[Sequence[float]], Curve]
+    is_private: bool = False
+
+
+def trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
+    """Return a trapezoid; two corners beyond `FAR` leave a side open.
+
+    A side to the next double is a step: no value lies on it.
+
+    Example:
+        >>> trapezoid(-2e300, -1e300, 3.0, 5.0).a is None
+        True
+    """
+    is_left, is_right = b <= -FAR, c >= FAR
+    a = b if a == math.nextafter(b, -math.inf) else a
+    d = c if d == math.nextafter(c, math.inf) else d
+    if is_left and is_right:
+        return Trapezoid(None, 0.0, 0.0, None)
+    if is_left:
+        return Trapezoid(None, c, c, d)
+    if is_right:
+        return Trapezoid(a, b, b, None)
+    return Trapezoid(a, b, c, d)
+
+
+def _ramp(start: float, end: float) -> Curve:
+    if start == end:
+        return Points((start,), (0.0,))  # as fuzzylite
+    if start < end:
+        return Points((start, end), (0.0, 1.0))
+    return Points((end, start), (1.0, 0.0))
+
+
+def _rising(start: float, end: float) -> Curve:
+    if start < end:
+        return SCurve(start, end)
+    return Binary((start + end) / 2)  # as MATLAB's smf
+
+
+def _falling(start: float, end: float) -> Curve:
+    if start < end:
+        return SCurve(end, start)
+    return Binary((start + end) / 2, is_above=False)
+
+
+KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
+    {
+        "trimf": Kind("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
+        "trapmf": Kind("a b c d", lambda n: trapezoid(*n)),
+        "linzmf": Kind("a b", lambda n: _ramp(n[1], n[0])),
+        "linsmf": Kind("a b", lambda n: _ramp(*n)),
+        "gaussmf": Kind("deviation mean", lambda n: Gaussian(n[1], abs(n[0]))),
+        "gauss2mf": Kind(
+            "deviation mean deviation mean",
+            lambda n: TwoGaussians(n[1], abs(n[0]), n[3], abs(n[2])),
+        ),
+        "gbellmf": Kind("width slope center", lambda n: Bell(n[2], abs(n[0]), n[1])),
+        "sigmf": Kind("slope inflection", lambda n: Sigmoid(n[1], n[0])),
+        "dsigmf": Kind(
+            "slope inflection slope inflection",
+            lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
+        ),
+        "psigmf": Kind(
+            "slope inflection slope inflection",
+            lambda n: SigmoidProduct(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
+        ),
+        "smf": Kind("start end", lambda n: _rising(*n)),
+        "zmf": Kind("start end", lambda n: _falling(*n)),
+        "pimf": Kind("a b c d", lambda n: PiCurve(*n)),
+        "rampmf": Kind("start end", lambda n: _ramp(*n), is_private=True),
+        "rectmf": Kind(
+            "start end", lambda n: Trapezoid(n[0], n[0], n[1], n[1]), is_private=True
+        ),
+        "cosinemf": Kind("center width", lambda n: Cosine(*n), is_private=True),
+        "spikemf": Kind("center width", lambda n: Spike(*n), is_private=True),
+        "concavemf": Kind("inflection end", lambda n: Concave(*n), is_private=True),
+        "binarymf": Kind(
+            "start direction",
+            lambda n: Binary(n[0], is_above=n[1] > n[0]),
+            is_private=True,
+        ),
+    }
+)
+"""The curves with a fixed number of parameters, by their name in a file."""
+
+OTHER_KINDS: Final = ("discretemf", "constant", "linear", "function")
+PRIVATE: Final = frozenset(
+    {name for name, kind in KINDS.items() if kind.is_private}
+    | {"discretemf", "function"}
+)
+"""Kinds that MATLAB lacks; all of them are fuzzylite's."""
+
+_MAY_BE_INFINITE: Final = frozenset({"trapmf", "binarymf"})
+
+
+def curve_of(kind: str, numbers: Sequence[float]) -> Curve | str:
+    """Return the curve that a kind of `KINDS` or `discretemf` makes of its numbers.
+
+    Returns:
+        The curve, or a sentence on what is wrong with the numbers.
+
+    Example:
+        >>> curve_of("smf", [1.0, 2.0])
+        SCurve(start=1.0, end=2.0)
+        >>> curve_of("trimf", [1.0, 2.0])
+        "a 'trimf' has 3 numbers (a b c), not 2"
+    """
+    if kind not in _MAY_BE_INFINITE and not all(map(math.isfinite, numbers)):
+        return "the numbers must be finite"
+    if kind == "discretemf":
+        return _points(numbers)
+    words = KINDS[kind].numbers
+    needed = len(words.split())
+    if len(numbers) != needed:
+        return f"a {kind!r} has {needed} numbers ({words}), not {len(numbers)}"
+    if any(number != number for number in numbers):
+        return "the numbers must be finite"
+    curve = KINDS[kind].make(numbers)
+    for text in curve_mistakes(curve):
+        return text
+    return curve
+
+
+def _points(numbers: Sequence[float]) -> Curve | str:
+    if len(numbers) % 2 or not numbers:
+        return f"a 'discretemf' has pairs of numbers (x y x y ...), not {len(numbers)}"
+    if len(numbers) > 2 * MOST_POINTS:
+        return f"{len(numbers) // 2} points are more than the {MOST_POINTS} of a curve"
+    curve = Points(tuple(numbers[0::2]), tuple(numbers[1::2]))
+    for text in curve_mistakes(curve):
+        return text
+    return curve

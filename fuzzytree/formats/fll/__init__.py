@@ -1,0 +1,1 @@
+"""fuzzylite's FLL files."""

@@ -1,0 +1,349 @@
+"""Terms of fuzzylite: a class and its numbers, such as `Triangle 0 1 2`, to a curve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+import msgspec
+
+from fuzzytree.errors import ReadError
+from fuzzytree.formats.formulas import FormulaError, parse
+from fuzzytree.formats.lines import Word, number_of
+from fuzzytree.formats.yaml.nodes import Found
+from fuzzytree.model.rulebase import Points, name_choice
+from fuzzytree.model.system import (
+    Arc,
+    Bell,
+    Binary,
+    Call,
+    Concave,
+    Cosine,
+    Curve,
+    Expression,
+    Formula,
+    Gaussian,
+    Label,
+    Linear,
+    Name,
+    Number,
+    PiCurve,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Spike,
+    Trapezoid,
+    TwoGaussians,
+    curve_mistakes,
+)
+from fuzzytree.semantics.conversion.shapes import stepped
+
+_FURTHEST: Final = 1e308  # an end that no value comes near
+
+
+class Place(msgspec.Struct, frozen=True):
+    """What a term's meaning depends on beside its own line.
+
+    Attributes:
+        variable: The name of its variable.
+        inputs: The names of all inputs, in order.
+        names: The names of all variables.
+        is_weighted: Whether its variable is an output of weighted numbers.
+        is_inverse: Whether a weighted output asks where monotone terms have a degree.
+    """
+
+    variable: str
+    inputs: tuple[str, ...]
+    names: Collection[str]
+    is_weighted: bool = False
+    is_inverse: bool = False
+
+
+class Term(msgspec.Struct, frozen=True):
+    """A term as it was read.
+
+    Attributes:
+        label: Its name, curve and height.
+        kind: Its class in the file.
+    """
+
+    label: Label
+    kind: str
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is a number for weighted outputs."""
+        return self.kind in ("Constant", "Linear", "Function")
+
+    @property
+    def is_monotone(self) -> bool:
+        """Whether a weighted output asks where it has a degree."""
+        return self.kind in _MONOTONE
+
+
+_MONOTONE = frozenset({"Arc", "Concave", "Ramp", "Sigmoid", "SShape", "ZShape"})
+
+
+def read_term(
+    name: str, kind: Word, rest: Sequence[Word], place: Place, formula: str = ""
+) -> Term:
+    """Return a term of a class and its parameters.
+
+    Args:
+        name: Its name.
+        kind: Its class.
+        rest: The words behind the class.
+        place: Where it stands.
+        formula: The same words as one text, for a class that takes a formula.
+
+    Raises:
+        TermError: If it is none.
+    """
+    if kind.text == "Function":
+        return Term(Label(name, _function(kind, rest, place, formula)), kind.text)
+    numbers = _numbers(rest)
+    height = 1.0
+    match kind.text:
+        case "Constant":
+            _check_count(kind, numbers, (1,), "1 number")
+            curve: Curve = Singleton(numbers[0])
+            if not place.is_weighted:
+                curve = Formula(Number(numbers[0]))
+        case "Linear":
+            curve = _linear(kind, numbers, place)
+        case "Discrete":
+            if len(numbers) % 2:
+                height = numbers.pop()
+            if not numbers:
+                raise _error(kind, "Discrete takes pairs of a value and a degree")
+            curve = Points(stepped(numbers[::2]), tuple(numbers[1::2]))
+        case known if known in _CLASSES:
+            count, make = _CLASSES[known]
+            wanted = f"{count} numbers, or {count + 1} with the height"
+            _check_count(kind, numbers, (count, count + 1), wanted)
+            if len(numbers) > count:
+                height = numbers.pop()
+            curve = _made(kind, make, numbers)
+            if place.is_inverse and known in ("SShape", "ZShape"):
+                # Where it has a degree has a formula, though it ends before it starts.
+                start, end = numbers if known == "SShape" else reversed(numbers)
+                curve = SCurve(start, end)
+        case _:
+            choice = name_choice(kind.text, CLASSES)
+            raise _error(kind, f"no term {kind.text!r}; {choice}")
+    found = Label(name, curve, height)
+    _check(kind, found, place)
+    return Term(found, kind.text)
+
+
+class TermError(ReadError):
+    """A term that cannot be read.
+
+    Attributes:
+        found: Its mistakes.
+    """
+
+    def __init__(self, *found: Found) -> None:
+        self.found = found
+        super().__init__("; ".join(sentence for _, _, sentence in found))
+
+
+def _error(word: Word, sentence: str) -> TermError:
+    return TermError(word.mistake(sentence))
+
+
+def _check(kind: Word, label: Label, place: Place) -> None:
+    where = f"term {label.name!r} of {place.variable!r}"
+    for sentence in curve_mistakes(label.curve):
+        raise _error(kind, f"{where}: {sentence}")
+    if not 0.0 < label.height <= 1.0:
+        sentence = f"{where}: the height must lie in (0, 1], not {label.height!r}"
+        raise _error(kind, sentence)
+
+
+def _check_count(
+    kind: Word, numbers: Sequence[float], counts: tuple[int, ...], wanted: str
+) -> None:
+    if len(numbers) not in counts:
+        raise _error(kind, f"{kind.text} takes {wanted}, not {len(numbers)}")
+
+
+def _numbers(words: Sequence[Word]) -> list[float]:
+    values: list[float] = []
+    found: list[Found] = []
+    for word in words:
+        value = number_of(word.text)
+        if value is None or math.isnan(value):
+            found.append(word.mistake(f"{word.text!r} where a number must stand"))
+        else:
+            values.append(value)
+    if found:
+        raise TermError(*found)
+    return values
+
+
+def _made(
+    kind: Word, make: Callable[[Sequence[float]], Curve], numbers: Sequence[float]
+) -> Curve:
+    try:
+        return make(numbers)
+    except ValueError as error:
+        raise _error(kind, str(error)) from error
+
+
+def _function(kind: Word, rest: Sequence[Word], place: Place, formula: str) -> Formula:
+    if not rest:
+        raise _error(kind, "Function takes a formula")
+    if "x" in place.names:
+        sentence = "'x' in a formula is the value itself; rename the variable 'x'"
+        raise _error(rest[0], sentence)
+    try:
+        return Formula(parse(formula, place.names))
+    except FormulaError as error:
+        column = rest[0].column + error.column - 1
+        raise TermError((rest[0].line, column, error.sentence)) from error
+
+
+def _linear(kind: Word, numbers: Sequence[float], place: Place) -> Curve:
+    count = len(place.inputs)
+    wanted = f"{count} weights, one for each input, and perhaps an offset"
+    _check_count(kind, numbers, (count, count + 1), wanted)
+    offset = numbers[count] if len(numbers) > count else 0.0
+    if place.is_weighted:
+        return Linear(tuple(numbers[:count]), offset)
+    total: Expression = Number(offset)
+    parts = [
+        Call("*", (Number(weight), Name(name)))
+        for weight, name in zip(numbers[:count], place.inputs, strict=True)
+    ]
+    if parts:
+        first, *others = parts
+        total = first
+        for part in others:
+            total = Call("+", (total, part))
+        total = Call("+", (total, Number(offset)))
+    return Formula(total)
+
+
+def _binary(numbers: Sequence[float]) -> Curve:
+    start, direction = numbers
+    if start == direction:
+        raise ValueError("the direction of Binary must be above or below its start")
+    return Binary(start, direction > start)
+
+
+def _ramp(numbers: Sequence[float]) -> Curve:
+    start, end = numbers
+    if start == end:
+        raise ValueError("a Ramp must end elsewhere than where it starts")
+    if start < end:
+        return Points((start, end), (0.0, 1.0))
+    return Points((end, start), (1.0, 0.0))
+
+
+def _rectangle(numbers: Sequence[float]) -> Curve:
+    start, end = sorted(numbers)
+    return _trapezoid((start, start, end, end))
+
+
+def _trapezoid(numbers: Sequence[float]) -> Curve:
+    a, b, c, d = numbers
+    low = None if a == -math.inf else a
+    high = None if d == math.inf else d
+    if b == -math.inf and low is None:
+        b = min(c, d) if math.isfinite(min(c, d)) else 0.0
+    if c == math.inf and high is None:
+        c = max(a, b) if math.isfinite(max(a, b)) else 0.0
+    return Trapezoid(low, b, c, high)
+
+
+def _s_shape(numbers: Sequence[float]) -> Curve:
+    start, end = numbers
+    if start < end:
+        return SCurve(start, end)
+    return Points((start, start), (0.0, 1.0))
+
+
+def _z_shape(numbers: Sequence[float]) -> Curve:
+    start, end = numbers
+    if start < end:
+        return SCurve(end, start)
+    return Points((start, start), (1.0, 0.0))
+
+
+def _sigmoids(numbers: Sequence[float]) -> tuple[Sigmoid, Sigmoid]:
+    left, rising, falling, right = numbers
+    return Sigmoid(left, rising), Sigmoid(right, falling)
+
+
+_CLASSES: Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]] = (
+    MappingProxyType(
+        {
+            "Arc": (2, lambda n: Arc(*n)),
+            "Bell": (3, lambda n: Bell(n[0], abs(n[1]), n[2])),
+            "Binary": (2, _binary),
+            "Concave": (2, lambda n: Concave(*n)),
+            "Cosine": (2, lambda n: Cosine(*n)),
+            "Gaussian": (2, lambda n: Gaussian(n[0], abs(n[1]))),
+            "GaussianProduct": (
+                4,
+                lambda n: TwoGaussians(n[0], abs(n[1]), n[2], abs(n[3])),
+            ),
+            "PiShape": (4, lambda n: PiCurve(*n)),
+            "Ramp": (2, _ramp),
+            "Rectangle": (2, _rectangle),
+            "SemiEllipse": (2, lambda n: SemiEllipse(*sorted(n))),
+            "Sigmoid": (2, lambda n: Sigmoid(*n)),
+            "SigmoidDifference": (4, lambda n: SigmoidDifference(*_sigmoids(n))),
+            "SigmoidProduct": (4, lambda n: SigmoidProduct(*_sigmoids(n))),
+            "Spike": (2, lambda n: Spike(n[0], abs(n[1]))),
+            "SShape": (2, _s_shape),
+            "Trapezoid": (4, _trapezoid),
+            "Triangle": (3, lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
+            "ZShape": (2, _z_shape),
+        }
+    )
+)
+CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *_CLASSES)
+"""The classes of terms, by their names in files."""
+
+
+def as_degree(label: Label) -> Label:
+    """Return a monotone term as one whose own degree is a weighted output's number.
+
+    A weighted output asks a monotone term *where* it has a degree (after Tsukamoto),
+    and any other term *which* degree it has at the activation. The curve that comes
+    back has the same degrees and does not count as monotone.
+    """
+    match label.curve:
+        case Points(values=(a, b) as values, degrees=degrees) if a < b:
+            # A second point at the end is a step of no height.
+            again = Points((*values, values[-1]), (*degrees, degrees[-1]))
+            return msgspec.structs.replace(label, curve=again)
+        case SCurve(start=start, end=end) if start < end:
+            rising = PiCurve(start, end, _FURTHEST, _FURTHEST)
+            return msgspec.structs.replace(label, curve=rising)
+        case SCurve(start=start, end=end):
+            falling = PiCurve(-_FURTHEST, -_FURTHEST, end, start)
+            return msgspec.structs.replace(label, curve=falling)
+        case Sigmoid(inflection=inflection, slope=slope):
+            text = f"1 / (1 + exp({-slope!r} * (x - {inflection!r})))"
+        case Concave(inflection=inflection, end=end) if inflection <= end:
+            text = (
+                f"{end - inflection!r} / ({end - inflection!r} + max({end!r} - x, 0))"
+            )
+        case Concave(inflection=inflection, end=end):
+            text = (
+                f"{inflection - end!r} / ({inflection - end!r} + max(x - {end!r}, 0))"
+            )
+        case Arc(start=start, end=end):
+            part = f"min(max((x - {start!r}) / {end - start!r}, 0), 1)"
+            text = f"sqrt({part} * (2 - {part}))"
+        case _:
+            return label
+    return Label(label.name, Formula(parse(f"{label.height!r} * ({text})")))

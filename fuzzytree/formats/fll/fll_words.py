@@ -1,0 +1,386 @@
+"""FLL files as sections of keys and values, and the words that values are made of."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, Literal, TypeVar
+
+import msgspec
+
+from fuzzytree.formats.lines import LONGEST_WORD, Word, number_of, split_lines, words
+from fuzzytree.formats.yaml.nodes import MOST_SHOWN, Found
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import name_choice
+from fuzzytree.model.system import Activation, Defuzzifier, SNorm, TNorm
+
+KEYS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "Engine": ("description",),
+        "InputVariable": ("description", "enabled", "range", "lock-range", "term"),
+        "OutputVariable": (
+            *("description", "enabled", "range", "lock-range", "aggregation"),
+            *("defuzzifier", "default", "lock-previous", "term"),
+        ),
+        "RuleBlock": (
+            *("description", "enabled", "conjunction", "disjunction", "implication"),
+            *("activation", "rule"),
+        ),
+    }
+)
+"""What each kind of section may say."""
+
+T = TypeVar("T")
+
+MOST_BYTES: Final = 32 * 2**20
+MOST_LINES: Final = 500_000
+MOST_WORDS: Final = 20_000
+"""Of one line: enough for 4096 points, or for a rule of 5000 questions."""
+
+_REPEATED = frozenset({"term", "rule"})
+
+T_NORMS: Mapping[str, TNorm] = MappingProxyType(
+    {
+        "Minimum": "minimum",
+        "AlgebraicProduct": "product",
+        "BoundedDifference": "bounded difference",
+        "DrasticProduct": "drastic product",
+        "EinsteinProduct": "einstein product",
+        "HamacherProduct": "hamacher product",
+        "NilpotentMinimum": "nilpotent minimum",
+    }
+)
+S_NORMS: Mapping[str, SNorm] = MappingProxyType(
+    {
+        "Maximum": "maximum",
+        "AlgebraicSum": "algebraic sum",
+        "BoundedSum": "bounded sum",
+        "DrasticSum": "drastic sum",
+        "EinsteinSum": "einstein sum",
+        "HamacherSum": "hamacher sum",
+        "NilpotentMaximum": "nilpotent maximum",
+        "NormalizedSum": "normalized sum",
+        "UnboundedSum": "sum",
+    }
+)
+
+Method = Literal[
+    "centroid",
+    "bisector",
+    "smallest of maximum",
+    "largest of maximum",
+    "mean of maximum",
+    "weighted average",
+    "weighted sum",
+]
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "Centroid": "centroid",
+        "Bisector": "bisector",
+        "SmallestOfMaximum": "smallest of maximum",
+        "LargestOfMaximum": "largest of maximum",
+        "MeanOfMaximum": "mean of maximum",
+        "WeightedAverage": "weighted average",
+        "WeightedSum": "weighted sum",
+    }
+)
+TYPES: Final = ("Automatic", "TakagiSugeno", "Tsukamoto")
+"""What a weighted defuzzifier may be told to do with terms."""
+
+SAMPLES: Final = 1000
+"""At how many values a curve is looked at where a file does not say it."""
+
+Choice = Literal[
+    "general", "first", "last", "highest", "lowest", "proportional", "threshold"
+]
+ACTIVATIONS: Mapping[str, Choice] = MappingProxyType(
+    {
+        "General": "general",
+        "First": "first",
+        "Last": "last",
+        "Highest": "highest",
+        "Lowest": "lowest",
+        "Proportional": "proportional",
+        "Threshold": "threshold",
+    }
+)
+Relation = Literal["<", "<=", "==", "!=", ">=", ">"]
+RELATIONS: Mapping[str, Relation] = MappingProxyType(
+    {"<": "<", "<=": "<=", "==": "==", "!=": "!=", ">=": ">=", ">": ">"}
+)
+
+
+class Notes(msgspec.Struct, frozen=True):
+    """What is found on the way through a file."""
+
+    found: list[Found]
+    losses: list[Loss]
+    remarks: list[str]
+
+    @property
+    def is_full(self) -> bool:
+        """Whether so many mistakes were found that no more are looked for."""
+        return len(self.found) >= MOST_SHOWN
+
+
+class Entry(msgspec.Struct, frozen=True):
+    """A line `key: value`, and where the key and the value stand."""
+
+    key: str
+    value: str
+    line: int
+    column: int
+    start: int
+
+    def mistake(self, sentence: str) -> Found:
+        """Return a mistake of the value."""
+        return self.line, self.start, sentence
+
+    def words(self, signs: str = "") -> tuple[Word, ...]:
+        """Return the words of the value, as many as a line may have."""
+        found = words(self.value, self.line, self.start, signs)
+        return tuple(itertools.islice(found, MOST_WORDS))
+
+    @property
+    def end(self) -> Word:
+        """An empty word behind the value."""
+        return Word("", self.line, self.start + len(self.value))
+
+
+class Section(msgspec.Struct, frozen=True):
+    """A section: its first line, and those behind it."""
+
+    head: Entry
+    entries: tuple[Entry, ...]
+
+    @property
+    def kind(self) -> str:
+        """Engine, InputVariable, OutputVariable or RuleBlock."""
+        return self.head.key
+
+    def all_of(self, key: str) -> tuple[Entry, ...]:
+        """Return the lines of a key, in order."""
+        return tuple(one for one in self.entries if one.key == key)
+
+    def one_of(self, key: str) -> Entry | None:
+        """Return the line of a key that stands once; None where it is missing."""
+        return next((one for one in self.entries if one.key == key), None)
+
+
+class Page(msgspec.Struct, frozen=True):
+    """A file: its sections, and its comments without their sign."""
+
+    sections: tuple[Section, ...]
+    comments: tuple[str, ...]
+
+
+def read_page(text: str, notes: Notes) -> Page:
+    """Return the sections of a text; what is wrong with its lines is noted."""
+    comments: list[str] = []
+    heads: list[tuple[Entry, list[Entry]]] = []
+    count = max(text.count("\n"), text.count("\r"))
+    if count > MOST_LINES:
+        found = f"{count:,} lines are more than the {MOST_LINES:,} that are read"
+        notes.found.append((MOST_LINES + 1, 1, found))
+        return Page((), ())
+    for number, line in enumerate(split_lines(text), 1):
+        said, sign, comment = line.partition("#")
+        if sign:
+            comments.append(comment.strip())
+        if not said.strip() or notes.is_full:
+            continue
+        entry = _entry(said, number, notes)
+        if entry is None or _is_too_long(entry, notes):
+            continue
+        if entry.key in KEYS:
+            heads.append((entry, []))
+        elif _belongs(entry, heads, notes):
+            heads[-1][1].append(entry)
+    sections = tuple(Section(head, tuple(entries)) for head, entries in heads)
+    for extra in [one for one in sections if one.kind == "Engine"][1:]:
+        found = "a second Engine; a file holds one"
+        notes.found.append((extra.head.line, extra.head.column, found))
+    return Page(sections, tuple(comments))
+
+
+def _entry(text: str, line: int, notes: Notes) -> Entry | None:
+    key, colon, value = text.partition(":")
+    column = len(key) - len(key.lstrip()) + 1
+    if not colon:
+        sentence = f"{_short(text)!r} where 'key: value' must stand"
+        notes.found.append((line, column, sentence))
+        return None
+    start = len(key) + 2 + len(value) - len(value.lstrip())
+    return Entry(key.strip(), value.strip(), line, column, start)
+
+
+def _is_too_long(entry: Entry, notes: Notes) -> bool:
+    if len(entry.value) < MOST_WORDS:
+        return False
+    found = words(entry.value, entry.line, entry.start, "()")
+    extra = next(itertools.islice(found, MOST_WORDS - 1, None), None)
+    if extra is not None:
+        sentence = f"a line of more words than the {MOST_WORDS:,} that are read"
+        notes.found.append(extra.mistake(sentence))
+    return extra is not None
+
+
+def _belongs(
+    entry: Entry, heads: Sequence[tuple[Entry, list[Entry]]], notes: Notes
+) -> bool:
+    """Return whether an entry may stand in the last section."""
+    key = entry.key
+    if not heads:
+        known = [*KEYS, *(key for keys in KEYS.values() for key in keys)]
+        sentence = f"{_short(key)!r} stands before any section"
+        if key not in known:
+            sentence = f"no section {_short(key)!r}; {name_choice(key[:99], KEYS)}"
+    elif key not in KEYS[heads[-1][0].key]:
+        kind = heads[-1][0].key
+        choice = name_choice(key[:99], [*KEYS[kind], *KEYS])
+        sentence = f"{kind} has no key {_short(key)!r}; {choice}"
+    elif key not in _REPEATED and any(one.key == key for one in heads[-1][1]):
+        sentence = f"a second {key!r} in one {heads[-1][0].key}"
+    else:
+        return True
+    notes.found.append((entry.line, entry.column, sentence))
+    return False
+
+
+def _short(text: str) -> str:
+    text = text.strip()
+    return text if len(text) <= LONGEST_WORD else text[:LONGEST_WORD] + "..."
+
+
+def truth(entry: Entry | None, default: bool, notes: Notes) -> bool:
+    """Return what an entry of `true` or `false` says."""
+    if entry is None:
+        return default
+    if entry.value not in ("true", "false"):
+        sentence = f"{entry.key} is true or false, not {_short(entry.value)!r}"
+        notes.found.append(entry.mistake(sentence))
+    return entry.value == "true"
+
+
+def number(word: Word, notes: Notes) -> float:
+    """Return the number that a word is; NaN, and a mistake, where it is none."""
+    value = number_of(word.text)
+    if value is None:
+        notes.found.append(
+            word.mistake(f"{_short(word.text)!r} where a number must stand")
+        )
+        return float("nan")
+    return value
+
+
+def t_norm(entry: Entry | None, notes: Notes) -> TNorm | None:
+    """Return the AND that an entry names; None for none."""
+    return _named(entry, T_NORMS, notes)
+
+
+def s_norm(entry: Entry | None, notes: Notes) -> SNorm | None:
+    """Return the OR that an entry names; None for none."""
+    return _named(entry, S_NORMS, notes)
+
+
+def _named(entry: Entry | None, table: Mapping[str, T], notes: Notes) -> T | None:
+    if entry is None or entry.value in ("", "none"):
+        return None
+    if entry.value not in table:
+        choice = name_choice(entry.value[:99], [*table, "none"])
+        sentence = f"no {entry.key} {_short(entry.value)!r}; {choice}"
+        notes.found.append(entry.mistake(sentence))
+    return table.get(entry.value)
+
+
+def activation(entry: Entry | None, notes: Notes) -> Activation:
+    """Return the activation method that an entry says."""
+    if entry is None or entry.value in ("", "none"):
+        return Activation()
+    name, *rest = entry.words()
+    method = ACTIVATIONS.get(name.text)
+    if method is None:
+        sentence = f"no activation {name.text!r}; {name_choice(name.text, ACTIVATIONS)}"
+        notes.found.append(name.mistake(sentence))
+        return Activation()
+    counts = {"first": 2, "last": 2, "threshold": 2, "highest": 1, "lowest": 1}
+    if len(rest) not in (0, counts.get(method, 0)):
+        sentence = f"{name.text} takes {_WANTED[method]}"
+        notes.found.append(name.mistake(sentence))
+        return Activation()
+    if not rest or method in ("general", "proportional"):
+        return Activation(method)
+    if method == "threshold":
+        relation = RELATIONS.get(rest[0].text)
+        if relation is None:
+            sentence = f"no relation {rest[0].text!r}; {name_choice('', RELATIONS)}"
+            notes.found.append(rest[0].mistake(sentence))
+        threshold = _threshold(rest[1], notes)
+        return Activation(method, threshold=threshold, relation=relation or ">=")
+    count = _count(rest[0], 1, notes)
+    threshold = _threshold(rest[1], notes) if len(rest) > 1 else 0.0
+    return Activation(method, count, threshold)
+
+
+_WANTED: Mapping[Choice, str] = MappingProxyType(
+    {
+        "general": "nothing",
+        "proportional": "nothing",
+        "first": "a number of rules and a threshold",
+        "last": "a number of rules and a threshold",
+        "highest": "a number of rules",
+        "lowest": "a number of rules",
+        "threshold": "a relation and a threshold",
+    }
+)
+
+
+def _threshold(word: Word, notes: Notes) -> float:
+    value = number(word, notes)
+    if not 0.0 <= value <= 1.0:
+        notes.found.append(word.mistake(f"a threshold lies in [0, 1], not {word.text}"))
+        return 0.0
+    return value
+
+
+def _count(word: Word, least: int, notes: Notes) -> int:
+    text = word.text
+    if not (
+        text.isascii() and text.isdigit() and len(text) < 10 and int(text) >= least
+    ):
+        sentence = f"{_short(text)!r} where a whole number from {least} on must stand"
+        notes.found.append(word.mistake(sentence))
+        return least
+    return int(text)
+
+
+def defuzzifier(entry: Entry | None, notes: Notes) -> tuple[Defuzzifier, str] | None:
+    """Return the defuzzifier that an entry names, and the type of a weighted one.
+
+    Returns:
+        None, and a mistake, where there is none.
+    """
+    if entry is None or entry.value in ("", "none"):
+        return None
+    name, *rest = entry.words()
+    method = METHODS.get(name.text)
+    if method is None:
+        sentence = f"no defuzzifier {name.text!r}; {name_choice(name.text, METHODS)}"
+        notes.found.append(name.mistake(sentence))
+        return Defuzzifier("centroid"), ""
+    if len(rest) > 1:
+        notes.found.append(rest[1].mistake(f"{name.text} takes one word behind it"))
+    if method in ("weighted average", "weighted sum"):
+        kind = rest[0].text if rest else "Automatic"
+        if kind not in TYPES:
+            sentence = f"no type {kind!r}; {name_choice(kind, TYPES)}"
+            notes.found.append(rest[0].mistake(sentence))
+        return Defuzzifier(method), kind
+    samples = _count(rest[0], 2, notes) if rest else SAMPLES
+    if not rest:
+        notes.remarks.append(
+            f"line {entry.line}: {name.text} without a resolution looks at {SAMPLES} "
+            "values, as in pyfuzzylite; fuzzylite 6 looks at 100"
+        )
+    return Defuzzifier(method, samples), ""

@@ -1,0 +1,1 @@
+"""Fuzzy Markup Language (IEEE 1855)."""

@@ -1,0 +1,371 @@
+"""The rule bases of FML as blocks of rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, NamedTuple, TypeVar
+
+import msgspec
+
+from fuzzytree.formats.fml import fml_words as words
+from fuzzytree.formats.fml.fml_terms import Notes, number
+from fuzzytree.formats.fml.xml import Element
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import name_choice
+from fuzzytree.model.system import (
+    And,
+    Conclusion,
+    Condition,
+    Hedge,
+    Is,
+    Not,
+    Or,
+    RuleBlock,
+    SNorm,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+)
+
+_Norm = TypeVar("_Norm")
+
+_RULES: Final = {
+    "mamdaniRuleBase": ("rule", "consequent", "then", "else", "clause"),
+    "tsukamotoRuleBase": ("rule", "consequent", "then", "else", "clause"),
+    "tskRuleBase": ("tskRule", "tskConsequent", "tskThen", "tskElse", "tskClause"),
+}
+
+
+_MOST_LEVELS: Final = 20
+_MOST_ASKED: Final = 50_000
+
+
+class Variables(msgspec.Struct, frozen=True):
+    """What rules can ask and conclude.
+
+    Attributes:
+        labels: For each variable the names of its terms: in rules, and in the system.
+        circular: Terms that are an and or an or of others.
+        outputs: The outputs by name.
+        negated: Terms that are the complement of their shape.
+        spent: One entry for each term that was asked, so that terms which are made of
+            others many times over come to an end.
+    """
+
+    labels: dict[str, dict[str, str]]
+    circular: dict[tuple[str, str], Element]
+    outputs: dict[str, SystemOutput]
+    negated: set[tuple[str, str]] = msgspec.field(default_factory=set)
+    spent: list[None] = msgspec.field(default_factory=list)
+
+
+class _Norms(msgspec.Struct, frozen=True):
+    conjunction: TNorm
+    disjunction: SNorm
+    implication: TNorm | None
+
+
+class _Inner(NamedTuple):
+    """An <and> or <or> of a circular definition, and what it joins by."""
+
+    element: Element
+    t_norm: TNorm | None = None
+    s_norm: SNorm | None = None
+
+
+_About = tuple[Variables, list[_Inner]]
+"""What rules can ask, and the joints of the terms that one rule asks."""
+
+
+def blocks_of(
+    bases: Sequence[Element], variables: Variables, notes: Notes
+) -> tuple[RuleBlock, ...]:
+    """Return the rule bases; rules in a row with equal norms are one block."""
+    blocks: list[RuleBlock] = []
+    for base in bases:
+        if base.name not in _RULES:
+            what = "has no place in a system here"
+            if base.name != "anYaRuleBase":
+                what = f"is no rule base; {name_choice(base.name[:40], _RULES)}"
+            notes.wrong(base, f"<{base.name[:40]}> {what}")
+            continue
+        name = base.attributes.get("name", "")
+        rule_name, *_ = _RULES[base.name]
+        run: list[SystemRule] = []
+        norms: _Norms | None = None
+        for element in base.children:
+            if element.name != rule_name:
+                notes.wrong(element, f"<{element.name[:40]}> is no <{rule_name}>")
+                continue
+            made = _rule(base, element, variables, notes)
+            if made is None:
+                continue
+            rule, meant = made
+            if norms is not None and meant != norms:
+                blocks.append(_block(run, norms, name))
+                run = []
+            norms = meant
+            run.append(rule)
+        if norms is not None and run:
+            blocks.append(_block(run, norms, name))
+    return tuple(blocks)
+
+
+def _block(rules: Sequence[SystemRule], norms: _Norms, name: str) -> RuleBlock:
+    how = norms.conjunction, norms.disjunction, norms.implication
+    return RuleBlock(tuple(rules), *how, name=name)
+
+
+def _norms(base: Element, rule: Element, notes: Notes) -> _Norms:
+    """Return the norms of a rule: its own, or those of its base."""
+
+    def norm(
+        key: str, known: Mapping[str, _Norm], default: str, own: Element
+    ) -> _Norm | None:
+        element = own if key in own.attributes else base
+        text = element.attributes.get(key, default)
+        if text.upper() not in known:
+            notes.wrong(element, _unknown(key, text, known))
+        return known.get(text.upper())
+
+    conjunction = norm("andMethod", words.TNORMS, "MIN", rule)
+    disjunction = norm("orMethod", words.SNORMS, "MAX", rule)
+    implication: TNorm | None = None
+    if base.name == "mamdaniRuleBase":
+        implication = norm("activationMethod", words.TNORMS, "MIN", base)
+    return _Norms(conjunction or "minimum", disjunction or "maximum", implication)
+
+
+def _unknown(key: str, text: str, known: Iterable[str]) -> str:
+    return f"no {key} {text[:40]!r}; {name_choice(text[:40].upper(), known)}"
+
+
+def _rule(
+    base: Element, element: Element, variables: Variables, notes: Notes
+) -> tuple[SystemRule, _Norms] | None:
+    """Return a rule and its norms, with those that its terms are made with."""
+    norms = _norms(base, element, notes)
+    inner: list[_Inner] = []
+    about = variables, inner
+    _, consequent, then, otherwise, clause = _RULES[base.name]
+    before = len(notes.found)
+    name = element.attributes.get("name", "")
+    asked = _only(element, "antecedent", notes)
+    concluded = _only(element, consequent, notes)
+    if asked is None or concluded is None:
+        return None
+    parts = [
+        part
+        for one in asked.all("clause")
+        if (part := _question(one, about, notes)) is not None
+    ]
+    if not parts and len(notes.found) == before:
+        notes.wrong(asked, f"rule {name!r} asks nothing")
+    for one in concluded.all(otherwise):
+        what = "its else is left out"
+        notes.losses.append(Loss(f"rule {name!r}, line {one.line}", what))
+    wanted = _only(concluded, then, notes)
+    found = [
+        conclusion
+        for child in ([] if wanted is None else wanted.all(clause))
+        if (conclusion := _conclusion(child, about[0], name, notes)) is not None
+    ]
+    weight = number(element, "weight", notes, 1.0)
+    if len(notes.found) > before:
+        return None
+    if not 0.0 <= weight <= 1.0:
+        notes.wrong(element, f"the weight must lie in [0, 1], not {weight!r}")
+        return None
+    connector = element.attributes.get("connector", "and").lower()
+    if connector not in ("and", "or"):
+        notes.wrong(element, f"the connector is and or or, not {connector[:20]!r}")
+        return None
+    joined = (Or if connector == "or" else And)(tuple(parts))
+    when: Condition = parts[0] if len(parts) == 1 else joined
+    own = None if len(parts) == 1 else connector
+    norms = _with_inner(norms, own, inner, notes)
+    return SystemRule(when, tuple(found), weight, name), norms
+
+
+def _with_inner(
+    norms: _Norms, connector: str | None, inner: Iterable[_Inner], notes: Notes
+) -> _Norms:
+    """Return the norms of a rule, of which its terms may settle what it leaves open."""
+    t_norms = {norms.conjunction} if connector == "and" else set()
+    s_norms = {norms.disjunction} if connector == "or" else set()
+    for one in inner:
+        if one.t_norm is not None:
+            t_norms.add(one.t_norm)
+        if one.s_norm is not None:
+            s_norms.add(one.s_norm)
+        if max(len(t_norms), len(s_norms)) > 1:
+            both = sorted(t_norms if len(t_norms) > 1 else s_norms)
+            what = f"one rule cannot join by {both[0]} and by {both[1]}"
+            notes.wrong(one.element, what)
+            return norms
+    return msgspec.structs.replace(
+        norms,
+        conjunction=next(iter(t_norms), norms.conjunction),
+        disjunction=next(iter(s_norms), norms.disjunction),
+    )
+
+
+def _only(element: Element, name: str, notes: Notes) -> Element | None:
+    found = element.all(name)
+    if len(found) != 1:
+        what = f"<{element.name}> needs one <{name}>, and has {len(found)}"
+        notes.wrong(element, what)
+        return None
+    return found[0]
+
+
+def _named(
+    clause: Element, variables: Variables, notes: Notes
+) -> tuple[str, str] | None:
+    """Return the variable and the term of a clause, as the file calls them."""
+    variable, term = _only(clause, "variable", notes), _only(clause, "term", notes)
+    if variable is None or term is None:
+        return None
+    if variable.text not in variables.labels:
+        choice = name_choice(variable.text[:40], variables.labels)
+        notes.wrong(variable, f"no variable {variable.text[:40]!r}; {choice}")
+        return None
+    known = variables.labels[variable.text]
+    if term.text not in known:
+        choice = name_choice(term.text[:40], known)
+        what = f"{variable.text!r} has no term {term.text[:40]!r}; {choice}"
+        notes.wrong(term, what)
+        return None
+    return variable.text, term.text
+
+
+def _modifier(clause: Element, notes: Notes) -> tuple[Hedge, ...]:
+    word = clause.attributes.get("modifier")
+    if word is None:
+        return ()
+    if word in words.MODIFIERS:
+        return (words.MODIFIERS[word],)
+    if word not in words.OTHER_MODIFIERS and not word.startswith("custom_"):
+        known = [*words.MODIFIERS, *words.OTHER_MODIFIERS]
+        notes.wrong(clause, _unknown("modifier", word, known))
+        return ()
+    what = f"the modifier {word!r} has no meaning here and is left out"
+    notes.losses.append(Loss(f"line {clause.line}", what))
+    return ()
+
+
+def _question(clause: Element, about: _About, notes: Notes) -> Condition | None:
+    named = _named(clause, about[0], notes)
+    if named is None:
+        return None
+    hedges = _modifier(clause, notes)
+    asked = _asked(named, about, notes, 0)
+    if hedges == ("any",):
+        return Is(named[0], None, ("any",))
+    match asked:
+        case Is(variable=variable, label=label, hedges=before):
+            return Is(variable, label, (*hedges, *before))
+        case None:
+            return None
+        case _ if hedges == ("not",):
+            return Not(asked)
+        case _ if not hedges:
+            return asked
+        case _:
+            what = f"{hedges[0]!r} of a term that is made of others has no place here"
+            notes.wrong(clause, what)
+            return None
+
+
+def _asked(
+    named: tuple[str, str], about: _About, notes: Notes, level: int
+) -> Condition | None:
+    """Return what a term asks: itself, or what it is made of."""
+    variables, _ = about
+    definition = variables.circular.get(named)
+    if definition is None:
+        label = variables.labels[named[0]][named[1]]
+        hedges: tuple[Hedge, ...] = ("not",) if named in variables.negated else ()
+        return Is(named[0], label, hedges)
+    variables.spent.append(None)
+    if level > _MOST_LEVELS or len(variables.spent) > _MOST_ASKED:
+        what = f"the term {named[1]!r} is made of too many others, or of itself"
+        notes.wrong(definition, what)
+        return None
+    parts = [
+        part
+        for child in definition.children
+        if (part := _joined(child, named[0], about, notes, level)) is not None
+    ]
+    if len(parts) != 1:
+        notes.wrong(definition, f"the term {named[1]!r} needs one <and> or <or>")
+        return None
+    return Not(parts[0]) if named in variables.negated else parts[0]
+
+
+def _inner(element: Element, notes: Notes) -> _Inner:
+    """Return what an <and> or an <or> joins its parts by."""
+    if element.name == "and":
+        word = element.attributes.get("t-norm", "MIN")
+        if word.upper() not in words.TNORMS:
+            notes.wrong(element, _unknown("t-norm", word, words.TNORMS))
+        return _Inner(element, t_norm=words.TNORMS.get(word.upper()))
+    word = element.attributes.get("t-conorm", "MAX")
+    if word.upper() not in words.SNORMS:
+        notes.wrong(element, _unknown("t-conorm", word, words.SNORMS))
+    return _Inner(element, s_norm=words.SNORMS.get(word.upper()))
+
+
+def _joined(
+    element: Element,
+    variable: str,
+    about: _About,
+    notes: Notes,
+    level: int,
+) -> Condition | None:
+    """Return an <and>, an <or> or a <termName> of a circular definition."""
+    variables, inner_norms = about
+    if element.name == "termName":
+        if element.text not in variables.labels[variable]:
+            choice = name_choice(element.text[:40], variables.labels[variable])
+            what = f"{variable!r} has no term {element.text[:40]!r}; {choice}"
+            notes.wrong(element, what)
+            return None
+        found = _asked((variable, element.text), about, notes, level + 1)
+        is_not = element.attributes.get("complement", "false").lower() == "true"
+        if is_not and isinstance(found, Is):
+            return Is(variable, found.label, ("not", *found.hedges))
+        return Not(found) if is_not and found is not None else found
+    if element.name not in ("and", "or"):
+        notes.wrong(element, f"<{element.name[:40]}> is no <and>, <or> or <termName>")
+        return None
+    inner_norms.append(_inner(element, notes))
+    parts = [
+        part
+        for child in element.children
+        if (part := _joined(child, variable, about, notes, level)) is not None
+    ]
+    if len(parts) != 2:
+        notes.wrong(element, f"<{element.name}> needs two parts, not {len(parts)}")
+        return None
+    kind = And if element.name == "and" else Or
+    first, second = parts
+    # From left to right: (a and b) and c is a and b and c.
+    inner = first.parts if isinstance(first, kind) else (first,)
+    return kind((*inner, second))
+
+
+def _conclusion(
+    clause: Element, variables: Variables, rule: str, notes: Notes
+) -> Conclusion | None:
+    named = _named(clause, variables, notes)
+    if named is None:
+        return None
+    if named[0] not in variables.outputs:
+        notes.wrong(clause, f"rule {rule!r} concludes {named[0]!r}, which is an input")
+        return None
+    if "modifier" in clause.attributes:
+        word = clause.attributes["modifier"][:40]
+        what = f"the modifier {word!r} of a conclusion is left out"
+        notes.losses.append(Loss(f"rule {rule!r}", what))
+    return Conclusion(named[0], variables.labels[named[0]][named[1]])

@@ -1,0 +1,348 @@
+"""A decision tree of scikit-learn as a tree of ours: the same answer at every double.
+
+Scikit-learn rounds every value to a float of 32 bits before it compares it with a
+threshold of 64: it goes left where `float32(x) <= threshold`. That is `x <= cut` for
+one double, the largest that is still rounded to a float that is not above the threshold
+(`exact_cut`). So our tree needs no rounding, and answers alike.
+
+The library itself is not imported: what is read are the arrays of a fitted tree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from fuzzytree.errors import LossError
+from fuzzytree.model.rulebase import (
+    Band,
+    Flank,
+    LabelType,
+    Semantics,
+    Term,
+    Variable,
+    label_type_of,
+    name_choice,
+)
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, interval_names
+
+_BEYOND = 2.0**128  # where the floats of 32 bits would go on
+
+
+def from_sklearn(
+    classifier: object,
+    *,
+    columns: Sequence[str] | None = None,
+    classes: Sequence[str] | None = None,
+    soft: float | Mapping[str, float] | None = None,
+    spreads: Iterable[float] | None = None,
+    name: str = "scikit-learn tree",
+    missing: str | None = None,
+) -> FuzzyTree:
+    """Return a fitted `DecisionTreeClassifier` as a tree.
+
+    Its answers are those of `predict` at every finite double. Rules made from it
+    (`fuzzytree.rules_from_tree`) are crisp, with strengths of 0 and 1; `soft` gives
+    them flanks, which changes no decision.
+
+    Args:
+        classifier: A fitted tree with one output.
+        columns: The name of each column that it was fitted on; its own names unless
+            given, and without those x1, x2, ...
+        classes: The name of each class, in the order of `classes_`; as they are
+            written unless given.
+        soft: Over what width beside a cut the degree falls in a line from 1 to 0: a
+            number of spreads of each column, or a width for each column that the tree
+            asks, in the column's own unit.
+        spreads: The spread of each column, such as `X.std(axis=0)`, if `soft` is a
+            number.
+        name: The tree's name.
+        missing: The class of a row with a missing value; None answers "no class".
+            Scikit-learn sends it along some branch, which nothing says is right.
+
+    Raises:
+        TypeError: If it is no decision tree for classes, such as a forest or a
+            regressor.
+        ValueError: If it is not fitted, or names or widths do not fit.
+        LossError: If it has several outputs, asks whether a value is missing, or has
+            learnt where missing values go.
+
+    Example:
+        >>> from sklearn.tree import DecisionTreeClassifier
+        >>> grown = DecisionTreeClassifier().fit([[0.0], [1.0]], ["soft", "firm"])
+        >>> print(from_sklearn(grown, columns=["force"]))
+        force? (cut at 0.5)
+          low: soft [1]
+          high: firm [2]
+    """
+    grown = _grown(classifier)
+    named = _Names.of(grown, columns, classes)
+    arrays = _Arrays.of(grown.tree_, named)
+    widths = _widths(arrays.asked(named), named, soft, spreads)
+    nodes, leaves = _nodes(arrays, named)
+    terms = _with_terms(nodes, widths)
+    inputs = [column for column in named.columns if column in terms]
+    return FuzzyTree(
+        name=name,
+        classes=named.classes,
+        variables=tuple(Variable(one, terms[one]) for one in inputs),
+        nodes=tuple(_named(nodes)),
+        leaves=leaves,
+        semantics=Semantics(missing=missing, label_type=named.label_type),
+        columns=named.columns,
+    )
+
+
+def exact_cut(threshold: float) -> float:
+    """Return the double `cut` for which `x <= cut` is `float32(x) <= threshold`.
+
+    Rounding to the nearest float, and to the even one of two: with f the largest float
+    that is not above the threshold, all doubles up to the middle between f and the
+    next float become f or less; the middle itself does if f is even.
+
+    Example:
+        >>> cut = exact_cut(0.1)
+        >>> float(np.float32(cut)) <= 0.1 < float(np.float32(math.nextafter(cut, 1)))
+        True
+    """
+    with np.errstate(over="ignore"):
+        below = np.float32(threshold)
+        if float(below) > threshold:
+            below = np.nextafter(below, np.float32(-np.inf))
+        above = np.nextafter(below, np.float32(np.inf))
+    ends = (min(max(float(end), -_BEYOND), _BEYOND) for end in (below, above))
+    middle = sum(ends) / 2.0
+    is_even = int(below.view(np.uint32)) % 2 == 0
+    return middle if is_even else math.nextafter(middle, -math.inf)
+
+
+def _grown(classifier: object) -> Any:
+    """Return a classifier that can be read, or say why it cannot."""
+    kind = type(classifier).__name__
+    names = {
+        one.__name__
+        for one in type(classifier).__mro__
+        if one.__module__.startswith("sklearn.")
+    }
+    if "DecisionTreeClassifier" not in names:
+        raise TypeError(
+            f"from_sklearn reads a DecisionTreeClassifier, and not a {kind}"
+        )
+    if not hasattr(classifier, "tree_"):
+        raise ValueError(f"the {kind} is not fitted")
+    grown: Any = classifier
+    if grown.n_outputs_ != 1:
+        raise LossError(
+            f"cannot read a {kind} with {grown.n_outputs_} outputs: a tree has one"
+        )
+    return grown
+
+
+class _Names(NamedTuple):
+    """What columns and classes are called."""
+
+    columns: tuple[str, ...]
+    classes: tuple[str, ...]
+    label_type: LabelType | msgspec.UnsetType
+
+    @staticmethod
+    def of(
+        grown: Any, columns: Sequence[str] | None, classes: Sequence[str] | None
+    ) -> _Names:
+        count = int(grown.n_features_in_)
+        own = getattr(grown, "feature_names_in_", None)
+        if columns is None and own is not None:
+            columns = [str(one) for one in own]
+        if columns is None:
+            columns = [f"x{number}" for number in range(1, count + 1)]
+        labels = grown.classes_.tolist()
+        found = [str(one) for one in labels]
+        for what, given, needed in (
+            ("columns", columns, count),
+            ("classes", classes or found, len(found)),
+        ):
+            if len(given) != needed:
+                raise ValueError(f"{len(given)} names for {needed} {what}")
+        if classes is not None:
+            return _Names(tuple(columns), tuple(classes), msgspec.UNSET)
+        return _Names(tuple(columns), tuple(found), label_type_of(labels))
+
+
+class _Arrays(NamedTuple):
+    """A fitted tree: for each node its children (-1: none), column, cut and so on."""
+
+    left: list[int]
+    right: list[int]
+    column: list[int]
+    cut: list[float]
+    winner: list[int]
+    support: list[int]
+
+    @staticmethod
+    def of(tree: Any, named: _Names) -> _Arrays:
+        left, right = tree.children_left.tolist(), tree.children_right.tolist()
+        columns, thresholds = tree.feature.tolist(), tree.threshold.tolist()
+        cuts: list[float] = []
+        for start, column, threshold in zip(left, columns, thresholds, strict=True):
+            if start >= 0 and not math.isfinite(threshold):
+                raise LossError(
+                    "cannot read a tree that asks whether "
+                    f"{named.columns[column]!r} is missing"
+                )
+            cuts.append(exact_cut(threshold) if start >= 0 else 0.0)
+        _refuse_directions(tree, columns, named)
+        winners = np.argmax(tree.value[:, 0, :], axis=1).tolist()
+        counts = tree.n_node_samples.tolist()
+        return _Arrays(left, right, columns, cuts, winners, counts)
+
+    def asked(self, named: _Names) -> dict[str, int]:
+        """Return the columns that nodes ask, and their places."""
+        places = sorted(
+            {c for c, start in zip(self.column, self.left, strict=True) if start >= 0}
+        )
+        return {named.columns[place]: place for place in places}
+
+
+def _refuse_directions(tree: Any, columns: list[int], named: _Names) -> None:
+    """Refuse a tree that learnt where missing values go.
+
+    A node that saw none sends them to the child with more rows. Another direction was
+    learnt; one that happens to be the same cannot be told apart.
+    """
+    for place, goes_left in enumerate(tree.missing_go_to_left.tolist()):
+        left, right = int(tree.children_left[place]), int(tree.children_right[place])
+        if left < 0:
+            continue
+        counts = tree.n_node_samples
+        if bool(goes_left) != bool(counts[left] > counts[right]):
+            raise LossError(
+                "cannot read a tree that learnt where missing values of "
+                f"{named.columns[columns[place]]!r} go"
+            )
+
+
+def _widths(
+    asked: Mapping[str, int],
+    named: _Names,
+    soft: float | Mapping[str, float] | None,
+    spreads: Iterable[float] | None,
+) -> dict[str, float | None]:
+    """Return how wide the flanks on each column are."""
+    if soft is None:
+        return dict.fromkeys(asked)
+    if isinstance(soft, Mapping):
+        for column in soft:
+            if column not in named.columns:
+                choice = name_choice(column, named.columns)
+                raise ValueError(f"soft: no column {column!r}; {choice}")
+        for column in asked:
+            if column not in soft:
+                raise ValueError(f"soft: no width for {column!r}, which the tree asks")
+        widths = {column: float(soft[column]) for column in asked}
+    elif spreads is None:
+        raise ValueError(
+            "soft is a number of spreads: give spreads=X.std(axis=0) too, or a width "
+            "for each column"
+        )
+    else:
+        listed = [float(spread) for spread in spreads]  # a pandas series has an index
+        if len(listed) != len(named.columns):
+            raise ValueError(f"{len(listed)} spreads for {len(named.columns)} columns")
+        widths = {column: soft * listed[place] for column, place in asked.items()}
+    for column, width in widths.items():
+        if not (math.isfinite(width) and width > 0.0):
+            raise ValueError(
+                f"the width beside a cut of {column!r} must be above 0, not {width!r}"
+            )
+    return {**widths}
+
+
+class _Bare(NamedTuple):
+    """A node without the names of its terms."""
+
+    variable: str
+    cut: float
+    ends: list[tuple[int | None, int | None]]
+
+
+def _nodes(arrays: _Arrays, named: _Names) -> tuple[list[_Bare], tuple[Leaf, ...]]:
+    """Return nodes and leaves, numbered in depth-first order from 1."""
+    nodes: list[_Bare] = []
+    leaves: list[Leaf] = []
+    todo: list[tuple[int, _Bare | None]] = [(0, None)]
+    while todo:
+        place, parent = todo.pop()
+        if arrays.left[place] < 0:
+            label = named.classes[arrays.winner[place]]
+            leaves.append(Leaf(label, support=arrays.support[place]))
+            end: tuple[int | None, int | None] = (None, len(leaves))
+        else:
+            column = named.columns[arrays.column[place]]
+            nodes.append(_Bare(column, arrays.cut[place], []))
+            todo.append((arrays.right[place], nodes[-1]))
+            todo.append((arrays.left[place], nodes[-1]))
+            end = (len(nodes), None)
+        if parent is not None:
+            parent.ends.append(end)
+    return nodes, tuple(leaves)
+
+
+def _cut_names(nodes: Sequence[_Bare]) -> dict[tuple[str, float], tuple[str, str]]:
+    """Return the names of the two terms of each cut."""
+    cuts: dict[str, list[float]] = {}
+    for node in nodes:
+        if node.cut not in cuts.setdefault(node.variable, []):
+            cuts[node.variable].append(node.cut)
+    return {
+        (variable, cut): (below, above)
+        for variable, some in cuts.items()
+        for cut, (below, above) in zip(
+            some, interval_names([[cut] for cut in some]), strict=True
+        )
+    }
+
+
+def _with_terms(
+    nodes: Sequence[_Bare], widths: Mapping[str, float | None]
+) -> dict[str, tuple[Term, ...]]:
+    """Return the terms of each column: two for each of its cuts."""
+    terms: dict[str, list[Term]] = {}
+    for (variable, cut), (below, above) in _cut_names(nodes).items():
+        left = right = None
+        width = widths[variable]
+        if width is not None:
+            left, right = Flank(cut, cut - width), Flank(cut, cut + width)
+            if not left.end < cut < right.end or math.isinf(right.end - left.end):
+                raise ValueError(
+                    f"a width of {width!r} beside the cut of {variable!r} at {cut!r} "
+                    "is no flank in doubles"
+                )
+        terms.setdefault(variable, []).extend(
+            [
+                Term(below, Band(high=cut, right=right)),
+                Term(above, Band(low=cut, left=left)),
+            ]
+        )
+    return {variable: tuple(some) for variable, some in terms.items()}
+
+
+def _named(nodes: Sequence[_Bare]) -> list[Node]:
+    names = _cut_names(nodes)
+    return [
+        Node(
+            node.variable,
+            (node.cut,),
+            (0, 1),
+            tuple(
+                Branch((term,), node=number, leaf=leaf)
+                for term, (number, leaf) in zip(
+                    names[node.variable, node.cut], node.ends, strict=True
+                )
+            ),
+        )
+        for node in nodes
+    ]

@@ -1,0 +1,297 @@
+"""Nodes of a file to records, with every mistake on the way and its place."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import re
+from collections.abc import Iterable
+from typing import Final, TypeVar
+
+from msgspec import inspect
+
+from fuzzytree.formats.yaml.layout import Form, Record
+from fuzzytree.formats.yaml.nodes import (
+    MOST_SHOWN,
+    Found,
+    ListNode,
+    MappingNode,
+    Node,
+    Refused,
+    Scalar,
+    meaning,
+)
+
+R = TypeVar("R", bound=Record)
+Entries = dict[str, Node]
+_LONGEST_DIGITS: Final = 18
+
+
+def bind(node: Node, kind: type[R], found: list[Found]) -> R | None:
+    """Return a mapping as a record, or None if it cannot be one.
+
+    Args:
+        node: The mapping.
+        kind: The record.
+        found: Where mistakes are added. An unknown key is one, and the record is
+            returned without it.
+    """
+    if not isinstance(node, MappingNode):
+        _expected(node, f"{kind.noun} must be a mapping", found)
+        return None
+    return record(entries(node, kind, found), kind, found)
+
+
+def entries(node: MappingNode, kind: type[Record], found: list[Found]) -> Entries:
+    """Return the values of a mapping by key; check its keys and their choice."""
+    known = _fields(kind)
+    kept: Entries = {}
+    is_known = True
+    for key, value in node.pairs:
+        if not isinstance(key, Scalar):
+            _expected(key, f"a key of {kind.noun} must be text", found)
+        elif key.text in kept:
+            _add(found, key, f"key {shortened(key.text)} stands twice")
+        elif key.text not in known:
+            is_known = False
+            choice = _choice(key.text, known, has_hint=len(found) < MOST_SHOWN)
+            text = f"{kind.noun} has no key {shortened(key.text)}; {choice}"
+            _add(found, key, text)
+        else:
+            kept[key.text] = value
+    for name, field in known.items():
+        if field.required and name not in kept:
+            _add(found, node, f"{kind.noun} needs {shortened(name)}")
+    if is_known and not _fits_a_form(kind, kept):
+        _add(found, node, _form_mistake(kind, kept))
+    return kept
+
+
+def record(kept: Entries, kind: type[R], found: list[Found]) -> R | None:
+    """Return the record of checked entries; entries of no field are left alone."""
+    values: dict[str, object] = {}
+    is_whole = True
+    for name, field in _fields(kind).items():
+        if name in kept:
+            value = _value(kept[name], shortened(name), field.type, found)
+            is_whole = is_whole and value is not None
+            values[field.name] = value
+        elif field.required:
+            is_whole = False
+    is_whole = is_whole and _fits_a_form(kind, kept)
+    return kind(**values) if is_whole else None
+
+
+@functools.cache
+def _fields(kind: type[Record]) -> dict[str, inspect.Field]:
+    info = inspect.type_info(kind)
+    fields = info.fields if isinstance(info, inspect.StructType) else ()
+    return {field.encode_name: field for field in fields}
+
+
+def _fits_a_form(kind: type[Record], kept: Iterable[str]) -> bool:
+    chosen = frozenset[str]().union(*map(_keys, kind.forms)).intersection(kept)
+    return not kind.forms or any(
+        chosen.issuperset(form.needs) and chosen <= _keys(form) for form in kind.forms
+    )
+
+
+def _form_mistake(kind: type[Record], kept: Iterable[str]) -> str:
+    """Return which keys belong together."""
+    sets: dict[frozenset[str], str] = {}
+    for form in kind.forms:
+        sets.setdefault(_keys(form), ", ".join((*form.needs, *form.may)))
+    choosable = frozenset[str]().union(*map(_keys, kind.forms))
+    has = ", ".join(sorted(choosable.intersection(kept))) or "nothing"
+    either = "; or ".join(sets.values())
+    return f"{kind.noun} cannot be made of {has}; it is made of {either}"
+
+
+@functools.cache
+def _keys(form: Form) -> frozenset[str]:
+    return frozenset((*form.needs, *form.may))
+
+
+def _value(
+    node: Node, what: str, kind: inspect.Type, found: list[Found], about: str = ""
+) -> object | None:
+    """Return a value of a type, or None after adding why there is none."""
+    match kind:
+        case inspect.Metadata():
+            about = str((kind.extra_json_schema or {}).get("description", ""))
+            return _value(node, what, kind.type, found, about)
+        case inspect.UnionType():
+            return _value(node, what, _chosen(node, kind), found)
+        case inspect.StructType():
+            return bind(node, _record_type(kind), found)
+        case inspect.VarTupleType():
+            return _list(node, what, kind, found)
+        case inspect.StrType():
+            return _text(node, what, kind, about, found)
+        case inspect.IntType():
+            return _integer(node, what, kind, found)
+        case inspect.FloatType():
+            return _number(node, what, kind, found)
+        case inspect.LiteralType():
+            return _literal(node, what, kind, found)
+        case _:
+            raise TypeError(f"no rule for {kind}")
+
+
+def _record_type(kind: inspect.StructType) -> type[Record]:
+    if not issubclass(kind.cls, Record):
+        raise TypeError(f"{kind.cls} is no record of the layout")
+    return kind.cls
+
+
+def _chosen(node: Node, union: inspect.UnionType) -> inspect.Type:
+    """Return the type that a node is meant to have: records are mappings."""
+    kinds = [one for one in union.types if not isinstance(one, inspect.NoneType)]
+    records = [one for one in kinds if isinstance(one, inspect.StructType)]
+    if isinstance(node, MappingNode) and records:
+        return records[0]
+    return next((one for one in kinds if one not in records), kinds[0])
+
+
+def _list(
+    node: Node, what: str, kind: inspect.VarTupleType, found: list[Found]
+) -> tuple[object, ...] | None:
+    if not isinstance(node, ListNode):
+        _expected(node, f"{what} must be a list", found)
+        return None
+    least, most = kind.min_length or 0, kind.max_length
+    size = len(node.items)
+    if size < least or (most is not None and size > most):
+        size_text = f"at least {least}" if most is None else f"{least} to {most}"
+        size_text = str(least) if least == most else size_text
+        _add(found, node, f"{what} needs {size_text} entries, not {size}")
+        return None
+    item = f"an entry of {what}"
+    values = [_value(one, item, kind.item_type, found) for one in node.items]
+    return None if None in values else tuple(values)
+
+
+def _text(
+    node: Node, what: str, kind: inspect.StrType, about: str, found: list[Found]
+) -> str | None:
+    if not isinstance(node, Scalar):
+        _expected(node, f"{what} must be text", found)
+        return None
+    if meaning(node) != "text":
+        hint = f"; in quotes it is text: '{node.text}'" if node.text else ""
+        _expected(node, f"{what} must be text", found, hint)
+        return None
+    size = len(node.text)
+    if size < (kind.min_length or 0):
+        _add(found, node, f"{what} must not be empty")
+    elif kind.max_length is not None and size > kind.max_length:
+        text = f"{what} is longer than {kind.max_length} characters"
+        _add(found, node, text)
+    elif kind.pattern is not None and not re.search(kind.pattern, node.text):
+        _add(found, node, f"{what} cannot be {shortened(node.text)}; it is {about}")
+    else:
+        return node.text
+    return None
+
+
+def _integer(
+    node: Node, what: str, kind: inspect.IntType, found: list[Found]
+) -> int | None:
+    if not isinstance(node, Scalar) or meaning(node) != "an integer":
+        _expected(node, f"{what} must be an integer", found)
+        return None
+    text = node.text
+    if len(text) > _LONGEST_DIGITS:
+        _add(found, node, f"{what} has more than {_LONGEST_DIGITS} digits")
+        return None
+    value = _read_integer(text)
+    if kind.ge is not None and value < kind.ge:
+        _add(found, node, f"{what} must be at least {kind.ge}, not {value}")
+        return None
+    if kind.le is not None and value > kind.le:
+        _add(found, node, f"{what} must be at most {kind.le}, not {value}")
+        return None
+    return value
+
+
+def _number(
+    node: Node, what: str, kind: inspect.FloatType, found: list[Found]
+) -> float | None:
+    is_number = isinstance(node, Scalar) and meaning(node) in (
+        "a number",
+        "an integer",
+    )
+    if not (isinstance(node, Scalar) and is_number):
+        _expected(node, f"{what} must be a number", found)
+        return None
+    text = node.text
+    if text.startswith(("0o", "0x")):
+        if len(text) > _LONGEST_DIGITS:
+            _add(found, node, f"{what} has more than {_LONGEST_DIGITS} digits")
+            return None
+        value = float(_read_integer(text))
+    else:
+        value = float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+    # Not a number is neither.
+    if kind.ge is not None and not value >= kind.ge:
+        _add(found, node, f"{what} must be at least {kind.ge:g}, not {value:g}")
+        return None
+    if kind.le is not None and not value <= kind.le:
+        _add(found, node, f"{what} must be at most {kind.le:g}, not {value:g}")
+        return None
+    return value
+
+
+def _read_integer(text: str) -> int:
+    if text.startswith(("0o", "0x")):
+        return int(text, 0)
+    return int(text)
+
+
+def _literal(
+    node: Node, what: str, kind: inspect.LiteralType, found: list[Found]
+) -> str | int | None:
+    if isinstance(node, Scalar):
+        for value in kind.values:
+            expected = "text" if isinstance(value, str) else "an integer"
+            if node.text == str(value) and meaning(node) == expected:
+                return value
+    allowed = " or ".join(shortened(str(value)) for value in kind.values)
+    _expected(node, f"{what} must be {allowed}", found)
+    return None
+
+
+def not_a_list(node: Node, key: str, found: list[Found]) -> None:
+    """Add that the value of a key must be a list."""
+    _expected(node, f"{shortened(key)} must be a list", found)
+
+
+def _expected(node: Node, what: str, found: list[Found], hint: str = "") -> None:
+    """Add that a node is not what it must be; a refused one was added before."""
+    match node:
+        case Scalar():
+            is_text = meaning(node) == "text"
+            it = shortened(node.text) if is_text else f"{meaning(node)}"
+        case ListNode():
+            it = "a list"
+        case MappingNode():
+            it = "a mapping"
+        case Refused():
+            return
+    _add(found, node, f"{what}, not {it}{hint}")
+
+
+def _add(found: list[Found], node: Node, sentence: str) -> None:
+    found.append((node.line, node.column, sentence))
+
+
+def shortened(text: str) -> str:
+    """Return a text in quotes, its beginning only if it is long."""
+    return repr(text if len(text) <= 100 else f"{text[:100]}...")
+
+
+def _choice(wrong: str, known: Iterable[str], *, has_hint: bool) -> str:
+    names = list(known)
+    close = difflib.get_close_matches(wrong[:100], names, n=1) if has_hint else []
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return f"there is {', '.join(names)}{hint}"

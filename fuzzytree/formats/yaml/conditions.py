@@ -1,0 +1,261 @@
+"""Conditions and conclusions of systems as sentences, read and written.
+
+`temperature is very hot and (pressure is not low or speed is fast)`. AND binds closer
+than OR. A name may have several words; one with a word of the language in it, such as
+`and` or `very`, or with signs that would end it, stands in quotes, where a quote is
+written twice. Between a variable and its term stand hedges, the words of a hedge joined
+by `-`. `not (...)` takes the opposite of a condition, `always` is no condition at all,
+and `(and a is b)` an AND of one part.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, get_args
+
+import msgspec
+
+from fuzzytree.model.system import (
+    MOST_LEVELS,
+    And,
+    Conclusion,
+    Condition,
+    Hedge,
+    Is,
+    Not,
+    Or,
+)
+
+ALWAYS: Final = "always"
+HEDGES: Final[Mapping[str, Hedge]] = MappingProxyType(
+    {hedge.replace(" ", "-"): hedge for hedge in get_args(Hedge)}
+)
+_KEYWORDS: Final = frozenset(["is", "and", "or", "not", ALWAYS, *HEDGES])
+_TOKEN: Final = re.compile(
+    r"""
+    (?P<blank>\s+)
+  | (?P<quoted>'(?:[^']|'')*'|"(?:[^"]|"")*")
+  | (?P<sign>[()])
+  | (?P<word>[^\s()'"][^\s()]*)
+    """,
+    re.VERBOSE,
+)
+
+
+class SentenceError(ValueError):
+    """Why a text is no condition, or no conclusion."""
+
+
+class _Token(msgspec.Struct, frozen=True):
+    """A word, a sign or a name in quotes; the last one is an empty word."""
+
+    text: str
+    kind: str = "word"
+
+    def is_word(self, *words: str) -> bool:
+        return self.kind == "word" and self.text in words
+
+    def is_sign(self, sign: str) -> bool:
+        return self.kind == "sign" and self.text == sign
+
+    @property
+    def is_of_a_name(self) -> bool:
+        return self.kind == "word" and bool(self.text) and self.text not in _KEYWORDS
+
+
+def parse_condition(text: str) -> Condition | None:
+    """Return the condition of a sentence, None for `always`.
+
+    Raises:
+        SentenceError: If it is none, or is nested too deeply.
+
+    Example:
+        >>> parse_condition("speed is not very high")
+        Is(variable='speed', label='high', hedges=('not', 'very'))
+    """
+    sentence = _Sentence(text)
+    if [token.text for token in sentence.tokens] == [ALWAYS, ""]:
+        return None
+    found = sentence.condition(1)
+    sentence.end("'and', 'or' or the end")
+    return found
+
+
+def parse_conclusions(text: str) -> tuple[Conclusion, ...]:
+    """Return the conclusions of a sentence, joined by AND.
+
+    Raises:
+        SentenceError: If it is none.
+
+    Example:
+        >>> parse_conclusions("power is high and fan is off")[1]
+        Conclusion(output='fan', label='off', hedges=())
+    """
+    sentence = _Sentence(text)
+    found = [sentence.conclusion()]
+    while sentence.takes("and"):
+        found.append(sentence.conclusion())
+    sentence.end("'and' or the end")
+    return tuple(found)
+
+
+def condition_text(condition: Condition | None) -> str:
+    """Return the sentence of a condition; `parse_condition` gives back an equal one.
+
+    Example:
+        >>> condition_text(And((Is("wall", "near"), Is("is it", "so", ("very",)))))
+        'wall is near and "is it" is very so'
+    """
+    match condition:
+        case None:
+            return ALWAYS
+        case Is(variable=variable, label=label, hedges=hedges):
+            return _clause(variable, label, hedges)
+        case Not(part=part):
+            return f"not ({condition_text(part)})"
+        case And(parts=parts) | Or(parts=parts):
+            word = "and" if isinstance(condition, And) else "or"
+            inner = (And, Or) if word == "and" or len(parts) == 1 else (Or,)
+            texts = [
+                f"({condition_text(part)})"
+                if isinstance(part, inner) and len(part.parts) > 1
+                else condition_text(part)
+                for part in parts
+            ]
+            if len(parts) == 1:
+                return f"({word} {texts[0]})"
+            return f" {word} ".join(texts)
+
+
+def conclusions_text(conclusions: tuple[Conclusion, ...]) -> str:
+    """Return the sentence of conclusions; `parse_conclusions` reads it."""
+    return " and ".join(
+        _clause(one.output, one.label, one.hedges) for one in conclusions
+    )
+
+
+def _clause(variable: str, label: str | None, hedges: tuple[Hedge, ...]) -> str:
+    words = [hedge.replace(" ", "-") for hedge in hedges]
+    name = [] if label is None else [_quoted(label)]
+    return " ".join([_quoted(variable), "is", *words, *name])
+
+
+def _quoted(name: str) -> str:
+    """Return a name, in quotes unless each of its words is an ordinary one."""
+    words = [found.group() for found in _TOKEN.finditer(name) if found["word"]]
+    if words and " ".join(words) == name and _KEYWORDS.isdisjoint(words):
+        return name
+    doubled = name.replace('"', '""')
+    return f'"{doubled}"'
+
+
+class _Sentence:
+    """The tokens of a sentence, and how far it has been read."""
+
+    def __init__(self, text: str) -> None:
+        self.tokens: list[_Token] = []
+        self.place = 0
+        place = 0
+        while place < len(text):
+            found = _TOKEN.match(text, place)
+            if found is None:
+                raise SentenceError(f"the quote {text[place]} is not closed")
+            if not found["blank"]:
+                self.tokens.append(_Token(found.group(), found.lastgroup or ""))
+            place = found.end()
+        self.tokens.append(_Token(""))
+
+    @property
+    def next(self) -> _Token:
+        return self.tokens[self.place]
+
+    def takes(self, word: str) -> bool:
+        """Read a word if it is the next one, and say whether it was."""
+        if not self.next.is_word(word):
+            return False
+        self.place += 1
+        return True
+
+    def end(self, wanted: str) -> None:
+        """Refuse what stands behind a whole sentence."""
+        if self.place < len(self.tokens) - 1:
+            raise self.unexpected(wanted)
+
+    def unexpected(self, wanted: str) -> SentenceError:
+        """Return what was found in the place of what was wanted."""
+        found = repr(self.next.text) if self.next.text else "the end"
+        before = " ".join(token.text for token in self.tokens[: self.place][-6:])
+        behind = f" behind {before!r}" if before else ""
+        return SentenceError(f"{found} where {wanted} must stand{behind}")
+
+    def condition(self, level: int) -> Condition:
+        """Read parts that are joined by OR."""
+        if level > MOST_LEVELS:
+            raise SentenceError(f"nested deeper than {MOST_LEVELS} levels")
+        parts = [self.conjunction(level)]
+        while self.takes("or"):
+            parts.append(self.conjunction(level))
+        return parts[0] if len(parts) == 1 else Or(tuple(parts))
+
+    def conjunction(self, level: int) -> Condition:
+        """Read parts that are joined by AND."""
+        parts = [self.part(level)]
+        while self.takes("and"):
+            parts.append(self.part(level))
+        return parts[0] if len(parts) == 1 else And(tuple(parts))
+
+    def part(self, level: int) -> Condition:
+        """Read a clause, or a condition in parentheses."""
+        if self.takes("not"):
+            if not self.next.is_sign("("):
+                raise self.unexpected("'('")
+            return Not(self.part(level))
+        if not self.next.is_sign("("):
+            return self.question()
+        self.place += 1
+        kind = And if self.takes("and") else Or if self.takes("or") else None
+        found = self.condition(level + 1) if kind is None else self.part(level + 1)
+        if not self.next.is_sign(")"):
+            raise self.unexpected("')'" if kind else "'and', 'or' or ')'")
+        self.place += 1
+        return found if kind is None else kind((found,))
+
+    def question(self) -> Is:
+        """Read `variable is hedge ... term`."""
+        variable, hedges = self.clause()
+        has_label = self.next.kind == "quoted" or self.next.is_of_a_name
+        if hedges and hedges[-1] == "any" and not has_label:
+            return Is(variable, None, hedges)
+        return Is(variable, self.name("a term"), hedges)
+
+    def conclusion(self) -> Conclusion:
+        """Read `output is hedge ... term`."""
+        output, hedges = self.clause()
+        return Conclusion(output, self.name("a term"), hedges)
+
+    def clause(self) -> tuple[str, tuple[Hedge, ...]]:
+        """Read a variable, `is` and hedges."""
+        variable = self.name("a variable")
+        if not self.takes("is"):
+            raise self.unexpected("'is'")
+        hedges: list[Hedge] = []
+        while self.next.is_word(*HEDGES):
+            hedges.append(HEDGES[self.next.text])
+            self.place += 1
+        return variable, tuple(hedges)
+
+    def name(self, what: str) -> str:
+        """Read a name: one in quotes, or words."""
+        token = self.next
+        if token.kind == "quoted":
+            self.place += 1
+            mark = token.text[0]
+            return token.text[1:-1].replace(mark * 2, mark)
+        start = self.place
+        while self.next.is_of_a_name:
+            self.place += 1
+        if self.place == start:
+            raise self.unexpected(what)
+        return " ".join(token.text for token in self.tokens[start : self.place])

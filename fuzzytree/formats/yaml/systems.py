@@ -1,0 +1,370 @@
+"""Nodes of a YAML file to a fuzzy system; `docs/systems.md` describes the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Final
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.formats.formulas import FormulaError, parse
+from fuzzytree.formats.yaml import system_layout as layout
+from fuzzytree.formats.yaml import values
+from fuzzytree.formats.yaml.binding import (
+    Entries,
+    bind,
+    entries,
+    not_a_list,
+    record,
+    shortened,
+)
+from fuzzytree.formats.yaml.conditions import (
+    SentenceError,
+    parse_conclusions,
+    parse_condition,
+)
+from fuzzytree.formats.yaml.nodes import (
+    MOST_SHOWN,
+    Found,
+    ListNode,
+    MappingNode,
+    Node,
+    Scalar,
+)
+from fuzzytree.formats.yaml.places import located, record_at, records_at, value_of
+from fuzzytree.formats.yaml.references import is_flood
+from fuzzytree.model.rulebase import Band, Mistake, Part, Path
+from fuzzytree.model.system import (
+    Activation,
+    Arc,
+    Bell,
+    Binary,
+    Concave,
+    Conclusion,
+    Condition,
+    Cosine,
+    Curve,
+    Defuzzifier,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Label,
+    Linear,
+    Number,
+    PiCurve,
+    RuleBlock,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Spike,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    Trapezoid,
+    TwoGaussians,
+    names_in,
+    questions,
+)
+
+
+def read_system(root: MappingNode, found: list[Found]) -> FuzzySystem | None:
+    """Return the system of a file of `kind: system`.
+
+    Args:
+        root: The file's mapping.
+        found: Where mistakes are added.
+
+    Returns:
+        The system, or None after adding why there is none. With mistakes added it may
+        be one with placeholders.
+    """
+    kept = entries(root, layout.SystemFile, found)
+    head = record(kept, layout.SystemHead, found)
+    record_at(kept, "semantics", layout.SystemSemantics, found)
+    mistakes: list[Mistake] = []
+    broken: set[Path] = set()
+    inputs = _inputs(kept, found, mistakes, broken)
+    outputs = _outputs(kept, found, mistakes, broken)
+    blocks = _blocks(kept, found, mistakes, broken, _spare(outputs or ()))
+    found += located(root, mistakes)
+    if head is None or inputs is None or outputs is None or blocks is None:
+        return None
+    unknown = [*_unknown(inputs, outputs, blocks)]
+    variables: list[SystemInput | SystemOutput] = [*inputs, *outputs]
+    if is_flood(unknown, sum(1 + len(one.labels) for one in variables)):
+        found += located(root, unknown)
+        return None
+    try:
+        return FuzzySystem(head.name, inputs, outputs, blocks, head.note or "")
+    except InvalidModelError as error:
+        found += located(root, error.mistakes, broken)
+        return None
+
+
+def _inputs(
+    kept: Entries, found: list[Found], mistakes: list[Mistake], broken: set[Path]
+) -> tuple[SystemInput, ...] | None:
+    """Return the inputs; a broken one has its name and those of its terms only."""
+    inputs: list[SystemInput] = []
+    bound = records_at(kept, "inputs", layout.InputOfSystem, found)
+    for position, one in enumerate(bound or ()):
+        path: Path = ("inputs", position)
+        if one is None:
+            names = _names(kept["inputs"], position)
+            if names is None:
+                return None
+            broken.add(path)
+            inputs.append(SystemInput(names[0], _bare(names[1:])))
+            continue
+        low, high, clips = _range(one.range)
+        parts = tuple(Part(p.input, p.weight, p.centre) for p in one.sum_of)
+        labels = _labels(path, one.terms, mistakes)
+        made = SystemInput(one.name, labels, low, high, clips, one.unit or "", parts)
+        inputs.append(made)
+    return None if bound is None else tuple(inputs)
+
+
+def _outputs(
+    kept: Entries, found: list[Found], mistakes: list[Mistake], broken: set[Path]
+) -> tuple[SystemOutput, ...] | None:
+    """Return the outputs; a broken one has its name and those of its terms only."""
+    outputs: list[SystemOutput] = []
+    bound = records_at(kept, "outputs", layout.OutputOfSystem, found)
+    for position, one in enumerate(bound or ()):
+        path: Path = ("outputs", position)
+        if one is None:
+            names = _names(kept["outputs"], position)
+            if names is None:
+                return None
+            broken.add(path)
+            how, labels = Defuzzifier("weighted sum"), _bare(names[1:])
+            outputs.append(SystemOutput(names[0], labels, None, None, how))
+            continue
+        low, high, clips = _range(one.range)
+        how = Defuzzifier(one.defuzzifier, one.samples, one.grid)
+        labels = _labels(path, one.terms, mistakes)
+        outputs.append(
+            SystemOutput(
+                *(one.name, labels, low, high, how, one.aggregation, one.default),
+                clips=clips,
+                unit=one.unit or "",
+            )
+        )
+    return None if bound is None else tuple(outputs)
+
+
+def _names(variables: Node, position: int) -> list[str] | None:
+    """Return the name of a variable and of its terms, as far as they can be read."""
+    node = variables.items[position] if isinstance(variables, ListNode) else variables
+    terms = value_of(node, "terms")
+    items = terms.items if isinstance(terms, ListNode) else ()
+    named = [value_of(node, "name"), *(value_of(term, "name") for term in items)]
+    texts = [one.text for one in named if isinstance(one, Scalar)]
+    return texts if len(texts) == len(named) else None
+
+
+def _bare(names: Sequence[str]) -> tuple[Label, ...]:
+    return tuple(Label(name, Band()) for name in names)
+
+
+def _range(
+    one: layout.RangeOfSystem | None,
+) -> tuple[float | None, float | None, bool]:
+    """Return both ends of a range, and whether it clips."""
+    return (
+        (None, None, False) if one is None else (one.from_, one.to, bool(one.outside))
+    )
+
+
+def _labels(
+    path: Path, terms: Sequence[layout.LabelOfVariable], mistakes: list[Mistake]
+) -> tuple[Label, ...]:
+    labels: list[Label] = []
+    for index, one in enumerate(terms):
+        curve = _curve(one)
+        if one.formula is not None and len(mistakes) < MOST_SHOWN:
+            try:
+                curve = Formula(parse(one.formula))
+            except FormulaError as error:
+                text = f"term {one.name!r}, character {error.column}: {error.sentence}"
+                mistakes.append(((*path, "labels", index, "formula"), text))
+        labels.append(Label(one.name, curve, one.height))
+    return tuple(labels)
+
+
+def _curve(one: layout.LabelOfVariable) -> Curve:
+    """Return the one curve that is given."""
+    for field, build in _CURVES.items():
+        given = getattr(one, field)
+        if given is not None:
+            return build(given)
+    return values.shape(one)
+
+
+def _trapezoid(corners: Sequence[float]) -> Trapezoid:
+    a, b, c, d = corners
+    return Trapezoid(None if a == -math.inf else a, b, c, None if d == math.inf else d)
+
+
+def _sigmoid(one: layout.SigmoidCurve) -> Sigmoid:
+    return Sigmoid(one.inflection, one.slope)
+
+
+_CURVES: Final[Mapping[str, Callable[[Any], Curve]]] = MappingProxyType(
+    {
+        "trapezoid": _trapezoid,
+        "triangle": lambda one: Trapezoid(one[0], one[1], one[1], one[2]),
+        "gaussian": lambda one: Gaussian(one.mean, one.deviation),
+        "two_gaussians": lambda one: TwoGaussians(
+            one.left, one.left_deviation, one.right, one.right_deviation
+        ),
+        "bell": lambda one: Bell(one.center, one.width, one.slope),
+        "sigmoid": _sigmoid,
+        "sigmoid_difference": lambda one: SigmoidDifference(*map(_sigmoid, one)),
+        "sigmoid_product": lambda one: SigmoidProduct(*map(_sigmoid, one)),
+        "s": lambda one: SCurve(one.start, one.end),
+        "pi": lambda one: PiCurve(*one),
+        "cosine": lambda one: Cosine(one.center, one.width),
+        "concave": lambda one: Concave(one.inflection, one.end),
+        "spike": lambda one: Spike(one.center, one.width),
+        "arc": lambda one: Arc(one.start, one.end),
+        "semi_ellipse": lambda one: SemiEllipse(one.start, one.end),
+        "at_least": lambda one: Binary(one, is_above=True),
+        "at_most": lambda one: Binary(one, is_above=False),
+        "singleton": Singleton,
+        "linear": lambda one: Linear(one.weights, one.offset),
+        "formula": lambda one: Formula(Number(0.0)),  # until it is parsed
+    }
+)
+"""What each field of `LabelOfVariable` becomes; the layout has checked its form."""
+
+
+def _spare(outputs: Sequence[SystemOutput]) -> SystemRule | None:
+    """Return a rule that is always right, to stand in the place of a broken one."""
+    for output in outputs:
+        for label in output.labels:
+            return SystemRule(None, (Conclusion(output.name, label.name),))
+    return None
+
+
+def _blocks(
+    kept: Entries,
+    found: list[Found],
+    mistakes: list[Mistake],
+    broken: set[Path],
+    spare: SystemRule | None,
+) -> tuple[RuleBlock, ...] | None:
+    """Return the blocks; a broken one has operators that are never wrong.
+
+    In the place of a broken rule stands the spare one; None is returned without it.
+    """
+    node = kept.get("blocks")
+    if not isinstance(node, ListNode):
+        if node is not None:
+            not_a_list(node, "blocks", found)
+        return None
+    blocks: list[RuleBlock] = []
+    for position, item in enumerate(node.items):
+        if not isinstance(item, MappingNode):
+            bind(item, layout.BlockOfSystem, found)
+            return None
+        own = entries(item, layout.BlockOfSystem, found)
+        head = record(own, layout.BlockHead, found)
+        bound = records_at(own, "rules", layout.RuleOfSystem, found)
+        rules: list[SystemRule] = []
+        for index, one in enumerate(bound or ()):
+            path: Path = ("blocks", position, "rules", index)
+            rule = _rule(path, one, mistakes)
+            if rule is None:
+                broken.add(path)
+                rule = spare
+            if rule is None:
+                return None
+            rules.append(rule)
+        blocks.append(_block(head, tuple(rules)))
+    return tuple(blocks)
+
+
+def _block(head: layout.BlockHead | None, rules: tuple[SystemRule, ...]) -> RuleBlock:
+    if head is None:
+        return RuleBlock(rules, "minimum", "maximum", "minimum")
+    how = head.activation
+    return RuleBlock(
+        rules,
+        head.and_,
+        head.or_,
+        head.implication,
+        Activation(how.method, how.count, how.threshold, how.relation),
+        head.name or "",
+    )
+
+
+def _rule(
+    path: Path, one: layout.RuleOfSystem | None, mistakes: list[Mistake]
+) -> SystemRule | None:
+    """Return a rule, or None if it is broken."""
+    if one is None or len(mistakes) >= MOST_SHOWN:
+        return None
+    count = len(mistakes)
+    when: Condition | None = None
+    then: tuple[Conclusion, ...] = ()
+    try:
+        when = parse_condition(one.if_)
+    except SentenceError as error:
+        mistakes.append(((*path, "when"), f"{shortened(one.if_)}: {error}"))
+    try:
+        then = parse_conclusions(one.then)
+    except SentenceError as error:
+        mistakes.append(((*path, "then"), f"{shortened(one.then)}: {error}"))
+    if len(mistakes) > count:
+        return None
+    return SystemRule(when, then, one.weight, one.name or "")
+
+
+def _unknown(
+    inputs: Sequence[SystemInput],
+    outputs: Sequence[SystemOutput],
+    blocks: Sequence[RuleBlock],
+) -> Iterator[Mistake]:
+    """Yield the names that nothing declares, without looking for similar ones."""
+    variables: list[SystemInput | SystemOutput] = [*inputs, *outputs]
+    known = {one.name: {label.name for label in one.labels} for one in variables}
+    for position, variable in enumerate(variables):
+        for label in variable.labels:
+            if isinstance(label.curve, Formula):
+                for name in names_in(label.curve.expression):
+                    if name != "x" and name not in known:
+                        path = _path(position, len(inputs))
+                        yield path, f"a formula needs {shortened(name)}"
+    concludable = {one.name for one in outputs}
+    for position, block in enumerate(blocks):
+        for index, rule in enumerate(block.rules):
+            asked = [(one.variable, one.label) for one in questions(rule.when)]
+            wrong = [
+                *(pair for pair in asked if not _is_known(*pair, known)),
+                *(
+                    (one.output, one.label)
+                    for one in rule.then
+                    if one.output not in concludable
+                    or not _is_known(one.output, one.label, known)
+                ),
+            ]
+            for name, term in wrong:
+                text = f"{shortened(f'{name} is {term}')} names what is not declared"
+                yield ("blocks", position, "rules", index), text
+
+
+def _path(position: int, inputs: int) -> Path:
+    if position < inputs:
+        return "inputs", position
+    return "outputs", position - inputs
+
+
+def _is_known(
+    variable: str, label: str | None, known: Mapping[str, Collection[str]]
+) -> bool:
+    return variable in known and (label is None or label in known[variable])

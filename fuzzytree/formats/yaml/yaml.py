@@ -1,0 +1,304 @@
+"""YAML to a rule base, a tree or a system; see `docs/yaml-format.md` for the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Final, TypeVar
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.formats.yaml import layout, values
+from fuzzytree.formats.yaml.binding import Entries, entries, record
+from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
+from fuzzytree.formats.yaml.nodes import (
+    Found,
+    ListNode,
+    MappingNode,
+    Node,
+    Scalar,
+    compose,
+    report,
+)
+from fuzzytree.formats.yaml.places import find, located, record_at, records_at, value_of
+from fuzzytree.formats.yaml.references import (
+    clauses_of_nodes,
+    clauses_of_rules,
+    is_flood,
+    sets_of_nodes,
+    unknown_classes,
+    unknown_inputs,
+    unknown_terms,
+)
+from fuzzytree.formats.yaml.rules import read_rules
+from fuzzytree.formats.yaml.sentences import Vocabulary, vocabulary_of, words
+from fuzzytree.formats.yaml.systems import read_system
+from fuzzytree.model.contracts import Document, Locate, Reading
+from fuzzytree.model.rulebase import (
+    Band,
+    Mistake,
+    Path,
+    RuleBase,
+    Term,
+    Variable,
+    naming_mistakes,
+    variable_mistakes,
+)
+from fuzzytree.model.tree import FuzzyTree
+
+R = TypeVar("R")
+
+
+def read(content: bytes, name: str) -> Document:
+    """Return the rule base, tree or system of a YAML file.
+
+    Args:
+        content: The file.
+        name: What messages call it.
+
+    Raises:
+        ReadError: If the file is no model; it lists all mistakes with their places.
+
+    Example:
+        >>> from fuzzytree.exporters.yaml import write
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1)
+        >>> read(write(tree).content, "tree.yaml") == tree
+        True
+    """
+    root, found = compose(content, name)
+    if not isinstance(root, MappingNode):
+        text = "a model must be a mapping that begins with 'format: fuzzytree/1'"
+        raise report(name, [*found, (root.line, root.column, text)])
+    try:
+        _check_format(root)
+        model = _READERS[_kind(root)](root, found)
+    except _UnreadableError as error:
+        raise report(name, [*found, *error.found]) from error.__cause__
+    if found or model is None:
+        raise report(name, found)
+    return model
+
+
+def reading(content: bytes, name: str) -> Reading:
+    """Return what `read` makes of a file; nothing of it is lost.
+
+    Raises:
+        ReadError: As `read`.
+    """
+    return Reading(read(content, name))
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of a YAML file stand, or what holds them.
+
+    Raises:
+        ReadError: If the file is no YAML.
+    """
+    root, _ = compose(content, name)
+
+    def at(path: Path) -> tuple[int, int]:
+        node = find(root, path)
+        return node.line, node.column
+
+    return at
+
+
+class _UnreadableError(Exception):
+    """What stops a file from being read at all."""
+
+    def __init__(self, *found: Found) -> None:
+        self.found = found
+        super().__init__()
+
+
+def _check_format(root: MappingNode) -> None:
+    node = value_of(root, "format")
+    if node is None:
+        text = "no 'format: fuzzytree/1' says what this file is"
+        raise _UnreadableError((root.line, root.column, text))
+    given = node.text if isinstance(node, Scalar) else ""
+    if given == layout.FORMAT:
+        return
+    text = f"'format' must be {layout.FORMAT!r}"
+    if re.fullmatch(r"fuzzytree/[1-9][0-9]{0,8}", given):
+        text = (
+            f"a file of format {given!r} needs a newer fuzzytree, one that reads "
+            f"{given!r}; this one reads {layout.FORMAT!r}"
+        )
+    raise _UnreadableError((node.line, node.column, text))
+
+
+def _kind(root: MappingNode) -> str:
+    node = value_of(root, "kind")
+    if isinstance(node, Scalar) and node.text in _READERS:
+        return node.text
+    place = node or root
+    text = "'kind' must be 'rule base', 'tree' or 'system'"
+    raise _UnreadableError((place.line, place.column, text))
+
+
+def _rule_base(root: MappingNode, found: list[Found]) -> RuleBase | None:
+    kept = entries(root, RuleBaseFile, found)
+    head = record(kept, layout.RuleBaseHead, found)
+    semantics = record_at(kept, "semantics", layout.RuleSemantics, found)
+    bound = records_at(kept, "rules", layout.RuleOfModel, found)
+    known = _variables(kept, found)
+    if head is None or bound is None or known is None:
+        return None
+    variables, broken = known
+    vocabulary = vocabulary_of(variables)
+    mistakes: list[Mistake] = []
+    rules = read_rules(bound, head.classes[0], vocabulary, mistakes)
+    found += located(root, mistakes)
+    unknown = [
+        *unknown_inputs(variables, head.columns),
+        *unknown_classes(rules, head.classes),
+        *unknown_terms(clauses_of_rules(rules), vocabulary),
+    ]
+    if is_flood(unknown, _names_declared(head, vocabulary)):
+        found += located(root, unknown)
+        return None
+    return _built(
+        lambda: RuleBase(
+            name=head.name,
+            classes=head.classes,
+            variables=variables,
+            rules=rules,
+            semantics=values.semantics(semantics),
+            kind=head.terms,
+            columns=head.columns,
+        ),
+        root, found, broken,
+    )  # fmt: skip
+
+
+def _tree(root: MappingNode, found: list[Found]) -> FuzzyTree | None:
+    kept = entries(root, TreeFile, found)
+    head = record(kept, layout.TreeHead, found)
+    semantics = record_at(kept, "semantics", layout.TreeSemantics, found)
+    questions = records_at(kept, "nodes", layout.Question, found)
+    ends = records_at(kept, "leaves", layout.End, found)
+    groups = records_at(kept, "sets", layout.FittedSets, found)
+    known = _variables(kept, found)
+    if questions is not None and ends is not None:
+        found += located(root, [*_number_mistakes(questions, ends)])
+    if head is None or known is None:
+        return None
+    variables, broken = known
+    nodes, leaves, fitted = _whole(questions), _whole(ends), _whole(groups)
+    asked = tuple(map(values.node, nodes or ()))
+    sets = tuple(map(values.sets, fitted or ()))
+    vocabulary = vocabulary_of(variables)
+    patterns = {group.variable: words(t.name for t in group.terms) for group in sets}
+    astray = [
+        *unknown_terms(clauses_of_nodes(asked), vocabulary),
+        *(unknown_terms(sets_of_nodes(asked), patterns) if fitted is not None else ()),
+    ]
+    unknown = [*unknown_inputs(variables, head.columns), *astray]
+    if is_flood(unknown, _names_declared(head, vocabulary, patterns)):
+        found += located(root, unknown)
+        return None
+    meant = values.semantics(semantics)
+    if nodes is None or leaves is None or fitted is None or broken:
+        mistakes = [
+            *naming_mistakes(head.name, head.classes, meant),
+            *variable_mistakes(variables, head.columns),
+        ]
+        found += located(root, [*mistakes, *astray], broken)
+        return None
+    return _built(
+        lambda: FuzzyTree(
+            name=head.name,
+            classes=head.classes,
+            variables=variables,
+            nodes=asked,
+            leaves=tuple(map(values.leaf, leaves)),
+            sets=sets,
+            semantics=meant,
+            columns=head.columns,
+        ),
+        root, found, broken,
+    )  # fmt: skip
+
+
+M = TypeVar("M", RuleBase, FuzzyTree)
+
+
+def _built(
+    build: Callable[[], M], root: Node, found: list[Found], broken: set[Path]
+) -> M | None:
+    """Return the model, or None after adding what is wrong with it."""
+    try:
+        return build()
+    except InvalidModelError as error:
+        found += located(root, error.mistakes, broken)
+        return None
+
+
+def _names_declared(head: layout.Head, *vocabularies: Vocabulary) -> int:
+    of_variables = sum(1 + len(w.terms) for v in vocabularies for w in v.values())
+    return len(head.classes) + len(head.columns) + of_variables
+
+
+_READERS: Final[Mapping[str, Callable[[MappingNode, list[Found]], Document | None]]] = {
+    "rule base": _rule_base,
+    "tree": _tree,
+    "system": read_system,
+}
+
+
+def _whole(items: list[R | None] | None) -> list[R] | None:
+    """Return the items if none is broken."""
+    kept = [item for item in items or () if item is not None]
+    return None if items is None or len(kept) < len(items) else kept
+
+
+def _variables(
+    kept: Entries, found: list[Found]
+) -> tuple[tuple[Variable, ...], set[Path]] | None:
+    """Return the variables and which are broken; None if names cannot be known.
+
+    In the place of a broken variable stands one of its name and its terms' names, so
+    that what speaks of it can be checked.
+    """
+    bound = records_at(kept, "variables", layout.VariableOfModel, found)
+    if bound is None:
+        return None
+    variables: list[Variable] = []
+    broken: set[Path] = set()
+    for position, one in enumerate(bound):
+        if one is not None:
+            variables.append(values.variable(one))
+            continue
+        names = _names(kept["variables"], position)
+        if names is None:
+            return None
+        broken.add(("variables", position))
+        terms = tuple(Term(name, Band()) for name in names[1:])
+        variables.append(Variable(names[0], terms))
+    return tuple(variables), broken
+
+
+def _names(variables: Node, position: int) -> list[str] | None:
+    """Return the name of a variable and of its terms, as far as they can be read."""
+    node = variables.items[position] if isinstance(variables, ListNode) else variables
+    name = value_of(node, "name")
+    terms = value_of(node, "terms")
+    items = terms.items if isinstance(terms, ListNode) else ()
+    named = [name, *(value_of(term, "name") for term in items)]
+    texts = [one.text for one in named if isinstance(one, Scalar)]
+    return texts if len(texts) == len(named) else None
+
+
+def _number_mistakes(
+    questions: list[layout.Question | None], ends: list[layout.End | None]
+) -> Iterator[Mistake]:
+    """Compare the numbers that stand in nodes and leaves with their places."""
+    for place, node in enumerate(questions, 1):
+        if node is not None and node.node != place:
+            text = f"this is node {place} of the list, not node {node.node}"
+            yield ("nodes", place - 1, "node"), text
+    for place, leaf in enumerate(ends, 1):
+        if leaf is not None and leaf.leaf != place:
+            text = f"this is leaf {place} of the list, not leaf {leaf.leaf}"
+            yield ("leaves", place - 1, "leaf"), text

@@ -1,0 +1,1 @@
+"""Values: variables, membership functions, rules, trees, systems and their records."""

@@ -1,0 +1,234 @@
+"""The records that readers, writers and runtimes fill in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import msgspec
+
+from fuzzytree.model.rulebase import Path, RuleBase, summary
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    FloatArray = npt.NDArray[np.float64]
+    IntArray = npt.NDArray[np.int64]
+
+Model = FuzzyTree | RuleBase
+"""What decides for a class."""
+
+Document = FuzzyTree | RuleBase | FuzzySystem
+"""What a file can hold."""
+
+
+class Fitted(Protocol):
+    """A fitted classifier that can say which tree it predicts with."""
+
+    def __fuzzytree__(self) -> FuzzyTree:
+        """Return the tree, or raise what scikit-learn raises where none is fitted."""
+        ...
+
+
+ModelSource = Document | Fitted | str | os.PathLike[str]
+"""What public functions take as a model; `checking.converting.as_model` reads it."""
+
+Carrier = Literal["tree", "rules", "system"]
+Dtype = Literal["float64", "mixed", "float32"]
+
+
+class Loss(msgspec.Struct, frozen=True):
+    """One thing that a format or runtime cannot carry.
+
+    Attributes:
+        where: The part of the model, as people name it.
+        what: What is lost, and what stands in its place.
+        bound: The largest error of a degree that it causes, if it is that kind.
+    """
+
+    where: str
+    what: str
+    bound: float | None = None
+
+
+class Written(msgspec.Struct, frozen=True):
+    """What a writer made.
+
+    Attributes:
+        content: The file.
+        losses: What was lost on the way, and can change an answer.
+        remarks: What else is worth knowing, a sentence each, such as facts that the
+            file has no place for and no answer depends on.
+        names: The names that are others in the file, by those of the model.
+    """
+
+    content: bytes
+    losses: tuple[Loss, ...] = ()
+    remarks: tuple[str, ...] = ()
+    names: Mapping[str, str] = msgspec.field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Show how large the file is, and how many losses and remarks there are."""
+        return summary(
+            "Written",
+            bytes=len(self.content),
+            losses=len(self.losses),
+            remarks=len(self.remarks),
+        )
+
+
+class Reading(msgspec.Struct, frozen=True):
+    """What a reader made of a file.
+
+    Attributes:
+        model: A tree, a rule base or a system.
+        losses: What the file says that the model cannot hold, and what stands in its
+            place.
+        remarks: What else is worth knowing, such as the dialect that was detected.
+    """
+
+    model: Document
+    losses: tuple[Loss, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+class Writer(Protocol):
+    """A writer: a model to bytes; options are the writer's own, by keyword.
+
+    It gets only what its format says that it carries.
+    """
+
+    def __call__(self, model: Any, /, *, allow_loss: bool = False) -> Written:
+        """Write a model, or raise LossError when something would be lost."""
+        ...
+
+
+Locate = Callable[[Path], tuple[int, int] | None]
+"""Where a part of a model stands in its file: line and column from 1, if known."""
+
+
+class Format(msgspec.Struct, frozen=True):
+    """A file format.
+
+    Attributes:
+        name: As in `--to`.
+        suffixes: With the dot; the first is the usual one.
+        carries: What the format can hold.
+        write: Model to bytes.
+        read: Bytes and a name for messages to a reading; None if it cannot be read.
+            Raises ReadError with all mistakes of the file.
+        cannot: What it cannot hold, a sentence each.
+        extra: The optional packages it needs, if any.
+        dtype: The number type in which a file of it computes, unless the writer's
+            option of that name says another; None if it only holds the model.
+        places: Bytes and a name to where the parts of their model stand; None if a
+            file of it has no lines.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    carries: tuple[Carrier, ...]
+    write: Writer
+    read: Callable[[bytes, str], Reading] | None = None
+    cannot: tuple[str, ...] = ()
+    extra: str | None = None
+    dtype: Dtype | None = None
+    places: Callable[[bytes, str], Locate] | None = None
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """The answers of a runtime to many rows.
+
+    Attributes:
+        rule: The number of the winning rule or leaf of each row, from 1; 0 for none.
+        status: A `fuzzytree.semantics.reference.Status` for each row.
+        strengths: Shape (rules, rows), or None where only the path was followed or
+            the strengths were not asked for. NaN in rows with missing values.
+    """
+
+    rule: IntArray
+    status: IntArray
+    strengths: FloatArray | None = None
+
+    def part(self, rows: slice | IntArray) -> Outcome:
+        """Return the answers to some of the rows."""
+        strengths = None if self.strengths is None else self.strengths[:, rows]
+        return Outcome(self.rule[rows], self.status[rows], strengths)
+
+
+Progress = Callable[[str, float], None]
+"""Called with what is done next and the share that is done, in [0, 1]."""
+
+Run = Callable[["FloatArray"], Outcome]
+"""Answers to values of shape (inputs, rows), in the order of the model's inputs."""
+
+
+class SystemOutcome(msgspec.Struct, frozen=True):
+    """The numbers that a runtime gives for a fuzzy system and many rows.
+
+    Attributes:
+        outputs: Shape (outputs, rows), in the order of the system; NaN without number.
+        status: A `fuzzytree.semantics.reference.Status` for each row: decided,
+            uncovered (a default or NaN answers an output) or missing.
+        activations: Shape (rules, rows), of the rules of all blocks; None where they
+            were not asked for. NaN in rows with missing values.
+    """
+
+    outputs: FloatArray
+    status: IntArray
+    activations: FloatArray | None = None
+
+    def part(self, rows: slice | IntArray) -> SystemOutcome:
+        """Return the answers to some of the rows."""
+        degrees = None if self.activations is None else self.activations[:, rows]
+        return SystemOutcome(self.outputs[:, rows], self.status[rows], degrees)
+
+
+SystemRun = Callable[["FloatArray"], SystemOutcome]
+"""Numbers for values of shape (columns, rows), in the order of the system's columns."""
+
+
+class SystemLoader(Protocol):
+    """Prepares a fuzzy system for many rows."""
+
+    def __call__(
+        self, system: FuzzySystem, /, *, activations: bool = False
+    ) -> SystemRun:
+        """Return what runs it, or raise LossError if it is outside its means."""
+        ...
+
+
+class Runtime(msgspec.Struct, frozen=True):
+    """Something that can execute a model.
+
+    Attributes:
+        name: As in reports, such as `onnxruntime float32`.
+        runs: Which models it can execute.
+        load: Prepare a tree or rules; raises LossError if it is outside its means.
+        load_system: Prepare a fuzzy system; None if it runs none.
+        dtype: The number type of degrees and strengths.
+        bound: The largest difference of a strength that is allowed against the
+            reference, for a model, and where it comes from; None demands equal bits
+            with the runtime `native` of the same number type.
+        cannot: What it cannot do, a sentence each.
+        extra: The optional packages it needs, if any.
+        modules: The modules that must be importable.
+        programs: The programs of which one must be installed.
+        is_slow: Whether rows cost so much that a check gives it only a share of them.
+    """
+
+    name: str
+    runs: tuple[Carrier, ...]
+    load: Callable[[Model], Run]
+    load_system: SystemLoader | None = None
+    dtype: Dtype = "float64"
+    bound: Callable[[Model], tuple[float, str]] | None = None
+    cannot: tuple[str, ...] = ()
+    extra: str | None = None
+    modules: tuple[str, ...] = ()
+    programs: tuple[str, ...] = ()
+    is_slow: bool = False

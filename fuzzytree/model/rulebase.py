@@ -1,0 +1,695 @@
+"""The hub: a fuzzy rule base as a frozen value that knows no file and no array.
+
+What a rule base *means* is computed, slowly and plainly, in
+`fuzzytree.semantics.reference`; everything that could change an answer stands in the
+values below.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import itertools
+import math
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Literal
+
+import msgspec
+
+from fuzzytree.errors import InvalidModelError
+
+_LARGEST_COEFFICIENT = 1e6  # keeps every polynomial finite, in float32 too
+
+MOST_POINTS = 4096
+
+_MOST_COMPARED = 1000  # names among which a similar one is sought
+
+_CONTROL = re.compile(
+    r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff]"
+)
+
+Path = tuple[str | int, ...]
+Mistake = tuple[Path, str]
+
+
+class Value(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A frozen, comparable, hashable record."""
+
+
+_ONE = {"leaves": "leaf", "classes": "class", "losses": "loss"}
+
+
+def summary(name: str, **counts: int) -> str:
+    """Return what `repr` shows of something large: its name and how much it holds.
+
+    Example:
+        >>> summary("RuleBase", rules=3, classes=1)
+        'RuleBase(3 rules, 1 class)'
+    """
+    shown = (
+        f"{count} {noun if count != 1 else _ONE.get(noun, noun.removesuffix('s'))}"
+        for noun, count in counts.items()
+    )
+    return f"{name}({', '.join(shown)})"
+
+
+class Flank(Value, frozen=True):
+    """How a degree falls from `start` (towards 1) to `end` (exactly 0).
+
+    With `q = clip((x - end) / (start - end), 0, 1)` the degree is
+    `q * (c0 + q * (c1 + ...))`, held in [0, largest number below 1]. `end` may lie
+    on either side of `start`.
+
+    Attributes:
+        start: Where q is 1, in the variable's unit.
+        end: Where q and the degree are 0; not equal to `start`.
+        curve: c0, c1, ...: one to eight coefficients.
+        error: The largest difference from the curve that it was fitted to.
+    """
+
+    start: float
+    end: float
+    curve: tuple[float, ...] = (1.0,)
+    error: float | None = None
+
+
+class Band(Value, frozen=True, tag="band"):
+    """A plateau with flanks: degree exactly 1 for `low < x <= high`.
+
+    Attributes:
+        low: The plateau's open lower end; None reaches down without end.
+        high: The plateau's closed upper end; None reaches up without end.
+        left: The degree for `x <= low`; None is 0.
+        right: The degree for `x > high`; None is 0.
+    """
+
+    low: float | None = None
+    high: float | None = None
+    left: Flank | None = None
+    right: Flank | None = None
+
+
+class Side(Value, frozen=True):
+    """One side of an LR set, in `u`, the distance from the mean in spreads.
+
+    With `t = min(u, 1)`, `v = 2 t - 1` and `w = clip((reach - u) / (reach - 1), 0, 1)`
+    the degree is `clip(1 - t * (c0 + v * (c1 + ...)), 0, 1) * w**4`: the paper's
+    fitted polynomial within one spread, a falling tail beyond.
+
+    Attributes:
+        spread: The unit of u, in the variable's unit; above 0.
+        curve: c0, c1, ...: one to eight coefficients.
+        reach: Where the degree becomes exactly 0, in spreads; above 1.
+    """
+
+    spread: float
+    curve: tuple[float, ...]
+    reach: float = 5.0
+
+
+class LR(Value, frozen=True, tag="lr"):
+    """The paper's LR-type fuzzy set (2.2.2): degree exactly 1 at the mean.
+
+    Attributes:
+        mean: The peak, in the variable's unit.
+        left: The side below the mean.
+        right: The side above the mean.
+    """
+
+    mean: float
+    left: Side
+    right: Side
+
+
+class Points(Value, frozen=True, tag="points"):
+    """Points joined by lines: triangles, trapezoids, ramps, steps and free curves.
+
+    Between two neighbours `(a, p)` and `(b, r)`, for `a < x <= b`, the degree is
+    `r + (x - b) / (a - b) * (p - r)`, or `(x - a) / (b - a) * r` if p is 0, each
+    operation rounded once, held between p and r: so it is exact at the points and where
+    p = r, and monotone between them. Before the first point its degree holds, behind
+    the last one the last one's.
+
+    A value that occurs twice is a step: at the value itself the first degree holds,
+    above it the second.
+
+    Attributes:
+        values: One to 4096, in the variable's unit, none below the one before it and
+            none more than twice.
+        degrees: As many, in [0, 1].
+
+    Example:
+        >>> triangle = Points((0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
+        >>> step = Points((2.5, 2.5), (1.0, 0.0))
+    """
+
+    values: tuple[float, ...]
+    degrees: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Make a degree of -0.0 a 0.0, so that every runtime gives the same bits."""
+        if 0.0 in self.degrees:
+            degrees = tuple(degree + 0.0 for degree in self.degrees)
+            msgspec.structs.force_setattr(self, "degrees", degrees)
+
+
+Shape = Band | LR | Points
+
+
+class Term(Value, frozen=True):
+    """A label of a variable and its curve."""
+
+    name: str
+    shape: Shape
+
+
+class Part(Value, frozen=True):
+    """One summand of a combination: `weight * (input - centre)`."""
+
+    input: str
+    weight: float
+    centre: float = 0.0
+
+
+class Variable(Value, frozen=True):
+    """An input column, or a linear combination of input columns.
+
+    Attributes:
+        name: Unique in its rule base.
+        terms: The labels; names are unique within the variable.
+        unit: The unit of its values, for people.
+        low: The smallest value seen or allowed; None if unknown.
+        high: The largest value seen or allowed; None if unknown.
+        parts: Empty for an input column. Otherwise the summands of a combination,
+            added in this order, each operation rounded once to double.
+    """
+
+    name: str
+    terms: tuple[Term, ...] = ()
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    parts: tuple[Part, ...] = ()
+
+
+class Clause(Value, frozen=True):
+    """`variable is term`, `variable is term or term`, or the negation of either."""
+
+    variable: str
+    terms: tuple[str, ...]
+    negated: bool = False
+
+
+class Rule(Value, frozen=True):
+    """IF all clauses hold THEN the class is `then`; no clause holds always.
+
+    Attributes:
+        when: The clauses, joined by AND in this order.
+        then: The class.
+        support: How many training rows reached it, if known.
+    """
+
+    when: tuple[Clause, ...]
+    then: str
+    support: int | None = None
+
+
+Conjunction = Literal["min", "product"]
+
+LabelType = Literal["number", "boolean"]
+"""What class names stand for where they are no text."""
+
+Label = str | float | bool
+"""The label of a class; a whole number is an `int`."""
+
+
+class Semantics(Value, frozen=True):
+    """What the rules leave open and an answer depends on.
+
+    The class is that of the strongest rule, of the first of them on a tie.
+
+    Attributes:
+        conjunction: How the degrees of a rule's clauses become its strength.
+        uncovered: The answer where no rule fires; None answers "no class".
+        missing: The answer where a needed value is missing or not finite, or a
+            combination overflows; None answers "no class".
+        label_type: What the class names stand for, if not text: a number, such as
+            "1" or "0.5", or a boolean, "False" or "True". Predictions have these.
+    """
+
+    conjunction: Conjunction = "min"
+    uncovered: str | None = None
+    missing: str | None = None
+    label_type: LabelType | msgspec.UnsetType = msgspec.UNSET
+
+
+Kind = Literal["relative", "raw"]
+
+
+class RuleBase(Value, frozen=True):
+    """A named, ordered set of fuzzy rules that decides for one class.
+
+    Attributes:
+        name: For people and files.
+        classes: The possible answers, in the order of their numbers.
+        variables: Inputs and combinations; a combination stands after its inputs.
+        rules: In order: the first of equally strong rules wins.
+        semantics: What an answer depends on beside the rules.
+        kind: `relative` (equal to its tree) or `raw` (the paper's sets); None for
+            rules that come from no tree.
+        columns: The columns of the training table, of which the inputs are some.
+
+    Raises:
+        InvalidModelError: If the parts contradict each other; it lists everything.
+    """
+
+    name: str
+    classes: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    rules: tuple[Rule, ...]
+    semantics: Semantics = Semantics()
+    kind: Kind | None = None
+    columns: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a rule base that contradicts itself."""
+        mistakes = [
+            *naming_mistakes(self.name, self.classes, self.semantics),
+            *variable_mistakes(self.variables, self.columns),
+            *_rule_mistakes(self),
+        ]
+        if mistakes:
+            raise InvalidModelError(mistakes)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the columns that the rules need, in order."""
+        return tuple(v.name for v in self.variables if not v.parts)
+
+    def __repr__(self) -> str:
+        """Show how much it holds; `str` shows the rules."""
+        rules, inputs = len(self.rules), len(self.inputs)
+        return summary(
+            "RuleBase", rules=rules, inputs=inputs, classes=len(self.classes)
+        )
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.model_html(self)
+        return shown
+
+    def __str__(self) -> str:
+        """Show the rules as numbered sentences."""
+        return "\n".join(
+            f"{number}. {sentence(rule)}" for number, rule in enumerate(self.rules, 1)
+        )
+
+
+def sentence(rule: Rule) -> str:
+    """Return a rule as people read it.
+
+    Example:
+        >>> sentence(Rule((Clause("grip", ("firm", "hard")),), "hand"))
+        'IF grip is firm or hard THEN hand'
+    """
+    if not rule.when:
+        return f"ALWAYS {rule.then}"
+    clauses = " AND ".join(clause_text(clause) for clause in rule.when)
+    return f"IF {clauses} THEN {rule.then}"
+
+
+def clause_text(clause: Clause) -> str:
+    """Return a clause as people read it, such as `grip is not soft or loose`."""
+    verb = "is not" if clause.negated else "is"
+    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
+
+
+def shapes_of(variables: Iterable[Variable]) -> dict[tuple[str, str], Shape]:
+    """Return the shape of each term, by variable and name."""
+    return {(v.name, t.name): t.shape for v in variables for t in v.terms}
+
+
+def fingerprint(value: msgspec.Struct) -> str:
+    """Return the SHA-256 of a model's content, as 64 hexadecimal digits.
+
+    Equal models have equal fingerprints on every machine; numbers enter with all
+    their digits.
+    """
+    return hashlib.sha256(msgspec.json.encode(value)).hexdigest()
+
+
+def label_type_of(labels: Iterable[object]) -> LabelType | msgspec.UnsetType:
+    """Return the type of labels that are all numbers or all booleans.
+
+    Example:
+        >>> label_type_of([0, 1.5]), label_type_of([True]), label_type_of([True, 2])
+        ('number', 'boolean', UNSET)
+    """
+    found = [*labels]
+    if all(isinstance(label, bool) for label in found):
+        return "boolean"
+    if any(isinstance(label, bool) for label in found):
+        return msgspec.UNSET
+    is_number = all(isinstance(label, int | float) for label in found)
+    return "number" if is_number else msgspec.UNSET
+
+
+def label_of(name: str, label_type: LabelType | msgspec.UnsetType) -> Label:
+    """Return the label that a class name stands for.
+
+    Raises:
+        ValueError: If the name is not what Python writes for such a label.
+
+    Example:
+        >>> label_of("1", "number"), label_of("1", msgspec.UNSET)
+        (1, '1')
+    """
+    if label_type is msgspec.UNSET:
+        return name
+    if label_type == "boolean":
+        label: Label = name == "True"
+    else:
+        label = int(name) if name.lstrip("-").isdecimal() else float(name)
+    if str(label) != name:
+        raise ValueError(name)
+    return label
+
+
+def is_label(name: str, label_type: LabelType | msgspec.UnsetType) -> bool:
+    """Return whether a class name is what Python writes for a label of a type."""
+    try:
+        label_of(name, label_type)
+    except ValueError:
+        return False
+    return True
+
+
+def naming_mistakes(
+    name: str, classes: tuple[str, ...], semantics: Semantics
+) -> Iterator[Mistake]:
+    """Yield what is wrong with a model's name, classes and default answers."""
+    if not name:
+        yield ("name",), "a model needs a name"
+    fault = text_fault(name)
+    if fault:
+        yield ("name",), f"the name {name!r} {fault}"
+    if not classes:
+        yield ("classes",), "a model needs at least one class"
+    yield from name_mistakes(("classes",), "class", classes)
+    for position, label in enumerate(classes):
+        if not label:
+            yield ("classes", position), "a class name cannot be empty"
+        elif not is_label(label, semantics.label_type):
+            text = f"the label type is {semantics.label_type}"
+            yield ("classes", position), f"{text}, and the class {label!r} is none"
+    for field in ("uncovered", "missing"):
+        answer: str | None = getattr(semantics, field)
+        if answer is not None and answer not in classes:
+            yield (
+                ("semantics", field),
+                f"the answer for {field} is no class: {answer!r}; "
+                f"{name_choice(answer, classes)}",
+            )
+
+
+def variable_mistakes(
+    variables: tuple[Variable, ...], columns: tuple[str, ...] = ()
+) -> Iterator[Mistake]:
+    """Yield what is wrong with variables: names, ranges, shapes, combinations."""
+    yield from name_mistakes(("variables",), "variable", [v.name for v in variables])
+    yield from name_mistakes(("columns",), "column", columns)
+    named = set(columns)
+    known: dict[str, bool] = {}
+    for position, variable in enumerate(variables):
+        path: Path = ("variables", position)
+        if not variable.name:
+            yield (*path, "name"), "a variable needs a name"
+        if columns and not variable.parts and variable.name not in named:
+            yield (
+                (*path, "name"),
+                f"input {variable.name!r} is not among the columns; "
+                f"{name_choice(variable.name, columns)}",
+            )
+        yield from unit_mistakes(path, variable.name, variable.unit)
+        yield from range_mistakes(path, variable.name, variable.low, variable.high)
+        yield from part_mistakes(path, variable.name, variable.parts, known)
+        names = [term.name for term in variable.terms]
+        yield from name_mistakes((*path, "terms"), f"term of {variable.name!r}", names)
+        for index, term in enumerate(variable.terms):
+            where = f"term {term.name!r} of {variable.name!r}"
+            if not term.name:
+                yield (
+                    (*path, "terms", index),
+                    f"a term of {variable.name!r} has no name",
+                )
+            for text in shape_mistakes(term.shape):
+                yield (*path, "terms", index, "shape"), f"{where}: {text}"
+        known[variable.name] = bool(variable.parts)
+
+
+def unit_mistakes(path: Path, name: str, unit: str) -> Iterator[Mistake]:
+    """Yield why the unit of a variable is none."""
+    fault = text_fault(unit)
+    if fault:
+        yield (*path, "unit"), f"the unit {unit!r} of {name!r} {fault}"
+
+
+def range_mistakes(
+    path: Path, name: str, low: float | None, high: float | None
+) -> Iterator[Mistake]:
+    """Yield what is wrong with the range of a variable."""
+    for field, value in (("low", low), ("high", high)):
+        if value is not None and not math.isfinite(value):
+            yield (*path, field), f"the range of {name!r} must be finite"
+            return
+    if low is not None and high is not None and low > high:
+        yield (
+            (*path, "low"),
+            f"the range of {name!r} starts at {low!r} and ends below it, at {high!r}",
+        )
+
+
+def part_mistakes(
+    path: Path, name: str, parts: tuple[Part, ...], known: Mapping[str, bool]
+) -> Iterator[Mistake]:
+    """Yield what is wrong with a combination.
+
+    Args:
+        path: Where it stands.
+        name: What it is called.
+        parts: Its summands.
+        known: The variables before it, and whether each is a combination itself.
+    """
+    for index, part in enumerate(parts):
+        where = (*path, "parts", index)
+        if known.get(part.input, True):
+            inputs = [one for one, combined in known.items() if not combined]
+            yield (
+                (*where, "input"),
+                f"combination {name!r} needs input {part.input!r}, "
+                f"which does not stand before it; {name_choice(part.input, inputs)}",
+            )
+        if not math.isfinite(part.weight) or part.weight == 0.0:
+            yield (
+                (*where, "weight"),
+                f"the weight of {part.input!r} in {name!r} must be finite "
+                f"and not 0, not {part.weight!r}",
+            )
+        if not math.isfinite(part.centre):
+            yield (
+                (*where, "centre"),
+                f"the centre of {part.input!r} in {name!r} must be finite",
+            )
+
+
+def shape_mistakes(shape: Shape) -> Iterator[str]:
+    """Yield what is wrong with a shape, without saying whose it is."""
+    match shape:
+        case Band():
+            yield from _band_mistakes(shape)
+        case LR():
+            if not math.isfinite(shape.mean):
+                yield f"the mean must be finite, not {shape.mean!r}"
+            for name, side in (("left", shape.left), ("right", shape.right)):
+                yield from _side_mistakes(name, side)
+        case Points():
+            yield from _points_mistakes(shape)
+
+
+def _points_mistakes(points: Points) -> Iterator[str]:
+    values, degrees = points.values, points.degrees
+    if len(values) != len(degrees):
+        yield f"{len(values)} values of points need as many degrees, not {len(degrees)}"
+    if not 1 <= len(values) <= MOST_POINTS:
+        yield f"a shape needs 1 to {MOST_POINTS} points, not {len(values)}"
+    if not all(map(math.isfinite, values)):
+        wrong = next(value for value in values if not math.isfinite(value))
+        yield f"the values of points must be finite, not {wrong!r}"
+        return
+    yield from itertools.islice(_order_mistakes(values), 1)
+    for value, degree in zip(values, degrees, strict=False):
+        if not 0.0 <= degree <= 1.0:
+            yield f"the degree at {value!r} must lie in [0, 1], not {degree!r}"
+            return
+
+
+def _order_mistakes(values: tuple[float, ...]) -> Iterator[str]:
+    for before, value in itertools.pairwise(values):
+        if value < before:
+            yield (
+                f"the values of points must not decrease: {value!r} stands "
+                f"behind {before!r}"
+            )
+        elif not math.isfinite(value - before):
+            yield f"the points at {before!r} and {value!r} are too far apart"
+    for before, after in zip(values, values[2:], strict=False):
+        if before == after:
+            yield f"three points at {before!r}; two make a step"
+
+
+def _band_mistakes(band: Band) -> Iterator[str]:
+    for name, value in (("low", band.low), ("high", band.high)):
+        if value is not None and not math.isfinite(value):
+            yield f"{name} must be finite or left out, not {value!r}"
+            return
+    low, high = band.low, band.high
+    if low is not None and high is not None and low >= high:
+        yield f"the plateau starts at {low!r} and must end above it, not at {high!r}"
+    for name, bound, flank, sign in (
+        ("left", low, band.left, 1),
+        ("right", high, band.right, -1),
+    ):
+        if flank is None:
+            continue
+        if bound is None:
+            yield f"a plateau that is open on the {name} has no {name} flank"
+        ends = (flank.start, flank.end)
+        if not all(map(math.isfinite, ends)) or not math.isfinite(
+            flank.start - flank.end
+        ):
+            yield f"the {name} flank must start and end at finite values"
+        elif (flank.start - flank.end) * sign <= 0:
+            side = "below" if sign > 0 else "above"
+            yield f"the {name} flank must end {side} its start {flank.start!r}"
+        yield from _curve_mistakes(f"{name} flank", flank.curve)
+
+
+def _side_mistakes(name: str, side: Side) -> Iterator[str]:
+    if not (math.isfinite(side.spread) and side.spread > 0):
+        yield f"the {name} spread must be finite and above 0, not {side.spread!r}"
+    if not (math.isfinite(side.reach) and side.reach > 1):
+        yield f"the {name} reach must be finite and above 1, not {side.reach!r}"
+    yield from _curve_mistakes(f"{name} side", side.curve)
+
+
+def _curve_mistakes(name: str, curve: tuple[float, ...]) -> Iterator[str]:
+    if not 1 <= len(curve) <= 8:
+        yield f"the {name} needs 1 to 8 coefficients, not {len(curve)}"
+    if not all(abs(coefficient) <= _LARGEST_COEFFICIENT for coefficient in curve):
+        yield f"the coefficients of the {name} must lie within +-1e6"
+
+
+def term_names(variables: Iterable[Variable]) -> dict[str, dict[str, None]]:
+    """Return the names of each variable's terms, in order and quick to look up."""
+    return {v.name: dict.fromkeys(term.name for term in v.terms) for v in variables}
+
+
+def clause_mistakes(
+    path: Path, where: str, clause: Clause, terms: Mapping[str, Collection[str]]
+) -> Iterator[Mistake]:
+    """Yield what is wrong with a clause, given the term names of each variable."""
+    if clause.variable not in terms:
+        yield (
+            (*path, "variable"),
+            f"{where}: no variable {clause.variable!r}; "
+            f"{name_choice(clause.variable, list(terms))}",
+        )
+        return
+    if not clause.terms:
+        yield (
+            (*path, "terms"),
+            f"{where}: the clause on {clause.variable!r} names no term",
+        )
+    known = terms[clause.variable]
+    for index, term in enumerate(clause.terms):
+        if term not in known:
+            yield (
+                (*path, "terms", index),
+                f"{where}: {clause.variable!r} has no term {term!r}; "
+                f"{name_choice(term, known)}",
+            )
+    yield from name_mistakes((*path, "terms"), f"term in {where}", clause.terms)
+
+
+def _rule_mistakes(rules: RuleBase) -> Iterator[Mistake]:
+    if not rules.rules:
+        yield ("rules",), "a rule base needs at least one rule"
+    classes = dict.fromkeys(rules.classes)
+    terms = term_names(rules.variables)
+    checked: set[int] = set()  # clauses are shared between rules of one tree
+    for number, rule in enumerate(rules.rules, 1):
+        path: Path = ("rules", number - 1)
+        if rule.then not in classes:
+            yield (
+                (*path, "then"),
+                f"rule {number}: no class {rule.then!r}; "
+                f"{name_choice(rule.then, rules.classes)}",
+            )
+        if rule.support is not None and rule.support < 0:
+            yield (*path, "support"), f"rule {number}: the support cannot be below 0"
+        for index, clause in enumerate(rule.when):
+            if id(clause) not in checked:
+                checked.add(id(clause))
+                yield from clause_mistakes(
+                    (*path, "when", index), f"rule {number}", clause, terms
+                )
+
+
+def name_mistakes(path: Path, what: str, names: Iterable[str]) -> Iterator[Mistake]:
+    """Yield which names stand twice or hold what no name may hold."""
+    seen: set[str] = set()
+    for position, name in enumerate(names):
+        fault = text_fault(name)
+        if fault:
+            yield (*path, position), f"{what} {name!r} {fault}"
+        if name in seen:
+            yield (*path, position), f"{what} {name!r} stands twice"
+        seen.add(name)
+
+
+def text_fault(text: str) -> str:
+    """Return why a text is no name or unit, empty if it may be one.
+
+    Terminals, editors and line-based formats obey control characters, line breaks and
+    marks that change the direction of writing, so that no name holds one.
+
+    Example:
+        >>> text_fault("petal length (µm)"), text_fault("petal" + chr(27) + "[2J")
+        ('', 'has a control character')
+    """
+    if _CONTROL.search(text):
+        return "has a control character"
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return "cannot be written as UTF-8"
+    return ""
+
+
+def name_choice(wrong: str, names: Iterable[str]) -> str:
+    """Return `there is a, b (did you mean 'a'?)`, at most a dozen names long."""
+    import difflib
+
+    known = list(dict.fromkeys(names))
+    # A message has one line, whatever is in a name.
+    lines = [one if one.isprintable() else repr(one) for one in known[:12]]
+    if len(known) > _MOST_COMPARED:
+        return f"there are {len(known)}: {', '.join(lines)}, ..."
+    if not known:
+        return "there is none"
+    shown = ", ".join(lines) + (", ..." if len(known) > 12 else "")
+    close = difflib.get_close_matches(wrong, known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return f"there is {shown}{hint}"

@@ -1,0 +1,273 @@
+"""The rules of a fuzzy system as frozen values: conditions, conclusions, blocks.
+
+What they *mean* is computed in `fuzzytree.semantics.inference` and
+`fuzzytree.semantics.inference.norms`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Literal
+
+from fuzzytree.model.rulebase import Mistake, Path, Value, name_choice
+from fuzzytree.model.system.curves import MOST_LEVELS
+
+TNorm = Literal[
+    "minimum",
+    "product",
+    "bounded difference",
+    "drastic product",
+    "einstein product",
+    "hamacher product",
+    "nilpotent minimum",
+]
+"""An AND. With a and b: min; a b; max(0, a + b - 1); min(a, b) if max(a, b) = 1, else
+0; a b / (2 - (a + b - a b)); a b / (a + b - a b), 0 if both are 0; min(a, b) if
+a + b > 1, else 0."""
+
+SNorm = Literal[
+    "maximum",
+    "algebraic sum",
+    "bounded sum",
+    "drastic sum",
+    "einstein sum",
+    "hamacher sum",
+    "nilpotent maximum",
+    "normalized sum",
+    "sum",
+]
+"""An OR. With a and b: max; a + b - a b; min(1, a + b); max(a, b) if min(a, b) = 0,
+else 1; (a + b) / (1 + a b); (a + b - 2 a b) / (1 - a b), 1 if a b = 1; max(a, b) if
+a + b < 1, else 1; (a + b) / max(1, a + b); a + b."""
+
+Hedge = Literal[
+    "any",
+    "not",
+    "very",
+    "somewhat",
+    "extremely",
+    "seldom",
+    "cubed",
+    "very very",
+    "plus",
+    "minus",
+    "cube root",
+]
+"""What is done to a degree d: 1; 1 - d; d d; sqrt(d); 2 d d up to 1/2, then
+1 - 2 (1 - d)(1 - d); sqrt(d / 2) up to 1/2, then 1 - sqrt((1 - d) / 2); d d d;
+(d d)(d d); d^1.25; d^0.75; d^(1/3)."""
+
+
+class Is(Value, frozen=True, tag="is"):
+    """`variable is hedge ... label`; of an output, how far it was concluded so far.
+
+    Attributes:
+        variable: An input or an output.
+        label: One of its labels; None only behind the hedge `any`.
+        hedges: As they are read, from left to right; the last is applied first.
+    """
+
+    variable: str
+    label: str | None
+    hedges: tuple[Hedge, ...] = ()
+
+
+class And(Value, frozen=True, tag="and"):
+    """Conditions joined by the block's conjunction, from left to right."""
+
+    parts: tuple[Condition, ...]
+
+
+class Or(Value, frozen=True, tag="or"):
+    """Conditions joined by the block's disjunction, from left to right."""
+
+    parts: tuple[Condition, ...]
+
+
+class Not(Value, frozen=True, tag="not"):
+    """1 minus the degree of a condition."""
+
+    part: Condition
+
+
+Condition = Is | And | Or | Not
+
+
+class Conclusion(Value, frozen=True):
+    """`output is hedge ... label`; hedges change the degree of activation.
+
+    They act on the conclusions of the rule that stand behind it too, as in fuzzylite:
+    of `a is very high and b is low` both get the square of the rule's degree.
+    """
+
+    output: str
+    label: str
+    hedges: tuple[Hedge, ...] = ()
+
+
+class SystemRule(Value, frozen=True):
+    """IF a condition holds THEN some conclusions are activated.
+
+    Attributes:
+        when: The condition; None holds always. It may ask an output: of a label of it
+            the degrees concluded so far, joined by the output's aggregation (summed if
+            None), by earlier blocks, and by rules of this block that were run before,
+            unless its activation must know all degrees first (`highest`, `lowest`,
+            `proportional`).
+        then: The conclusions.
+        weight: What the degree of the condition is multiplied by, in [0, 1].
+        name: For people; may be empty.
+    """
+
+    when: Condition | None
+    then: tuple[Conclusion, ...]
+    weight: float = 1.0
+    name: str = ""
+
+
+ActivationMethod = Literal[
+    "general", "first", "last", "highest", "lowest", "proportional", "threshold"
+]
+Relation = Literal["<", "<=", "==", "!=", ">=", ">"]
+
+
+class Activation(Value, frozen=True):
+    """Which of a block's rules are activated, of those whose degree is above 0.
+
+    Attributes:
+        method: `general`: all. `first`, `last`: at most `count` of them in the order of
+            the rules or against it, whose degree is at least `threshold`; the block is
+            run in that order. `highest`,
+            `lowest`: at most `count` of them by degree, the first of equals first.
+            `proportional`: all, each degree divided by their sum. `threshold`: those
+            whose degree stands in `relation` to `threshold`.
+        count: How many.
+        threshold: A degree.
+        relation: How a degree must compare with the threshold.
+    """
+
+    method: ActivationMethod = "general"
+    count: int = 1
+    threshold: float = 0.0
+    relation: Relation = ">="
+
+
+class RuleBlock(Value, frozen=True):
+    """Rules with the operators that they share; blocks are run in order.
+
+    Attributes:
+        rules: The rules, in order.
+        conjunction: The AND; None where no rule needs one.
+        disjunction: The OR; None where no rule needs one.
+        implication: How an activated rule limits its conclusion's curve; None where the
+            outputs are weighted numbers.
+        activation: Which rules are activated.
+        name: For people; may be empty.
+    """
+
+    rules: tuple[SystemRule, ...]
+    conjunction: TNorm | None = "minimum"
+    disjunction: SNorm | None = "maximum"
+    implication: TNorm | None = None
+    activation: Activation = Activation()
+    name: str = ""
+
+
+def questions(condition: Condition | None) -> Iterator[Is]:
+    """Yield what a condition asks, from left to right."""
+    match condition:
+        case Is():
+            yield condition
+        case And(parts=parts) | Or(parts=parts):
+            for part in parts:
+                yield from questions(part)
+        case Not(part=part):
+            yield from questions(part)
+        case None:
+            return
+
+
+def joints(condition: Condition | None) -> Iterator[type[And] | type[Or]]:
+    """Yield how the parts of a condition are joined, from the outside in."""
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            yield type(condition)
+            for part in parts:
+                yield from joints(part)
+        case Not(part=part):
+            yield from joints(part)
+        case _:
+            return
+
+
+Terms = Mapping[str, Mapping[str, None]]
+
+
+def activation_mistakes(path: Path, how: Activation) -> Iterator[Mistake]:
+    """Yield what is wrong with an activation."""
+    if how.count < 1:
+        yield path, f"at least 1 rule is activated, not {how.count}"
+    if not 0.0 <= how.threshold <= 1.0:
+        yield path, f"the threshold must lie in [0, 1], not {how.threshold!r}"
+
+
+def condition_mistakes(
+    condition: Condition | None, block: RuleBlock, terms: Terms
+) -> Iterator[str]:
+    """Yield what is wrong with a condition, given the terms of each variable."""
+    if _levels(condition) > MOST_LEVELS:
+        yield f"nested deeper than {MOST_LEVELS} levels"
+        return
+    if _is_empty(condition):
+        yield "it joins no conditions at all"
+    for asked in questions(condition):
+        if asked.label is not None or asked.variable not in terms:
+            yield from reference_mistakes(asked.variable, asked.label, terms)
+        elif not asked.hedges or asked.hedges[-1] != "any":
+            yield f"{asked.variable!r} is asked without a term"
+    if block.conjunction is None and _uses(condition, And):
+        yield "it needs a conjunction, and its block has none"
+    if block.disjunction is None and _uses(condition, Or):
+        yield "it needs a disjunction, and its block has none"
+
+
+def reference_mistakes(variable: str, label: str | None, terms: Terms) -> Iterator[str]:
+    """Yield which of two names nothing declares."""
+    if variable not in terms:
+        yield f"no variable {variable!r}; {name_choice(variable, terms)}"
+    elif label is not None and label not in terms[variable]:
+        choice = name_choice(label, terms[variable])
+        yield f"{variable!r} has no term {label!r}; {choice}"
+
+
+def _is_empty(condition: Condition | None) -> bool:
+    """Return whether a condition joins nothing anywhere."""
+    if isinstance(condition, And | Or) and not condition.parts:
+        return True
+    return any(map(_is_empty, _parts(condition)))
+
+
+def _levels(condition: Condition | None) -> int:
+    deepest, todo = 0, [(condition, 1)]
+    while todo:
+        one, level = todo.pop()
+        deepest = max(deepest, level)
+        if level <= MOST_LEVELS:
+            todo += [(part, level + 1) for part in _parts(one)]
+    return deepest
+
+
+def _parts(condition: Condition | None) -> Iterable[Condition]:
+    match condition:
+        case And(parts=parts) | Or(parts=parts):
+            return parts
+        case Not(part=part):
+            return (part,)
+        case _:
+            return ()
+
+
+def _uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
+    if isinstance(condition, kind):
+        return True
+    return any(_uses(part, kind) for part in _parts(condition))

@@ -1,0 +1,364 @@
+"""What is learnt: a fuzzy decision tree as a frozen value.
+
+Nodes and leaves lie in flat tuples and are numbered from 1: node 1 is the root,
+leaf k becomes rule k. A node looks at one variable. It stores where the decision
+changes (`cuts`) and which branch owns each interval between them; every interval is
+open below and closed above, so a value equal to a cut goes to the left of it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+import msgspec
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.model.rulebase import (
+    Band,
+    Clause,
+    LabelType,
+    Mistake,
+    Path,
+    Semantics,
+    Term,
+    Value,
+    Variable,
+    clause_mistakes,
+    naming_mistakes,
+    shapes_of,
+    summary,
+    term_names,
+    variable_mistakes,
+)
+
+Use = Literal["tree", "relative", "raw"]
+"""What a tree serves: its own path, its relative rules, the paper's raw rules."""
+
+
+class Leaf(Value, frozen=True):
+    """Where a path ends.
+
+    Attributes:
+        label: The class.
+        pattern: The fuzzy pattern that it holds; the class itself, or one of several
+            shapes of the class, such as `hand #2`.
+        support: How many training rows reached it, if known; estimated from a sample
+            where learning kept one (`rows_per_class`).
+    """
+
+    label: str
+    pattern: str = ""
+    support: int | None = None
+
+
+class Branch(Value, frozen=True):
+    """One way on from a node: to the node or leaf of that number.
+
+    Attributes:
+        terms: The relative terms of the node's variable, joined by OR, one for each
+            interval that the branch owns, in their order: bands whose plateaus are
+            these intervals, so that the degree is 1 exactly where the branch is taken.
+        sets: The patterns whose fitted sets on that variable make up the raw degree
+            of the branch, joined by OR; empty in a tree that carries no sets.
+        node: The number of the next node, or None.
+        leaf: The number of the leaf, or None; exactly one of the two is given.
+    """
+
+    terms: tuple[str, ...]
+    sets: tuple[str, ...] = ()
+    node: int | None = None
+    leaf: int | None = None
+
+
+class Node(Value, frozen=True):
+    """A question about one variable.
+
+    Attributes:
+        variable: The variable it looks at.
+        cuts: b1 < b2 < ... < bk: where the decision changes.
+        owners: For each of the k + 1 intervals (b_i, b_i+1], the position of its
+            branch in `branches`; every branch owns at least one, and neighbours
+            belong to different branches.
+        branches: At least two.
+    """
+
+    variable: str
+    cuts: tuple[float, ...]
+    owners: tuple[int, ...]
+    branches: tuple[Branch, ...]
+
+
+class Sets(Value, frozen=True):
+    """The fitted sets (LR type) of the patterns on one variable, named by pattern."""
+
+    variable: str
+    terms: tuple[Term, ...]
+
+
+class FuzzyTree(Value, frozen=True):
+    """A fuzzy decision tree.
+
+    Attributes:
+        name: For people and files.
+        classes: The possible answers, in the order of their numbers.
+        variables: Inputs and combinations, with their relative terms; a combination
+            stands after its inputs.
+        nodes: Numbered from 1 in depth-first order; none if there is one leaf only.
+        leaves: Numbered from 1 in the order in which a depth-first walk meets them.
+        sets: The paper's fitted sets on each variable that a node asks; may be empty.
+        semantics: How missing values are answered, and the AND of the tree's rules.
+        columns: The columns of the training table, of which the inputs are some.
+
+    Raises:
+        InvalidModelError: If the parts contradict each other; it lists everything.
+    """
+
+    name: str
+    classes: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    nodes: tuple[Node, ...]
+    leaves: tuple[Leaf, ...]
+    sets: tuple[Sets, ...] = ()
+    semantics: Semantics = Semantics()
+    columns: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a tree that contradicts itself."""
+        mistakes = [
+            *naming_mistakes(self.name, self.classes, self.semantics),
+            *variable_mistakes(self.variables, self.columns),
+            *_set_mistakes(self),
+            *_leaf_mistakes(self),
+            *_node_mistakes(self),
+        ]
+        if not mistakes:
+            mistakes = [*_order_mistakes(self), *_plateau_mistakes(self)]
+        if mistakes:
+            raise InvalidModelError(mistakes)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the columns that the tree needs, in order."""
+        return tuple(v.name for v in self.variables if not v.parts)
+
+    def __repr__(self) -> str:
+        """Show how much it holds; `str` shows the outline."""
+        return summary(
+            "FuzzyTree",
+            nodes=len(self.nodes),
+            leaves=len(self.leaves),
+            inputs=len(self.inputs),
+            classes=len(self.classes),
+        )
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        page = importlib.import_module("fuzzytree.report.notebook")
+        shown: str = page.model_html(self)
+        return shown
+
+    def __str__(self) -> str:
+        """Show the tree as an indented outline."""
+        return "\n".join(outline(self))
+
+
+def with_label_type(
+    tree: FuzzyTree, label_type: LabelType | msgspec.UnsetType
+) -> FuzzyTree:
+    """Return a tree whose class names stand for labels of a type."""
+    semantics = msgspec.structs.replace(tree.semantics, label_type=label_type)
+    return msgspec.structs.replace(tree, semantics=semantics)
+
+
+def outline(tree: FuzzyTree) -> Iterator[str]:
+    """Yield the tree line by line, two spaces a level, branches in interval order."""
+    todo: list[tuple[int, Branch]] = []
+    yield from _expand(tree, 0, 1 if tree.nodes else None, 1, todo)
+    while todo:
+        depth, branch = todo.pop()
+        yield from _expand(tree, depth, branch.node, branch.leaf, todo, branch)
+
+
+def _expand(
+    tree: FuzzyTree,
+    depth: int,
+    node: int | None,
+    leaf: int | None,
+    todo: list[tuple[int, Branch]],
+    branch: Branch | None = None,
+) -> Iterator[str]:
+    label = " or ".join(branch.terms) + ": " if branch else ""
+    indent = "  " * depth
+    if node is None:
+        end = tree.leaves[(leaf or 1) - 1]
+        pattern = f" ({end.pattern})" if end.pattern not in ("", end.label) else ""
+        yield f"{indent}{label}{end.label}{pattern} [{leaf}]"
+        return
+    asked = tree.nodes[node - 1]
+    cuts = ", ".join(f"{cut:.6g}" for cut in asked.cuts)
+    yield f"{indent}{label}{asked.variable}? (cut at {cuts})"
+    todo.extend((depth + 1, branch) for branch in reversed(asked.branches))
+
+
+def interval_names(nodes_cuts: Sequence[Sequence[float]]) -> list[list[str]]:
+    """Return a name for each interval of each node that asks one variable.
+
+    A variable that one node asks, with two or three intervals, has the terms low,
+    (medium) and high. Otherwise a term is named by its bounds, with as few digits
+    (three at least) as tell all the cuts apart.
+
+    Args:
+        nodes_cuts: The cuts of each node that asks the variable.
+
+    Example:
+        >>> interval_names([[2.45]])
+        [['low', 'high']]
+        >>> interval_names([[1.7512], [0.8, 1.7]])
+        [['below 1.75', 'above 1.75'], ['below 0.8', '0.8 to 1.7', 'above 1.7']]
+    """
+    words = {1: ["low", "high"], 2: ["low", "medium", "high"]}
+    if len(nodes_cuts) == 1 and len(nodes_cuts[0]) in words:
+        return [words[len(nodes_cuts[0])]]
+    text = _short_numbers({cut for cuts in nodes_cuts for cut in cuts})
+    names: list[list[str]] = []
+    for cuts in nodes_cuts:
+        shown = [text[cut] for cut in cuts]
+        inner = [f"{a} to {b}" for a, b in itertools.pairwise(shown)]
+        names.append([f"below {shown[0]}", *inner, f"above {shown[-1]}"])
+    return names
+
+
+def _short_numbers(values: set[float]) -> dict[float, str]:
+    text: dict[float, str] = {}
+    for digits in range(3, 18):
+        text = {value: f"{value:.{digits}g}" for value in values}
+        if len(set(text.values())) == len(values):
+            break
+    return text
+
+
+def _set_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
+    names = {variable.name for variable in tree.variables}
+    for position, group in enumerate(tree.sets):
+        path: Path = ("sets", position)
+        if group.variable not in names:
+            yield (*path, "variable"), f"sets of an unknown variable {group.variable!r}"
+        for _, sentence in variable_mistakes((Variable(group.variable, group.terms),)):
+            yield (*path, "terms"), f"sets: {sentence}"
+
+
+def _leaf_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
+    if not tree.leaves:
+        yield ("leaves",), "a tree needs at least one leaf"
+    classes = set(tree.classes)
+    for number, leaf in enumerate(tree.leaves, 1):
+        if leaf.label not in classes:
+            yield (
+                ("leaves", number - 1, "label"),
+                f"leaf {number}: no class {leaf.label!r}",
+            )
+        if leaf.support is not None and leaf.support < 0:
+            yield (
+                ("leaves", number - 1, "support"),
+                f"leaf {number}: the support cannot be below 0",
+            )
+
+
+def _node_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
+    terms = term_names(tree.variables)
+    sets = term_names(Variable(s.variable, s.terms) for s in tree.sets)
+    for number, node in enumerate(tree.nodes, 1):
+        path: Path = ("nodes", number - 1)
+        where = f"node {number}"
+        if node.variable not in terms:
+            yield (*path, "variable"), f"{where}: no variable {node.variable!r}"
+            continue
+        yield from _cut_mistakes(path, where, node)
+        for index, branch in enumerate(node.branches):
+            step = (*path, "branches", index)
+            clause = Clause(node.variable, branch.terms)
+            yield from clause_mistakes(step, where, clause, terms)
+            if branch.sets or tree.sets:
+                clause = Clause(node.variable, branch.sets)
+                yield from clause_mistakes(step, f"{where}, sets", clause, sets)
+            if (branch.node is None) == (branch.leaf is None):
+                yield step, f"{where}: a branch leads to one node or to one leaf"
+
+
+def _cut_mistakes(path: Path, where: str, node: Node) -> Iterator[Mistake]:
+    cuts = node.cuts
+    if not all(map(math.isfinite, cuts)) or any(
+        a >= b for a, b in itertools.pairwise(cuts)
+    ):
+        yield (*path, "cuts"), f"{where}: the cuts must be finite and increase"
+    if len(node.owners) != len(cuts) + 1:
+        yield (
+            (*path, "owners"),
+            f"{where}: {len(cuts)} cuts make {len(cuts) + 1} intervals, "
+            f"but {len(node.owners)} have an owner",
+        )
+    if any(a == b for a, b in itertools.pairwise(node.owners)):
+        yield (*path, "owners"), f"{where}: a cut lies within one branch"
+    if set(node.owners) != set(range(len(node.branches))):
+        yield (*path, "owners"), f"{where}: every branch must own an interval"
+    if len(node.branches) < 2:
+        yield (*path, "branches"), f"{where}: a node needs two branches"
+
+
+def _order_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
+    """Walk depth-first and expect nodes and leaves in the order of their numbers."""
+    nodes = leaves = 0
+    todo: list[Branch] = [
+        Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
+    ]
+    while todo:
+        branch = todo.pop()
+        if branch.leaf is not None:
+            leaves += 1
+            if branch.leaf != leaves:
+                yield (
+                    ("nodes",),
+                    f"leaf {branch.leaf} stands where leaf {leaves} should",
+                )
+                return
+        elif branch.node is not None:
+            nodes += 1
+            if branch.node != nodes or nodes > len(tree.nodes):
+                text = f"node {branch.node} stands where node {nodes} should"
+                yield ("nodes",), text
+                return
+            todo.extend(reversed(tree.nodes[nodes - 1].branches))
+    if nodes != len(tree.nodes) or leaves != len(tree.leaves):
+        yield (
+            ("nodes",),
+            f"the root reaches {nodes} of {len(tree.nodes)} nodes "
+            f"and {leaves} of {len(tree.leaves)} leaves",
+        )
+
+
+def intervals(node: Node) -> tuple[tuple[float | None, float | None], ...]:
+    """Return the open lower and closed upper end of each interval of a node."""
+    return tuple(zip((None, *node.cuts), (*node.cuts, None), strict=True))
+
+
+def _plateau_mistakes(tree: FuzzyTree) -> Iterator[Mistake]:
+    """Compare each branch's plateaus with its intervals: this makes rules = tree."""
+    shapes = shapes_of(tree.variables)
+    for number, node in enumerate(tree.nodes, 1):
+        owned: list[list[tuple[float | None, float | None]]]
+        owned = [[] for _ in node.branches]
+        for owner, interval in zip(node.owners, intervals(node), strict=True):
+            owned[owner].append(interval)
+        for index, branch in enumerate(node.branches):
+            found = [shapes[node.variable, name] for name in branch.terms]
+            plateaus = [(s.low, s.high) for s in found if isinstance(s, Band)]
+            if plateaus != owned[index]:
+                yield (
+                    ("nodes", number - 1, "branches", index, "terms"),
+                    f"node {number}: the plateaus of branch {index + 1} are not "
+                    "the intervals that it owns",
+                )

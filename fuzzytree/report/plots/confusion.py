@@ -1,0 +1,172 @@
+"""A confusion table as a picture: what was there, and what it was taken for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzytree.report.plots.labels import SIZE
+from fuzzytree.report.plots.saving import style
+from fuzzytree.report.plots.words import LINE, MARGIN, TITLE, WORD, Sheet, short
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    from matplotlib.figure import Figure
+
+    Counts = npt.NDArray[np.integer]
+
+MOST_CLASSES = 60
+"""The most classes in one picture."""
+
+RIGHT, WRONG = "#0072b2", "#c04d00"
+"""The colours of what was taken for itself, and for something else."""
+
+_THERE, _TAKEN = "what was there", "what it was taken for"
+_CELL = 0.46  # inches
+_LONGEST = 24  # letters of a name; what is longer is cut and ends in dots
+_GAP = 0.09
+_RATES = 0.62  # the column of rates
+_WORDS = 0.22  # the words that name a side
+_SLANT_DEG = 38.0  # of the names of columns
+_DARK = 0.55  # above this share of a row, letters are white
+
+
+def draw_confusion(
+    matrix: Counts,
+    classes: Sequence[str],
+    *,
+    title: str = "",
+    other: str = "none of them",
+) -> Figure:
+    """Draw how often each class was taken for each class, and the rate of each.
+
+    A row is a class that was there; it has the number of each class that it was taken
+    for, in a colour as strong as the number's share of the row. At the right stands
+    the share that was right, and in the corner below that of all.
+
+    Args:
+        matrix: Whole numbers of shape (classes, classes), or one column more for what
+            was taken for none of the classes.
+        classes: In the order of rows and columns.
+        title: Above the picture.
+        other: What the further column is called.
+
+    Returns:
+        A figure of its own, outside of any state of the library.
+
+    Raises:
+        ValueError: If the matrix is none of counts, or does not fit the classes.
+        MissingExtraError: If matplotlib is not installed.
+    """
+    counts = _checked(np.asarray(matrix), classes)
+    names = [short(name, _LONGEST) for name in classes]
+    heads = [*names, short(other, _LONGEST)][: counts.shape[1]]
+    with style():
+        sheet = Sheet()
+        left = MARGIN + _WORDS + max(map(sheet.width, names)) + _GAP
+        slant = math.radians(_SLANT_DEG)
+        long = max(map(sheet.width, heads))
+        top = MARGIN + (TITLE if title else 0.0) + long * math.sin(slant) + _GAP + 0.1
+        wide, high = (side * _CELL for side in counts.shape[::-1])
+        left = max(left, MARGIN + sheet.width(_TAKEN) - wide)
+        right = max(_RATES, long * math.cos(slant) - _CELL / 2.0) + MARGIN
+        least = sheet.width(title, SIZE + 3, bold=True) + 2.0 * MARGIN
+        width = max(left + wide + right, least)
+        sheet.resize(width, top + high + _CELL + MARGIN)
+        sheet.write_title(title)
+        _write_names(sheet, names, heads, left, top)
+        _draw_cells(sheet, counts, left, top)
+        _write_rates(sheet, counts, left + wide, top)
+    return sheet.figure
+
+
+def rate_text(right: int, total: int) -> str:
+    """Return a share as a picture shows it, in thousandths.
+
+    Example:
+        >>> rate_text(314, 350), rate_text(0, 0)
+        ('89.7 %', '-')
+    """
+    return f"{right / total * 100.0:.1f} %" if total else "-"
+
+
+def _checked(counts: Counts, classes: Sequence[str]) -> Counts:
+    number = len(classes)
+    if not 1 <= number <= MOST_CLASSES:
+        raise ValueError(f"a picture has 1 to {MOST_CLASSES} classes, not {number}")
+    if counts.shape not in ((number, number), (number, number + 1)):
+        raise ValueError(
+            f"a table of shape {counts.shape} does not fit {number} classes"
+        )
+    if counts.dtype.kind not in "iu" or bool((counts < 0).any()):
+        raise ValueError("a confusion table holds whole numbers of at least 0")
+    return counts
+
+
+def _write_names(
+    sheet: Sheet, names: Sequence[str], heads: Sequence[str], left: float, top: float
+) -> None:
+    high = len(names) * _CELL
+    for number, name in enumerate(names):
+        y = top + (number + 0.5) * _CELL
+        sheet.write(left - _GAP, y, name, colour=WORD, ha="right")
+    for number, head in enumerate(heads):
+        x = left + (number + 0.4) * _CELL
+        y = top - _GAP
+        sheet.write(x, y, head, colour=WORD, va="baseline", turn_deg=_SLANT_DEG)
+    middle, below = top + high / 2.0, top + high + _CELL / 2.0
+    sheet.write(MARGIN, middle, _THERE, ha="center", va="top", turn_deg=90.0)
+    sheet.write(left + len(heads) * _CELL, below, _TAKEN, ha="right")
+
+
+def _draw_cells(sheet: Sheet, counts: Counts, left: float, top: float) -> None:
+    from matplotlib.colors import to_rgb
+    from matplotlib.patches import Rectangle
+
+    totals = counts.sum(axis=1)
+    for (row, column), count in np.ndenumerate(counts):
+        share = float(count / totals[row]) if totals[row] else 0.0
+        ink = to_rgb(RIGHT if row == column else WRONG)
+        x, y = left + column * _CELL, top + row * _CELL
+        sheet.axes.add_patch(
+            Rectangle(
+                (x, y),
+                _CELL,
+                _CELL,
+                facecolor=[1.0 - share**0.7 * (1.0 - part) for part in ink],
+                edgecolor="#d0d7de",
+                linewidth=0.6,
+            )
+        )
+        if count:
+            colour = "white" if share > _DARK else WORD
+            middle = x + _CELL / 2.0, y + _CELL / 2.0
+            is_right = row == column
+            sheet.write(
+                *middle, f"{count:,}", colour=colour, bold=is_right, ha="center"
+            )
+    sheet.axes.add_patch(
+        Rectangle(
+            (left, top),
+            counts.shape[1] * _CELL,
+            counts.shape[0] * _CELL,
+            fill=False,
+            edgecolor=LINE,
+            linewidth=0.8,
+        )
+    )
+
+
+def _write_rates(sheet: Sheet, counts: Counts, left: float, top: float) -> None:
+    right = counts.diagonal()
+    totals = counts.sum(axis=1)
+    x = left + _RATES
+    for row, (good, total) in enumerate(zip(right, totals, strict=True)):
+        y = top + (row + 0.5) * _CELL
+        sheet.write(x, y, rate_text(int(good), int(total)), colour=WORD, ha="right")
+    whole = rate_text(int(right.sum()), int(totals.sum()))
+    y = top + (len(counts) + 0.5) * _CELL
+    sheet.write(x, y, whole, colour="black", bold=True, ha="right")

@@ -1,0 +1,1 @@
+"""What a model means: evaluation, programs, conversion and simplification."""

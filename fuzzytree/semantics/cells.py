@@ -1,0 +1,129 @@
+"""The crisp cells of a tree: every input decides like one of finitely many points.
+
+The cuts on a variable part its axis into intervals, open below and closed above, and
+the tree decides alike on all of an interval. Taking the axes as free coordinates, a
+product of intervals is a cell; what holds on one point of each cell, and on each edge
+and the floats beside it, holds on every input.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, TypeVar
+
+from msgspec.structs import replace
+
+from fuzzytree.model.rulebase import Clause, RuleBase, Variable, shapes_of
+from fuzzytree.model.tree import FuzzyTree, Node
+from fuzzytree.semantics.reference import clause_degree
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+_Model = TypeVar("_Model", bound=FuzzyTree | RuleBase)
+
+
+def free_axes(model: _Model) -> _Model:
+    """Return a model whose combinations are inputs of their own.
+
+    The inputs that only combinations need are left out, so that a row of the new
+    model is a point on the axes that the old one asks.
+    """
+    asked = {variable.name for variable in model.variables if variable.terms}
+    variables = tuple(
+        Variable(v.name, v.terms, v.unit, v.low, v.high)
+        for v in model.variables
+        if v.name in asked
+    )
+    return replace(model, variables=variables, columns=())
+
+
+def cuts_by_variable(tree: FuzzyTree) -> dict[str, tuple[float, ...]]:
+    """Return all cuts on each variable that a node asks, in ascending order."""
+    cuts: dict[str, set[float]] = {}
+    for node in tree.nodes:
+        cuts.setdefault(node.variable, set()).update(node.cuts)
+    return {name: tuple(sorted(values)) for name, values in cuts.items()}
+
+
+def axis_points(tree: FuzzyTree) -> dict[str, tuple[float, ...]]:
+    """Return, for each variable that a node asks, the points that tell all about it.
+
+    They are each cut and the two floats beside it, a point inside each interval, and
+    one far beyond either end.
+    """
+    return {
+        name: tuple(_points(list(cuts)))
+        for name, cuts in cuts_by_variable(tree).items()
+    }
+
+
+def cell_count(tree: FuzzyTree) -> int:
+    """Return the number of cells: the product of the numbers of intervals."""
+    return math.prod(len(cuts) + 1 for cuts in cuts_by_variable(tree).values())
+
+
+def grid_size(tree: FuzzyTree) -> int:
+    """Return the number of points that `grid` yields in all."""
+    return math.prod(len(points) for points in axis_points(tree).values())
+
+
+def grid(tree: FuzzyTree, *, chunk: int = 1 << 16) -> Iterator[FloatArray]:
+    """Yield all combinations of the axes' points for the tree with free axes.
+
+    Yields:
+        Arrays of shape (axes, at most `chunk`), rows in the order of the inputs of
+        `free_axes(tree)`.
+    """
+    import numpy as np
+
+    points = axis_points(tree)
+    axes = [np.array(points.get(name, (0.0,))) for name in free_axes(tree).inputs]
+    sizes = tuple(axis.size for axis in axes)
+    total = math.prod(sizes)
+    for start in range(0, total, chunk):
+        flat = np.arange(start, min(start + chunk, total))
+        where = np.unravel_index(flat, sizes) if sizes else ()
+        columns = [axis[index] for axis, index in zip(axes, where, strict=True)]
+        yield np.array(columns).reshape(len(axes), flat.size)
+
+
+def node_faults(tree: FuzzyTree) -> Iterator[str]:
+    """Yield each point of each node where its terms do not say what its cuts say.
+
+    At every point of the node's axis the branch that owns it must have degree exactly
+    1 and every other branch less. With `fuzzytree.semantics.lowering`'s argument this
+    proves that the relative rules equal the tree on every input.
+    """
+    shapes = shapes_of(tree.variables)
+    for number, node in enumerate(tree.nodes, 1):
+        clauses = [Clause(node.variable, branch.terms) for branch in node.branches]
+        for point in node_points(node):
+            owner = node.owners[sum(1 for cut in node.cuts if point > cut)]
+            for index, clause in enumerate(clauses):
+                found = clause_degree(clause, shapes, point)
+                if (found == 1.0) != (index == owner):
+                    yield (
+                        f"node {number}: at {node.variable} = {point!r} branch "
+                        f"{index + 1} has degree {found!r}, and branch {owner + 1} "
+                        "owns the point"
+                    )
+
+
+def node_points(node: Node) -> tuple[float, ...]:
+    """Return the points that tell all about one node's axis."""
+    return tuple(_points(list(node.cuts)))
+
+
+def _points(cuts: list[float]) -> Iterator[float]:
+    seen: set[float] = set()
+    inner = [a + (b - a) / 2 for a, b in itertools.pairwise(cuts)]
+    reach = max(abs(cuts[0]), abs(cuts[-1]), cuts[-1] - cuts[0], 1e-300)
+    ends = [cuts[0] - reach, cuts[-1] + reach]
+    near = [math.nextafter(cut, end) for cut in cuts for end in (-math.inf, math.inf)]
+    for point in sorted([*cuts, *inner, *ends, *near]):
+        if point not in seen and math.isfinite(point):
+            seen.add(point)
+            yield point

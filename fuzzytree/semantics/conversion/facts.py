@@ -1,0 +1,515 @@
+"""The way back: which rule base a system stands for, if it stands for one.
+
+A file of a format for control holds the curves and rules of a system, and in a comment
+the *facts*: what it has no place for. The two make a rule base again, and only if
+`as_system` would make that very system of it. So nothing in a comment can change what
+the rules of the file say.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from fuzzytree.errors import FuzzyTreeError
+from fuzzytree.model.rulebase import (
+    Clause,
+    Kind,
+    Part,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Value,
+    Variable,
+)
+from fuzzytree.model.system import (
+    Activation,
+    And,
+    Condition,
+    FuzzySystem,
+    Is,
+    Not,
+    Or,
+    RuleBlock,
+    questions,
+)
+from fuzzytree.semantics.conversion.scores import Always, Scores, as_system, flattened
+from fuzzytree.semantics.conversion.shapes import shape_of
+
+_UNSAFE = {character: f"\\u{ord(character):04x}" for character in "*/<>&#%'`$\x7f"}
+
+FACTS: Final = "rules of fuzzytree: "
+"""What a comment with facts begins with, in formats whose comments are text."""
+
+_MOST = 4 * 2**20  # bytes of facts
+
+
+class _Named(Value, frozen=True):
+    """A variable without its curves."""
+
+    name: str
+    terms: tuple[str, ...]
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    parts: tuple[Part, ...] = ()
+
+
+class _Facts(Value, frozen=True):
+    """A rule base without its curves, and how it became a system.
+
+    Clauses are (place of the variable, places of its terms, whether it is negated);
+    rules are (places of the clauses, place of the class, support).
+    """
+
+    fuzzytree: int
+    scores: Scores
+    always: Always
+    name: str
+    kind: Kind | None
+    classes: tuple[str, ...]
+    columns: tuple[str, ...]
+    semantics: Semantics
+    variables: tuple[_Named, ...]
+    clauses: tuple[tuple[int, tuple[int, ...], bool], ...]
+    rules: tuple[tuple[tuple[int, ...], int, int | None], ...]
+
+
+def facts_of(
+    rules: RuleBase, scores: Scores = "rule", *, always: Always = "nothing"
+) -> str:
+    """Return one line of JSON with what a file for control has no place for.
+
+    It is ASCII, and holds no `*`, `/`, `<`, `>`, `#`, `%` and no two `-` in a row: so
+    it can stand in a comment of any format.
+
+    Args:
+        rules: The rule base.
+        scores: As given to `as_system`.
+        always: As given to `as_system`.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0))
+        >>> as_rules(as_system(rules), facts_of(rules)) == rules
+        True
+    """
+    places = {
+        v.name: (k, {term.name: n for n, term in enumerate(v.terms)})
+        for k, v in enumerate(rules.variables)
+    }
+    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
+    number = {clause: k for k, clause in enumerate(clauses)}
+    labels = {name: k for k, name in enumerate(rules.classes)}
+    facts = _Facts(
+        fuzzytree=1,
+        scores=scores,
+        always=always,
+        name=rules.name,
+        kind=rules.kind,
+        classes=rules.classes,
+        columns=rules.columns,
+        semantics=rules.semantics,
+        variables=tuple(
+            _Named(
+                v.name, tuple(t.name for t in v.terms), v.unit, v.low, v.high, v.parts
+            )
+            for v in rules.variables
+        ),
+        clauses=tuple(
+            (
+                places[clause.variable][0],
+                tuple(places[clause.variable][1][term] for term in clause.terms),
+                clause.negated,
+            )
+            for clause in clauses
+        ),
+        rules=tuple(
+            (tuple(number[c] for c in rule.when), labels[rule.then], rule.support)
+            for rule in rules.rules
+        ),
+    )
+    text = json.dumps(msgspec.to_builtins(facts), separators=(",", ":"))
+    for character, escape in _UNSAFE.items():
+        text = text.replace(character, escape)
+    return text.replace("--", "-\\u002d")
+
+
+def as_rules(system: FuzzySystem, facts: str | None = None) -> RuleBase | None:
+    """Return the rule base that a system stands for, or None.
+
+    The names of the system may be others than those of the facts: what belongs
+    together stands at the same place. Names of people, units and ranges are those of
+    the facts; curves, conditions and conclusions must be the system's.
+
+    Args:
+        system: A system, such as one that was read.
+        facts: The line that `facts_of` made; None recognises systems of the form
+            `winner`, with the defaults for what a system does not say.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0))
+        >>> as_rules(as_system(rules, "winner")).rules[0].then
+        'class 1'
+        >>> as_rules(as_system(rules)) is None
+        True
+    """
+    if facts is None:
+        return _recognised(system)
+    system, _ = flattened(system)
+    try:
+        found = _decoded(facts)
+    except (msgspec.DecodeError, UnicodeEncodeError, RecursionError):
+        return None
+    if found is None or not _may_fit(system, found):
+        return None
+    places = _places(found)
+    curves = _shapes(system, [len(found.variables[place].terms) for place in places])
+    if curves is None:
+        return None
+    try:
+        rules = _rules(found, dict(zip(places, curves, strict=True)))
+        expected, _ = flattened(as_system(rules, found.scores, always=found.always))
+    except (FuzzyTreeError, IndexError, ValueError):
+        return None
+    is_winner = found.scores == "winner"
+    given, wanted = (_plain(one, has_default=is_winner) for one in (system, expected))
+    return rules if given == wanted else None
+
+
+def as_written(
+    system: FuzzySystem, comments: Iterable[str]
+) -> tuple[RuleBase | FuzzySystem, str | None]:
+    """Return the rule base that a file was made of, and its facts, or the system.
+
+    Args:
+        system: The system of the file.
+        comments: Its comments; the first that begins with `FACTS` counts.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0))
+        >>> as_written(as_system(rules), [FACTS + facts_of(rules)])[0] == rules
+        True
+    """
+    every = (comment.strip() for comment in comments)
+    facts = next(
+        (one.removeprefix(FACTS) for one in every if one.startswith(FACTS)), None
+    )
+    rules = None if facts is None else as_rules(system, facts)
+    return (system, None) if rules is None else (rules, facts)
+
+
+def numbers_of(facts: str) -> tuple[int, ...]:
+    """Return for each rule of a rule base the place of the system's rule that holds it.
+
+    Args:
+        facts: A line that `as_rules` took.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0, leaves=2))
+        >>> numbers_of(facts_of(rules)), numbers_of(facts_of(rules, "winner"))
+        ((1, 2), (0, 1))
+    """
+    found = _decoded(facts)
+    if found is None:
+        return ()
+    labels = [label for _, label, _ in found.rules]
+    if found.scores == "class":  # behind the rule that always holds, one for each class
+        used = sorted(set(labels))
+        return tuple(1 + used.index(label) for label in labels)
+    first = 0 if found.scores == "winner" else 1
+    return tuple(range(first, first + len(labels)))
+
+
+def places_of(facts: str) -> tuple[int | None, ...]:
+    """Return for each variable of a rule base the place of the file's input, if any.
+
+    Args:
+        facts: A line that `as_rules` took.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0, leaves=2, combinations=1.0))
+        >>> places_of(facts_of(rules))
+        (None, None, None, 0)
+    """
+    found = _decoded(facts)
+    if found is None:
+        return ()
+    places = {place: k for k, place in enumerate(_places(found))}
+    return tuple(places.get(place) for place in range(len(found.variables)))
+
+
+def _decoded(facts: str) -> _Facts | None:
+    data = facts.encode()
+    if len(data) > _MOST:
+        return None
+    found = msgspec.json.decode(data, type=_Facts)
+    return found if found.fuzzytree == 1 else None
+
+
+def _may_fit(system: FuzzySystem, facts: _Facts) -> bool:
+    """Return whether facts are as large as the system, before anything is made of them.
+
+    Facts name a clause by its place, so that few bytes could stand for very much.
+    """
+    sizes = [len(terms) for _, terms, _ in facts.clauses]
+    asked = 0
+    for clauses, place, _ in facts.rules:
+        if not 0 <= place < len(facts.classes):
+            return False
+        if not all(0 <= k < len(sizes) for k in clauses):
+            return False
+        asked += sum(sizes[k] for k in clauses) if clauses else 1
+    if len(_places(facts)) != len(system.inputs):
+        return False
+    found = sum(1 for rule in system.rules for _ in questions(rule.when))
+    return asked <= found + 2 * len(facts.rules) + 1
+
+
+def _shapes(system: FuzzySystem, counts: Sequence[int]) -> list[list[Term]] | None:
+    """Return the curves of each input's first labels, as terms, if all are shapes."""
+    found: list[list[Term]] = []
+    for one, count in zip(system.inputs, counts, strict=True):
+        terms: list[Term] = []
+        for label in one.labels[:count]:
+            shape = shape_of(label.curve)
+            if shape is None or label.height != 1.0:
+                return None
+            terms.append(Term(label.name, shape))
+        if len(terms) < count or one.clips:
+            return None
+        found.append(terms)
+    return found
+
+
+def _places(facts: _Facts) -> list[int]:
+    """Return which variables a file has: not those that serve for sums alone."""
+    summed = {part.input for one in facts.variables for part in one.parts}
+    return [
+        place
+        for place, one in enumerate(facts.variables)
+        if one.terms or one.name not in summed
+    ]
+
+
+def _rules(facts: _Facts, curves: Mapping[int, Sequence[Term]]) -> RuleBase:
+    variables = tuple(
+        Variable(
+            v.name,
+            tuple(
+                Term(name, term.shape)
+                for name, term in zip(v.terms, curves.get(place, ()), strict=True)
+            ),
+            v.unit,
+            v.low,
+            v.high,
+            v.parts,
+        )
+        for place, v in enumerate(facts.variables)
+    )
+    clauses = [
+        Clause(
+            variables[_place(place)].name,
+            tuple(variables[place].terms[_place(k)].name for k in terms),
+            negated,
+        )
+        for place, terms, negated in facts.clauses
+    ]
+    rules = tuple(
+        Rule(tuple(clauses[k] for k in places), facts.classes[label], support)
+        for places, label, support in facts.rules
+    )
+    return RuleBase(
+        facts.name,
+        facts.classes,
+        variables,
+        rules,
+        facts.semantics,
+        facts.kind,
+        facts.columns,
+    )
+
+
+def _place(place: int) -> int:
+    if place < 0:
+        raise IndexError(place)
+    return place
+
+
+def _recognised(system: FuzzySystem) -> RuleBase | None:
+    """Return the rule base of a system of the form `winner`."""
+    if len(system.outputs) != 1 or len(system.blocks) != 1:
+        return None
+    output, block = system.outputs[0], system.blocks[0]
+    default = output.default
+    is_number = default is None or default in range(1, len(output.labels) + 1)
+    curves = _shapes(system, [len(one.labels) for one in system.inputs])
+    if not is_number or curves is None:
+        return None
+    classes = tuple(label.name for label in output.labels)
+    variables = tuple(
+        Variable(one.name, tuple(terms), one.unit, one.low, one.high, one.parts)
+        for one, terms in zip(system.inputs, curves, strict=True)
+    )
+    is_product = block.conjunction == "product" and any(
+        isinstance(rule.when, And) for rule in block.rules
+    )
+    uncovered = None if default is None else classes[int(default) - 1]
+    semantics = Semantics("product" if is_product else "min", uncovered)
+    try:
+        rules = tuple(
+            Rule(tuple(_clauses(rule.when)), rule.then[0].label) for rule in block.rules
+        )
+        found = RuleBase(system.name, classes, variables, rules, semantics)
+        expected = as_system(found, "winner")
+    except (FuzzyTreeError, LookupError, ValueError):
+        return None
+    given, wanted = (_plain(one, has_default=True) for one in (system, expected))
+    return found if given == wanted else None
+
+
+def _clauses(condition: Condition | None) -> Iterator[Clause]:
+    """Yield the clauses of a condition, from left to right.
+
+    What is no AND of clauses gives others than were asked for, or raises LookupError.
+    """
+    match condition:
+        case None:
+            return
+        case And(parts=parts):
+            for part in parts:
+                yield from _clauses(part)
+        case Is(variable=variable, label=str(label), hedges=() | ("not",) as hedges):
+            yield Clause(variable, (label,), bool(hedges))
+        case Not(part=part):
+            (whole,) = _clauses(part)
+            yield replace(whole, negated=not whole.negated)
+        case Or(parts=parts):
+            inner = [clause for part in parts for clause in _clauses(part)]
+            terms = tuple(term for clause in inner for term in clause.terms)
+            yield Clause(inner[0].variable, terms)
+        case _:
+            raise LookupError
+
+
+def _plain(system: FuzzySystem, *, has_default: bool) -> object:
+    """Return what must be alike in two systems for them to be one, up to names.
+
+    Names become places. Ranges, units, notes, and operators that no rule uses cannot
+    change an answer. As no label is concluded by two rules that are activated at a
+    time, an aggregation changes nothing.
+
+    Args:
+        system: The system.
+        has_default: Whether a default can answer; of scores some rule always fires.
+    """
+    places = {one.name: k for k, one in enumerate(system.variables)}
+    labels = {
+        one.name: {label.name: k for k, label in enumerate(one.labels)}
+        for one in system.variables
+    }
+    inputs = [
+        ([(shape_of(label.curve), label.height) for label in one.labels], one.clips)
+        for one in system.inputs
+    ]
+    outputs = [
+        (
+            [(label.curve, label.height) for label in one.labels],
+            one.defuzzifier.method,
+            one.default if has_default else None,
+            (one.low, one.high) if one.clips else None,
+        )
+        for one in system.outputs
+    ]
+    blocks: list[object] = []
+    for block in system.blocks:
+        flat = _Flat(block, places, labels)
+        rules = [
+            (
+                flat.condition(rule.when),
+                [
+                    (places[c.output], labels[c.output][c.label], c.hedges)
+                    for c in rule.then
+                ],
+                rule.weight,
+            )
+            for rule in block.rules
+        ]
+        blocks.append((rules, sorted(flat.used), _activation(block.activation)))
+    return inputs, outputs, blocks
+
+
+class _Flat:
+    """Conditions of a block as nested tuples, with places for names.
+
+    An AND within an AND is one AND where that gives the same bits: under minimum
+    everywhere, under any norm at its beginning. The same holds for OR.
+    """
+
+    def __init__(
+        self,
+        block: RuleBlock,
+        places: Mapping[str, int],
+        labels: Mapping[str, Mapping[str, int]],
+    ) -> None:
+        self.block, self.places, self.labels = block, places, labels
+        self.used: set[str] = set()
+
+    def condition(self, one: Condition | None) -> tuple[object, ...]:
+        match one:
+            case None:
+                return ()
+            case Is(variable=variable, label=label, hedges=hedges):
+                place = None if label is None else self.labels[variable][label]
+                return ("is", self.places[variable], place, hedges)
+            case Not(part=Is() as part):
+                return self.condition(replace(part, hedges=("not", *part.hedges)))
+            case Not(part=part):
+                return ("not", self.condition(part))
+            case And(parts=parts):
+                return self._joined("and", parts, self.block.conjunction)
+            case Or(parts=parts):
+                return self._joined("or", parts, self.block.disjunction)
+
+    def _joined(
+        self, word: str, parts: tuple[Condition, ...], norm: str | None
+    ) -> tuple[object, ...]:
+        found: list[object] = []
+        for position, part in enumerate(parts):
+            flat = self.condition(part)
+            is_same = norm in ("minimum", "maximum") or position == 0
+            if is_same and flat[:1] == (word,):
+                found += flat[1:]
+            else:
+                found.append(flat)
+        if len(parts) == 1:
+            return self.condition(parts[0])
+        if norm in ("minimum", "maximum"):
+            found.sort(key=repr)  # in any order they give the same bits
+        self.used.add(f"{word} {norm}")
+        return (word, *found)
+
+
+def _activation(activation: Activation) -> object:
+    """Return what matters of an activation."""
+    match activation.method:
+        case "general" | "proportional":
+            return activation.method
+        case "highest" | "lowest":
+            return activation.method, activation.count
+        case _:
+            return activation

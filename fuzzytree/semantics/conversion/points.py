@@ -1,0 +1,326 @@
+"""Points in the place of the curves that a format lacks, with certified bounds.
+
+Shapes of rule bases are placed by `fuzzytree.numerics.placing`; trapezoids, singletons
+and steps are points already (`fuzzytree.semantics.conversion.shapes`). The other curves
+are cut into *pieces*, and points are put on each of them, as far apart as the tolerance
+allows:
+
+- On a piece that bends to one side only, the curve lies between its chord and its
+  tangents. With tangents at both ends and in the middle, the chord is furthest from the
+  outermost of them where two tangents meet. (An upright tangent meets at its own end.)
+- Products and differences of sigmoids bend as they like. There a chord is at most
+  `max |f''| h^2 / 8` away, and f'' is enclosed over the stretch by interval arithmetic
+  of the sigmoids' own derivatives, whose extremes are known.
+- Where a curve goes on for ever towards 0 or 1, the outermost point stands where it is
+  as near as the tolerance; the degree stays what it is there.
+
+`_slack` covers rounding: degrees and slopes are good to a few units of 2^-52 times what
+their exponents amplify, and where pieces meet at a rounded place, the few doubles of
+another bend change a chord by no more than the curve's steepness times their width.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, TypeVar
+
+from msgspec.structs import replace
+
+from fuzzytree.errors import LossError
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import MOST_POINTS, Band, Points, RuleBase, Term
+from fuzzytree.model.system import Curve, FuzzySystem, Label
+from fuzzytree.numerics.curves import BELOW_ONE
+from fuzzytree.numerics.placing import points_of
+from fuzzytree.semantics.conversion.bends import plan_of
+from fuzzytree.semantics.conversion.pieces import Piece, Plan
+from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.inference.curves import curve_degree
+
+EXACT = 2.0**-52
+"""Bounds up to this are no loss: rounding alone makes as much."""
+
+_MOST_STUCK = 16  # neighbouring doubles on one piece
+_ROUNDING = 1.0 + 2.0**-40
+_TOO_COARSE = "doubles around it are too coarse"
+_TOO_MANY = f"it would need more than {MOST_POINTS} points"
+
+D = TypeVar("D", RuleBase, FuzzySystem)
+
+
+def pointed(
+    document: D, tolerance: float, *, allowed: tuple[type, ...] = ()
+) -> tuple[D, tuple[Loss, ...]]:
+    """Return a document whose curves are points, and how far each can be off.
+
+    Of a system all terms of inputs and of outputs that are no weighted numbers change.
+    The bound is of the degree, at any real value of the axis.
+
+    Args:
+        document: A rule base or a system.
+        tolerance: The largest difference of a degree that is allowed; above 0 and
+            below 1.
+        allowed: Classes of curves that stay as they are, beside `Points`.
+
+    Returns:
+        The document, and a loss for each curve whose points are further off than
+        2^-52.
+
+    Raises:
+        ValueError: If the tolerance is not above 0 and below 1.
+        LossError: If a curve would need more than 4096 points, doubles around it are
+            too coarse, or it is a formula.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules, losses = pointed(rules_from_tree(random_tree(0), "raw"), 1e-3)
+        >>> all(0.0 < loss.bound <= 1e-3 for loss in losses)
+        True
+    """
+    check_tolerance(tolerance)
+    change: _Change = _Change(tolerance, (Points, *allowed))
+    found: D = (
+        _pointed_rules(document, change)
+        if isinstance(document, RuleBase)
+        else _pointed_system(document, change)
+    )
+    if change.reasons:
+        head = f"cannot write the curves of {document.name} as points:"
+        raise LossError("\n  ".join([head, *change.reasons]))
+    return found, tuple(change.losses)
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Refuse a tolerance that no degree can be held to, or that allows every degree.
+
+    Raises:
+        ValueError: If it is not above 0 and below 1.
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise ValueError(
+            f"tolerance: must be above 0 and below 1, such as 1e-3, not {tolerance!r}"
+        )
+
+
+def _pointed_rules(rules: RuleBase, change: _Change) -> RuleBase:
+    variables = tuple(
+        replace(v, terms=tuple(change.term(v.name, term) for term in v.terms))
+        for v in rules.variables
+    )
+    return replace(rules, variables=variables)
+
+
+def _pointed_system(system: FuzzySystem, change: _Change) -> FuzzySystem:
+    inputs = tuple(
+        replace(one, labels=tuple(change.label(one.name, x) for x in one.labels))
+        for one in system.inputs
+    )
+    outputs = tuple(
+        one
+        if one.defuzzifier.is_weighted
+        else replace(one, labels=tuple(change.label(one.name, x) for x in one.labels))
+        for one in system.outputs
+    )
+    return replace(system, inputs=inputs, outputs=outputs)
+
+
+class _Change:
+    """Changes curves, and remembers what was lost and what cannot be done."""
+
+    def __init__(self, tolerance: float, allowed: tuple[type, ...]) -> None:
+        self.tolerance, self.allowed = tolerance, allowed
+        self.losses: list[Loss] = []
+        self.reasons: list[str] = []
+
+    def term(self, variable: str, term: Term) -> Term:
+        found = self._curve(variable, term.name, term.shape)
+        return Term(term.name, found) if isinstance(found, Points) else term
+
+    def label(self, variable: str, label: Label) -> Label:
+        found = self._curve(variable, label.name, label.curve)
+        return replace(label, curve=found)
+
+    def _curve(self, variable: str, name: str, curve: Curve) -> Curve:
+        if isinstance(curve, self.allowed):
+            return curve
+        where = f"term {name!r} of {variable!r}"
+        try:
+            found = points_for(curve, self.tolerance)
+        except LossError as error:
+            self.reasons.append(f"{where}: {error}")
+            return curve
+        if found.bound > EXACT:
+            count = len(found.points.values)
+            tail = f"; {found.tail}" if found.tail else ""
+            what = f"it becomes {count} points joined by lines{tail}"
+            self.losses.append(Loss(where, what, found.bound))
+        return found.points
+
+
+class Found(NamedTuple):
+    """Points in the place of a curve.
+
+    Attributes:
+        points: The points.
+        bound: The largest difference of a degree.
+        tail: What becomes of a tail without end, if it has one.
+    """
+
+    points: Points
+    bound: float
+    tail: str = ""
+
+
+def points_for(curve: Curve, tolerance: float) -> Found:
+    """Return points in the place of a curve, and how far they can be off.
+
+    Args:
+        curve: The curve.
+        tolerance: The largest difference of a degree; above 0 and below 1.
+
+    Raises:
+        ValueError: If the tolerance is not above 0 and below 1.
+        LossError: If no points are that close, or a curve has no degrees of its own.
+
+    Example:
+        >>> from fuzzytree.model.system import Gaussian
+        >>> found = points_for(Gaussian(0.0, 1.0), 0.01)
+        >>> len(found.points.values), found.bound <= 0.01
+        (15, True)
+    """
+    check_tolerance(tolerance)
+    tolerance = min(tolerance, 0.5)  # half of all degrees: no plan needs more
+    shape = shape_of(curve)
+    if isinstance(shape, Points):
+        return Found(shape, 0.0)
+    if shape is not None:
+        straight = straight_points(shape) if isinstance(shape, Band) else None
+        return Found(*(straight or points_of(shape, tolerance)))
+    return _placed(curve, plan_of(curve, tolerance), tolerance)
+
+
+def straight_points(band: Band) -> tuple[Points, float] | None:
+    """Return the points of a band whose flanks are straight, and how far they are off.
+
+    A flank `q c0` that starts at the plateau's end or outside of it is a line up to
+    its start and constant from there on. Only where c0 is 1 is it held below 1, by
+    2^-53.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Flank
+        >>> straight_points(Band(high=1.0, right=Flank(1.0, 2.0)))[0].values
+        (1.0, 1.0, 2.0)
+    """
+    points: list[tuple[float, float]] = []
+    bound = 0.0
+    for edge, flank, sign in ((band.low, band.left, -1), (band.high, band.right, 1)):
+        if edge is None:
+            continue
+        half = [(edge, 0.0), (edge, 1.0)]
+        if flank is not None:
+            height = flank.curve[0]
+            is_outside = (flank.start - edge) * sign >= 0.0
+            if len(flank.curve) > 1 or not 0.0 <= height <= 1.0 or not is_outside:
+                return None
+            bound = max(bound, 2.0**-53 if height == 1.0 else 0.0)
+            height = min(height, BELOW_ONE)
+            half = [
+                (flank.end, 0.0),
+                (flank.start, height),
+                (edge, height),
+                (edge, 1.0),
+            ]
+            if flank.start == edge:
+                del half[2]
+        points += half if sign < 0 else reversed(half)
+    if not points:
+        points = [(0.0, 1.0)]
+    values, degrees = zip(*points, strict=True)
+    if not all(map(math.isfinite, (b - a for a, b in itertools.pairwise(values)))):
+        return None
+    return Points(values, degrees), bound
+
+
+def _placed(curve: Curve, plan: Plan, tolerance: float) -> Found:
+    """Return points along the pieces of a curve."""
+    room = (tolerance - plan.slack) / _ROUNDING
+    if not room > plan.tail:
+        raise LossError(_TOO_COARSE)
+    points: list[tuple[float, float]] = []
+    worst = plan.tail
+    for part in plan.parts:
+        if isinstance(part, Piece):
+            if not points or points[-1][0] != part.start:
+                points.append((part.start, curve_degree(curve, part.start)))
+            for place, error in _march(part, room, MOST_POINTS - len(points)):
+                points.append((place, curve_degree(curve, place)))
+                worst = max(worst, error)
+        elif not points or points[-1] != part:
+            points.append(part)
+    if not points:
+        raise LossError(_TOO_COARSE)
+    if plan.first is not None:
+        points[0] = (points[0][0], plan.first)
+    if plan.last is not None:
+        points[-1] = (points[-1][0], plan.last)
+    if len(points) > MOST_POINTS:
+        raise LossError(_TOO_MANY)
+    values, degrees = zip(*points, strict=True)
+    if not all(map(math.isfinite, values)) or math.isinf(values[-1] - values[0]):
+        raise LossError("it reaches beyond the largest double")
+    bound = worst * _ROUNDING + plan.slack
+    return Found(Points(values, degrees), bound, _tail_text(degrees, plan))
+
+
+def _tail_text(degrees: Sequence[float], plan: Plan) -> str:
+    if plan.tail == 0.0:
+        return ""
+    return f"before them it stays at {degrees[0]:.2g}, after them at {degrees[-1]:.2g}"
+
+
+def _march(piece: Piece, room: float, most: int) -> Iterator[tuple[float, float]]:
+    """Yield where the next point of a piece stands, and the error before it."""
+    place, end = piece.start, piece.end
+    stuck = 0
+    while place < end:
+        most -= 1
+        if most < 0:
+            raise LossError(_TOO_MANY)
+        before = place
+        place, error = _furthest(piece.error, place, end, room)
+        stuck += place == math.nextafter(before, math.inf)
+        if stuck > _MOST_STUCK:
+            raise LossError(_TOO_COARSE)
+        yield place, error
+
+
+def _furthest(
+    error: Callable[[float, float], float],
+    start: float,
+    end: float,
+    room: float,
+) -> tuple[float, float]:
+    """Return the furthest place up to which one chord is near enough, and its error."""
+    whole = error(start, end)
+    if whole <= room:
+        return end, whole
+    good, bad = start, end
+    found = math.inf
+    for _ in range(1100):  # halving reaches any double
+        middle = good + (bad - good) / 2
+        if not good < middle < bad:
+            break
+        here = error(start, middle)
+        if here <= room:
+            good, found = middle, here
+        else:
+            bad = middle
+        if found < math.inf and bad - good <= (good - start) * 2.0**-6:
+            break
+    if good == start:
+        following = math.nextafter(start, math.inf)
+        return following, 0.0  # no double lies between
+    return good, found

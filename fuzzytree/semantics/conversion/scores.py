@@ -1,0 +1,428 @@
+"""Rule bases in the form that formats for control know: outputs that are numbers.
+
+Three ways, `scores`:
+
+- `winner`: one output, the number of the class of the first strongest rule, from 1.
+  Of all rules only the highest is activated. Exactly the decision of the rule base.
+- `rule`: for targets that activate all rules and sum. One output per rule. A rule that
+  always holds says that all scores are `absent` (0), rule k that score k is `present`
+  (1); the weighted average of the two is `w / (1 + w)` for a strength w. The highest
+  score wins, the first of equals; the strength is `w = s / (1 - s)`. All scores are 0
+  where no rule fires.
+- `class`: one output per class, with the strength of its strongest rule (an OR of their
+  conditions) in the place of w. Equal classes are decided by the order of the classes.
+
+**What rounding does to scores.** The computed `s = w / (1 + w)` has two roundings, each
+of a relative error of at most u = 2^-53. So with w < w' a computed s' can be equal to s
+or below it only if the true scores are within `4 u` of each other, relatively. As
+`d log s = d log w / (1 + w)` and w is at most 1, the strengths are then within
+`8 u = 2^-50`: strengths that differ by a larger share never change their order. Equal
+strengths have equal scores, so that the first of them wins as before.
+
+**Relative rules stay exact.** The winner has strength 1, so its score is exactly 1/2.
+Let another have `w = 1 - k u`. `1 + w = 2 - k u` is a double for an even k, and for an
+odd one it is rounded to `2 - (k - 1) u` or `2 - (k + 1) u`. The quotient is at most
+`(1 - k u) / (2 - (k + 1) u)`, which is `1/2 - (k - 1) u / (4 - 2 (k + 1) u)`, at most
+`1/2 - u / 2` for k >= 3; for k = 2 it is `(1 - 2 u) / (2 - 2 u)`, less than
+`1/2 - u / 2`; for k = 1 the sum is rounded to the even 2, and the quotient is
+`1/2 - u / 2`. That is the double before 1/2, so every other score is below 1/2.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
+
+from msgspec.structs import replace
+
+from fuzzytree.errors import LossError
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.naming import unlike
+from fuzzytree.model.rulebase import Clause, Points, RuleBase, Variable
+from fuzzytree.model.system import (
+    Activation,
+    And,
+    Conclusion,
+    Condition,
+    Defuzzifier,
+    Formula,
+    FuzzySystem,
+    Is,
+    Label,
+    Linear,
+    Not,
+    Or,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+    questions,
+)
+
+Scores = Literal["rule", "class", "winner"]
+"""What the outputs of a system say about a rule base."""
+
+Always = Literal["nothing", "any", "term"]
+"""What a rule without clauses asks: nothing; `input is any`; or whether the input is a
+term of degree 1 everywhere. The input is the first that is not for sums alone."""
+
+_AVERAGE = Defuzzifier("weighted average")
+_EVERYWHERE = Points((0.0,), (1.0,))
+
+
+def as_system(
+    rules: RuleBase, scores: Scores = "rule", *, always: Always = "nothing"
+) -> FuzzySystem:
+    """Return a rule base as a system with numeric outputs.
+
+    `fuzzytree.semantics.conversion.scores` says what the outputs mean. A clause with
+    several terms becomes an OR of one variable, joined by maximum. A negated one
+    becomes `is not`, which under min is asked of each of its terms; under product it is
+    a NOT of the OR.
+
+    Args:
+        rules: The rule base.
+        scores: What the outputs say.
+        always: What a rule without clauses asks.
+
+    Raises:
+        LossError: If a rule without clauses must ask an input and there is none.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0, leaves=2))
+        >>> [output.name for output in as_system(rules, "rule").outputs]
+        ['score 1 class 1', 'score 2 class 1']
+    """
+    inputs = tuple(map(_input, rules.variables))
+    held: Condition | None = None
+    needs_one = scores != "winner" or any(not rule.when for rule in rules.rules)
+    if always != "nothing" and needs_one:
+        inputs, held = _held(inputs, always)
+    taken = [one.name for one in inputs]
+    conditions = _conditions(rules, held)
+    if scores == "winner":
+        outputs: tuple[SystemOutput, ...] = (_class_output(rules, taken),)
+        made = tuple(
+            SystemRule(when, (Conclusion(outputs[0].name, rule.then),))
+            for when, rule in zip(conditions, rules.rules, strict=True)
+        )
+        block = _block(rules, made, Activation("highest"))
+    else:
+        found = _scored(rules, scores, conditions, held)
+        outputs = _score_outputs([one.name for one in found], taken)
+        absent = tuple(Conclusion(one.name, "absent") for one in outputs)
+        present = tuple(
+            SystemRule(one.when, (Conclusion(output.name, "present"),))
+            for one, output in zip(found, outputs, strict=True)
+            if one.has_rules
+        )
+        block = _block(rules, (SystemRule(held, absent), *present), Activation())
+    return FuzzySystem(rules.name, inputs, outputs, (block,), _note(rules, scores))
+
+
+def winner(
+    rules: RuleBase, outputs: Sequence[float], scores: Scores = "rule"
+) -> str | None:
+    """Return the class that the outputs of `as_system` decide for.
+
+    Args:
+        rules: The rule base.
+        outputs: The system's answer to a row, NaN where a value was missing.
+        scores: What the outputs say.
+
+    Returns:
+        The class, or None for "no class"; for NaN as the number of a winner too, for it
+        does not say whether a value was missing or no rule fired.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> rules = rules_from_tree(random_tree(0, leaves=2))
+        >>> winner(rules, [0.5, 0.25])
+        'class 1'
+    """
+    if scores == "winner":
+        number = outputs[0]
+        return None if math.isnan(number) else rules.classes[round(number) - 1]
+    if any(map(math.isnan, outputs)):
+        return rules.semantics.missing
+    best = max(outputs)
+    if best == 0.0:
+        return rules.semantics.uncovered
+    place = outputs.index(best)
+    return rules.classes[place] if scores == "class" else rules.rules[place].then
+
+
+def cast_losses(rules: RuleBase, scores: Scores = "rule") -> tuple[Loss, ...]:
+    """Return what `as_system` cannot carry and an answer depends on."""
+    return tuple(_cast_losses(rules, scores))
+
+
+def _cast_losses(rules: RuleBase, scores: Scores) -> Iterator[Loss]:
+    if rules.semantics.missing is not None:
+        yield Loss(
+            "the answer to missing values",
+            f"NaN stands in the place of {rules.semantics.missing!r}",
+        )
+    if scores == "class" and rules.kind != "relative":
+        numbers = [rules.classes.index(rule.then) for rule in rules.rules]
+        if any(a > b for a, b in itertools.pairwise(numbers)):
+            yield Loss(
+                "equally strong rules",
+                "the first class wins and not the first rule, for scores by class "
+                "do not say which rule was strongest",
+            )
+
+
+def cast_remarks(rules: RuleBase, scores: Scores = "rule") -> tuple[str, ...]:
+    """Return how the numbers of `as_system` are to be read, a sentence each."""
+    found = [_note(rules, scores)]
+    if rules.semantics.missing is None:
+        found.append("a row with a missing value answers NaN, which is no class")
+    if scores == "rule" and rules.kind != "relative":
+        found.append(
+            "rules whose strengths differ by less than 1 part in 2^50 may change places"
+        )
+    return tuple(found)
+
+
+def refuse_singletons(system: FuzzySystem, to: str) -> None:
+    """Refuse a system whose singletons a format that samples ranges would miss.
+
+    Raises:
+        LossError: If an output that is not weighted has a singleton.
+    """
+    for output in system.outputs:
+        for label in output.labels if not output.defuzzifier.is_weighted else ():
+            if isinstance(label.curve, Singleton):
+                raise LossError(
+                    f"cannot write {system.name[:100]} as {to}: its engines sample the "
+                    f"range of {output.name!r} and miss the singleton {label.name!r}; "
+                    "fml and yaml keep it"
+                )
+
+
+def flattened(system: FuzzySystem) -> tuple[FuzzySystem, tuple[Loss, ...]]:
+    """Return a system whose combinations are inputs, and a loss for each of them.
+
+    The caller must compute the sum that the loss names, in that order. An input that
+    serves for sums alone is left out.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Part
+        >>> mixed = SystemInput("mix", parts=(Part("a", 2.0, 0.5), Part("b", -1.0)))
+        >>> labels = (Label("one", Singleton(1.0)),)
+        >>> how = Defuzzifier("weighted average")
+        >>> output = SystemOutput("y", labels, 0.0, 1.0, how)
+        >>> block = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
+        >>> inputs = SystemInput("a"), SystemInput("b"), mixed
+        >>> flat, losses = flattened(FuzzySystem("s", inputs, (output,), (block,)))
+        >>> flat.columns
+        ('mix',)
+        >>> losses[0].what
+        "it is an input, to be given as 2.0 * ('a' - 0.5) + -1.0 * ('b' - 0.0)"
+    """
+    losses = tuple(
+        Loss(
+            f"combination {one.name!r}",
+            "it is an input, to be given as "
+            + " + ".join(
+                f"{p.weight!r} * ({p.input!r} - {p.centre!r})" for p in one.parts
+            ),
+        )
+        for one in system.inputs
+        if one.parts
+    )
+    if not losses:
+        return system, ()
+    return replace(
+        system,
+        inputs=tuple(replace(one, parts=()) for one in _kept(system)),
+        outputs=tuple(
+            replace(
+                one,
+                labels=tuple(_widened(label, system.inputs) for label in one.labels),
+            )
+            for one in system.outputs
+        ),
+    ), losses
+
+
+def _kept(system: FuzzySystem) -> Iterator[SystemInput]:
+    """Yield the inputs that something other than a combination uses."""
+    summed = {part.input for one in system.inputs for part in one.parts}
+    used = {one.variable for r in system.rules for one in questions(r.when)}
+    curves = [label.curve for one in system.variables for label in one.labels]
+    is_computed = any(isinstance(curve, Linear | Formula) for curve in curves)
+    for one in system.inputs:
+        if one.labels or one.name not in summed or one.name in used or is_computed:
+            yield one
+
+
+def _widened(label: Label, inputs: tuple[SystemInput, ...]) -> Label:
+    """Return a conclusion that gives combinations, which are columns now, no weight."""
+    if not isinstance(label.curve, Linear):
+        return label
+    left = iter(label.curve.weights)
+    weights = tuple(0.0 if one.parts else next(left) for one in inputs)
+    return replace(label, curve=replace(label.curve, weights=weights))
+
+
+def _note(rules: RuleBase, scores: Scores) -> str:
+    uncovered = rules.semantics.uncovered
+    answer = "no class" if uncovered is None else repr(uncovered)
+    match scores:
+        case "winner":
+            return (
+                "the output is the number of the class, from 1, of the first strongest "
+                "rule; where no rule fires, " + answer
+            )
+        case "rule":
+            return (
+                "score k is w / (1 + w) for the strength w of rule k; the highest "
+                "score wins, the first of equals; where all are 0, " + answer
+            )
+        case "class":
+            return (
+                "each score is w / (1 + w) for the strength w of its class's strongest "
+                "rule; the highest wins, the first of equals; where all are 0, "
+                + answer
+            )
+
+
+def _input(variable: Variable) -> SystemInput:
+    return SystemInput(
+        variable.name,
+        tuple(Label(term.name, term.shape) for term in variable.terms),
+        variable.low,
+        variable.high,
+        unit=variable.unit,
+        parts=variable.parts,
+    )
+
+
+def _held(
+    inputs: tuple[SystemInput, ...], always: Always
+) -> tuple[tuple[SystemInput, ...], Condition]:
+    """Return inputs that can be asked something that always holds, and the question."""
+    if not inputs:
+        raise LossError(
+            "a rule without clauses must ask an input, and the rule base has none"
+        )
+    summed = {part.input for one in inputs for part in one.parts}
+    asked = next(one for one in inputs if one.labels or one.name not in summed)
+    if always == "any":
+        return inputs, Is(asked.name, None, ("any",))
+    name = unlike("always", {label.name for label in asked.labels})
+    label = Label(name, _EVERYWHERE)
+    changed = replace(asked, labels=(*asked.labels, label))
+    return tuple(changed if one is asked else one for one in inputs), Is(
+        asked.name, name
+    )
+
+
+def _conditions(rules: RuleBase, held: Condition | None) -> list[Condition | None]:
+    """Return the condition of each rule; rules share what their clauses become."""
+    is_product = rules.semantics.conjunction == "product"
+    known: dict[int, tuple[Condition, ...]] = {}
+    found: list[Condition | None] = []
+    for rule in rules.rules:
+        parts: list[Condition] = []
+        for clause in rule.when:
+            if id(clause) not in known:
+                known[id(clause)] = _clause(clause, is_product=is_product)
+            parts += known[id(clause)]
+        found.append(
+            And(tuple(parts)) if len(parts) > 1 else parts[0] if parts else held
+        )
+    return found
+
+
+def _clause(clause: Clause, *, is_product: bool) -> tuple[Condition, ...]:
+    """Return what a clause becomes: conditions that are joined by AND."""
+    variable, terms = clause.variable, clause.terms
+    if not clause.negated:
+        asked = tuple(Is(variable, term) for term in terms)
+        return asked if len(asked) == 1 else (Or(asked),)
+    if len(terms) == 1 or not is_product:  # 1 - max = min of 1 - each, exactly
+        return tuple(Is(variable, term, ("not",)) for term in terms)
+    return (Not(Or(tuple(Is(variable, term) for term in terms))),)
+
+
+def _class_output(rules: RuleBase, taken: list[str]) -> SystemOutput:
+    number = {name: float(k) for k, name in enumerate(rules.classes, 1)}
+    uncovered = rules.semantics.uncovered
+    return SystemOutput(
+        unlike("class", taken),
+        tuple(Label(name, Singleton(value)) for name, value in number.items()),
+        1.0,
+        float(len(number)),
+        _AVERAGE,
+        default=None if uncovered is None else number[uncovered],
+    )
+
+
+def _score_outputs(names: list[str], taken: list[str]) -> tuple[SystemOutput, ...]:
+    labels = (Label("absent", Singleton(0.0)), Label("present", Singleton(1.0)))
+    used = set(taken)
+    found: list[SystemOutput] = []
+    for name in names:
+        found.append(SystemOutput(unlike(name, used), labels, 0.0, 1.0, _AVERAGE))
+        used.add(found[-1].name)
+    return tuple(found)
+
+
+class _Score(NamedTuple):
+    """What is known of a score."""
+
+    name: str
+    when: Condition | None
+    has_rules: bool = True
+
+
+def _scored(
+    rules: RuleBase,
+    scores: Scores,
+    conditions: list[Condition | None],
+    held: Condition | None,
+) -> list[_Score]:
+    """Return what each score is called and the condition of its rules."""
+    if scores == "rule":
+        return [
+            _Score(f"score {number} {rule.then}", condition)
+            for number, (rule, condition) in enumerate(
+                zip(rules.rules, conditions, strict=True), 1
+            )
+        ]
+    own: dict[str, list[Condition | None]] = {name: [] for name in rules.classes}
+    for rule, condition in zip(rules.rules, conditions, strict=True):
+        own[rule.then].append(condition)
+    return [
+        _Score(f"score {name}", _any_of(some, held), bool(some))
+        for name, some in own.items()
+    ]
+
+
+def _any_of(
+    conditions: list[Condition | None], held: Condition | None
+) -> Condition | None:
+    """Return an OR of conditions; a rule that always holds is as strong as can be."""
+    asked = [one for one in conditions if one is not None and one is not held]
+    if len(asked) < len(conditions) or not asked:
+        return held
+    return Or(tuple(asked)) if len(asked) > 1 else asked[0]
+
+
+def _block(
+    rules: RuleBase, made: tuple[SystemRule, ...], activation: Activation
+) -> RuleBlock:
+    conjunction: TNorm = (
+        "product" if rules.semantics.conjunction == "product" else "minimum"
+    )
+    return RuleBlock(made, conjunction, "maximum", None, activation)

@@ -1,0 +1,137 @@
+"""From a tree to rules: one rule for each path, one clause for each node on it.
+
+**Relative rules equal the tree on every input.** On the path that the tree takes, each
+clause has degree exactly 1, for its terms' plateaus are the intervals of the taken
+branch. Any other path leaves that path at some node, by a branch that is not taken
+there, whose degree is below 1. Min and product never exceed their smallest operand, in
+floating point too, so every other rule is below 1 and the taken path's rule, with
+strength 1, wins alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Literal
+
+import msgspec
+
+from fuzzytree.errors import InvalidModelError
+from fuzzytree.model.rulebase import (
+    Clause,
+    Conjunction,
+    Kind,
+    Rule,
+    RuleBase,
+    Term,
+    Variable,
+)
+from fuzzytree.model.tree import Branch, FuzzyTree, Use
+
+Form = Literal["tree", "relative rules", "raw rules", "rules"]
+"""What can be made of a model, as people call it."""
+
+TITLES: Mapping[Use, Form] = MappingProxyType(
+    {"tree": "tree", "relative": "relative rules", "raw": "raw rules"}
+)
+"""The form of a tree that serves each use."""
+
+
+def forms(
+    model: FuzzyTree | RuleBase, uses: Iterable[Use] | None = None
+) -> dict[Form, FuzzyTree | RuleBase]:
+    """Return what can be made of a model, by the name that people call it.
+
+    Args:
+        model: A tree or a rule base.
+        uses: Only what serves these; all that the model can serve if None.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> list(forms(random_tree(1)))
+        ['tree', 'relative rules', 'raw rules']
+    """
+    if isinstance(model, RuleBase):
+        return {"rules": model}
+    wanted = set(TITLES if uses is None else uses)
+    made: dict[Form, FuzzyTree | RuleBase] = {}
+    if "tree" in wanted:
+        made[TITLES["tree"]] = model
+    kinds: tuple[Kind, ...] = ("relative", "raw") if model.sets else ("relative",)
+    for kind in kinds:
+        if kind in wanted:
+            made[TITLES[kind]] = rules_from_tree(model, kind)
+    return made
+
+
+def rules_from_tree(
+    tree: FuzzyTree,
+    kind: Kind = "relative",
+    *,
+    conjunction: Conjunction | None = None,
+) -> RuleBase:
+    """Turn each path of a tree into a rule, in the order of the leaves.
+
+    Args:
+        tree: The tree.
+        kind: `relative` for rules that equal the tree on every input; `raw` for the
+            paper's rules, whose terms are the fitted sets as they are.
+        conjunction: The AND of the rules; the tree's own unless given.
+
+    Returns:
+        A rule base whose rule k is leaf k, with the variables that the nodes ask.
+
+    Raises:
+        InvalidModelError: If `kind` is `raw` and the tree carries no sets.
+    """
+    if kind == "raw" and tree.nodes and not tree.sets:
+        raise InvalidModelError(
+            [
+                (
+                    ("sets",),
+                    f"tree {tree.name!r} carries no fitted sets, "
+                    "so it has no raw rules",
+                )
+            ]
+        )
+    semantics = tree.semantics
+    if conjunction:
+        semantics = msgspec.structs.replace(semantics, conjunction=conjunction)
+    return RuleBase(
+        name=tree.name,
+        classes=tree.classes,
+        variables=_variables(tree, kind),
+        rules=_rules(tree, kind),
+        semantics=semantics,
+        kind=kind,
+        columns=tree.columns,
+    )
+
+
+def _variables(tree: FuzzyTree, kind: Kind) -> tuple[Variable, ...]:
+    terms: dict[str, tuple[Term, ...]]
+    if kind == "relative":
+        terms = {v.name: v.terms for v in tree.variables}
+    else:
+        terms = {s.variable: s.terms for s in tree.sets}
+    return tuple(
+        Variable(v.name, terms.get(v.name, ()), v.unit, v.low, v.high, v.parts)
+        for v in tree.variables
+    )
+
+
+def _rules(tree: FuzzyTree, kind: Kind) -> tuple[Rule, ...]:
+    rules: list[Rule] = []
+    start = Branch(terms=(), node=1) if tree.nodes else Branch(terms=(), leaf=1)
+    todo: list[tuple[Branch, tuple[Clause, ...]]] = [(start, ())]
+    while todo:
+        branch, path = todo.pop()
+        if branch.leaf is not None:
+            leaf = tree.leaves[branch.leaf - 1]
+            rules.append(Rule(path, leaf.label, leaf.support))
+        elif branch.node is not None:
+            node = tree.nodes[branch.node - 1]
+            for step in reversed(node.branches):
+                names = step.terms if kind == "relative" else step.sets
+                todo.append((step, (*path, Clause(node.variable, names))))
+    return tuple(rules)

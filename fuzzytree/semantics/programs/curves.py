@@ -1,0 +1,267 @@
+"""Curves of systems as steps: as `fuzzytree.semantics.inference.curves`, in its order.
+
+Where that module decides between formulas, all are computed here and `where` takes
+one, so that a formula may give NaN or an infinity where it is not taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import assert_never
+
+from fuzzytree.model.rulebase import LR, Band, Points
+from fuzzytree.model.system import (
+    Arc,
+    Bell,
+    Binary,
+    Concave,
+    Cosine,
+    Curve,
+    Formula,
+    Gaussian,
+    Linear,
+    PiCurve,
+    SCurve,
+    SemiEllipse,
+    Sigmoid,
+    SigmoidDifference,
+    SigmoidProduct,
+    Singleton,
+    Spike,
+    Trapezoid,
+    TwoGaussians,
+)
+from fuzzytree.semantics.programs.formulas import as_number, value_of
+from fuzzytree.semantics.programs.shapes import degree as shape_degree
+from fuzzytree.semantics.programs.shapes import smaller_slope
+from fuzzytree.semantics.programs.steps import Maker
+
+
+def is_unit(curve: Curve) -> bool:
+    """Return whether a curve's degree lies in [0, 1] at every finite value, surely."""
+    match curve:
+        case Formula() | Linear() | SemiEllipse():  # a root may be rounded above 1
+            return False
+        case SCurve(start=start, end=end) | Arc(start=start, end=end):
+            return math.isfinite(end - start)
+        case PiCurve(a=a, b=b, c=c, d=d):
+            return math.isfinite(b - a) and math.isfinite(d - c)
+        case Sigmoid(slope=slope):
+            return slope != 0.0
+        case (
+            SigmoidDifference(first=first, second=second)
+            | SigmoidProduct(first=first, second=second)
+        ):
+            return is_unit(first) and is_unit(second)
+        case Bell(slope=slope):
+            return slope != 0.0
+        case Concave(inflection=inflection, end=end):
+            return math.isfinite(2.0 * (end - inflection))
+        case _:
+            return True
+
+
+def curve_degree(make: Maker, curve: Curve, x: int, names: Mapping[str, int]) -> int:
+    """Return the degree at a value, without the label's height.
+
+    Args:
+        make: Where the steps go.
+        curve: The curve.
+        x: The place of the value.
+        names: The places of the variables' values, for formulas.
+    """
+    match curve:
+        case Band() | LR() | Points():
+            return shape_degree(make, curve, x)
+        case Trapezoid():
+            return _trapezoid(make, curve, x)
+        case Gaussian(mean=mean, deviation=deviation):
+            return _gaussian(make, x, mean, deviation)
+        case TwoGaussians():
+            left, right = curve.left, curve.right
+            low = make("minimum", x, make.constant(left))
+            high = make("maximum", x, make.constant(right))
+            below = _gaussian(make, low, left, curve.left_deviation)
+            above = _gaussian(make, high, right, curve.right_deviation)
+            return make("multiply", below, above)
+        case Bell(center=center, width=width, slope=slope):
+            size = make("absolute", _scaled(make, x, center, width))
+            power = make("power", size, make.constant(2.0 * slope))
+            return _one_by_one_plus(make, power)
+        case Sigmoid(inflection=inflection, slope=slope):
+            offset = make("subtract", x, make.constant(inflection))
+            steep = make("multiply", make.constant(-slope), offset)
+            return _one_by_one_plus(make, make("exponential", steep))
+        case SigmoidDifference(first=first, second=second):
+            pair = [curve_degree(make, one, x, names) for one in (first, second)]
+            return make("absolute", make("subtract", *pair))
+        case SigmoidProduct(first=first, second=second):
+            pair = [curve_degree(make, one, x, names) for one in (first, second)]
+            return make("multiply", *pair)
+        case SCurve(start=start, end=end):
+            return _s(make, x, start, end)
+        case PiCurve():
+            return _pi(make, curve, x)
+        case Cosine(center=center, width=width):
+            return _cosine(make, _scaled(make, x, center, width))
+        case Concave(inflection=inflection, end=end):
+            return _concave(make, x, inflection, end)
+        case Spike(center=center, width=width):
+            t = _scaled(make, x, center, width)
+            size = make("absolute", make("multiply", make.constant(10.0), t))
+            return make("exponential", make("negate", size))
+        case Arc(start=start, end=end):
+            return _arc(make, _scaled(make, x, start, end - start))
+        case SemiEllipse(start=start, end=end):
+            return _semi_ellipse(make, x, start, end)
+        case Binary(start=start, is_above=is_above):
+            ends = (make.constant(start), x) if is_above else (x, make.constant(start))
+            return as_number(make, make("at_most", *ends))
+        case Singleton(value=value):
+            return as_number(make, make("equal", x, make.constant(value)))
+        case Linear():
+            return make.constant(math.nan)
+        case Formula(expression=expression):
+            return value_of(make, expression, {**names, "x": x})
+        case _:
+            assert_never(curve)
+
+
+def value_at(make: Maker, curve: Curve, degree: int) -> int | None:
+    """Return where a monotone curve has a degree; None for the other curves."""
+    one = make.constant(1.0)
+    match curve:
+        case Points(values=(first, last), degrees=(0.0, 1.0)) if first < last:
+            rise = make("multiply", make.constant(last - first), degree)
+            return make("add", make.constant(first), rise)
+        case Points(values=(first, last), degrees=(1.0, 0.0)) if first < last:
+            rise = make("multiply", make.constant(first - last), degree)
+            return make("add", make.constant(last), rise)
+        case Sigmoid(inflection=inflection, slope=slope):
+            odds = make("logarithm", _odds(make, degree))
+            steep = make("divide", odds, make.constant(slope))
+            return make("subtract", make.constant(inflection), steep)
+        case SCurve(start=start, end=end):
+            width, half = make.constant(end - start), make.constant(0.5)
+            low = make("square_root", make("multiply", half, degree))
+            rest = make("multiply", half, make("subtract", one, degree))
+            high = make("square_root", rest)
+            low = make("add", make.constant(start), make("multiply", width, low))
+            high = make("subtract", make.constant(end), make("multiply", width, high))
+            return make("where", make("at_most", degree, half), low, high)
+        case Concave(inflection=inflection, end=end):
+            back = make(
+                "multiply", make.constant(end - inflection), _odds(make, degree)
+            )
+            return make("subtract", make.constant(end), back)
+        case Arc(start=start, end=end):
+            below, above = make("subtract", one, degree), make("add", one, degree)
+            root = make("square_root", make("multiply", below, above))
+            back = make("multiply", make.constant(end - start), root)
+            return make("subtract", make.constant(end), back)
+        case _:
+            return None
+
+
+def _odds(make: Maker, degree: int) -> int:
+    one = make.constant(1.0)
+    return make("subtract", make("divide", one, degree), one)
+
+
+def _scaled(make: Maker, x: int, start: float, width: float) -> int:
+    offset = make("subtract", x, make.constant(start))
+    return make("divide", offset, make.constant(width))
+
+
+def _one_by_one_plus(make: Maker, a: int) -> int:
+    one = make.constant(1.0)
+    return make("divide", one, make("add", one, a))
+
+
+def _trapezoid(make: Maker, curve: Trapezoid, x: int) -> int:
+    """Return the smaller slope, held in [0, 1]; an upright side is cut off last."""
+    a, b, c, d = curve.a, curve.b, curve.c, curve.d
+    slopes: list[int] = []
+    if a is not None and a < b:
+        slopes.append(_scaled(make, x, a, b - a))
+    if d is not None and c < d:
+        rest = make("subtract", make.constant(d), x)
+        slopes.append(make("divide", rest, make.constant(d - c)))
+    zero, one = make.constant(0.0), make.constant(1.0)
+    found = one
+    if slopes:
+        is_peak = len(slopes) == 2 and b == c
+        found = smaller_slope(make, slopes, is_peak=is_peak)
+    if a is not None and a == b:
+        found = make("where", make("less", x, make.constant(a)), zero, found)
+    if d is not None and c == d:
+        found = make("where", make("less", make.constant(d), x), zero, found)
+    return found
+
+
+def _gaussian(make: Maker, x: int, mean: float, deviation: float) -> int:
+    t = _scaled(make, x, mean, deviation)
+    square = make("multiply", t, t)
+    return make("exponential", make("multiply", make.constant(-0.5), square))
+
+
+def _s(make: Maker, x: int, start: float, end: float) -> int:
+    zero, one, two = (make.constant(number) for number in (0.0, 1.0, 2.0))
+    if start == end:
+        return make("where", make("at_most", x, make.constant(start)), zero, one)
+    t = _scaled(make, x, start, end - start)
+    rest = _scaled(make, x, end, end - start)
+    low = make("multiply", two, make("multiply", t, t))
+    high = make("subtract", one, make("multiply", two, make("multiply", rest, rest)))
+    found = make("where", make("at_most", one, t), one, high)
+    found = make("where", make("at_most", t, make.constant(0.5)), low, found)
+    return make("where", make("at_most", t, zero), zero, found)
+
+
+def _pi(make: Maker, curve: PiCurve, x: int) -> int:
+    zero, one = make.constant(0.0), make.constant(1.0)
+    falling = _s(make, x, curve.d, curve.c)
+    is_behind = make("at_most", make.constant(curve.d), x)
+    falling = make("where", is_behind, zero, falling)
+    falling = make("where", make("at_most", x, make.constant(curve.c)), one, falling)
+    return make("multiply", _s(make, x, curve.a, curve.b), falling)
+
+
+def _cosine(make: Maker, t: int) -> int:
+    one, half = make.constant(1.0), make.constant(0.5)
+    wave = make("cosine", make("multiply", make.constant(2.0 * math.pi), t))
+    inside = make("at_most", make("absolute", t), half)
+    degree = make("multiply", half, make("add", one, wave))
+    return make("where", inside, degree, make.constant(0.0))
+
+
+def _concave(make: Maker, x: int, inflection: float, end: float) -> int:
+    one, there = make.constant(1.0), make.constant(end)
+    if inflection <= end:
+        width, gap = make.constant(end - inflection), make("subtract", there, x)
+        outside = make("less", x, there)
+    else:
+        width, gap = make.constant(inflection - end), make("subtract", x, there)
+        outside = make("less", there, x)
+    share = make("divide", width, make("add", width, gap))
+    return make("where", outside, share, one)
+
+
+def _arc(make: Maker, u: int) -> int:
+    zero, one = make.constant(0.0), make.constant(1.0)
+    rest = make("subtract", make.constant(2.0), u)
+    root = make("square_root", make("multiply", u, rest))
+    found = make("where", make("at_most", one, u), one, root)
+    return make("where", make("at_most", u, zero), zero, found)
+
+
+def _semi_ellipse(make: Maker, x: int, start: float, end: float) -> int:
+    width = make.constant(end - start)
+    left = _scaled(make, x, start, end - start)
+    right = make("divide", make("subtract", make.constant(end), x), width)
+    root = make("square_root", make("multiply", left, right))
+    degree = make("multiply", make.constant(2.0), root)
+    above = make("at_most", make.constant(start), x)
+    inside = make("and", above, make("at_most", x, make.constant(end)))
+    return make("where", inside, degree, make.constant(0.0))

@@ -1,0 +1,141 @@
+"""Running a program on one row, in plain Python: what every other runner must match."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+
+import msgspec
+
+from fuzzytree.semantics.programs.operations import (
+    LOGICAL,
+    NUMERIC,
+    maximum,
+    minimum,
+    of_table,
+    total,
+)
+from fuzzytree.semantics.programs.steps import Program, ResultKind, Step
+
+Found = float | bool | list[float] | list[bool]
+
+
+class Numbers(msgspec.Struct, frozen=True):
+    """The results of a program for one row.
+
+    Attributes:
+        program: The program.
+        values: The number of each of its results, in order.
+    """
+
+    program: Program
+    values: tuple[float, ...]
+
+    def of(self, kind: ResultKind) -> tuple[float, ...]:
+        """Return the numbers of a kind, in order."""
+        pairs = zip(self.program.results, self.values, strict=True)
+        return tuple(value for result, value in pairs if result.kind == kind)
+
+
+def evaluate(program: Program, row: Mapping[str, float]) -> Numbers:
+    """Run a program on one row.
+
+    Args:
+        program: The program.
+        row: A value for each input, by name.
+
+    Raises:
+        KeyError: If an input has no value.
+
+    Example:
+        >>> from fuzzytree.semantics.programs.rules import from_rules
+        >>> from fuzzytree.model.rulebase import (
+        ...     Band, Clause, Flank, Rule, RuleBase, Term, Variable
+        ... )
+        >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> rules = RuleBase(
+        ...     "grip", ("soft",), (Variable("force", (low,)),),
+        ...     (Rule((Clause("force", ("low",)),), "soft"),),
+        ... )
+        >>> evaluate(from_rules(rules), {"force": 2.0}).of("strength")
+        (0.5,)
+    """
+    found: list[Found] = []
+    for step in program.steps:
+        found.append(_result(step, [found[place] for place in step.arguments], row))
+    values: list[float] = []
+    for result in program.results:
+        value = found[result.step]
+        if isinstance(value, list):  # a program cannot be made of such results
+            raise TypeError(f"{result.name} has many samples")
+        values.append(float(value))
+    return Numbers(program, tuple(values))
+
+
+def still_results(program: Program) -> tuple[Found | None, ...]:
+    """Return the results that no input enters, by step; None for the other steps.
+
+    Runners compute these once, here, and so with Python's own functions.
+
+    Example:
+        >>> from fuzzytree.semantics.programs.steps import Maker, Result
+        >>> make = Maker()
+        >>> grid = make("multiply", make.index(3), make.constant(0.5))
+        >>> scaled = make("total", make("multiply", make.input("x"), grid))
+        >>> program = make.program("p", ("x",), (Result("output", "y", scaled),))
+        >>> still_results(program)
+        ([0.0, 1.0, 2.0], 0.5, [0.0, 0.5, 1.0], None, None, None)
+    """
+    found: list[Found | None] = []
+    for step in program.steps:
+        given = [found[place] for place in step.arguments]
+        known = [value for value in given if value is not None]
+        is_moving = step.operation == "input" or len(known) < len(given)
+        found.append(None if is_moving else _result(step, known, {}))
+    return tuple(found)
+
+
+def _result(step: Step, given: list[Found], row: Mapping[str, float]) -> Found:
+    match step.operation:
+        case "constant":
+            return step.number
+        case "input":
+            return float(row[step.name])
+        case "index":
+            return [float(place) for place in range(step.samples)]
+        case "total" | "running" | "last" | "highest" | "lowest":
+            (samples,) = given
+            if not isinstance(samples, list):  # a program cannot be made of such steps
+                raise TypeError(f"{step.operation} of a single number")
+            return _over_samples(step.operation, list(map(float, samples)))
+        case _ if not step.samples:
+            return _one(step, given)
+        case _:
+            return [
+                _one(step, [one[i] if isinstance(one, list) else one for one in given])
+                for i in range(step.samples)
+            ]
+
+
+def _one(step: Step, given: list[Found]) -> float | bool:
+    if step.table:
+        (value,) = given
+        return of_table(step.operation, step.table, float(value))  # type: ignore[arg-type] # no list
+    if step.operation in LOGICAL:
+        return LOGICAL[step.operation](*given)
+    return NUMERIC[step.operation](*given)
+
+
+def _over_samples(operation: str, samples: list[float]) -> float | list[float]:
+    if operation == "total":
+        return total(samples)
+    if operation == "last":
+        return samples[-1]
+    if operation == "highest":
+        return functools.reduce(maximum, samples)
+    if operation == "lowest":
+        return functools.reduce(minimum, samples)
+    sums: list[float] = []
+    for value in samples:
+        sums.append(sums[-1] + value if sums else value)
+    return sums

@@ -1,0 +1,195 @@
+"""ANDs, ORs and hedges as steps: the operations of `semantics.inference.norms`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from fuzzytree.model.system import Hedge, SNorm, TNorm
+from fuzzytree.semantics.programs.steps import Maker
+
+Norm = Callable[[Maker, int, int], int]
+
+KEEPS_UNIT: frozenset[str] = frozenset(
+    (
+        "minimum",
+        "product",
+        "bounded difference",
+        "drastic product",
+        "nilpotent minimum",
+        "maximum",
+        "bounded sum",
+        "drastic sum",
+        "nilpotent maximum",
+        "normalized sum",
+    )
+)
+"""Norms whose result lies in [0, 1] if both degrees do, in rounded numbers too."""
+
+
+def hedged(make: Maker, hedges: Sequence[Hedge], degree: int) -> int:
+    """Return what hedges make of a degree, the last first."""
+    for hedge in reversed(hedges):
+        degree = _HEDGES[hedge](make, degree)
+    return degree
+
+
+def _one_minus(make: Maker, a: int) -> int:
+    return make("subtract", make.constant(1.0), a)
+
+
+def _twice(make: Maker, a: int) -> int:
+    return make("multiply", make.constant(2.0), a)
+
+
+def _half(make: Maker, a: int) -> int:
+    return make("multiply", make.constant(0.5), a)
+
+
+def _square(make: Maker, a: int) -> int:
+    return make("multiply", a, a)
+
+
+def _in_halves(make: Maker, d: int, low: int, high: int) -> int:
+    return make("where", make("at_most", d, make.constant(0.5)), low, high)
+
+
+def _any(make: Maker, d: int) -> int:
+    return make.constant(1.0)
+
+
+def _somewhat(make: Maker, d: int) -> int:
+    return make("square_root", d)
+
+
+def _extremely(make: Maker, d: int) -> int:
+    low = _twice(make, _square(make, d))
+    high = _one_minus(make, _twice(make, _square(make, _one_minus(make, d))))
+    return _in_halves(make, d, low, high)
+
+
+def _seldom(make: Maker, d: int) -> int:
+    low = make("square_root", _half(make, d))
+    root = make("square_root", _half(make, _one_minus(make, d)))
+    return _in_halves(make, d, low, _one_minus(make, root))
+
+
+def _cubed(make: Maker, d: int) -> int:
+    return make("multiply", _square(make, d), d)
+
+
+def _very_very(make: Maker, d: int) -> int:
+    return _square(make, _square(make, d))
+
+
+def _power(exponent: float) -> Callable[[Maker, int], int]:
+    def power(make: Maker, d: int) -> int:
+        return make("power", d, make.constant(exponent))
+
+    return power
+
+
+_HEDGES: Mapping[Hedge, Callable[[Maker, int], int]] = {
+    "any": _any,
+    "not": _one_minus,
+    "very": _square,
+    "somewhat": _somewhat,
+    "extremely": _extremely,
+    "seldom": _seldom,
+    "cubed": _cubed,
+    "very very": _very_very,
+    "plus": _power(1.25),
+    "minus": _power(0.75),
+    "cube root": _power(1.0 / 3.0),
+}
+
+
+def _plain(operation: str) -> Norm:
+    def norm(make: Maker, a: int, b: int) -> int:
+        return make(operation, a, b)
+
+    return norm
+
+
+def _sum_less_product(make: Maker, a: int, b: int) -> int:
+    return make("subtract", make("add", a, b), make("multiply", a, b))
+
+
+def _bounded_difference(make: Maker, a: int, b: int) -> int:
+    rest = make("subtract", make("add", a, b), make.constant(1.0))
+    return make("maximum", make.constant(0.0), rest)
+
+
+def _drastic_product(make: Maker, a: int, b: int) -> int:
+    is_one = make("equal", make("maximum", a, b), make.constant(1.0))
+    return make("where", is_one, make("minimum", a, b), make.constant(0.0))
+
+
+def _einstein_product(make: Maker, a: int, b: int) -> int:
+    below = make("subtract", make.constant(2.0), _sum_less_product(make, a, b))
+    return make("divide", make("multiply", a, b), below)
+
+
+def _hamacher_product(make: Maker, a: int, b: int) -> int:
+    zero = make.constant(0.0)
+    share = make("divide", make("multiply", a, b), _sum_less_product(make, a, b))
+    return make("where", make("equal", make("add", a, b), zero), zero, share)
+
+
+def _nilpotent_minimum(make: Maker, a: int, b: int) -> int:
+    is_above = make("less", make.constant(1.0), make("add", a, b))
+    return make("where", is_above, make("minimum", a, b), make.constant(0.0))
+
+
+def _bounded_sum(make: Maker, a: int, b: int) -> int:
+    return make("minimum", make.constant(1.0), make("add", a, b))
+
+
+def _drastic_sum(make: Maker, a: int, b: int) -> int:
+    is_zero = make("equal", make("minimum", a, b), make.constant(0.0))
+    return make("where", is_zero, make("maximum", a, b), make.constant(1.0))
+
+
+def _einstein_sum(make: Maker, a: int, b: int) -> int:
+    below = make("add", make.constant(1.0), make("multiply", a, b))
+    return make("divide", make("add", a, b), below)
+
+
+def _hamacher_sum(make: Maker, a: int, b: int) -> int:
+    one, product = make.constant(1.0), make("multiply", a, b)
+    above = make("subtract", make("add", a, b), _twice(make, product))
+    share = make("divide", above, make("subtract", one, product))
+    return make("where", make("equal", product, one), one, share)
+
+
+def _nilpotent_maximum(make: Maker, a: int, b: int) -> int:
+    one = make.constant(1.0)
+    is_below = make("less", make("add", a, b), one)
+    return make("where", is_below, make("maximum", a, b), one)
+
+
+def _normalized_sum(make: Maker, a: int, b: int) -> int:
+    both = make("add", a, b)
+    return make("divide", both, make("maximum", make.constant(1.0), both))
+
+
+T_NORMS: Mapping[TNorm, Norm] = {
+    "minimum": _plain("minimum"),
+    "product": _plain("multiply"),
+    "bounded difference": _bounded_difference,
+    "drastic product": _drastic_product,
+    "einstein product": _einstein_product,
+    "hamacher product": _hamacher_product,
+    "nilpotent minimum": _nilpotent_minimum,
+}
+
+S_NORMS: Mapping[SNorm, Norm] = {
+    "maximum": _plain("maximum"),
+    "algebraic sum": _sum_less_product,
+    "bounded sum": _bounded_sum,
+    "drastic sum": _drastic_sum,
+    "einstein sum": _einstein_sum,
+    "hamacher sum": _hamacher_sum,
+    "nilpotent maximum": _nilpotent_maximum,
+    "normalized sum": _normalized_sum,
+    "sum": _plain("add"),
+}

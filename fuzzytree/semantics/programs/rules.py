@@ -1,0 +1,111 @@
+"""A rule base as a program: every rule is fired, the first of the strongest wins."""
+
+from __future__ import annotations
+
+from fuzzytree.model.rulebase import Clause, Rule, RuleBase, shapes_of
+from fuzzytree.semantics.programs.shapes import axis, degree
+from fuzzytree.semantics.programs.steps import Maker, Program, Result
+
+DECIDED, TIE, UNCOVERED, MISSING = 0.0, 1.0, 2.0, 3.0
+
+
+def from_rules(rules: RuleBase) -> Program:
+    """Return the program of a rule base.
+
+    It performs the operations of `fuzzytree.semantics.reference.evaluate` in the same
+    order, so its strengths have the same bits. Rows with a value that is missing or not
+    finite, or with a combination that is not, have strengths NaN, rule 0 and status 3.
+
+    Returns:
+        A program with the results `strength` of each rule, `rule`, `status` and
+        `class`.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(0))
+        >>> program = from_rules(rules)
+        >>> len(program.of("strength")) == len(rules.rules)
+        True
+    """
+    make = Maker()
+    axes = {variable.name: axis(make, variable) for variable in rules.variables}
+    known = known_row(make, list(axes.values()))
+    strengths = _strengths(make, rules, axes)
+    best = make.chain("maximum", strengths)
+    hits = [make("equal", strength, best) for strength in strengths]
+    rule = _first(make, hits, list(range(1, len(hits) + 1)))
+    last = _first(make, hits[::-1], list(range(len(hits), 0, -1)))
+    zero = make.constant(0.0)
+    is_none = make("equal", best, zero)
+    rule = make("where", is_none, zero, rule)
+    tie, decided = make.constant(TIE), make.constant(DECIDED)
+    status = make("where", make("equal", rule, last), decided, tie)
+    status = make("where", is_none, make.constant(UNCOVERED), status)
+    rule = make("where", known, rule, zero)
+    status = make("where", known, status, make.constant(MISSING))
+    answer = make("where", known, _answer(make, rules, rule), _code(make, rules))
+    nothing = make.constant(float("nan"))
+    shown = [make("where", known, strength, nothing) for strength in strengths]
+    results = [Result("strength", str(n), s) for n, s in enumerate(shown, 1)]
+    results += [
+        Result("rule", "rule", rule),
+        Result("status", "status", status),
+        Result("class", "class", answer),
+    ]
+    return make.program(rules.name, rules.inputs, tuple(results))
+
+
+def known_row(make: Maker, axes: list[int]) -> int:
+    """Return whether all of some values are finite; always if there are none."""
+    if not axes:
+        zero = make.constant(0.0)
+        return make("at_most", zero, zero)
+    return make.chain("and", [make("is_finite", value) for value in axes])
+
+
+def _strengths(make: Maker, rules: RuleBase, axes: dict[str, int]) -> list[int]:
+    shapes = shapes_of(rules.variables)
+    degrees: dict[Clause, int] = {}
+
+    def clause_degree(clause: Clause) -> int:
+        if clause not in degrees:
+            x = axes[clause.variable]
+            terms = [degree(make, shapes[clause.variable, t], x) for t in clause.terms]
+            highest = make.chain("maximum", terms)
+            if clause.negated:
+                highest = make("subtract", make.constant(1.0), highest)
+            degrees[clause] = highest
+        return degrees[clause]
+
+    is_product = rules.semantics.conjunction == "product"
+    join = "multiply" if is_product else "minimum"
+
+    def strength(rule: Rule) -> int:
+        parts = [clause_degree(clause) for clause in rule.when]
+        return make.chain(join, parts) if parts else make.constant(1.0)
+
+    return [strength(rule) for rule in rules.rules]
+
+
+def _first(make: Maker, hits: list[int], numbers: list[int]) -> int:
+    """Return the number of the first hit, 0 without one."""
+    found = make.constant(float(numbers[-1]))
+    pairs = list(zip(hits, numbers, strict=True))
+    for hit, number in reversed(pairs[:-1]):
+        found = make("where", hit, make.constant(float(number)), found)
+    return found
+
+
+def _answer(make: Maker, rules: RuleBase, rule: int) -> int:
+    """Return the class of the winning rule, or the answer where none fires."""
+    place = {label: float(number) for number, label in enumerate(rules.classes)}
+    uncovered = rules.semantics.uncovered
+    none = -1.0 if uncovered is None else place[uncovered]
+    return make.table("pick", rule, [none, *(place[r.then] for r in rules.rules)])
+
+
+def _code(make: Maker, rules: RuleBase) -> int:
+    missing = rules.semantics.missing
+    code = -1 if missing is None else rules.classes.index(missing)
+    return make.constant(float(code))

@@ -1,0 +1,504 @@
+"""A fuzzy system as a program: the operations of `semantics.inference`, in order.
+
+There a rule that is not activated concludes nothing; here every rule concludes, with
+degree 0 where it is not activated. With degrees in [0, 1] that changes no bit: every
+AND makes 0 of it and every OR leaves the other degree as it is. Where degrees could
+leave [0, 1], or be NaN, or a number be infinite, `where` leaves the rule out instead.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.system import (
+    Activation,
+    And,
+    Condition,
+    Formula,
+    FuzzySystem,
+    Is,
+    Label,
+    Linear,
+    Not,
+    Or,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+    is_drawn_by_lines,
+    sampled_values,
+)
+from fuzzytree.semantics.inference import line_tables
+from fuzzytree.semantics.programs.choosing import passes, positive, proportional, ranked
+from fuzzytree.semantics.programs.curves import curve_degree, is_unit, value_at
+from fuzzytree.semantics.programs.defuzzifying import (
+    centroid_of_lines,
+    defuzzified,
+    samples_of,
+)
+from fuzzytree.semantics.programs.formulas import as_number, is_nan, value_of
+from fuzzytree.semantics.programs.norms import (
+    KEEPS_UNIT,
+    S_NORMS,
+    T_NORMS,
+    Norm,
+    hedged,
+)
+from fuzzytree.semantics.programs.rules import DECIDED, MISSING, UNCOVERED, known_row
+from fuzzytree.semantics.programs.steps import Maker, Program, Result
+
+
+@functools.lru_cache(maxsize=4)
+def from_system(system: FuzzySystem, *, activations: bool = False) -> Program:
+    """Return the program of a fuzzy system.
+
+    Its numbers have the bits of `fuzzytree.semantics.inference.infer`, and so has every
+    runner whose `exp`, `pow` and the like are those of the C library. Rows with a value
+    that is missing or not finite give NaN and status 3.
+
+    Args:
+        system: The system.
+        activations: Whether the degree of activation of each rule is wanted.
+
+    Returns:
+        A program with the result `output` for each output, `status`, and `activation`
+        for each rule of all blocks if wanted.
+
+    Raises:
+        KeyError: If a formula needs an output that has no number yet.
+
+    Example:
+        >>> from fuzzytree.semantics.programs.evaluate import evaluate
+        >>> from fuzzytree.model.system import Conclusion, Defuzzifier, Points
+        >>> dirty = Label("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+        >>> long = Label("long", Singleton(60.0))
+        >>> system = FuzzySystem(
+        ...     "washer", (SystemInput("dirt", (dirty,)),),
+        ...     (SystemOutput("time", (long,), None, None,
+        ...                   Defuzzifier("weighted sum")),),
+        ...     (RuleBlock((SystemRule(Is("dirt", "dirty"),
+        ...                            (Conclusion("time", "long"),)),)),),
+        ... )
+        >>> evaluate(from_system(system), {"dirt": 5.0}).of("output")
+        (30.0,)
+    """
+    make = Maker()
+    known, values = _values(make, system)
+    run = _Run(make, system, values)
+    for block in system.blocks:
+        run.activate(block)
+    numbers: list[int] = []
+    for output in system.outputs:
+        with make.topic(output.name):
+            numbers.append(run.number(output))
+            values[output.name] = _answer(make, output, numbers[-1])
+    nothing = make.constant(math.nan)
+    results: list[Result] = []
+    for one in system.outputs:
+        with make.topic(one.name):
+            number = make("where", known, values[one.name], nothing)
+            make.titled(number, one.name)
+        results.append(Result("output", one.name, number))
+    if activations:
+        for rule, degree in enumerate(run.activations, 1):
+            shown = make("where", known, degree, nothing)
+            results.append(Result("activation", str(rule), shown))
+    results.append(Result("status", "status", _status(make, known, numbers)))
+    return make.program(system.name, system.columns, tuple(results))
+
+
+def _values(make: Maker, system: FuzzySystem) -> tuple[int, dict[str, int]]:
+    """Return whether all values are finite, and each input's value in its range."""
+    found: list[int] = []
+    values: dict[str, int] = {}
+    for one in system.inputs:
+        with make.topic(one.name):
+            value = _combined(make, one, values) if one.parts else make.input(one.name)
+            make.titled(value, one.name)
+            found.append(value)
+            values[one.name] = _held(make, one, value) if one.clips else value
+            make.titled(values[one.name], f"{one.name} clamped")
+    with make.topic("inputs"):
+        return known_row(make, found), values
+
+
+def _combined(make: Maker, one: SystemInput, values: dict[str, int]) -> int:
+    terms: list[int] = []
+    for part in one.parts:
+        offset = make("subtract", values[part.input], make.constant(part.centre))
+        terms.append(make("multiply", make.constant(part.weight), offset))
+    return make.chain("add", terms)
+
+
+def _held(make: Maker, one: SystemInput | SystemOutput, value: int) -> int:
+    """Return a value moved into a range; NaN stays NaN."""
+    held = value
+    if one.high is not None:
+        high = make.constant(one.high)
+        held = make("where", make("less", high, value), high, held)
+    if one.low is not None:
+        low = make.constant(one.low)
+        held = make("where", make("less", value, low), low, held)
+    return held
+
+
+def _answer(make: Maker, output: SystemOutput, number: int) -> int:
+    if output.default is not None:
+        default = make.constant(output.default)
+        number = make("where", is_nan(make, number), default, number)
+    return _held(make, output, number) if output.clips else number
+
+
+def _status(make: Maker, known: int, numbers: Sequence[int]) -> int:
+    with make.topic("status"):
+        is_none = make.chain("or", [is_nan(make, number) for number in numbers])
+        uncovered, decided = make.constant(UNCOVERED), make.constant(DECIDED)
+        status = make("where", is_none, uncovered, decided)
+        return make("where", known, status, make.constant(MISSING))
+
+
+class _Concluded(msgspec.Struct):
+    """A conclusion with its degree, 0 where its rule is not activated.
+
+    Attributes:
+        label: The label's name.
+        degree: Its place.
+        implication: The block's.
+    """
+
+    label: str
+    degree: int
+    implication: TNorm
+
+
+class _Run:
+    """The blocks of a system on their way to steps."""
+
+    def __init__(
+        self, make: Maker, system: FuzzySystem, values: dict[str, int]
+    ) -> None:
+        self.make = make
+        self.values = values
+        self.columns = system.columns
+        self.outputs = {one.name: one for one in system.outputs}
+        self.labels = {
+            (variable.name, label.name): label
+            for variable in system.variables
+            for label in variable.labels
+        }
+        self.activations: list[int] = []
+        self.concluded: dict[str, dict[tuple[int, int], _Concluded]] = {
+            name: {} for name in self.outputs
+        }
+        self.units: set[int] = {make.constant(0.0), make.constant(1.0)}
+        self.propositions: dict[Is, int] = {}
+        self.degrees: dict[tuple[str, str, int], int] = {}
+
+    def activate(self, block: RuleBlock) -> None:
+        """Add the rules of a block, and note what each concludes."""
+        how = block.activation
+        first = len(self.activations)
+        order = range(len(block.rules))
+        if how.method in ("highest", "lowest", "proportional"):
+            # Which rules are activated is known when all degrees are.
+            found = [
+                self._rule_degree(block, rule, number)
+                for number, rule in enumerate(block.rules, first + 1)
+            ]
+            degrees = self._chosen(how, found)
+            for index in order:
+                with self.make.topic(f"rule {first + index + 1}"):
+                    self._conclude(block, index, first + index, degrees[index])
+        else:
+            # Each rule sees what those before it concluded.
+            degrees = [0] * len(block.rules)
+            count = self.make.constant(0.0)
+            for index in reversed(order) if how.method == "last" else order:
+                rule = block.rules[index]
+                degree = self._rule_degree(block, rule, first + index + 1)
+                with self.make.topic(f"rule {first + index + 1}"):
+                    degrees[index], count = self._passed(how, degree, count)
+                    self._conclude(block, index, first + index, degrees[index])
+        self.activations += degrees
+
+    def _chosen(self, how: Activation, found: Sequence[int]) -> list[int]:
+        if not found:
+            return []
+        if how.method == "proportional":
+            degrees = proportional(self.make, found)
+        else:
+            degrees = ranked(self.make, how, found)
+        for degree in degrees:
+            self._unit(degree, if_all=found)
+        return degrees
+
+    def _passed(self, how: Activation, degree: int, count: int) -> tuple[int, int]:
+        """Return a rule's degree of activation, and how many are activated now."""
+        make, zero = self.make, self.make.constant(0.0)
+        test = passes(make, how, degree)
+        if test is None:
+            return self._positive(degree), count
+        active = make("and", make("less", zero, degree), test)
+        if how.method != "threshold":
+            limit = make.constant(float(how.count))
+            active = make("and", active, make("less", count, limit))
+            count = make("add", count, as_number(make, active))
+        found = make("where", active, degree, zero)
+        return self._unit(found, if_all=[degree]), count
+
+    def _positive(self, degree: int) -> int:
+        """Return a degree where it is above 0, else 0."""
+        return degree if degree in self.units else positive(self.make, degree)
+
+    def _unit(self, place: int, *, if_all: Sequence[int]) -> int:
+        """Note that a step lies in [0, 1] if some others do."""
+        if self.units.issuperset(if_all):
+            self.units.add(place)
+        return place
+
+    def _rule_degree(self, block: RuleBlock, rule: SystemRule, number: int) -> int:
+        checkpoint()
+        make = self.make
+        when = rule.when
+        with make.topic(f"rule {number}"):
+            degree = make.constant(1.0) if when is None else self._degree(when, block)
+            found = make("multiply", make.constant(rule.weight), degree)
+            make.titled(found, f"rule {number} strength")
+        return self._unit(found, if_all=[degree])
+
+    def _degree(self, condition: Condition, block: RuleBlock) -> int:
+        match condition:
+            case Is():
+                return self._asked(condition)
+            case And(parts=parts):
+                both = block.conjunction or "minimum"
+                degrees = [self._degree(part, block) for part in parts]
+                return self._joined(both, T_NORMS[both], degrees)
+            case Or(parts=parts):
+                either = block.disjunction or "maximum"
+                degrees = [self._degree(part, block) for part in parts]
+                return self._joined(either, S_NORMS[either], degrees)
+            case Not(part=part):
+                degree = self._degree(part, block)
+                found = self.make("subtract", self.make.constant(1.0), degree)
+                return self._unit(found, if_all=[degree])
+
+    def _joined(self, name: str, norm: Norm, degrees: Sequence[int]) -> int:
+        total = degrees[0]
+        for degree in degrees[1:]:
+            joined = norm(self.make, total, degree)
+            if name in KEEPS_UNIT:
+                self._unit(joined, if_all=[total, degree])
+            total = joined
+        return total
+
+    def _asked(self, asked: Is) -> int:
+        if asked in self.propositions:
+            return self.propositions[asked]
+        if asked.label is None:
+            degree = self.make.constant(math.nan)  # the hedge `any` makes 1 of it
+        elif asked.variable in self.outputs:
+            degree = self._so_far(self.outputs[asked.variable], asked.label)
+        else:
+            label = self.labels[asked.variable, asked.label]
+            value = self.values[asked.variable]
+            degree = self._label_degree(asked.variable, label, value)
+        words = (asked.variable, "is", *asked.hedges, asked.label or "")
+        with self.make.topic(" ".join(words)):
+            found = hedged(self.make, asked.hedges, degree)
+            self.make.titled(found, " ".join(words))
+        if asked.variable not in self.outputs:  # of those, each rule changes it
+            self.propositions[asked] = found
+        return self._unit(found, if_all=[degree])
+
+    def _label_degree(self, variable: str, label: Label, x: int) -> int:
+        key = variable, label.name, x
+        if key not in self.degrees:
+            with self.make.topic(f"{variable} is {label.name}"):
+                degree = curve_degree(self.make, label.curve, x, self.values)
+                height = self.make.constant(label.height)
+                found = self.make("multiply", height, degree)
+                self.make.titled(found, f"{variable} is {label.name}")
+            if is_unit(label.curve):
+                self.units.add(found)
+            self.degrees[key] = found
+        return self.degrees[key]
+
+    def _so_far(self, output: SystemOutput, label: str) -> int:
+        """Return how far a label was concluded: its degrees, aggregated from 0 on."""
+        found = [one for one in self._of(output) if one.label == label]
+        return self._aggregate(output, found)
+
+    def _aggregate(self, output: SystemOutput, found: Sequence[_Concluded]) -> int:
+        name = output.aggregation or "sum"
+        degrees = [one.degree for one in found]
+        if not degrees or degrees[0] not in self.units:
+            degrees.insert(0, self.make.constant(0.0))
+        # 0 OR the first is the first, if that lies in [0, 1].
+        return self._joined(name, S_NORMS[name], degrees)
+
+    def _of(self, output: SystemOutput) -> list[_Concluded]:
+        """Return what is concluded of an output, in the order of the rules."""
+        concluded = self.concluded[output.name]
+        return [concluded[place] for place in sorted(concluded)]
+
+    def _conclude(
+        self, block: RuleBlock, index: int, rule: int, activation: int
+    ) -> None:
+        """Note what a rule concludes; hedges act on the conclusions behind them too."""
+        make, zero = self.make, self.make.constant(0.0)
+        if block.activation.method == "proportional":
+            activation = self._positive(activation)
+        if activation == zero:
+            return
+        degree, is_hedged = activation, False
+        for offset, one in enumerate(block.rules[index].then):
+            is_hedged = is_hedged or bool(one.hedges)
+            before, degree = degree, hedged(make, one.hedges, degree)
+            self._unit(degree, if_all=[before])
+            noted = degree
+            if is_hedged:  # such as `not`: only of a rule that is activated
+                is_active = make("less", zero, activation)
+                noted = make("where", is_active, self._positive(degree), zero)
+                self._unit(noted, if_all=[degree])
+            how = block.implication or "minimum"
+            self.concluded[one.output][rule, offset] = _Concluded(one.label, noted, how)
+
+    def number(self, output: SystemOutput) -> int:
+        """Return what an output's conclusions amount to; NaN if to nothing."""
+        if not self._of(output):
+            return self.make.constant(math.nan)
+        if output.defuzzifier.is_weighted:
+            return self._weighted(output)
+        if is_drawn_by_lines(output):
+            concluded = {one.label for one in self._of(output)}
+            cuts = [
+                (self._so_far(output, label.name), line_tables(output, label))
+                for label in output.labels
+                if label.name in concluded
+            ]
+            return centroid_of_lines(self.make, output, cuts)
+        xs = samples_of(self.make, output)
+        return defuzzified(self.make, output, xs, self._aggregated(output, xs))
+
+    def _aggregated(self, output: SystemOutput, xs: int) -> int:
+        """Return the degree of the joined conclusions at each sample, from 0 on."""
+        make = self.make
+        join = S_NORMS[output.aggregation or "maximum"]
+        zero = make.constant(0.0)
+        values = sampled_values(output)
+        is_finite = all(map(math.isfinite, values))
+        total = zero
+        for one in self._gathered(output):
+            label = self.labels[output.name, one.label]
+            curve = self._label_degree(output.name, label, xs)
+            cut = T_NORMS[one.implication](make, one.degree, curve)
+            is_safe = is_finite and curve in self.units and one.degree in self.units
+            if is_safe and one.implication in KEEPS_UNIT and total == zero:
+                total = cut  # 0 OR it
+                continue
+            joined = join(make, total, cut)
+            if not is_safe:
+                joined = make("where", make("less", zero, one.degree), joined, total)
+            total = joined
+        if not make.samples(total):  # curves that are the same everywhere
+            index = make.index(len(values))
+            total = make("add", total, make("multiply", zero, index))
+        return total
+
+    def _gathered(self, output: SystemOutput) -> list[_Concluded]:
+        """Return the conclusions, those of one label as one where that is the same.
+
+        The larger of two cut curves is the curve cut at the larger degree, to the last
+        bit, because minimum and product keep order in rounded numbers too.
+        """
+        found = self._of(output)
+        if output.aggregation != "maximum":
+            return found
+        if not all(one.degree in self.units for one in found):
+            return found
+        gathered: dict[tuple[str, str], _Concluded] = {}
+        for one in found:
+            if one.implication not in ("minimum", "product"):
+                return found
+            if not is_unit(self.labels[output.name, one.label].curve):
+                return found
+            key = one.label, one.implication
+            if key in gathered:
+                pair = [gathered[key].degree, one.degree]
+                degree = self._joined("maximum", S_NORMS["maximum"], pair)
+                one = msgspec.structs.replace(one, degree=degree)
+            gathered[key] = one
+        return list(gathered.values())
+
+    def _weighted(self, output: SystemOutput) -> int:
+        """Return the weighted sum or average of numbers, from left to right."""
+        make, zero = self.make, self.make.constant(0.0)
+        weights: list[int] = []
+        products: list[int] = []
+        for label, degree, concluded in self._weights(output):
+            with make.topic(label.name):
+                number = self._number_of(output, label, degree)
+            product = make("multiply", degree, number)
+            known = make.number(number)
+            is_finite = known is not None and math.isfinite(known)
+            if not is_finite or degree not in self.units:
+                there = self._is_there(concluded)
+                product = make("where", there, product, zero)
+                degree = make("where", there, degree, zero)
+            weights.append(degree)
+            products.append(product)
+        total = make.chain("add", products)
+        if output.defuzzifier.method == "weighted average":
+            return make("divide", total, make.chain("add", weights))
+        is_any = self._is_there(self._of(output))
+        return make("where", is_any, total, make.constant(math.nan))
+
+    def _weights(
+        self, output: SystemOutput
+    ) -> Iterator[tuple[Label, int, list[_Concluded]]]:
+        """Yield labels and degrees, and the conclusions that they come from."""
+        found = self._of(output)
+        if output.aggregation is None:
+            for one in found:
+                yield self.labels[output.name, one.label], one.degree, [one]
+            return
+        owners: dict[str, list[_Concluded]] = {}
+        for one in found:
+            owners.setdefault(one.label, []).append(one)
+        for label in output.labels:
+            if own := owners.get(label.name):
+                yield label, self._aggregate(output, own), own
+
+    def _is_there(self, concluded: Sequence[_Concluded]) -> int:
+        """Return whether a row has any of some conclusions."""
+        zero = self.make.constant(0.0)
+        tests = [self.make("less", zero, one.degree) for one in concluded]
+        return self.make.chain("or", tests)
+
+    def _number_of(self, output: SystemOutput, label: Label, degree: int) -> int:
+        make = self.make
+        match label.curve:
+            case Singleton(value=value):
+                return make.constant(value)
+            case Linear(weights=weights, offset=offset):
+                values = [self.values[name] for name in self.columns]
+                pairs = zip(weights, values, strict=True)
+                parts = [make("multiply", make.constant(w), x) for w, x in pairs]
+                total = make.chain("add", parts) if parts else make.constant(0.0)
+                return make("add", total, make.constant(offset))
+            case Formula(expression=expression):
+                return value_of(make, expression, {**self.values, "x": degree})
+            case curve:
+                height = make.constant(label.height)
+                found = value_at(make, curve, make("divide", degree, height))
+                if found is not None:
+                    return found
+                return self._label_degree(output.name, label, degree)

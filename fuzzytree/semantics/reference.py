@@ -1,0 +1,237 @@
+"""The meaning of a rule base and of a tree, written to be believed and not to be fast.
+
+One row at a time, in plain Python floats (IEEE 754 double), without an array library.
+Each operation below is one rounding; every other runtime that promises equal bits
+performs the same operations in the same order.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Mapping
+from enum import IntEnum
+
+import msgspec
+
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Points,
+    RuleBase,
+    Shape,
+    Side,
+    Variable,
+    shapes_of,
+)
+from fuzzytree.model.tree import FuzzyTree
+
+BELOW_ONE = 1.0 - 2.0**-53
+"""The largest double below 1: the highest degree off a plateau."""
+
+
+class Status(IntEnum):
+    """How an answer came about."""
+
+    DECIDED = 0
+    TIE = 1
+    UNCOVERED = 2
+    MISSING = 3
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """What a rule base or a tree says about one row.
+
+    Attributes:
+        rule: The number of the winning rule or leaf, from 1; 0 if there is none.
+        label: The class, or None for "no class".
+        status: Decided, decided by order among equals, uncovered, or missing.
+        strengths: Of every rule, in order; NaN where a needed value is missing.
+            Empty for a tree.
+    """
+
+    rule: int
+    label: str | None
+    status: Status
+    strengths: tuple[float, ...] = ()
+
+
+def evaluate(rules: RuleBase, row: Mapping[str, float]) -> Answer:
+    """Fire every rule on one row and let the first of the strongest decide.
+
+    Args:
+        rules: The rule base.
+        row: A value for each input, by name.
+
+    Returns:
+        The answer, with the strength of every rule.
+
+    Raises:
+        KeyError: If an input has no value.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Rule, Term
+        >>> low = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> rules = RuleBase(
+        ...     "grip", ("soft",), (Variable("force", (low,)),),
+        ...     (Rule((Clause("force", ("low",)),), "soft"),),
+        ... )
+        >>> evaluate(rules, {"force": 2.0}).strengths
+        (0.5,)
+    """
+    axes = axis_values(rules.variables, row)
+    if not all(map(math.isfinite, axes.values())):
+        missing = (math.nan,) * len(rules.rules)
+        return Answer(0, rules.semantics.missing, Status.MISSING, missing)
+    shapes = shapes_of(rules.variables)
+    # The rules of a tree share their clauses: each is evaluated once.
+    clauses = {id(clause): clause for rule in rules.rules for clause in rule.when}
+    degrees = {
+        key: clause_degree(clause, shapes, axes[clause.variable])
+        for key, clause in clauses.items()
+    }
+    strengths = tuple(
+        strength(
+            [degrees[id(clause)] for clause in rule.when],
+            is_product=rules.semantics.conjunction == "product",
+        )
+        for rule in rules.rules
+    )
+    best = max(strengths)
+    if best == 0.0:
+        return Answer(0, rules.semantics.uncovered, Status.UNCOVERED, strengths)
+    winner = strengths.index(best)
+    status = Status.TIE if strengths.count(best) > 1 else Status.DECIDED
+    return Answer(winner + 1, rules.rules[winner].then, status, strengths)
+
+
+def descend(tree: FuzzyTree, row: Mapping[str, float]) -> Answer:
+    """Follow one path of the tree, at each node the interval that holds the value.
+
+    Raises:
+        KeyError: If an input has no value.
+    """
+    axes = axis_values(tree.variables, row)
+    if not all(map(math.isfinite, axes.values())):
+        return Answer(0, tree.semantics.missing, Status.MISSING)
+    node, leaf = (1, None) if tree.nodes else (None, 1)
+    while node is not None:
+        asked = tree.nodes[node - 1]
+        value = axes[asked.variable]
+        interval = sum(1 for cut in asked.cuts if value > cut)
+        branch = asked.branches[asked.owners[interval]]
+        node, leaf = branch.node, branch.leaf
+    number = leaf or 0
+    return Answer(number, tree.leaves[number - 1].label, Status.DECIDED)
+
+
+def axis_values(
+    variables: tuple[Variable, ...], row: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the value of each variable: the input, or the sum of its parts in order.
+
+    A combination is `w1 (x1 - c1) + w2 (x2 - c2) + ...`, rounded after each step.
+    """
+    axes: dict[str, float] = {}
+    for variable in variables:
+        if not variable.parts:
+            axes[variable.name] = float(row[variable.name])
+            continue
+        first, *others = variable.parts
+        total = first.weight * (float(row[first.input]) - first.centre)
+        for part in others:
+            total = total + part.weight * (float(row[part.input]) - part.centre)
+        axes[variable.name] = total
+    return axes
+
+
+def clause_degree(
+    clause: Clause, shapes: Mapping[tuple[str, str], Shape], value: float
+) -> float:
+    """Return how true a clause is: the largest degree of its terms, or 1 minus it."""
+    highest = max(degree(shapes[clause.variable, term], value) for term in clause.terms)
+    return 1.0 - highest if clause.negated else highest
+
+
+def strength(degrees: list[float], *, is_product: bool) -> float:
+    """Return the minimum, or the product from left to right; 1 without a clause."""
+    if not is_product:
+        return min(degrees, default=1.0)
+    total = 1.0
+    for value in degrees:
+        total = total * value
+    return total
+
+
+def degree(shape: Shape, value: float) -> float:
+    """Return how far a finite value belongs to a shape, in [0, 1].
+
+    Example:
+        >>> degree(Band(0.0, 1.0, right=Flank(1.0, 2.0)), 1.25)
+        0.75
+    """
+    match shape:
+        case Band(low=low, high=high, left=left, right=right):
+            if low is not None and value <= low:
+                return 0.0 if left is None else flank_degree(left, value)
+            if high is not None and value > high:
+                return 0.0 if right is None else flank_degree(right, value)
+            return 1.0
+        case LR(mean=mean, left=below, right=above):
+            distance = value - mean
+            return min(side_degree(below, -distance), side_degree(above, distance))
+        case Points():
+            return points_degree(shape, value)
+
+
+def flank_degree(flank: Flank, value: float) -> float:
+    """Return the degree off a plateau: 0 at and beyond the flank's end, below 1."""
+    position = _clip((value - flank.end) / (flank.start - flank.end), 1.0)
+    return min(max(0.0, horner(flank.curve, position) * position), BELOW_ONE)
+
+
+def side_degree(side: Side, distance: float) -> float:
+    """Return the degree of one side of an LR set (paper, 2.2.2, with a tail).
+
+    Exactly 1 for a distance of 0 or less, exactly 0 at `reach` spreads and beyond.
+    """
+    u = _clip(distance / side.spread, side.reach)
+    t = min(u, 1.0)
+    body = _clip(1.0 - t * horner(side.curve, 2.0 * t - 1.0), 1.0)
+    w = _clip((side.reach - u) / (side.reach - 1.0), 1.0)
+    square = w * w
+    return body * (square * square)
+
+
+def points_degree(points: Points, value: float) -> float:
+    """Return the degree on the line between the points on either side of a value.
+
+    The quotient lies in [0, 1] and is monotone, in rounded numbers too; so are the
+    product and the sum, which is held between the two degrees. Measured from its right
+    end, a line is exact there, and from a left end of degree 0 it is exact at both and
+    near 0 to the last digit.
+    """
+    values, degrees = points.values, points.degrees
+    after = bisect_left(values, value)  # so many points lie below the value
+    if after in (0, len(values)):
+        return degrees[after and -1]
+    anchor, other = values[after], values[after - 1]
+    near, far = degrees[after], degrees[after - 1]
+    if far == 0.0:
+        anchor, other, near, far = other, anchor, far, near
+    line = near + (value - anchor) / (other - anchor) * (far - near)
+    return min(max(line, min(near, far)), max(near, far))
+
+
+def horner(coefficients: tuple[float, ...], x: float) -> float:
+    """Return c0 + x (c1 + x (c2 + ...)), from the inside out."""
+    total = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        total = total * x + coefficient
+    return total
+
+
+def _clip(value: float, high: float) -> float:
+    return min(max(0.0, value), high)

@@ -1,0 +1,418 @@
+"""Small models, each with one thing that not every format can carry.
+
+`fuzzytree formats` writes each of them in each format and tells what comes of it; the
+conformance suite reads and writes them as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from msgspec.structs import replace
+
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Semantics,
+    Side,
+    Term,
+    Variable,
+)
+from fuzzytree.model.system import (
+    Activation,
+    And,
+    Call,
+    Conclusion,
+    Condition,
+    Curve,
+    Defuzzifier,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Is,
+    Label,
+    Linear,
+    Name,
+    Not,
+    Number,
+    Or,
+    RuleBlock,
+    SCurve,
+    Sigmoid,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    Trapezoid,
+)
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
+from fuzzytree.semantics.lowering import rules_from_tree
+
+
+def samples() -> dict[str, Document]:
+    """Return every sample, by what is special about it.
+
+    Example:
+        >>> list(samples())[:3]
+        ['tree', 'tree with combined features', 'relative rules']
+    """
+    return {name: make() for name, make in SAMPLES.items()}
+
+
+# --- trees and rule bases
+
+
+def _tree() -> FuzzyTree:
+    """Return a tree of two nodes: force, then slip."""
+    low = Term("low", Band(high=2.0, right=Flank(2.0, 4.0, (0.5, 0.5))))
+    high = Term("high", Band(low=2.0, left=Flank(2.0, 0.0)))
+    none = Term("none", Band(high=0.5, right=Flank(0.5, 1.5)))
+    much = Term("much", Band(low=0.5, left=Flank(0.5, -0.5)))
+    first = (Branch(("low",), ("soft",), leaf=1), Branch(("high",), ("firm",), node=2))
+    second = (
+        Branch(("none",), ("loose",), leaf=2),
+        Branch(("much",), ("firm",), leaf=3),
+    )
+    return FuzzyTree(
+        "grip",
+        ("firm", "loose", "soft"),
+        (
+            Variable("force", (low, high), low=0.0, high=5.0),
+            Variable("slip", (none, much), low=0.0, high=1.0),
+        ),
+        (
+            Node("force", (2.0,), (0, 1), first),
+            Node("slip", (0.5,), (0, 1), second),
+        ),
+        (Leaf("soft"), Leaf("loose"), Leaf("firm")),
+        sets=(
+            Sets("force", (_lr("soft", 1.0), _lr("firm", 3.0))),
+            Sets("slip", (_lr("loose", 0.2), _lr("firm", 0.9))),
+        ),
+    )
+
+
+def _lr(name: str, mean: float) -> Term:
+    return Term(name, LR(mean, Side(0.5, (0.6, 0.1)), Side(0.75, (0.5,))))
+
+
+def _mixed_tree() -> FuzzyTree:
+    """Return a tree that asks a sum of two inputs."""
+    mix = Variable(
+        "mix",
+        (
+            Term("low", Band(high=1.5, right=Flank(1.5, 2.5))),
+            Term("high", Band(low=1.5, left=Flank(1.5, 0.5))),
+        ),
+        parts=(Part("force", 0.5, 1.0), Part("slip", -2.0)),
+    )
+    inputs = (
+        Variable("force", low=0.0, high=5.0),
+        Variable("slip", low=0.0, high=1.0),
+    )
+    ends = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
+    return FuzzyTree(
+        "mixed",
+        ("firm", "soft"),
+        (*inputs, mix),
+        (Node("mix", (1.5,), (0, 1), ends),),
+        (Leaf("soft"), Leaf("firm")),
+    )
+
+
+def _rules(*rules: Rule, semantics: Semantics | None = None) -> RuleBase:
+    """Return a rule base over two inputs whose terms are ramps."""
+    low, high = Points((0.0, 4.0), (1.0, 0.0)), Points((0.0, 4.0), (0.0, 1.0))
+    middle = Points((0.0, 2.0, 4.0), (0.0, 1.0, 0.0))
+    terms = (Term("low", low), Term("middle", middle), Term("high", high))
+    return RuleBase(
+        "ramps",
+        ("firm", "soft"),
+        (
+            Variable("force", terms, low=0.0, high=4.0),
+            Variable("slip", terms, low=0.0, high=4.0),
+        ),
+        rules or _PLAIN,
+        semantics or Semantics(),
+    )
+
+
+_PLAIN = (
+    Rule((Clause("force", ("low",)), Clause("slip", ("high",))), "soft"),
+    Rule((Clause("force", ("high",)),), "firm"),
+)
+
+
+def _stepped() -> RuleBase:
+    """Return rules whose terms have a vertical edge."""
+    rules = _rules()
+    step = Points((1.0, 1.0, 4.0), (0.25, 1.0, 0.0))
+    first = replace(rules.variables[0], terms=(Term("low", step), Term("high", step)))
+    return replace(rules, variables=(first, rules.variables[1]))
+
+
+def _of_points() -> RuleBase:
+    return _rules()
+
+
+def _product() -> RuleBase:
+    return _rules(semantics=Semantics("product"))
+
+
+def _several_terms() -> RuleBase:
+    return _rules(Rule((Clause("force", ("low", "high")),), "soft"), _PLAIN[1])
+
+
+def _negated() -> RuleBase:
+    return _rules(Rule((Clause("force", ("low",), negated=True),), "soft"), _PLAIN[0])
+
+
+def _always() -> RuleBase:
+    return _rules(_PLAIN[0], Rule((), "firm"))
+
+
+def _defaults() -> RuleBase:
+    return _rules(semantics=Semantics(uncovered="firm", missing="soft"))
+
+
+# --- systems
+
+
+_LOW: Condition = Is("heat", "low")
+_HIGH: Condition = Is("heat", "high")
+_DRY: Condition = Is("damp", "dry")
+
+
+def _input(name: str, low: str, high: str) -> SystemInput:
+    return SystemInput(
+        name,
+        (
+            Label(low, Trapezoid(None, 0.0, 2.0, 6.0)),
+            Label(high, Trapezoid(4.0, 8.0, 10.0, None)),
+        ),
+        0.0,
+        10.0,
+    )
+
+
+def _sugeno(
+    *rules: SystemRule,
+    slow: Curve | None = None,
+    fast: Curve | None = None,
+    method: Defuzzifier | None = None,
+) -> FuzzySystem:
+    """Return a system whose output is a weighted number."""
+    labels = (
+        Label("slow", slow or Singleton(1.0)),
+        Label("fast", fast or Singleton(3.5)),
+    )
+    output = SystemOutput(
+        "fan", labels, 0.0, 5.0, method or Defuzzifier("weighted average")
+    )
+    return FuzzySystem(
+        "fan",
+        (_input("heat", "low", "high"), _input("damp", "dry", "wet")),
+        (output,),
+        (RuleBlock(rules or _two()),),
+    )
+
+
+def _two(weight: float = 1.0) -> tuple[SystemRule, ...]:
+    return (
+        SystemRule(And((_LOW, _DRY)), (Conclusion("fan", "slow"),), weight),
+        SystemRule(_HIGH, (Conclusion("fan", "fast"),)),
+    )
+
+
+def _mamdani(method: Defuzzifier | None = None) -> FuzzySystem:
+    """Return a system whose output is the centroid of curves."""
+    system = _sugeno(
+        slow=Trapezoid(0.0, 1.0, 1.0, 3.0), fast=Trapezoid(2.0, 4.0, 4.0, 5.0)
+    )
+    output = replace(
+        system.outputs[0],
+        defuzzifier=method or Defuzzifier("centroid"),
+        aggregation="maximum",
+    )
+    block = replace(system.blocks[0], implication="minimum")
+    return replace(system, outputs=(output,), blocks=(block,))
+
+
+def _mean_of_maximum() -> FuzzySystem:
+    return _mamdani(Defuzzifier("mean of maximum"))
+
+
+def _singletons() -> FuzzySystem:
+    """Return a classifier as JFML writes them: terms without width, and a maximum."""
+    system = _mamdani(Defuzzifier("smallest of maximum", 1000))
+    labels = (Label("slow", Singleton(1.0)), Label("fast", Singleton(3.5)))
+    output = replace(system.outputs[0], labels=labels)
+    return replace(system, outputs=(output,))
+
+
+def _fine() -> FuzzySystem:
+    return _mamdani(Defuzzifier("centroid", samples=777))
+
+
+def _linear() -> FuzzySystem:
+    return _sugeno(slow=Linear((0.5, -0.25), 1.0), fast=Linear((0.0, 1.0), 2.0))
+
+
+def _formula() -> FuzzySystem:
+    square = Call("^", (Name("heat"), Number(2.0)))
+    return _sugeno(slow=Formula(Call("/", (square, Number(20.0)))))
+
+
+def _weighted_sum() -> FuzzySystem:
+    return _sugeno(method=Defuzzifier("weighted sum"))
+
+
+def _monotone() -> FuzzySystem:
+    ramp = Points((0.0, 5.0), (0.0, 1.0))
+    return _sugeno(slow=Points((0.0, 5.0), (1.0, 0.0)), fast=ramp)
+
+
+def _weights() -> FuzzySystem:
+    return _sugeno(*_two(0.75))
+
+
+def _hedges() -> FuzzySystem:
+    condition = Is("heat", "high", ("very",))
+    return _sugeno(_two()[0], SystemRule(condition, (Conclusion("fan", "fast"),)))
+
+
+def _or() -> FuzzySystem:
+    condition = Or((And((_LOW, _DRY)), _HIGH))
+    return _sugeno(SystemRule(condition, (Conclusion("fan", "fast"),)))
+
+
+def _not() -> FuzzySystem:
+    condition = And((_LOW, Not(_DRY)))
+    return _sugeno(SystemRule(condition, (Conclusion("fan", "slow"),)), _two()[1])
+
+
+def _unconditional() -> FuzzySystem:
+    return _sugeno(*_two(), SystemRule(None, (Conclusion("fan", "slow"),)))
+
+
+def _gaussian() -> FuzzySystem:
+    return _curved(Gaussian(5.0, 1.5))
+
+
+def _sigmoid() -> FuzzySystem:
+    return _curved(Sigmoid(5.0, 2.0))
+
+
+def _spline() -> FuzzySystem:
+    return _curved(SCurve(2.0, 8.0))
+
+
+def _curved(curve: Curve) -> FuzzySystem:
+    system = _sugeno()
+    heat = replace(
+        system.inputs[0], labels=(system.inputs[0].labels[0], Label("high", curve))
+    )
+    return replace(system, inputs=(heat, system.inputs[1]))
+
+
+def _several_outputs() -> FuzzySystem:
+    system = _sugeno()
+    lamp = replace(system.outputs[0], name="lamp")
+    both = (Conclusion("fan", "slow"), Conclusion("lamp", "fast"))
+    rules = (SystemRule(_LOW, both), *_two())
+    return replace(system, outputs=(*system.outputs, lamp), blocks=(RuleBlock(rules),))
+
+
+def _several_blocks() -> FuzzySystem:
+    first, second = _two()
+    blocks = (RuleBlock((first,)), RuleBlock((second,), conjunction="product"))
+    return replace(_sugeno(), blocks=blocks)
+
+
+def _probabilistic() -> FuzzySystem:
+    block = RuleBlock(_two(), "product", "algebraic sum")
+    return replace(_sugeno(), blocks=(block,))
+
+
+def _hamacher() -> FuzzySystem:
+    block = RuleBlock(_two(), "hamacher product", "hamacher sum")
+    return replace(_sugeno(), blocks=(block,))
+
+
+def _highest() -> FuzzySystem:
+    block = RuleBlock(_two(), activation=Activation("highest", 1))
+    return replace(_sugeno(), blocks=(block,))
+
+
+def _default() -> FuzzySystem:
+    system = _sugeno()
+    return replace(system, outputs=(replace(system.outputs[0], default=2.5),))
+
+
+def _clipped() -> FuzzySystem:
+    system = _sugeno()
+    inputs = tuple(replace(one, clips=True) for one in system.inputs)
+    return replace(system, inputs=inputs)
+
+
+def _relative() -> RuleBase:
+    return rules_from_tree(_tree())
+
+
+def _raw() -> RuleBase:
+    return rules_from_tree(_tree(), "raw")
+
+
+def _mixed_rules() -> RuleBase:
+    return rules_from_tree(_mixed_tree())
+
+
+SAMPLES: Mapping[str, Callable[[], Document]] = MappingProxyType(
+    {
+        "tree": _tree,
+        "tree with combined features": _mixed_tree,
+        "relative rules": _relative,
+        "raw rules (LR curves)": _raw,
+        "rules with combined features": _mixed_rules,
+        "point lists": _of_points,
+        "vertical edges": _stepped,
+        "AND as product": _product,
+        "several terms in a clause": _several_terms,
+        "negated clauses": _negated,
+        "a rule that always holds": _always,
+        "answers where no rule fires": _defaults,
+        "Sugeno, numbers": _sugeno,
+        "Sugeno, linear": _linear,
+        "Sugeno, formulas": _formula,
+        "weighted sum": _weighted_sum,
+        "Tsukamoto": _monotone,
+        "Mamdani, centroid": _mamdani,
+        "Mamdani, mean of maximum": _mean_of_maximum,
+        "Mamdani, singletons": _singletons,
+        "number of samples": _fine,
+        "weights of rules": _weights,
+        "hedges": _hedges,
+        "OR": _or,
+        "NOT": _not,
+        "a conclusion without a condition": _unconditional,
+        "gaussian curves": _gaussian,
+        "sigmoid curves": _sigmoid,
+        "S curves": _spline,
+        "several outputs": _several_outputs,
+        "several rule blocks": _several_blocks,
+        "product and algebraic sum": _probabilistic,
+        "Hamacher norms": _hamacher,
+        "the highest rule alone": _highest,
+        "a default answer": _default,
+        "inputs held in their range": _clipped,
+    }
+)
+"""What makes each sample, by what is special about it."""

@@ -1,0 +1,515 @@
+"""A model without what its answers do not need, and the proof that it is the same.
+
+Nothing is left out that an output could show. What would change an answer, the number
+of a rule, or what can be made of a tree is left out only on request, and said.
+
+Why an answer keeps its bits:
+
+- *A term that no clause names* enters no operation.
+- *Two terms of one curve* have equal degrees, and max of equal numbers is that number.
+- *A clause that always holds* has degree 1: `min(1, d)` and `1 * d` are d.
+- *A clause that stands twice* under min: `min(d, d)` is d. Under product it counts.
+- *A combination that no clause asks* is looked at to see whether a value is missing. It
+  may go where it cannot overflow: then it is finite wherever its inputs are.
+- *A rule whose clauses never hold together* has strength 0 for every input, and a rule
+  of strength 0 neither wins nor ties; but the rules behind it change their numbers.
+- *An input that nothing asks* decides alone whether a row with a missing value is
+  answered: leaving it out answers more rows.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from fractions import Fraction
+from functools import partial
+
+import msgspec
+from msgspec.structs import replace
+
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import (
+    Band,
+    Clause,
+    Part,
+    Rule,
+    RuleBase,
+    Shape,
+    Term,
+    Value,
+    Variable,
+    clause_text,
+    shapes_of,
+)
+from fuzzytree.model.tree import Branch, FuzzyTree, Sets, Use
+from fuzzytree.semantics.holding import always_holds, never_firing
+
+USES: tuple[Use, ...] = ("tree", "relative", "raw")
+
+_SMALL_CENTRE = 2.0**100  # below half a unit in the last place of float32's largest
+
+
+class Removed(Value, frozen=True):
+    """One thing that was left out, or could be.
+
+    Attributes:
+        where: The part of the model, as people name it.
+        why: Why it is not needed.
+        changes: What is different without it; empty if nothing is.
+    """
+
+    where: str
+    why: str
+    changes: str = ""
+
+
+class Pruned(Value, frozen=True):
+    """A model without what it does not need.
+
+    Attributes:
+        model: What is left.
+        removed: What is not.
+        rules: For each rule that is left its number before, from 1; empty for a tree,
+            whose leaves keep their numbers.
+    """
+
+    model: Model
+    removed: tuple[Removed, ...]
+    rules: tuple[int, ...] = ()
+
+    @property
+    def is_same(self) -> bool:
+        """Whether every output keeps every bit, for every input."""
+        return not any(one.changes for one in self.removed)
+
+
+def pruned(
+    model: Model,
+    *,
+    uses: Collection[Use] = ("tree", "relative"),
+    inputs: bool = False,
+    rules: bool = False,
+) -> Pruned:
+    """Leave out of a model what its answers do not need.
+
+    Ranges, units, supports, fit errors and the names of the training table's columns
+    stay: people and other tools read them, and no answer depends on them.
+
+    Args:
+        model: A tree or a rule base.
+        uses: What a tree is to serve. Its fitted sets stay for `raw`, its flanks for
+            `relative`; its path needs the cuts alone. Without effect on a rule base.
+        inputs: Whether inputs that nothing asks go as well, and combinations that
+            might overflow: rows in which only these are missing are then answered.
+        rules: Whether rules that can never fire go as well: the rules behind them then
+            have other numbers.
+
+    Returns:
+        The model that is left, and what is not.
+
+    Raises:
+        ValueError: If a use is unknown or none is given, or if raw rules are wanted of
+            a tree without sets.
+
+    Example:
+        >>> from fuzzytree.testing import random_tree
+        >>> tree = random_tree(1, leaves=2, inputs=1)
+        >>> [one.where for one in pruned(tree).removed]
+        ["the fitted sets of 'x1'"]
+    """
+    _check_uses(model, uses)
+    if isinstance(model, FuzzyTree):
+        return _pruned_tree(model, uses, drops_inputs=inputs)
+    return _pruned_rules(model, drops_inputs=inputs, drops_rules=rules)
+
+
+def _check_uses(model: Model, uses: Collection[Use]) -> None:
+    wrong = [use for use in uses if use not in USES]
+    if wrong or not uses:
+        named = repr(wrong[0]) if wrong else "none"
+        raise ValueError(f"uses: there is {', '.join(USES)}, not {named}")
+    if isinstance(model, RuleBase):
+        return
+    if "raw" in uses and model.nodes and not model.sets:
+        raise ValueError(
+            f"uses: tree {model.name!r} carries no fitted sets, so it has no raw rules"
+        )
+
+
+# --- rule bases
+
+
+def _pruned_rules(rules: RuleBase, *, drops_inputs: bool, drops_rules: bool) -> Pruned:
+    removed: list[Removed] = []
+    dead = never_firing(rules) if drops_rules else {}
+    numbers = [n for n in range(1, len(rules.rules) + 1) if n not in dead]
+    numbers = numbers or [1]  # a rule base needs one
+    for number, why in dead.items():
+        if number not in numbers:
+            change = "the rules behind it have lower numbers"
+            removed.append(Removed(f"rule {number}", why, change))
+    same = {v.name: _same_curves(v.terms) for v in rules.variables}
+    removed += [
+        _duplicate(f"term {name!r} of {variable!r}", other)
+        for variable, names in same.items()
+        for name, other in names.items()
+    ]
+    is_min = rules.semantics.conjunction == "min"
+    # Rules of a tree share their clauses, and these may name thousands of terms.
+    renamed = functools.cache(partial(_renamed, same=same))
+    is_idle = functools.cache(partial(always_holds, shapes=shapes_of(rules.variables)))
+    kept: list[Rule] = []
+    for number in numbers:
+        rule = rules.rules[number - 1]
+        when = [renamed(clause) for clause in rule.when]
+        needed = _needed_clauses(when, is_idle, is_min=is_min)
+        texts = [clause_text(c) for k, c in enumerate(when) if k not in needed]
+        removed += [
+            Removed(f"clause {text!r} of rule {number}", "it changes no strength")
+            for text in texts
+        ]
+        kept.append(replace(rule, when=tuple(when[k] for k in needed)))
+    clauses = {clause for rule in kept for clause in rule.when}
+    named = {(clause.variable, t) for clause in clauses for t in clause.terms}
+    variables = _pruned_variables(
+        _merged(rules.variables, same), named, removed, drops_inputs=drops_inputs
+    )
+    left = replace(rules, variables=variables, rules=tuple(kept))
+    return Pruned(left, tuple(removed), tuple(numbers))
+
+
+def _needed_clauses(
+    when: list[Clause], is_idle: Callable[[Clause], bool], *, is_min: bool
+) -> list[int]:
+    """Return the positions of the clauses that can lower a strength."""
+    needed: dict[Clause | int, int] = {}
+    for position, clause in enumerate(when):
+        if not is_idle(clause):
+            needed.setdefault(clause if is_min else position, position)
+    return list(needed.values())
+
+
+def _duplicate(where: str, other: str) -> Removed:
+    return Removed(where, f"its curve is that of {other!r}, which stands in its place")
+
+
+def _same_curves(terms: Iterable[Term]) -> dict[str, str]:
+    """Return, for each term whose curve an earlier one has, that one's name."""
+    first: dict[bytes, str] = {}
+    same: dict[str, str] = {}
+    for term in terms:
+        other = first.setdefault(curve_bytes(term.shape), term.name)
+        if other != term.name:
+            same[term.name] = other
+    return same
+
+
+def curve_bytes(shape: Shape) -> bytes:
+    """Return what tells curves apart: all numbers of a shape, the sign of 0 included.
+
+    Example:
+        >>> curve_bytes(Band(high=0.0)) == curve_bytes(Band(high=-0.0))
+        False
+    """
+    return msgspec.json.encode(shape)
+
+
+def _renamed(clause: Clause, same: Mapping[str, Mapping[str, str]]) -> Clause:
+    of = same[clause.variable]
+    if not of.keys() & set(clause.terms):
+        return clause
+    names = dict.fromkeys(of.get(name, name) for name in clause.terms)
+    return replace(clause, terms=tuple(names))
+
+
+def _merged(
+    variables: Iterable[Variable], same: Mapping[str, Mapping[str, str]]
+) -> list[Variable]:
+    """Return variables without the terms that others stand in for."""
+    return [
+        replace(v, terms=tuple(t for t in v.terms if t.name not in same[v.name]))
+        for v in variables
+    ]
+
+
+def _pruned_variables(
+    variables: Iterable[Variable],
+    named: Collection[tuple[str, str]],
+    removed: list[Removed],
+    *,
+    drops_inputs: bool,
+) -> tuple[Variable, ...]:
+    """Leave out terms that are not named, then variables that are not asked."""
+    kept: list[Variable] = []
+    for variable in variables:
+        terms = tuple(t for t in variable.terms if (variable.name, t.name) in named)
+        removed += [
+            Removed(f"term {term.name!r} of {variable.name!r}", "nothing names it")
+            for term in variable.terms
+            if (variable.name, term.name) not in named
+        ]
+        kept.append(replace(variable, terms=terms))
+    gone: set[str] = set()
+    for one, name in _idle_variables(kept):
+        if drops_inputs or not one.changes:
+            removed.append(one)
+            gone.add(name)
+    return tuple(v for v in kept if v.name not in gone)
+
+
+def _idle_variables(variables: Iterable[Variable]) -> Iterator[tuple[Removed, str]]:
+    """Yield each variable that nothing asks, with what leaving it out changes.
+
+    An input that only idle combinations ask is idle as well.
+    """
+    known = list(variables)
+    asked = {part.input for v in known if v.terms for part in v.parts}
+    for variable in known:
+        if variable.terms or variable.name in asked:
+            continue
+        name = repr(variable.name)
+        if not variable.parts:
+            change = "a row is answered though it is missing"
+            yield Removed(f"input {name}", "nothing asks it", change), variable.name
+            continue
+        change = "a row is answered though it overflows"
+        change = "" if cannot_overflow(variable.parts) else change
+        yield Removed(f"combination {name}", "nothing asks it", change), variable.name
+
+
+def cannot_overflow(parts: Iterable[Part]) -> bool:
+    """Return whether a combination is finite for all finite inputs, in every type.
+
+    With M the largest number of the type, `|x - c|` rounds to M at most where |c| is
+    below half a unit in M's last place, and `w (x - c)` is at most |w| M. The sum over
+    n parts makes at most n + 1 roundings, each of at most one part in 2**24; for them,
+    and for weights that are rounded to float32, a share of (n + 3) / 2**22 is left
+    free. The sum of the weights is taken in rational numbers.
+
+    Example:
+        >>> cannot_overflow((Part("a", 0.5), Part("b", 0.25)))
+        True
+        >>> cannot_overflow((Part("a", 0.5), Part("b", 0.75)))
+        False
+    """
+    known = list(parts)
+    if any(abs(part.centre) > _SMALL_CENTRE for part in known):
+        return False
+    weights = sum((abs(Fraction(part.weight)) for part in known), Fraction(0))
+    return weights * (1 + Fraction(len(known) + 3, 2**22)) <= 1
+
+
+# --- trees
+
+
+def _pruned_tree(
+    tree: FuzzyTree, uses: Collection[Use], *, drops_inputs: bool
+) -> Pruned:
+    removed: list[Removed] = []
+    variables = list(tree.variables)
+    if "relative" not in uses:
+        variables = _without_flanks(variables, removed)
+    same = {v.name: _same_curves(v.terms) for v in variables}
+    removed += [
+        _duplicate(f"term {name!r} of {variable!r}", other)
+        for variable, names in same.items()
+        for name, other in names.items()
+    ]
+    sets, same_sets = _pruned_sets(tree, uses, removed)
+
+    def left(variable: str, branch: Branch) -> Branch:
+        terms = tuple(same[variable].get(name, name) for name in branch.terms)
+        if not sets:
+            return replace(branch, terms=terms, sets=())
+        of = same_sets[variable]
+        patterns = dict.fromkeys(of.get(name, name) for name in branch.sets)
+        return replace(branch, terms=terms, sets=tuple(patterns))
+
+    nodes = tuple(
+        replace(node, branches=tuple(left(node.variable, b) for b in node.branches))
+        for node in tree.nodes
+    )
+    named = {(n.variable, t) for n in nodes for b in n.branches for t in b.terms}
+    merged = _merged(variables, same)
+    kept = _pruned_variables(merged, named, removed, drops_inputs=drops_inputs)
+    model = replace(tree, variables=kept, nodes=nodes, sets=sets)
+    return Pruned(model, tuple(removed))
+
+
+def _without_flanks(
+    variables: Iterable[Variable], removed: list[Removed]
+) -> list[Variable]:
+    """Return variables whose bands are their plateaus alone."""
+    kept: list[Variable] = []
+    for variable in variables:
+        terms: list[Term] = []
+        for term in variable.terms:
+            shape = term.shape
+            if isinstance(shape, Band) and (shape.left or shape.right):
+                where = f"the flanks of term {term.name!r} of {variable.name!r}"
+                removed.append(Removed(where, "only relative rules need them"))
+                shape = Band(shape.low, shape.high)
+            terms.append(Term(term.name, shape))
+        kept.append(replace(variable, terms=tuple(terms)))
+    return kept
+
+
+def _pruned_sets(
+    tree: FuzzyTree, uses: Collection[Use], removed: list[Removed]
+) -> tuple[tuple[Sets, ...], dict[str, dict[str, str]]]:
+    """Return the fitted sets that raw rules need, and which stand in for which."""
+    named = {(n.variable, s) for n in tree.nodes for b in n.branches for s in b.sets}
+    asked = {variable for variable, _ in named}
+    same: dict[str, dict[str, str]] = {}
+    kept: list[Sets] = []
+    for group in tree.sets:
+        where = f"the fitted sets of {group.variable!r}"
+        if "raw" not in uses or group.variable not in asked:
+            is_idle = group.variable not in asked
+            why = "no node asks it" if is_idle else "only raw rules need them"
+            removed.append(Removed(where, why))
+            continue
+        same[group.variable] = of = _same_curves(group.terms)
+        stands = {of.get(s, s) for v, s in named if v == group.variable}
+        for term in group.terms:
+            text = f"set {term.name!r} of {group.variable!r}"
+            if term.name in of:
+                removed.append(_duplicate(text, of[term.name]))
+            elif term.name not in stands:
+                removed.append(Removed(text, "no branch names it"))
+        terms = tuple(t for t in group.terms if t.name in stands)
+        kept.append(Sets(group.variable, terms))
+    return tuple(kept), same
+
+
+# --- the proof
+
+
+def proof_faults(
+    before: Model,
+    after: Model,
+    *,
+    uses: Collection[Use] = ("tree", "relative"),
+    rules: Collection[int] = (),
+) -> Iterator[str]:
+    """Yield what keeps two models from being the same function; nothing if they are.
+
+    Both are brought to a form in which a name stands for nothing but itself: a clause
+    becomes the curves that it takes the largest of, on the inputs and the chain of
+    sums that it looks at; what always holds is left out, and so is what cannot change
+    whether a value is missing. Equal forms perform equal operations on equal numbers,
+    whatever the input. Where `after` has fewer inputs or combinations the two are the
+    same for rows in which those left out are neither missing nor overflow.
+
+    This reads both models afresh and trusts no list of what was removed.
+
+    Args:
+        before: A model.
+        after: What is left of it.
+        uses: What a tree serves.
+        rules: For each rule of `after` its number in `before`; the same unless given.
+    """
+    if before.classes != after.classes or before.semantics != after.semantics:
+        yield "classes or semantics differ"
+    order = [name for name in before.inputs if name in set(after.inputs)]
+    if list(after.inputs) != order:
+        yield f"its inputs are {', '.join(after.inputs)}"
+    if isinstance(before, RuleBase) and isinstance(after, RuleBase):
+        yield from _rule_faults(before, after, rules)
+    elif isinstance(before, FuzzyTree) and isinstance(after, FuzzyTree):
+        yield from _tree_faults(before, after, uses)
+    else:
+        yield "one is a tree and the other a rule base"
+
+
+def unguarded(before: Model, after: Model) -> tuple[str, ...]:
+    """Return the variables whose missing values only the first of two models sees.
+
+    Where a combination stands, none of its inputs can be missing unseen: the weights
+    are not 0, so the sum is not finite either.
+    """
+    seen = {variable.parts for variable in after.variables if variable.parts}
+    inputs = {v.name for v in after.variables if not v.parts}
+    return tuple(
+        variable.name
+        for variable in before.variables
+        if not (
+            variable.name in inputs
+            if not variable.parts
+            else variable.parts in seen
+            or (
+                cannot_overflow(variable.parts)
+                and {part.input for part in variable.parts} <= inputs
+            )
+        )
+    )
+
+
+def _axes(model: Model) -> dict[str, str | tuple[Part, ...]]:
+    """Return what each variable looks at: an input's name, or a chain of sums."""
+    return {v.name: v.parts or v.name for v in model.variables}
+
+
+def _rule_faults(
+    before: RuleBase, after: RuleBase, numbers: Collection[int]
+) -> Iterator[str]:
+    kept = list(numbers) or list(range(1, len(before.rules) + 1))
+    dead = never_firing(before)
+    gone = sorted({*range(1, len(before.rules) + 1)}.difference(kept))
+    yield from (f"rule {n} may fire and is gone" for n in gone if n not in dead)
+    if len(kept) != len(after.rules) or kept != sorted(set(kept)):
+        yield f"{len(after.rules)} rules where {len(kept)} are right"
+        return
+    forms, others = _rule_forms(before), _rule_forms(after)
+    for place, number in enumerate(kept):
+        if forms[number - 1] != others[place]:
+            yield f"rule {number} is another rule"
+
+
+def _rule_forms(rules: RuleBase) -> list[object]:
+    axes, shapes = _axes(rules), shapes_of(rules.variables)
+    curves = {key: curve_bytes(shape) for key, shape in shapes.items()}
+    is_min = rules.semantics.conjunction == "min"
+
+    @functools.cache
+    def form(clause: Clause) -> tuple[object, ...]:
+        if always_holds(clause, shapes):
+            return ()
+        met = frozenset(curves[clause.variable, t] for t in clause.terms)
+        return axes[clause.variable], clause.negated, met
+
+    forms: list[object] = []
+    for rule in rules.rules:
+        when = [found for clause in rule.when if (found := form(clause))]
+        forms.append((rule.then, frozenset(when) if is_min else tuple(when)))
+    return forms
+
+
+def _tree_faults(
+    before: FuzzyTree, after: FuzzyTree, uses: Collection[Use]
+) -> Iterator[str]:
+    if [leaf.label for leaf in before.leaves] != [leaf.label for leaf in after.leaves]:
+        yield "its leaves have other classes"
+    if len(before.nodes) != len(after.nodes):
+        yield f"{len(after.nodes)} nodes where {len(before.nodes)} are right"
+        return
+    pairs = zip(_node_forms(before, uses), _node_forms(after, uses), strict=True)
+    for number, (one, two) in enumerate(pairs, 1):
+        if one != two:
+            yield f"node {number} is another node"
+
+
+def _node_forms(tree: FuzzyTree, uses: Collection[Use]) -> Iterator[object]:
+    axes, terms = _axes(tree), shapes_of(tree.variables)
+    sets = shapes_of(Variable(group.variable, group.terms) for group in tree.sets)
+    for node in tree.nodes:
+        ways: list[object] = []
+        for branch in node.branches:
+            curves = [(terms, name) for name in branch.terms if "relative" in uses]
+            fitted = [(sets, name) for name in branch.sets if "raw" in uses]
+            found = [
+                frozenset(curve_bytes(known[node.variable, name]) for known, name in of)
+                for of in (curves, fitted)
+            ]
+            ways.append((branch.node, branch.leaf, *found))
+        yield axes[node.variable], node.cuts, node.owners, ways

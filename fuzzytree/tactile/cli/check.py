@@ -1,0 +1,72 @@
+"""`fuzzytree tactile check`: files from frame to class, held against their model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    answer_json,
+    json_option,
+    quiet_option,
+    rows_only_option,
+    say,
+)
+from fuzzytree.tactile.cli.sensors import asked_model, sensor_options, wanted_sensor
+
+
+@click.command("check", short_help="Hold files of frames against their model.")
+@click.argument("model", metavar="MODEL")
+@click.argument("files", metavar="FILE.onnx...", nargs=-1, required=True)
+@click.option(
+    "--data", metavar="FRAMES", help="Frames to check with, beside made ones."
+)
+@sensor_options
+@click.option(
+    "--reject",
+    type=click.FloatRange(0.0, 1.0),
+    default=0.0,
+    help="The reject that the files were exported with; 0 unless given.",
+)
+@rows_only_option
+@json_option
+@quiet_option
+def command(
+    model: str,
+    files: Sequence[str],
+    data: str | None,
+    board: str | None,
+    size: str | None,
+    full: int | None,
+    threshold: int | None,
+    reject: float,
+    rows_only: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Compare ONNX files that take frames with MODEL, as `tactile export` wrote them.
+
+    What a file says of itself, its graph, and its answers to frames must be those of
+    the model, bit by bit; made frames are aimed at bounds and cuts. Exit 1 if not.
+    """
+    from fuzzytree.files import read_bounded
+    from fuzzytree.report.text import agreement_lines, verdict_text
+    from fuzzytree.tactile.given import given_frames
+    from fuzzytree.tactile.recognition.shipped import check_shipped
+
+    is_named = any(one is not None for one in (board, size, full, threshold))
+    sensor = wanted_sensor(board, size, full, threshold) if is_named else None
+    asked = asked_model(model)
+    contents = {name: read_bounded(name) for name in files}
+    frames = None if data is None else given_frames(data).presses.frames
+    found = check_shipped(
+        asked, contents, frames, sensor=sensor, reject=reject, rows_only=rows_only
+    )
+    if as_json:
+        answer_json({"check": found, "ok": found.ok})
+    else:
+        answer("\n".join(agreement_lines(found, is_full=False)))
+    say(verdict_text(found), quiet=quiet and found.ok)
+    return 0 if found.ok else 1

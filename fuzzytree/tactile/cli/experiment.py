@@ -1,0 +1,318 @@
+"""`fuzzytree tactile experiment`: learn, test on what was not learnt from, compare."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+import msgspec
+from click.core import ParameterSource
+
+from fuzzytree.cli.talk import (
+    answer,
+    answer_json,
+    json_option,
+    progress_bar,
+    quiet_option,
+    say,
+    say_rows,
+    wrong_options,
+)
+from fuzzytree.errors import WriteError, install_hint
+from fuzzytree.files import write_atomically
+
+if TYPE_CHECKING:
+    from fuzzytree.learning import Settings
+    from fuzzytree.tactile.recognition.experiment import Outcome
+    from fuzzytree.tactile.recognition.tasks import Task
+
+_FRAMES_SHOWN = 7
+_TIMES = (1, 3, 5, 7)
+"""Points for a cell in the pictures, as in the paper's Fig. 6."""
+
+
+_ONLY = {
+    "sensor": ("paper",),
+    "repeats": ("paper",),
+    "test": ("file",),
+    "label": ("file",),
+    "full": ("file",),
+    "threshold": ("file",),
+    "data": ("known",),
+}
+"""The kinds of task that an option is for."""
+
+
+@click.command("experiment", short_help="Learn, test and compare on frames.")
+@click.argument("task", metavar="[TASK]", default="paper")
+@click.option(
+    "--features", metavar="NAMES", help="Names and sets of features, with commas."
+)
+@click.option(
+    "--mode",
+    type=click.Choice(["default", "paper"]),
+    help="`paper` is the paper's learner to the letter.",
+)
+@click.option("--patterns", type=click.IntRange(1), help="For each class.")
+@click.option("--shrinkage", type=float, help="Of off-diagonal scatter, 0 to 1.")
+@click.option("--entry", type=float, help="What a further feature must gain.")
+@click.option(
+    "--choose",
+    is_flag=True,
+    help="Choose patterns, shrinkage and entry without those who are tested.",
+)
+@click.option(
+    "--sensor",
+    type=click.Choice(["paper", "ideal"]),
+    default="paper",
+    help="Of TASK paper: `ideal` is even and linear.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, help="Of presses and peers.")
+@click.option(
+    "--repeats",
+    type=click.IntRange(1, 100),
+    default=5,
+    show_default=True,
+    help="Of TASK paper, each pressed anew.",
+)
+@click.option("--test", metavar="FILE.npz", help="What FILE.npz is tested on.")
+@click.option(
+    "--label",
+    metavar="ARRAY",
+    default="label",
+    help="The classes in FILE.npz; `label`.",
+)
+@click.option("--full", type=int, help="What a cell of FILE.npz reads at most.")
+@click.option("--threshold", type=int, help="Above it a cell is pressed.")
+@click.option("--data", metavar="FOLDER", help="Where the project's frames lie.")
+@click.option("--no-peers", is_flag=True, help="Without learners of scikit-learn.")
+@click.option("-o", "--output", metavar="FOLDER", help="For models and pictures.")
+@json_option
+@quiet_option
+def command(
+    task: str,
+    features: str | None,
+    mode: Literal["default", "paper"] | None,
+    patterns: int | None,
+    shrinkage: float | None,
+    entry: float | None,
+    choose: bool,
+    sensor: str,
+    seed: int,
+    repeats: int,
+    test: str | None,
+    label: str,
+    full: int | None,
+    threshold: int | None,
+    data: str | None,
+    no_peers: bool,
+    output: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Learn a tree of TASK, test it on frames it has not learnt from, and compare.
+
+    TASK is paper (seven objects on the simulated sensor), postures or postures-17
+    (people on a mat), touch or touch-fingers (people on a touch screen), or FILE.npz:
+    frames of one's own with `label`, `label_names` and `subject`. Each subject is left
+    out in turn and tested on; frames are never divided at random.
+    """
+    from fuzzytree.tactile.recognition.choosing import CANDIDATES
+    from fuzzytree.tactile.recognition.experiment import experiment
+    from fuzzytree.tactile.recognition.peers import PEERS, are_there
+    from fuzzytree.tactile.report.experiment import experiment_lines
+
+    _check_options(task)
+    if output is not None:
+        _check_folder(Path(output))
+    given = {
+        "mode": mode,
+        "patterns_per_class": patterns,
+        "shrinkage": shrinkage,
+        "entry": entry,
+    }
+    with wrong_options():
+        if task == "paper":
+            found = _paper(sensor, seed, repeats)
+        else:
+            found = _real(task, test, label, full, threshold, data)
+        settings = _changed(found.settings, given)
+    peers = () if no_peers or not are_there() else tuple(PEERS)
+    with wrong_options(), progress_bar(quiet=quiet) as tell:
+        outcome = experiment(
+            found,
+            features=features,
+            settings=settings,
+            choose=CANDIDATES if choose else (),
+            peers=peers,
+            seed=seed,
+            progress=tell,
+        )
+    lines = [*experiment_lines(outcome.study, printed=_printed(task))]
+    if as_json:
+        answer_json(outcome.study.to_json())
+    else:
+        answer("\n".join(lines))
+    if not (peers or no_peers):
+        say(
+            f"without other learners: they need {install_hint('sklearn')}",
+            quiet=quiet,
+        )
+    if output is not None:
+        _write(Path(output), found, outcome, lines, quiet=quiet)
+
+
+def _check_options(task: str) -> None:
+    """Refuse a task that is none, and options that would do nothing for it.
+
+    Raises:
+        click.UsageError: If one was given.
+    """
+    from fuzzytree.tactile.recognition.tasks import KNOWN
+
+    context = click.get_current_context()
+    kind = "paper" if task == "paper" else "file" if task.endswith(".npz") else "known"
+    if kind == "known" and task not in KNOWN:
+        there = f"paper, {', '.join(KNOWN)}, and FILE.npz for frames of your own"
+        raise click.UsageError(f"there is no task {task!r}; there is {there}")
+    for name, kinds in _ONLY.items():
+        source = context.get_parameter_source(name)
+        if kind not in kinds and source is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name} does nothing for {task!r}")
+
+
+def _paper(sensor: str, seed: int, repeats: int) -> Task:
+    from fuzzytree.tactile.recognition.simulated import IDEAL, paper_task
+
+    if sensor == "ideal":
+        about = "the paper's seven objects on an even and linear sensor"
+        return paper_task(seed=seed, repeats=repeats, physics=IDEAL, about=about)
+    return paper_task(seed=seed, repeats=repeats)
+
+
+def _real(
+    task: str,
+    test: str | None,
+    label: str,
+    full: int | None,
+    threshold: int | None,
+    data: str | None,
+) -> Task:
+    from fuzzytree.tactile.recognition.tasks import KNOWN, file_task, known_task
+
+    if task in KNOWN or not task.endswith(".npz"):
+        return known_task(task, data)
+    return file_task(task, test=test, label=label, full=full, threshold=threshold)
+
+
+def _changed(settings: Settings, given: Mapping[str, object]) -> Settings:
+    """Return the task's settings with those of the options in them.
+
+    Another mode begins from its own defaults.
+
+    Raises:
+        ValueError: If one is out of its range.
+    """
+    from fuzzytree.learning import Settings
+
+    asked = {name: value for name, value in given.items() if value is not None}
+    base = Settings() if asked.get("mode", settings.mode) != settings.mode else settings
+    return msgspec.structs.replace(base, **asked)
+
+
+def _printed(task: str) -> dict[str, int]:
+    from fuzzytree.tactile.recognition.simulated import TABLE_3
+
+    return dict(TABLE_3) if task == "paper" else {}
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder that cannot be made, before long work is done for it.
+
+    Raises:
+        WriteError: If it is a file, or what it is in does not exist.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise WriteError(f"{folder}: is a file, and not a folder to write to")
+    if not folder.parent.is_dir():
+        raise WriteError(f"{folder}: cannot be made: there is no {folder.parent}")
+
+
+def _write(
+    folder: Path, task: Task, outcome: Outcome, lines: list[str], *, quiet: bool
+) -> None:
+    """Write the model, its rules, the board, the tables and, if possible, pictures."""
+    from fuzzytree.api.verbs import export
+    from fuzzytree.semantics.lowering import rules_from_tree
+    from fuzzytree.tactile.board_files.writer import board_text
+    from fuzzytree.tactile.boards import Board, Marker
+    from fuzzytree.tactile.report.experiment import confusion_csv
+
+    folder.mkdir(exist_ok=True)
+    board = Board(task.name[:60], task.sensor, Marker("AA 55", task.sensor.bits))
+    files = {
+        "tree.yaml": export(outcome.tree, "yaml").content,
+        "rules.yaml": export(rules_from_tree(outcome.tree), "yaml").content,
+        "board.yaml": board_text(board).encode(),
+        "confusion.csv": confusion_csv(outcome.study).encode(),
+        "report.txt": ("\n".join(lines) + "\n").encode(),
+        "report.json": (outcome.study.to_json() + "\n").encode(),
+        **_pictures(task, outcome, quiet=quiet),
+    }
+    for name, content in files.items():
+        write_atomically(folder / name, content)
+    tree = str(folder / "tree.yaml")
+    words = ["fuzzytree", "show", tree]
+    if task.name == "paper":
+        words = ["fuzzytree", "tactile", "live", "simulator", "--model", tree]
+    after = shlex.join(words)
+    say_rows(
+        ("wrote", f"{folder}/", ", ".join(files)), ("next", after, ""), quiet=quiet
+    )
+
+
+def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
+    """Return pictures of the tree, the table and frames; none without the extra."""
+    import importlib.util
+
+    if importlib.util.find_spec("matplotlib") is None:
+        say(
+            f"without pictures: they need {install_hint('plots')}",
+            quiet=quiet,
+        )
+        return {}
+    import numpy as np
+
+    from fuzzytree.report.plots.confusion import MOST_CLASSES, draw_confusion
+    from fuzzytree.report.plots.saving import drawn
+    from fuzzytree.report.plots.trees import MOST_LEAVES, draw_tree
+    from fuzzytree.tactile.interpolation import interpolated
+    from fuzzytree.tactile.plots import draw_frames
+    from fuzzytree.tactile.sensor import pressed
+
+    found: dict[str, bytes] = {}
+    study = outcome.study
+    if len(outcome.tree.leaves) <= MOST_LEAVES:
+        found["tree.svg"] = drawn(draw_tree(outcome.tree), ".svg")
+    else:
+        say(f"no picture of a tree of {len(outcome.tree.leaves)} leaves", quiet=quiet)
+    if len(study.classes) <= MOST_CLASSES:
+        table = np.array(study.confusion, np.int64)
+        count = len(study.classes)
+        none = table[:, count:].sum(axis=1, keepdims=True)
+        counts = np.hstack([table[:, :count], none]) if none.any() else table[:, :count]
+        found["confusion.svg"] = drawn(draw_confusion(counts, study.classes), ".svg")
+    first = [int(np.argmax(task.codes == code)) for code in range(len(study.classes))]
+    cells = pressed(task.sensor, task.frames[first[:_FRAMES_SHOWN]])
+    shown = [interpolated(one, times) for times in _TIMES for one in cells]
+    titles = [
+        f"{name}, {times} times" if times > 1 else name
+        for times in _TIMES
+        for name in study.classes[: len(cells)]
+    ]
+    figure = draw_frames(shown, titles=titles, columns=len(cells))
+    found["frames.png"] = drawn(figure, ".png")
+    return found

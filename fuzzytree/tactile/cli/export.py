@@ -1,0 +1,141 @@
+"""`fuzzytree tactile export`: one file from the raw frame to the class."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    answer_bytes,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    say_rows,
+    setting,
+    wrong_options,
+)
+from fuzzytree.files import check_place, write_atomically
+from fuzzytree.tactile.cli.sensors import (
+    asked_model,
+    frames_of,
+    sensor_options,
+    wanted_sensor,
+)
+
+if TYPE_CHECKING:
+    Form = Literal["onnx", "c"]
+
+_SUFFIXES: dict[str, Form] = {".onnx": "onnx", ".c": "c"}
+
+
+@click.command("export", short_help="Write one file from raw frame to class.")
+@click.argument("model", metavar="MODEL")
+@click.argument("output", metavar="OUT")
+@click.option(
+    "--to", type=click.Choice(["onnx", "c"]), help="If not OUT's suffix says."
+)
+@sensor_options
+@click.option(
+    "--data", metavar="FRAMES", help="Frames to check with, beside made ones."
+)
+@click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="outputs, reject, opset, ir, plain of a graph; name, reject of C.",
+)
+@json_option
+@quiet_option
+def command(
+    model: str,
+    output: str,
+    to: Form | None,
+    board: str | None,
+    size: str | None,
+    full: int | None,
+    threshold: int | None,
+    data: str | None,
+    settings: Sequence[str],
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Write MODEL as file OUT (.onnx or .c) that takes frames as a board sends them.
+
+    Every way from frame to class is checked first, bit by bit, and against exact
+    arithmetic. If one disagrees, nothing is written: exit 1. `-` is standard output.
+    """
+    from fuzzytree.report.text import verdict_text
+    from fuzzytree.tactile.recognition.carriers import (
+        check_frames_carriers,
+        frames_export,
+    )
+    from fuzzytree.tactile.report.frames import check_lines
+
+    form = _form(output, to)
+    options = _options(form, settings)
+    if output != "-":
+        check_place(output)
+    sensor = wanted_sensor(board, size, full, threshold)
+    asked = asked_model(model)
+    frames = frames_of(data, sensor, quiet=quiet)
+    with wrong_options():
+        written = frames_export(asked, sensor, form, **options)
+        found = check_frames_carriers(
+            asked, sensor, frames, reject=options.get("reject", 0.0)
+        )
+    lines = check_lines(found)
+    if output == "-":
+        for line in lines:
+            say(line, quiet=quiet)
+    elif as_json:
+        size_facts = {"file": output, "format": form, "bytes": len(written.content)}
+        answer_json({**size_facts, "check": found, "ok": found.ok})
+    else:
+        answer("\n".join(lines))
+    if not found.ok:
+        say(f"{verdict_text(found)}; nothing is written")
+        return 1
+    if output == "-":
+        answer_bytes(written.content)
+    else:
+        write_atomically(output, written.content)
+    digest = hashlib.sha256(written.content).hexdigest()
+    told = f"{form}, {len(written.content)} bytes, sha256 {digest}"
+    say_rows(("wrote", output, told), quiet=quiet)
+    return 0
+
+
+def _form(output: str, to: Form | None) -> Form:
+    if to is not None:
+        return to
+    suffix = Path(output).suffix.lower()
+    if suffix not in _SUFFIXES:
+        known = " or ".join(_SUFFIXES)
+        raise click.UsageError(f"{output}: a file from frame to class ends in {known}")
+    return _SUFFIXES[suffix]
+
+
+def _options(form: Form, settings: Sequence[str]) -> dict[str, Any]:
+    """Return what `--set` tells."""
+    from fuzzytree.model.contracts import Format
+    from fuzzytree.model.options import option_value
+    from fuzzytree.tactile.exporters.c_frames import write_frames_c
+    from fuzzytree.tactile.exporters.onnx_frames import write_frames
+
+    write: Any = write_frames_c if form == "c" else write_frames
+    known = Format(form, (f".{form}",), ("tree", "rules"), write)  # for its options
+    found: dict[str, Any] = {}
+    for text in settings:
+        name, value = setting(text)
+        if name in found:
+            raise click.UsageError(f"the option {name!r} is given twice")
+        with wrong_options():
+            found[name] = option_value(known, name, value)
+    return found

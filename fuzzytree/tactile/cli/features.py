@@ -1,0 +1,222 @@
+"""`fuzzytree tactile features`: frames as a table that a tree can be learnt from."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer_bytes,
+    answer_json,
+    json_option,
+    quiet_option,
+    say_rows,
+    wrong_options,
+)
+from fuzzytree.errors import ReadError
+from fuzzytree.files import check_place, write_atomically
+from fuzzytree.tactile.cli.sensors import given_options, wanted_frames
+
+if TYPE_CHECKING:
+    from fuzzytree.tactile.given import Given
+    from fuzzytree.tactile.runtimes.frames import Features
+
+CLASS = "class"
+"""The column of the classes."""
+
+
+@click.command("features", short_help="Turn frames into a table of features.")
+@click.argument("frames", nargs=-1, required=True, metavar="FRAMES...")
+@click.option(
+    "--features",
+    "text",
+    metavar="NAMES",
+    default="paper",
+    show_default=True,
+    help="Names and sets of features, with commas between them.",
+)
+@given_options
+@click.option(
+    "--label", metavar="ARRAY", default="label", help="The classes in FRAMES; `label`."
+)
+@click.option("-o", "--output", metavar="FILE", help="A CSV file; `-` is stdout.")
+@json_option
+@quiet_option
+def command(
+    frames: tuple[str, ...],
+    text: str,
+    board: str | None,
+    full: int | None,
+    threshold: int | None,
+    label: str,
+    output: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Compute features of FRAMES, a numpy archive (.npz) or a recording.
+
+    With -o they become a table for `fuzzytree learn`; without it, what each feature
+    costs is listed. Frames on which nothing presses are left out and counted. Files
+    of one class each are told as CLASS=FILE: cup=cup.ftr pen=pen.ftr.
+    """
+    from fuzzytree.tactile.features import costs
+    from fuzzytree.tactile.features.sets import names_of
+
+    if output and output != "-":
+        check_place(output)
+    with wrong_options():
+        names = names_of(text)
+    parts = [
+        _of_class(word, wanted_frames(path, board, full, threshold, label=label))
+        for word, path in _named(frames)
+    ]
+    _check_alike(frames, parts)
+    found = costs(parts[0].sensor, names)
+    if output is None:
+        if as_json:
+            answer_json({"costs": found})
+        else:
+            for name in names:
+                click.echo(f"{found[name]:8.0f}  {name}")
+        return 0
+    return _table(frames, parts, names, found, output, as_json=as_json, quiet=quiet)
+
+
+def _named(frames: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the class, empty if none is told, and the path of each file.
+
+    Raises:
+        click.UsageError: If there are several files, and one is of no class.
+    """
+    found: list[tuple[str, str]] = []
+    for text in frames:
+        word, sign, path = text.partition("=")
+        is_path = not sign or Path(text).exists()
+        found.append(("", text) if is_path else (word, path))
+    for word, path in found:
+        if not word and len(found) > 1:
+            raise click.UsageError(
+                f"of several files, each has a class: CLASS={path}, not {path}"
+            )
+    return found
+
+
+def _of_class(word: str, given: Given) -> Given:
+    """Return frames of one class; as they were if none is told."""
+    if not word:
+        return given
+    import numpy as np
+
+    presses = given.presses
+    code = np.zeros(len(presses.frames), np.int64)
+    return replace(given, presses=replace(presses, label=code, label_names=(word,)))
+
+
+def _check_alike(frames: Sequence[str], parts: Sequence[Given]) -> None:
+    """Refuse files that make no table together.
+
+    Raises:
+        ReadError: If sensors differ in more than what rests on them, or if some files
+            tell subjects and others do not.
+    """
+
+    def kind(part: Given) -> str:
+        found = part.sensor
+        size = f"{found.rows} x {found.columns} cells"
+        return f"{size}, full {found.full}, threshold {found.threshold}"
+
+    for name, part in zip(frames, parts, strict=True):
+        if kind(part) != kind(parts[0]):
+            raise ReadError(
+                f"{name}: is of another sensor ({kind(part)}) than {frames[0]} "
+                f"({kind(parts[0])})"
+            )
+        if bool(len(part.presses.subject)) != bool(len(parts[0].presses.subject)):
+            raise ReadError(f"of {name} and {frames[0]}, only one tells subjects")
+
+
+def _table(
+    sources: Sequence[str],
+    parts: Sequence[Given],
+    names: Sequence[str],
+    costs: object,
+    output: str,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    from fuzzytree.report.text import counted
+    from fuzzytree.tactile.runtimes.frames import features_of
+    from fuzzytree.tactile.sensor import saturated
+
+    found = [features_of(part.sensor, part.presses.frames, names) for part in parts]
+    content = "".join(_lines(parts, found)).encode()
+    if output == "-":
+        answer_bytes(content)
+        return 0
+    write_atomically(output, content)
+    presses, sensor = parts[0].presses, parts[0].sensor
+    counts = [len(part.presses.frames) for part in parts]
+    full = sum(
+        int((saturated(part.sensor, part.presses.frames) > 0).sum()) for part in parts
+    )
+    none = sum(int((~part.is_pressed).sum()) for part in found)
+    size = f"{sensor.rows} x {sensor.columns} cells"
+    rows = [
+        ("read", source, f"{counted(count, 'frame')} of {size}")
+        for source, count in zip(sources, counts, strict=True)
+    ]
+    if none:
+        rows.append(("left out", counted(none, "frame"), "nothing presses"))
+    if full:
+        text = f"a cell reads {sensor.full} or more"
+        rows.append(("full", counted(full, "frame"), text))
+    after = ["fuzzytree", "learn", output, "--target", CLASS, "-o", "tree.yaml"]
+    after += ["--ignore", "subject"] if len(presses.subject) else []
+    told = f"next: {shlex.join(after)}" if len(presses.label) else "without classes"
+    rows.append(("wrote", output, f"{counted(len(names), 'feature')}; {told}"))
+    say_rows(*rows, quiet=quiet)
+    if as_json:
+        answer_json(
+            {
+                "file": output,
+                "frames": sum(counts),
+                "nothing": none,
+                "saturated": full,
+                "features": list(names),
+                "costs": costs,
+            }
+        )
+    return 0
+
+
+def _lines(parts: Sequence[Given], found: Sequence[Features]) -> Iterator[str]:
+    """Yield the lines of a table: features, and class and subject where known."""
+    has_class = bool(len(parts[0].presses.label))
+    has_subject = bool(len(parts[0].presses.subject))
+    heads = [*found[0].names]
+    heads += [CLASS] if has_class else []
+    heads += ["subject"] if has_subject else []
+    yield _line(heads)
+    for part, features in zip(parts, found, strict=True):
+        presses = part.presses
+        for number in features.is_pressed.nonzero()[0].tolist():
+            cells: list[object] = [*features.values[:, number].tolist()]
+            if has_class:
+                cells.append(presses.label_names[int(presses.label[number])])
+            if has_subject:
+                cells.append(int(presses.subject[number]))
+            yield _line(cells)
+
+
+def _line(cells: Sequence[object]) -> str:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(cells)
+    return line.getvalue()

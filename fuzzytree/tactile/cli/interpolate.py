@@ -1,0 +1,241 @@
+"""`fuzzytree tactile interpolate`: frames of more points than the sensor has cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer_json,
+    json_option,
+    quiet_option,
+    say_rows,
+    wrong_options,
+)
+from fuzzytree.files import check_place, write_atomically
+from fuzzytree.tactile.cli.sensors import given_options, wanted_frames
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from fuzzytree.tactile.given import Given
+    from fuzzytree.tactile.plots import Axis
+
+    Pressed = npt.NDArray[np.int64]
+
+ARCHIVE = ".npz"
+MOST_BYTES = 2**30
+"""The most bytes of the arrays of an archive."""
+
+
+@click.command("interpolate", short_help="Interpolate frames; a picture or numbers.")
+@click.argument("frames", metavar="FRAMES")
+@click.option(
+    "--times",
+    "text",
+    metavar="NUMBERS",
+    default="3,5,7",
+    show_default=True,
+    help="Points for a cell on each side, with commas between them.",
+)
+@click.option(
+    "--frame",
+    metavar="NUMBER",
+    type=int,
+    help="From 0; a picture is of the first that something presses on if none.",
+)
+@click.option("--axis", "is_marked", is_flag=True, help="Mark centre and axis as well.")
+@given_options
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    required=True,
+    help="A picture (.svg, .png) of a frame, or numbers (.npz) of all.",
+)
+@json_option
+@quiet_option
+def command(
+    frames: str,
+    text: str,
+    frame: int | None,
+    is_marked: bool,
+    board: str | None,
+    full: int | None,
+    threshold: int | None,
+    output: str,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Interpolate FRAMES, a numpy archive (.npz) or a recording, by fuzzy numbers.
+
+    An archive gets an array `frames` of what presses on each cell, and an array
+    `times_N` of each number of times. `docs/interpolation.md` has the mathematics.
+    """
+    from fuzzytree.report.plots.saving import SUFFIXES
+    from fuzzytree.tactile.sensor import pressed
+
+    suffix = Path(output).suffix.lower()
+    if suffix not in (*SUFFIXES, ARCHIVE):
+        names = ", ".join(SUFFIXES)
+        raise click.UsageError(f"{output}: the name ends in {names} or {ARCHIVE}")
+    times = _times(text)
+    check_place(output)
+    given = wanted_frames(frames, board, full, threshold)
+    values = pressed(given.sensor, given.presses.frames)
+    number = _chosen(frames, frame, values, is_picture=suffix != ARCHIVE)
+    if number is not None:
+        values = values[number : number + 1]
+    with wrong_options():
+        if number is None or suffix == ARCHIVE:
+            content = _archive(values, times)
+        else:
+            content = _picture(
+                given, number, times, suffix, source=frames, is_marked=is_marked
+            )
+    write_atomically(output, content)
+    facts = _facts(given, number, values, times)
+    if not quiet:
+        _tell(frames, output, facts, full=given.sensor.full, size=len(content))
+    if as_json:
+        answer_json({"file": output, "bytes": len(content), **facts})
+    return 0
+
+
+def _facts(
+    given: Given, number: int | None, values: Pressed, times: Sequence[int]
+) -> dict[str, Any]:
+    from fuzzytree.tactile.sensor import saturated
+
+    raw = given.presses.frames
+    taken = raw if number is None else raw[number : number + 1]
+    rows, columns = values.shape[1:]
+    return {
+        "frame": number,
+        "frames": len(values),
+        "of": len(raw),
+        "rows": rows,
+        "columns": columns,
+        "times": [*times],
+        "nothing": int((values == 0).all(axis=(1, 2)).sum()),
+        "saturated": int((saturated(given.sensor, taken) > 0).sum()),
+    }
+
+
+def _tell(
+    source: str, output: str, facts: Mapping[str, Any], *, full: int, size: int
+) -> None:
+    from fuzzytree.report.text import counted
+
+    rows, columns = facts["rows"], facts["columns"]
+    one = f"frame {facts['frame']} of {counted(facts['of'], 'frame')}"
+    read = counted(facts["frames"], "frame") if facts["frame"] is None else one
+    told = [("read", source, f"{read}, {rows} x {columns} cells")]
+    if facts["nothing"]:
+        told.append(("empty", counted(facts["nothing"], "frame"), "nothing presses"))
+    if facts["saturated"]:
+        text = f"a cell reads {full} or more"
+        told.append(("full", counted(facts["saturated"], "frame"), text))
+    sizes = ", ".join(f"{n * rows} x {n * columns}" for n in facts["times"])
+    told.append(("wrote", output, f"{sizes} points, {size} bytes"))
+    say_rows(*told)
+
+
+def _times(text: str) -> list[int]:
+    parts = [part.strip() for part in text.split(",")]
+    is_number = [part.isascii() and part.isdecimal() for part in parts]
+    if not all(is_number) or not all(len(p) < 5 and int(p) for p in parts):
+        raise click.UsageError(
+            f"--times {text}: must be whole numbers from 1 to 9999, such as 3,5,7"
+        )
+    times = [int(part) for part in parts]
+    if len({*times}) < len(times):
+        raise click.UsageError(f"--times {text}: names a number twice")
+    return times
+
+
+def _chosen(
+    source: str, frame: int | None, values: Pressed, *, is_picture: bool
+) -> int | None:
+    """Return the frame to take; None for all.
+
+    Raises:
+        click.UsageError: If there is no such frame.
+    """
+    if frame is None and not is_picture:
+        return None
+    if frame is None:
+        return int(values.any(axis=(1, 2)).argmax())
+    if not 0 <= frame < len(values):
+        last = len(values) - 1
+        raise click.UsageError(f"--frame {frame}: {source} has frames 0 to {last}")
+    return frame
+
+
+def _archive(values: Pressed, times: Sequence[int]) -> bytes:
+    from fuzzytree.tactile.interpolation import interpolated
+    from fuzzytree.tactile.presses import packed_arrays
+
+    size = 8 * values.size * sum(number**2 for number in times)
+    if size > MOST_BYTES:
+        raise click.UsageError(
+            f"{len(values)} interpolated frames are {size} bytes, more than "
+            f"{MOST_BYTES}; name one --frame, or fewer --times"
+        )
+    arrays = {f"times_{number}": interpolated(values, number) for number in times}
+    return packed_arrays({"frames": values, **arrays})
+
+
+def _picture(
+    given: Given,
+    number: int,
+    times: Sequence[int],
+    suffix: str,
+    *,
+    source: str,
+    is_marked: bool,
+) -> bytes:
+    from fuzzytree.report.plots.saving import drawn
+    from fuzzytree.tactile.interpolation import interpolated
+    from fuzzytree.tactile.plots import draw_frames
+    from fuzzytree.tactile.sensor import pressed
+
+    presses, sensor = given.presses, given.sensor
+    cells = pressed(sensor, presses.frames[number])[0]
+    images = [cells, *(interpolated(cells, n) for n in times)]
+    title = f"{Path(source).name}, frame {number}"
+    if len(presses.label):
+        title = f"{title}, {presses.label_names[presses.label[number]]}"
+    axis = _axis(given, number) if is_marked else None
+    figure = draw_frames(
+        images,
+        titles=[f"{sensor.rows} x {sensor.columns} cells", *map(_times_text, times)],
+        title=title,
+        axes=[axis] * len(images),
+        cells=[(sensor.rows, sensor.columns)] * len(images),
+        unit="reading",
+    )
+    return drawn(figure, suffix)
+
+
+def _times_text(times: int) -> str:
+    return f"{times} times" if times > 1 else "once"
+
+
+def _axis(given: Given, number: int) -> Axis | None:
+    """Return the centre and axis of a frame; None where nothing presses."""
+    from fuzzytree.tactile.plots import Axis
+    from fuzzytree.tactile.runtimes.frames import features_of
+
+    frame = given.presses.frames[number]
+    found = features_of(given.sensor, frame, ["x", "y", "angle"])
+    if not found.is_pressed[0]:
+        return None
+    x, y, angle_deg = found.values[:, 0].tolist()
+    return Axis(
+        x, y, angle_deg, length=min(given.sensor.rows, given.sensor.columns) / 5
+    )

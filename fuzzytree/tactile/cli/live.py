@@ -1,0 +1,295 @@
+"""`fuzzytree tactile live`: recognise what lies on a sensor while frames come in."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from fuzzytree.cli.talk import quiet_option, say_rows, wrong_options
+from fuzzytree.tactile.cli.sensors import asked_model
+
+if TYPE_CHECKING:
+    from fuzzytree.tactile.boards import Board
+    from fuzzytree.tactile.frames import Frame
+    from fuzzytree.tactile.link import Line
+    from fuzzytree.tactile.link.recording import Recorder
+    from fuzzytree.tactile.recognition.live import Answer, Hold, Live, Source
+
+SIMULATOR = "simulator"
+MOST_WAITING = 4
+"""Frames that wait for an answer before older ones are dropped: the newest count."""
+_PATIENCE_S = 2.0  # for a first frame
+SWITCH_S = 2e-4
+"""How soon a thread that reads or draws gives way to an answer."""
+
+
+@click.command("live", short_help="Recognise what lies on a sensor, on-line.")
+@click.argument("source", metavar="SOURCE")
+@click.option("--model", required=True, metavar="MODEL", help="A tree or rules.")
+@click.option("--board", metavar="BOARD.yaml", help="What is connected to the port.")
+@click.option(
+    "--reject",
+    type=click.FloatRange(0.0, 1.0),
+    metavar="SHARE",
+    help="What is weaker is none of the known objects; 0.001 if strengths can tell.",
+)
+@click.option(
+    "--hold",
+    type=click.IntRange(1),
+    default=3,
+    show_default=True,
+    metavar="N",
+    help="A line for what has not changed for N frames.",
+)
+@click.option("--lines", is_flag=True, help="Lines, also on a terminal.")
+@click.option("--json", "as_json", is_flag=True, help="Lines of JSON.")
+@click.option(
+    "--page",
+    is_flag=False,
+    flag_value=0,
+    type=click.IntRange(0, 65535),
+    metavar="[PORT]",
+    help="Serve a page for browsers of this computer; a free port if none.",
+)
+@click.option(
+    "--times",
+    type=click.IntRange(1, 9),
+    default=3,
+    show_default=True,
+    metavar="N",
+    help="Points for a cell in the picture, at most.",
+)
+@click.option("--record", metavar="FILE", help="Keep the frames in a recording.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.0),
+    default=1.0,
+    show_default=True,
+    metavar="X",
+    help="Of a recording or the simulator; 0 for no pauses.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, help="Of the simulator.")
+@click.option("--frames", type=click.IntRange(1), metavar="N", help="End after N.")
+@quiet_option
+def command(
+    source: str,
+    model: str,
+    board: str | None,
+    reject: float | None,
+    hold: int,
+    lines: bool,
+    as_json: bool,
+    page: int | None,
+    times: int,
+    record: str | None,
+    speed: float,
+    seed: int,
+    frames: int | None,
+    quiet: bool,
+) -> None:
+    """Recognise what SOURCE shows, frame by frame.
+
+    SOURCE is a serial port, a recording, or `simulator`: the paper's objects one after
+    another. A terminal shows a picture, the class and the strengths; elsewhere there
+    is a line for each object that is newly recognised. Ctrl-C ends.
+    """
+    from fuzzytree.tactile.recognition.live import Hold, Live
+    from fuzzytree.tactile.recognition.recogniser import Recogniser, usual_floor
+
+    known = asked_model(model)
+    floor = usual_floor(known) if reject is None else reject
+    with contextlib.ExitStack() as stack:
+        stack.callback(_switched(SWITCH_S))
+        with wrong_options():
+            found, used = _opened(
+                source,
+                board,
+                speed=speed,
+                seed=seed,
+                is_kept=record is not None,
+                quiet=quiet,
+            )
+            stack.callback(found.close)
+            recogniser = Recogniser(known, used.sensor, floor)
+        live = Live(recogniser, found, source)
+        recorder = _recorder(record, used)
+        if recorder is not None:
+            stack.callback(recorder.close)
+        if page is not None:
+            url = _served(live, page, times, stack)
+            say_rows(("serves", url, ""), quiet=quiet)
+        tally = _Tally()
+        try:
+            with _display(live, times, is_wanted=not (lines or as_json)) as shows:
+                tell = None if shows else _teller(Hold(hold), as_json=as_json)
+                for answer in live.answers(frames):
+                    if tell is not None:
+                        tell(answer)
+                    tally.add(answer)
+                    if recorder is not None:
+                        recorder.write(answer.frame, found.counters)
+        except KeyboardInterrupt:
+            pass
+    tally.tell(live, floor, record, quiet=quiet)
+
+
+def _switched(seconds: float) -> Callable[[], None]:
+    """Let threads give way sooner; return what makes it as it was."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(seconds)
+    return lambda: sys.setswitchinterval(before)
+
+
+def _opened(
+    source: str,
+    board: str | None,
+    *,
+    speed: float,
+    seed: int,
+    is_kept: bool,
+    quiet: bool,
+) -> tuple[Source, Board]:
+    """Return where frames come from, and the board that they fit."""
+    from fuzzytree.tactile.recognition import sources
+
+    is_file = Path(source).is_file()
+    if board is None and source != SIMULATOR and not is_file:
+        raise click.UsageError(
+            f"{source} is no recording; for a port, tell its board with --board"
+        )
+    if board is not None and (source == SIMULATOR or is_file):
+        raise click.UsageError(f"--board is for a port; {source} has its own")
+    if source == SIMULATOR:
+        return sources.Paced(sources.simulated(seed), speed), sources.PAPER_BOARD
+    if is_file:
+        replayed = sources.Replayed(source, speed)
+        return replayed, replayed.board
+    assert board is not None  # refused above
+    return _line(source, board, is_kept=is_kept, quiet=quiet)
+
+
+def _line(port: str, board: str, *, is_kept: bool, quiet: bool) -> tuple[Source, Board]:
+    """Open a port, and measure what its board reads when nothing presses."""
+    from fuzzytree.tactile import link as lines
+    from fuzzytree.tactile.board_files.reader import load_board
+    from fuzzytree.tactile.recognition.sources import FromLine
+
+    known = load_board(board)
+    most = lines.MOST_WAITING if is_kept else MOST_WAITING
+    line = lines.open_line(known, port, most_waiting=most)
+    try:
+        return FromLine(line), _rested(known, line, quiet=quiet)
+    except BaseException:
+        line.close()
+        raise
+
+
+def _rested(board: Board, line: Line, *, quiet: bool) -> Board:
+    """Return a board with the baseline that its first frames show."""
+    from fuzzytree.tactile.link import start
+
+    count = board.start.frames
+    if count:
+        what = f"the baseline in {count} frames: nothing may lie on the sensor"
+        say_rows(("measures", what, ""), quiet=quiet)
+    found = start(board, _coming(line, quiet=quiet))
+    for remark in found.remarks:
+        say_rows(("remark", remark, ""), quiet=quiet)
+    return found.board
+
+
+def _coming(line: Line, *, quiet: bool) -> Iterator[Frame]:
+    """Give the frames of a line; say once that none comes."""
+    is_told = False
+    while line.state != "ended":
+        frame = line.take(_PATIENCE_S)
+        if frame is not None:
+            yield frame
+        elif not is_told:
+            is_told = True
+            say_rows(("waits", "no frame comes", "Ctrl-C ends"), quiet=quiet)
+
+
+def _served(live: Live, port: int, times: int, stack: contextlib.ExitStack) -> str:
+    from fuzzytree.tactile.report.page import Page
+
+    return stack.enter_context(Page(live, port, times=times)).url
+
+
+def _recorder(path: str | None, board: Board) -> Recorder | None:
+    from fuzzytree.tactile.link.recording import Recorder
+
+    return None if path is None else Recorder(path, board)
+
+
+@contextlib.contextmanager
+def _display(live: Live, times: int, *, is_wanted: bool) -> Generator[bool]:
+    """Show a picture if there is a terminal; tell whether there is."""
+    from fuzzytree.tactile.cli.screen import Screen, ended_by_signals, look_of
+
+    look = look_of(sys.stdout) if is_wanted else None
+    if look is None:
+        with ended_by_signals(None):
+            yield False
+        return
+    shown = Screen(live, sys.stdout, look, times)
+    with ended_by_signals(shown), shown:
+        yield True
+
+
+def _teller(hold: Hold, *, as_json: bool) -> Callable[[Answer], None]:
+    """Return what writes a line for an answer that is new and has held."""
+    from fuzzytree.tactile.report.live import line, line_facts
+
+    def tell(answer: Answer) -> None:
+        if answer.state is None or not hold((answer.state, answer.code)):
+            return
+        text = msgspec.json.encode(line_facts(answer)).decode() if as_json else ""
+        sys.stdout.write(f"{text or line(answer)}\n")
+        sys.stdout.flush()
+
+    return tell
+
+
+class _Tally:
+    """Counts the answers."""
+
+    def __init__(self) -> None:
+        self._labels: Counter[str] = Counter()
+
+    def add(self, answer: Answer) -> None:
+        """Take an answer."""
+        from fuzzytree.tactile.recognition.live import STATES
+
+        word = "refused" if answer.state is None else STATES[answer.state]
+        self._labels[answer.label or word] += 1
+
+    def tell(
+        self, live: Live, reject: float, record: str | None, *, quiet: bool
+    ) -> None:
+        """Say what was answered, how fast, and what was out of the ordinary."""
+        from fuzzytree.tactile.recognition.live import STATES
+        from fuzzytree.tactile.recognition.recogniser import State
+        from fuzzytree.tactile.report.live import counts, timing, visible
+
+        view = live.view()
+        found = [f"{visible(label)} {n}" for label, n in sorted(self._labels.items())]
+        total = sum(self._labels.values())
+        word = STATES[State.UNKNOWN]
+        unknown = self._labels[word]
+        floor = f"no rule, or one below {reject:g}, decides; --reject sets it"
+        say_rows(
+            ("answered", f"{total} frames", ", ".join(found)),
+            *([(word, f"{unknown} frames", floor)] if unknown else []),
+            ("counted", counts(view), ""),
+            *([("took", timing(view), "")] if view.latency else []),
+            *([("wrote", record, "")] if record else []),
+            quiet=quiet,
+        )

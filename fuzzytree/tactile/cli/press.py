@@ -1,0 +1,251 @@
+"""`fuzzytree tactile press`: the paper's objects, pressed on a simulated sensor."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import shlex
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from fuzzytree.cli.talk import (
+    answer,
+    answer_bytes,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    say_rows,
+    setting,
+    wrong_options,
+)
+
+if TYPE_CHECKING:
+    from fuzzytree.tactile.recognition.table2 import Comparison
+    from fuzzytree.tactile.simulation.physics import Settings, Simulated
+
+
+@click.command("press", short_help="Press objects on a simulated sensor.")
+@click.argument("name", metavar="OBJECT")
+@click.option("--count", metavar="NUMBER", type=int, default=50, show_default=True)
+@click.option("--seed", metavar="NUMBER", type=click.IntRange(0), default=0)
+@click.option("-o", "--output", metavar="FILE", help="`.npz`; `-` is stdout.")
+@click.option(
+    "--set",
+    "changes",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="A number of the simulator (repeat); docs/simulator.md lists them.",
+)
+@click.option(
+    "--means", is_flag=True, help="Print mean invariants beside the paper's Table 2."
+)
+@click.option(
+    "--effects",
+    "is_each",
+    is_flag=True,
+    help="Print what is recognised without each effect of the sensor.",
+)
+@json_option
+@quiet_option
+def command(
+    name: str,
+    count: int,
+    seed: int,
+    output: str | None,
+    changes: Sequence[str],
+    means: bool,
+    is_each: bool,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Press OBJECT again and again on a sensor of 16 x 16 cells; `all` presses all.
+
+    OBJECT is rectangle-0, rectangle-27, rectangle-45, circle, square, hand-0 or
+    hand-45. FILE holds the frames, their labels and what a full cell reads.
+    """
+    if output is None and not (means or is_each):
+        raise click.UsageError("name a file with -o, or ask for --means or --effects")
+    if output == "-" and (means or is_each or as_json):
+        raise click.UsageError(
+            "`-o -` leaves no room for --means, --effects or --json on stdout"
+        )
+    if is_each and (name != "all" or count < 2):
+        raise click.UsageError("--effects needs all objects, and 2 presses of each")
+    from fuzzytree.files import check_place, write_atomically
+    from fuzzytree.tactile.simulation.objects import OBJECTS
+    from fuzzytree.tactile.simulation.physics import press
+
+    if output not in (None, "-"):
+        check_place(output)
+    settings = _settings(changes)
+    names = tuple(OBJECTS) if name == "all" else (name,)
+    with wrong_options():
+        found = {one: press(one, count, seed, settings) for one in names}
+    say_rows(*(_row(one, made) for one, made in found.items()), quiet=quiet)
+    facts: dict[str, object] = {
+        "count": count,
+        "seed": seed,
+        "settings": msgspec.structs.asdict(settings),
+        "objects": [_facts(one, made) for one, made in found.items()],
+    }
+    if output is not None:
+        content = _content(found)
+        if output == "-":
+            answer_bytes(content)
+            return
+        write_atomically(output, content)
+        digest = hashlib.sha256(content).hexdigest()
+        size = f"{len(content)} bytes, sha256 {digest}"
+        words = ["fuzzytree", "tactile", "features", output, "--features", "S1, S9"]
+        after = shlex.join(words)
+        say_rows(("wrote", output, size), ("next", after, ""), quiet=quiet)
+        facts |= {"file": output, "bytes": len(content), "sha256": digest}
+    if means:
+        from fuzzytree.tactile.recognition.table2 import compare
+
+        comparison = compare(settings, seed, count=count, objects=names)
+        facts["means"] = _means_facts(comparison)
+        if not as_json:
+            _tell_means(comparison, quiet=quiet)
+    if is_each:
+        facts["effects"] = _tell_effects(settings, seed, count, is_silent=as_json)
+    if as_json:
+        answer_json(facts)
+
+
+def _settings(changes: Sequence[str]) -> Settings:
+    """Return the simulator's settings with those that were given."""
+    from fuzzytree.tactile.simulation.physics import PAPER
+
+    before = msgspec.structs.asdict(PAPER)
+    given: dict[str, object] = {}
+    for change in changes:
+        name, text = setting(change)
+        if name not in before:
+            close = difflib.get_close_matches(name, before, n=1)
+            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            raise click.UsageError(
+                f"the simulator has no setting {name!r}; "
+                f"it has {', '.join(before)}{hint}"
+            )
+        if name in given:
+            raise click.UsageError(f"the setting {name!r} is given twice")
+        given[name] = _value(name, text, type(before[name]))
+    try:
+        return msgspec.structs.replace(PAPER, **given)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def _value(name: str, text: str, kind: type) -> object:
+    if kind is str:
+        return text
+    try:
+        return kind(text)
+    except ValueError as error:
+        what = "a whole number" if kind is int else "a number"
+        raise click.UsageError(f"{name}: must be {what}, not {text!r}") from error
+
+
+def _row(name: str, found: Simulated) -> tuple[str, str, str]:
+    clipped, outside = int(found.clipped.sum()), float(found.outside.max())
+    over = f", up to {100 * outside:.0f} % over the edge" if outside > 1e-9 else ""
+    facts = f"{len(found.frames)} times, {clipped} cells clipped at full{over}"
+    return "pressed", name, facts
+
+
+def _facts(name: str, found: Simulated) -> dict[str, object]:
+    truth = found.truth
+    return {
+        "name": name,
+        "clipped": found.clipped.tolist(),
+        "outside": found.outside.tolist(),
+        "x": truth.x.tolist(),
+        "y": truth.y.tolist(),
+        "angle_deg": truth.angle_deg.tolist(),
+        "force_n": truth.force_n.tolist(),
+    }
+
+
+def _content(found: dict[str, Simulated]) -> bytes:
+    import numpy as np
+
+    from fuzzytree.tactile.presses import Presses, presses_content
+
+    frames = np.concatenate([made.frames for made in found.values()])
+    sizes = [len(made.frames) for made in found.values()]
+    label = np.repeat(np.arange(len(found)), sizes)
+    sensor = next(iter(found.values())).sensor
+    nobody = np.zeros(0, np.int64)
+    presses = Presses(
+        frames, sensor.full, label, tuple(found), nobody, sensor.threshold
+    )
+    return presses_content(presses)
+
+
+def _means_facts(found: Comparison) -> dict[str, object]:
+    from fuzzytree.tactile.recognition.table2 import FEATURES
+
+    return {
+        "features": FEATURES,
+        "objects": found.objects,
+        "means": found.means.tolist(),
+        "paper": found.paper.tolist(),
+        "within_2": found.within(2.0)[0],
+        "within_1.25": found.within(1.25)[0],
+        "of": found.within(2.0)[1],
+    }
+
+
+def _tell_means(found: Comparison, *, quiet: bool) -> None:
+    """Print a line for each feature: each object's mean and its ratio to Table 2."""
+    from fuzzytree.tactile.recognition.table2 import FEATURES, NO_ORACLE
+
+    rows = zip(FEATURES, found.means, found.ratios, strict=True)
+    answer(_line("feature", found.objects))
+    for feature, means, ratios in rows:
+        pairs = zip(means, ratios, strict=True)
+        answer(_line(feature, [f"{mean:.3g} x{ratio:.2f}" for mean, ratio in pairs]))
+    near, near_all = found.within(1.25)[0], found.within(2.0)
+    say(
+        f"x: times Table 2's mean; {near_all[0]} of {near_all[1]} lie within a factor "
+        f"of 2, {near} within 1.25; {NO_ORACLE} is not counted",
+        quiet=quiet,
+    )
+
+
+def _tell_effects(
+    settings: Settings, seed: int, count: int, *, is_silent: bool
+) -> list[dict[str, object]]:
+    """Print a line for each effect that is switched off, and return the facts."""
+    from fuzzytree.tactile.recognition.effects import effects
+    from fuzzytree.tactile.simulation.objects import OBJECTS
+
+    facts: list[dict[str, object]] = []
+    if not is_silent:
+        heads = ["all", *OBJECTS, "within 2"]
+        answer(" ".join([f"{'without':18}", *(f"{head:>12}" for head in heads)]))
+    with wrong_options():
+        for one in effects(settings, seed, count=count):
+            shares = [one.all, *one.objects.values()]
+            cells = [*(f"{100 * share:.0f} %" for share in shares), str(one.near)]
+            if not is_silent:
+                row = (f"{cell:>12}" for cell in cells)
+                answer(" ".join([f"{one.name:18}", *row]))
+            facts.append(
+                {
+                    "name": one.name,
+                    "all": one.all,
+                    "objects": one.objects,
+                    "within_2": one.near,
+                }
+            )
+    return facts
+
+
+def _line(title: str, cells: Iterable[str]) -> str:
+    return " ".join([f"{title:7}", *(f"{cell:>17}" for cell in cells)])

@@ -1,0 +1,282 @@
+"""`fuzzytree tactile record`: the frames of a board, kept in a file."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from fuzzytree.cli.talk import answer_json, json_option, quiet_option, say, say_rows
+from fuzzytree.errors import PortError, WriteError
+from fuzzytree.files import check_place
+from fuzzytree.tactile.cli.ending import told_to_end
+
+if TYPE_CHECKING:
+    from fuzzytree.tactile.boards import Board
+    from fuzzytree.tactile.frames import Frame
+    from fuzzytree.tactile.link import Line, Started, State
+    from fuzzytree.tactile.link.recording import Recorder
+
+End = Literal["frames", "seconds", "told", "port"]
+"""Enough frames, or seconds; Ctrl-C and its like; or the port went away."""
+
+_SENTENCES: dict[State, str] = {
+    "open": "frames come again",
+    "silent": "no frame comes; waiting",
+    "away": "went away; waiting until it is back",
+}
+_LOOK_S = 0.1
+_WAITING_BYTES = 2**24  # of frames, while the disk is busy
+
+
+@click.command("record", short_help="Keep the frames of a board in a file.")
+@click.argument("board", metavar="BOARD.yaml")
+@click.argument("port", metavar="PORT")
+@click.option("-o", "--output", metavar="FILE", required=True, help="The recording.")
+@click.option("--frames", type=click.IntRange(1), metavar="N", help="End after N.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="S",
+    help="End after S seconds.",
+)
+@click.option("--force", is_flag=True, help="Replace FILE if it is there.")
+@click.option("--no-wait", is_flag=True, help="End when the port goes away.")
+@json_option
+@quiet_option
+def command(
+    board: str,
+    port: str,
+    output: str,
+    frames: int | None,
+    seconds: float | None,
+    force: bool,
+    no_wait: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Keep what BOARD.yaml sends through PORT in FILE, until Ctrl-C.
+
+    First it is measured what the sensor reads at rest: let nothing lie on it. A port
+    that goes away is waited for. Exit 1 if it went away for good.
+    """
+    from fuzzytree.tactile.board_files.reader import load_board
+    from fuzzytree.tactile.link import open_line, start
+    from fuzzytree.tactile.link.recording import Recorder
+
+    if output == "-":
+        raise click.UsageError("a recording is a file, and not standard output")
+    known = load_board(board)
+    check_place(output)
+    if Path(output).exists() and not force:
+        raise WriteError(f"{output}: is there already; --force replaces it")
+    with (
+        told_to_end() as told,
+        open_line(known, port, wait=not no_wait, most_waiting=_waiting(known)) as line,
+    ):
+        coming = _Coming(line, told, quiet=quiet)
+        settings = f"{known.port.baud} baud"
+        say_rows(("opened", port, f"{known.name}, {settings}"), quiet=quiet)
+        coming.begin(seconds)  # a line that stays silent ends, too
+        try:
+            started = start(known, coming.frames())
+        except PortError:
+            if not told.is_set():
+                raise
+            say("ended before the baseline was measured; nothing was written")
+            return 0
+        _tell_start(started, quiet=quiet)
+        with Recorder(output, started.board, replace=force) as recorder:
+            end = _record(line, coming, recorder, frames=frames, seconds=seconds)
+    _tell(output, line, started, recorder, coming, quiet=quiet)
+    if as_json:
+        answer_json(_facts(output, line, started, recorder, coming, end))
+    return 1 if end == "port" else 0
+
+
+def _record(
+    line: Line,
+    coming: _Coming,
+    recorder: Recorder,
+    *,
+    frames: int | None,
+    seconds: float | None,
+) -> End:
+    """Write frames until it is enough; return why it ended."""
+    coming.begin(seconds)
+    for frame in coming.frames():
+        if not coming.takes(frame):
+            return "seconds"
+        recorder.write(frame, line.counters)
+        if coming.written(frame) == frames:
+            return "frames"
+    if line.state == "ended":
+        return "port"
+    if not coming.is_told():
+        return "seconds"
+    line.close()  # what came before is kept
+    with contextlib.suppress(PortError):  # whatever it is, it comes too late
+        for frame in line:
+            recorder.write(frame, line.counters)
+            if coming.written(frame) == frames:
+                break
+    return "told"
+
+
+class _Coming:
+    """The frames of a line, with a word on whatever happens to it."""
+
+    def __init__(self, line: Line, told: threading.Event, *, quiet: bool) -> None:
+        self.count = 0
+        self.first_s = self.last_s = 0.0
+        self._line, self._told, self._quiet = line, told, quiet
+        self._state: State = "open"
+        self._reconnects = 0
+        self._any = False
+        self._limit_s: float | None = None
+        self._begun = self._said = time.monotonic()
+
+    @property
+    def seconds(self) -> float:
+        """From the first to the last frame that was written."""
+        return self.last_s - self.first_s
+
+    def begin(self, limit_s: float | None) -> None:
+        """Begin to count, now."""
+        self._begun = self._said = time.monotonic()
+        self._limit_s = limit_s
+
+    def is_told(self) -> bool:
+        """Tell whether to end."""
+        return self._told.is_set()
+
+    def takes(self, frame: Frame) -> bool:
+        """Tell whether a frame came within the time, from the first one on."""
+        limit_s = self._limit_s
+        return limit_s is None or not self.count or frame.time - self.first_s < limit_s
+
+    def written(self, frame: Frame) -> int:
+        """Count a frame; return how many there are."""
+        if not self.count:
+            self.first_s = frame.time
+        self.last_s = frame.time
+        self.count += 1
+        return self.count
+
+    def frames(self) -> Iterator[Frame]:
+        """Give frames until told to end, until the time is over or the line ends."""
+        while not self._told.is_set():
+            frame = None
+            try:
+                frame = self._line.take(_LOOK_S)
+            except PortError as error:
+                if not self._any:
+                    raise
+                say(str(error))
+            self._tell()
+            if frame is not None:
+                self._any = True
+                yield frame
+            elif self._line.state == "ended" or self._is_late():
+                return
+
+    def _is_late(self) -> bool:
+        limit_s = self._limit_s
+        return limit_s is not None and time.monotonic() - self._begun >= limit_s
+
+    def _tell(self) -> None:
+        """Say when the line changes, and each second, on a terminal, how far it is."""
+        state, before = self._line.state, self._state
+        self._state = state
+        counters = self._line.counters
+        if counters.reconnects != self._reconnects:
+            self._reconnects = counters.reconnects
+            self._say("went away, and is back")
+        elif state != before and state in _SENTENCES:
+            self._say(_SENTENCES[state])
+        now = time.monotonic()
+        if now - self._said >= 1 and self.count:
+            self._said = now
+            if sys.stderr.isatty():
+                text = f"{now - self._begun:.0f} s, {self.count} frames"
+                wrong = f"{counters.damaged} damaged, {counters.dropped} dropped"
+                say(f"{text}, {wrong}", quiet=self._quiet)
+
+    def _say(self, text: str) -> None:
+        say(f"{self._line.port}: {text}", quiet=self._quiet)
+
+
+def _waiting(board: Board) -> int:
+    """Return how many frames may wait."""
+    size = board.sensor.rows * board.sensor.columns * board.sensor.bits // 8
+    return min(max(_WAITING_BYTES // size, 64), 4096)
+
+
+def _tell_start(started: Started, *, quiet: bool) -> None:
+    from fuzzytree.report.text import counted
+
+    board = started.board
+    baseline = board.sensor.baseline
+    text = f"{min(baseline)} to {max(baseline)}" if baseline else "none"
+    frames = counted(board.start.frames, "frame")
+    say_rows(("measured", f"baseline {text}", f"from {frames}"), quiet=quiet)
+    for remark in started.remarks:
+        say(f"remark   {remark}", quiet=quiet)
+
+
+def _tell(
+    output: str,
+    line: Line,
+    started: Started,
+    recorder: Recorder,
+    coming: _Coming,
+    *,
+    quiet: bool,
+) -> None:
+    from fuzzytree.report.text import counted
+
+    rate = ""
+    if coming.seconds:
+        rate = f", {(coming.count - 1) / coming.seconds:.1f} a second"
+    facts = line.counters.facts().items()
+    risk = counted(recorder.most_at_risk, "frame")
+    say_rows(
+        (
+            "wrote",
+            output,
+            f"{counted(coming.count, 'frame')}, {coming.seconds:.1f} s{rate}",
+        ),
+        ("counted", ", ".join(f"{name} {count}" for name, count in facts), ""),
+        ("at risk", f"{risk} at most, if the power had failed", ""),
+        ("next", shlex.join(["fuzzytree", "tactile", "replay", output]), ""),
+        quiet=quiet,
+    )
+
+
+def _facts(
+    output: str,
+    line: Line,
+    started: Started,
+    recorder: Recorder,
+    coming: _Coming,
+    end: End,
+) -> dict[str, object]:
+    board: Board = started.board
+    return {
+        "file": output,
+        "board": board.name,
+        "masked": board.sensor.masked,
+        "remarks": started.remarks,
+        "frames": coming.count,
+        "seconds": coming.seconds,
+        "end": end,
+        "counters": line.counters.facts(),
+        "most_at_risk": recorder.most_at_risk,
+    }

@@ -1,0 +1,189 @@
+"""`fuzzytree tactile replay`: what is in a recording; its frames, again."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import asdict
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    answer_json,
+    json_option,
+    quiet_option,
+    say,
+    say_rows,
+)
+from fuzzytree.files import check_place, open_atomically, write_atomically
+from fuzzytree.tactile.cli.ending import told_to_end
+
+if TYPE_CHECKING:
+    from fuzzytree.tactile.link.recording import RecordingFile
+    from fuzzytree.tactile.link.review import Review
+
+_LOOK_S = 0.1
+_LAST_S = 0.2  # for the reader of a port to take the last bytes
+
+
+@click.command("replay", short_help="Tell what is in a recording, or play it again.")
+@click.argument("recording", metavar="FILE")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="Its frames as .csv or .npz, or its board as .yaml.",
+)
+@click.option("--to-port", is_flag=True, help="Send it through a port, as its board.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="X",
+    help="How many times as fast as it came; 1.",
+)
+@json_option
+@quiet_option
+def command(
+    recording: str,
+    output: str | None,
+    to_port: bool,
+    speed: float | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Tell what is in a recording: board, frames, seconds, counters, gaps, damage.
+
+    With --to-port the frames go out through a new port, whose name is printed, once
+    something reads there, each when it came; Ctrl-C ends.
+    """
+    from fuzzytree.tactile.link.recording import RecordingFile
+    from fuzzytree.tactile.link.review import review
+
+    if speed is not None and not to_port:
+        raise click.UsageError("--speed is for --to-port")
+    if to_port and (output or as_json):
+        raise click.UsageError("--to-port plays only; -o and --json are for without it")
+    if output is not None:
+        check_place(output)
+        if Path(output).suffix not in _WRITERS:
+            raise click.UsageError(f"-o writes .csv, .npz or .yaml, not {output}")
+    with RecordingFile(recording) as file:
+        if to_port:
+            _play(file, speed or 1.0, quiet=quiet)
+            return
+        found = review(file)
+        if as_json:
+            answer_json(_facts(file, found))
+        else:
+            answer("\n".join(_lines(recording, file, found)))
+        if output is not None:
+            _WRITERS[Path(output).suffix](output, recording, file)
+            sensor = file.board.sensor
+            rests = any(sensor.baseline) or bool(sensor.masked)
+            is_bare = Path(output).suffix == ".npz" and rests
+            hint = "without baseline and mask: give its board with --board"
+            say_rows(("wrote", output, hint if is_bare else ""), quiet=quiet)
+
+
+def _facts(file: RecordingFile, found: Review) -> dict[str, object]:
+    return {"board": file.board, "started": _started(file), **asdict(found)}
+
+
+def _lines(name: str, file: RecordingFile, found: Review) -> Iterator[str]:
+    """Yield what is in a recording, in words."""
+    from fuzzytree.report.text import counted
+    from fuzzytree.tactile.link.starting import named
+
+    board, sensor = file.board, file.board.sensor
+    family = type(board.protocol).__name__.lower()
+    size = f"{sensor.rows} x {sensor.columns} cells, full {sensor.full}"
+    # A recording may come from anywhere, and a name may hold commands for a terminal.
+    shown = board.name if board.name.isprintable() else repr(board.name)
+    yield f"{name}: {shown}, {size}, {family}, {board.port.baud} baud"
+    seconds = found.seconds
+    rate = f", {(found.frames - 1) / seconds:.1f} a second" if seconds > 0 else ""
+    frames = counted(found.frames, "frame")
+    yield f"frames    {frames} in {seconds:.1f} s{rate}; begun {_started(file)}"
+    if sensor.baseline:
+        yield f"baseline  {min(sensor.baseline)} to {max(sensor.baseline)}"
+    if sensor.masked:
+        yield f"masked    {named(sensor.masked)}"
+    if found.still:
+        cells = named(found.still)
+        yield f"still     {cells}: never moved though both neighbours did"
+    missing = counted(found.missing, "frame")
+    yield f"missing   {missing} in {counted(found.gaps, 'gap')}"
+    yield f"pause     {found.longest_s:.3f} s at most between two frames"
+    damaged = counted(found.damaged, "record")
+    cut = counted(found.cut_bytes, "byte")
+    yield f"damaged   {damaged}, and {cut} of one that is cut off at the end"
+    counters = found.counters.facts().items()
+    yield f"counted   {', '.join(f'{name} {count}' for name, count in counters)}"
+
+
+def _started(file: RecordingFile) -> str:
+    begin = datetime(1970, 1, 1, tzinfo=UTC)
+    with contextlib.suppress(OverflowError):
+        begin += timedelta(microseconds=file.started_ns // 1000)
+    return begin.isoformat(timespec="milliseconds")
+
+
+def _write_table(output: str, _: str, file: RecordingFile) -> None:
+    """Write a line for each frame: its time, its number, and its cells."""
+    sensor = file.board.sensor
+    names = [f"r{r}c{c}" for r in range(sensor.rows) for c in range(sensor.columns)]
+    with open_atomically(output) as table:
+        table.write(",".join(["time", "number", *names]).encode() + b"\n")
+        for frame, _counters in file:
+            cells = ",".join(map(str, frame.cells.reshape(-1).tolist()))
+            table.write(f"{frame.time!r},{frame.number},{cells}\n".encode())
+
+
+def _write_arrays(output: str, name: str, _: RecordingFile) -> None:
+    """Write a numpy archive that the other actions read."""
+    import numpy as np
+
+    from fuzzytree.tactile.link.recording import read_recording
+    from fuzzytree.tactile.presses import packed_arrays
+
+    found = read_recording(name)
+    arrays = {
+        "frames": found.frames,
+        "full": np.array(found.board.sensor.full),
+        "threshold": np.array(found.board.sensor.threshold),
+        "times": found.times,
+        "numbers": found.numbers,
+    }
+    write_atomically(output, packed_arrays(arrays))
+
+
+def _write_board(output: str, _: str, file: RecordingFile) -> None:
+    """Write the board, with what was measured, as its file."""
+    from fuzzytree.tactile.board_files.writer import board_text
+
+    write_atomically(output, board_text(file.board).encode())
+
+
+_WRITERS = {".csv": _write_table, ".npz": _write_arrays, ".yaml": _write_board}
+
+
+def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
+    """Send the frames through a port of our own, each when it came."""
+    from fuzzytree.report.text import counted
+    from fuzzytree.tactile.recognition.sources import Paced
+    from fuzzytree.tactile.simulation.device import Device
+
+    paced = Paced(file, speed)
+    cells = (frame.cells for frame in paced)
+    device = Device(file.board, cells, rate=max(speed, 1.0))
+    with contextlib.closing(device), contextlib.closing(paced), told_to_end() as told:
+        answer(device.port)
+        say("the frames begin when it is opened; Ctrl-C ends", quiet=quiet)
+        while not (device.over.wait(_LOOK_S) or told.is_set()):
+            pass
+        told.wait(_LAST_S)
+    say_rows(("sent", counted(device.truth.frames, "frame"), ""), quiet=quiet)

@@ -1,0 +1,136 @@
+"""Which sensor frames come from: that of a board's file, or one told in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fuzzytree.cli.talk import say_rows, wrong_options
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import Model
+    from fuzzytree.tactile.given import Given
+    from fuzzytree.tactile.sensor import Cells, Sensor
+
+_SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
+
+
+def sensor_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say which sensor it is."""
+    for option in (
+        click.option("--threshold", metavar="N", type=int, help="A cell counts above."),
+        click.option(
+            "--full", metavar="N", type=int, help="The most a cell reads; 255."
+        ),
+        click.option("--sensor", "size", metavar="16x16", help="Rows and columns."),
+        click.option("--board", metavar="FILE", help="The file of the board."),
+    ):
+        command = option(command)
+    return command
+
+
+def wanted_sensor(
+    board: str | None, size: str | None, full: int | None, threshold: int | None
+) -> Sensor:
+    """Return the sensor that the options tell.
+
+    Raises:
+        click.UsageError: If they tell none, or two.
+        ReadError: If the board's file is none.
+    """
+    from fuzzytree.tactile.sensor import Sensor
+
+    if board is not None:
+        if size is not None or full is not None or threshold is not None:
+            raise click.UsageError(
+                "--board tells --sensor, --full and --threshold; give one of them"
+            )
+        from fuzzytree.tactile.board_files.reader import load_board
+
+        return load_board(board).sensor
+    if size is None:
+        raise click.UsageError(
+            "name the board with --board, or its size: --sensor 16x16"
+        )
+    found = _SIZE.fullmatch(size)
+    if found is None:
+        raise click.UsageError(f"--sensor {size}: rows and columns are as in 16x16")
+    rows, columns = map(int, found.groups())
+    with wrong_options():
+        return Sensor(rows, columns, 255 if full is None else full, threshold or 0)
+
+
+def given_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say more of a file of frames than it does itself."""
+    for option in (
+        click.option("--threshold", type=int, help="Above it a cell is pressed."),
+        click.option("--full", type=int, help="What a cell reads that takes no more."),
+        click.option("--board", metavar="FILE", help="The board of the frames."),
+    ):
+        command = option(command)
+    return command
+
+
+def wanted_frames(
+    path: str,
+    board: str | None,
+    full: int | None,
+    threshold: int | None,
+    *,
+    label: str = "label",
+) -> Given:
+    """Return the frames of an archive or recording, with the sensor they fit.
+
+    Raises:
+        click.UsageError: If a board is named, and what it tells as well.
+        ReadError: If a file is none, or the frames do not fit the board.
+    """
+    from fuzzytree.tactile.given import given_frames
+
+    if board is None:
+        return given_frames(path, full=full, threshold=threshold, label=label)
+    from fuzzytree.tactile.board_files.reader import load_board
+
+    sensor = load_board(board).sensor
+    if full is not None or threshold is not None:
+        raise click.UsageError("--board tells --full and --threshold; give one of them")
+    return given_frames(path, sensor=sensor, label=label)
+
+
+def frames_of(path: str | None, sensor: Sensor, *, quiet: bool = False) -> Cells | None:
+    """Return the frames of an archive or recording, None if none is named.
+
+    Says so where the file tells another threshold than the sensor's.
+
+    Raises:
+        ReadError: If the file is neither, or its frames do not fit the sensor.
+    """
+    if path is None:
+        return None
+    from fuzzytree.tactile.given import given_frames
+
+    presses = given_frames(path, sensor=sensor).presses
+    if presses.threshold not in (0, sensor.threshold):  # 0 where it tells none
+        told = f"tells the threshold {presses.threshold}, not {sensor.threshold}"
+        say_rows(("differs", path, told), quiet=quiet)
+    return presses.frames
+
+
+def asked_model(path: str) -> Model:
+    """Return a model that frames can be asked of.
+
+    Raises:
+        TableError: If the file holds something else.
+    """
+    from fuzzytree.api import verbs
+    from fuzzytree.errors import TableError
+    from fuzzytree.model.rulebase import RuleBase
+    from fuzzytree.model.tree import FuzzyTree
+
+    found = verbs.opened(path)
+    if not isinstance(found, FuzzyTree | RuleBase):
+        raise TableError(f"{path}: frames are asked of a tree or rules, not of this")
+    return found

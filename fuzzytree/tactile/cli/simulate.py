@@ -1,0 +1,156 @@
+"""`fuzzytree tactile simulate`: a board of our own behind a port, to try hosts with."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from itertools import cycle, islice
+from typing import TYPE_CHECKING
+
+import click
+
+from fuzzytree.cli.talk import (
+    answer,
+    answer_json,
+    json_option,
+    quiet_option,
+    say_rows,
+    wrong_options,
+)
+from fuzzytree.tactile.cli.ending import told_to_end
+
+if TYPE_CHECKING:
+    from fuzzytree.tactile.boards import Board
+    from fuzzytree.tactile.sensor import Cells
+    from fuzzytree.tactile.simulation.device import Device
+
+ALL = "all"
+_LOOK_S = 0.05
+
+
+@click.command("simulate", short_help="Be a board, with faults on request.")
+@click.argument("board", metavar="BOARD.yaml")
+@click.option("--object", "name", metavar="NAME", help="Of the paper, or `all`.")
+@click.option("--recording", metavar="FILE", help="Send its frames, over and over.")
+@click.option(
+    "--fault",
+    "faults",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="What goes wrong (repeat); docs/device.md lists them.",
+)
+@click.option("--link", metavar="PATH", help="The name of the port.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, help="Of all that is random."
+)
+@click.option("--fast", is_flag=True, help="As fast as it is read.")
+@click.option("--frames", type=click.IntRange(1), metavar="N", help="End after N.")
+@json_option
+@quiet_option
+def command(
+    board: str,
+    name: str | None,
+    recording: str | None,
+    faults: Sequence[str],
+    link: str | None,
+    seed: int,
+    fast: bool,
+    frames: int | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Send what BOARD.yaml would send, through a port that is told, until Ctrl-C.
+
+    Something round wanders over the sensor, unless an object or a recording is named.
+    The first frames after a host has opened the port are those at rest, as many as
+    its baseline takes; --frames does not count them.
+    """
+    if name is not None and recording is not None:
+        raise click.UsageError("--object and --recording exclude each other")
+    from fuzzytree.tactile.board_files.reader import load_board
+    from fuzzytree.tactile.recognition.sources import FRAMES_A_SECOND
+    from fuzzytree.tactile.simulation.device import Device
+    from fuzzytree.tactile.simulation.faults import faults_of
+
+    known = load_board(board)
+    rest, coming = _frames(known, name, recording, seed, quiet=quiet)
+    with told_to_end() as told:
+        with wrong_options():
+            device = Device(
+                known,
+                coming if frames is None else islice(coming, frames),
+                faults_of(faults),
+                None if fast else 1.0,
+                link=link,
+                seed=seed,
+                first=[rest] * known.start.frames,
+                frames_a_second=0.0 if fast else FRAMES_A_SECOND,
+            )
+        with device:
+            if not as_json:
+                answer(device.port)
+            speed = f"{known.port.baud} baud, {FRAMES_A_SECOND} frames a second at most"
+            speed = "as fast as it is read" if fast else speed
+            say_rows(("opened", device.port, f"{known.name}, {speed}"), quiet=quiet)
+            _wait(device, told)
+    facts = device.truth.facts()
+    counts = ", ".join(f"{what} {count}" for what, count in facts.items() if count)
+    say_rows(("counted", counts or "nothing", ""), quiet=quiet)
+    if as_json:
+        answer_json({"port": device.port, "board": known.name, "truth": facts})
+
+
+def _wait(device: Device, told: threading.Event) -> None:
+    """Wait until told to end, or until the host is gone that had the last frame."""
+    while not told.wait(_LOOK_S):
+        if device.over.is_set() and not device.is_open:
+            return
+
+
+def _frames(
+    board: Board, name: str | None, recording: str | None, seed: int, *, quiet: bool
+) -> tuple[Cells, Iterator[Cells]]:
+    """Return a frame without pressure and those to send, fitted to the board."""
+    from fuzzytree.tactile.simulation.device import blob, empty, fitted
+    from fuzzytree.tactile.simulation.physics import FULL, SIDE
+
+    if recording is not None:
+        import numpy as np
+
+        from fuzzytree.tactile.link.recording import read_recording
+
+        found = read_recording(recording)
+        if not len(found.frames):
+            raise click.UsageError(f"{recording}: holds no frames")
+        sensor = found.board.sensor
+        _say_fit(board, (sensor.rows, sensor.columns), sensor.full, quiet=quiet)
+        rest = empty(board)
+        if sensor.baseline:
+            cells = np.array(sensor.baseline).reshape(sensor.rows, sensor.columns)
+            rest = fitted(board, cells, sensor.full)
+        frames = cycle(list(found.frames))
+        return rest, (fitted(board, one, sensor.full) for one in frames)
+    if name is None:
+        return empty(board), blob(board, seed)
+    from fuzzytree.tactile.recognition.sources import simulated
+    from fuzzytree.tactile.simulation.objects import OBJECTS
+
+    if name not in (*OBJECTS, ALL):
+        known = ", ".join(OBJECTS)
+        raise click.UsageError(f"no object {name!r}; there is {known}, or {ALL}")
+    names = tuple(OBJECTS) if name == ALL else (name,)
+    _say_fit(board, (SIDE, SIDE), FULL, quiet=quiet)
+    records = simulated(seed, names=names)
+    return empty(board), (fitted(board, one.frame.cells, FULL) for one in records)
+
+
+def _say_fit(board: Board, sides: tuple[int, int], full: int, *, quiet: bool) -> None:
+    """Say how frames are changed, so that the board can send them."""
+    from fuzzytree.tactile.simulation.device import bounds
+
+    wanted, (low, high) = (board.sensor.rows, board.sensor.columns), bounds(board)
+    if wanted != sides:
+        was, now = (" x ".join(map(str, pair)) for pair in (sides, wanted))
+        say_rows(("fitted", f"{was} cells to {now}", ""), quiet=quiet)
+    if (low, high) != (0, full):
+        say_rows(("fitted", f"0 to {full} to {low} to {high}", ""), quiet=quiet)

@@ -1,0 +1,1 @@
+"""Writers of models that take frames."""

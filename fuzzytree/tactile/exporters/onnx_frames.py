@@ -1,0 +1,418 @@
+"""ONNX: one graph from the raw frame to what lies on the sensor.
+
+The cells become exact sums by one product of matrices, the sums become the features
+that the model asks for by the steps of their program, and the model's own graph
+decides. Nothing stands in it that the model does not need.
+
+All numbers up to the sums are whole and below 2^53 (`frame_program` refuses a sensor
+for which they are not), and so is each part of a sum. Doubles hold such numbers without
+rounding, so whatever order a library adds in, the sums have the same bits.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from fuzzytree.errors import DisagreementError
+from fuzzytree.exporters.onnx import FORMAT_VERSION, IRS, OPSETS, require, version
+from fuzzytree.model.contracts import Model, Written
+from fuzzytree.model.rulebase import RuleBase, fingerprint
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
+from fuzzytree.tactile.features.aimed import frame_type, proving_frames
+from fuzzytree.tactile.features.plain import check_reject
+from fuzzytree.tactile.features.states import State
+from fuzzytree.tactile.sensor import Sensor, offsets
+
+if TYPE_CHECKING:
+    import onnx
+
+    from fuzzytree.exporters.onnx_axes import Axes
+    from fuzzytree.exporters.onnx_graph import Sheet
+
+Output = Literal["label", "state", "rule", "features", "strengths"]
+
+USUAL: tuple[Output, ...] = ("label", "state", "rule")
+
+_NUMBERS_AT_ONCE = 2**16  # of the cells of frames that are best run together
+
+
+def write_frames(
+    model: Model,
+    sensor: Sensor,
+    *,
+    outputs: Sequence[Output] = USUAL,
+    reject: float = 0.0,
+    opset: int = 17,
+    ir: int = 8,
+    plain: bool = False,
+    verify: bool = True,
+) -> Written:
+    """Write a graph that takes raw frames and gives what lies on the sensor.
+
+    The input is `frames`, of shape (frames, rows, columns), uint8, or uint16 for a
+    sensor of 16 bits. The outputs, each with one entry per frame: `label`, the class,
+    or "" where nothing presses or nothing known; `state`, a
+    `fuzzytree.tactile.features.states.State`; `rule`, the number of the rule or leaf
+    that decides, from 1, or 0; `features`, of shape (frames, features); `strengths` of
+    a rule base, of shape (frames, rules), 0 where nothing presses. The same model,
+    sensor and options give the same bytes.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        sensor: Whose frames come.
+        outputs: Which outputs, in this order.
+        reject: Of raw rules: what is weaker in the rule that decides is unknown.
+        opset: The version of the operators, 12 to 26.
+        ir: The version of the file, 4 to 13.
+        plain: Whether a tree does without the operators of ai.onnx.ml.
+        verify: Whether to run the file in onnxruntime on aimed frames and to compare
+            every bit of its answers with plain Python's.
+
+    Raises:
+        TableError: If an input of the model is no feature of a frame.
+        InvalidModelError: If a feature is beyond the sensor.
+        LossError: If onnxruntime does not load the file.
+        DisagreementError: If the file gives another answer.
+        MissingExtraError: If onnx is not installed, or onnxruntime to verify with.
+        ValueError: If an option is not one of those above.
+
+    Example:
+        >>> from fuzzytree.api.verbs import learn
+        >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> write_frames(tree, Sensor(4, 4)).losses
+        ()
+    """
+    _check_options(model, outputs, opset, ir, plain=plain)
+    check_reject(model, reject)
+    require("onnx", "writing onnx needs")
+    if verify:
+        require("onnxruntime", "verifying a written onnx file needs")
+    made = frame_program(sensor, model.inputs)
+    proto = _model_proto(made, model, outputs, reject, opset, ir, plain=plain)
+    content: bytes = proto.SerializeToString(deterministic=True)
+    if verify:
+        from fuzzytree.tactile.exporters.onnx_frames_proof import differences
+
+        frames = proving_frames(made, model)
+        for text in differences(content, made, model, frames, outputs, reject):
+            raise DisagreementError(text)
+    return Written(content)
+
+
+def frames_at_once(sensor: Sensor) -> int:
+    """Return how many frames are best run together, so that they stay in the cache."""
+    return max(_NUMBERS_AT_ONCE // (sensor.rows * sensor.columns), 1)
+
+
+def _check_options(
+    model: Model, outputs: Sequence[Output], opset: int, ir: int, *, plain: bool
+) -> None:
+    known = get_args(Output)
+    for name in outputs:
+        if name not in known:
+            raise ValueError(f"outputs: there is {', '.join(known)}, not {name!r}")
+    if not outputs or len(set(outputs)) != len(outputs):
+        raise ValueError(f"outputs: name each once, at least one, not {outputs!r}")
+    if "strengths" in outputs and isinstance(model, FuzzyTree):
+        raise ValueError(
+            "outputs: a tree has no strengths; write its rules to have them"
+        )
+    if plain and not isinstance(model, FuzzyTree):
+        raise ValueError("plain is for trees: rules never need ai.onnx.ml")
+    for what, value, versions in (("opset", opset, OPSETS), ("ir", ir, IRS)):
+        if value not in versions:
+            raise ValueError(
+                f"{what}: onnx files are written for {versions[0]} to {versions[-1]}, "
+                f"not {value}"
+            )
+
+
+def _model_proto(
+    made: FrameProgram,
+    model: Model,
+    outputs: Sequence[Output],
+    reject: float,
+    opset: int,
+    ir: int,
+    *,
+    plain: bool,
+) -> onnx.ModelProto:
+    from onnx import TensorProto, helper
+
+    from fuzzytree.exporters.onnx_graph import TREES, Sheet
+
+    sheet, sensor = Sheet(opset), made.sensor
+    _fill(sheet, made, model, outputs, reject, plain=plain)
+    rules = len(model.rules) if isinstance(model, RuleBase) else 0
+    kinds: dict[Output, tuple[int, list[str | int]]] = {
+        "label": (TensorProto.STRING, ["frames"]),
+        "state": (TensorProto.INT64, ["frames"]),
+        "rule": (TensorProto.INT64, ["frames"]),
+        "features": (TensorProto.DOUBLE, ["frames", len(made.features)]),
+        "strengths": (TensorProto.DOUBLE, ["frames", rules]),
+    }
+    kind = TensorProto.UINT8 if sensor.bits == 8 else TensorProto.UINT16
+    shape: list[str | int] = ["frames", sensor.rows, sensor.columns]
+    graph = helper.make_graph(
+        sheet.nodes,
+        "frames",
+        [helper.make_tensor_value_info("frames", kind, shape)],
+        [helper.make_tensor_value_info(name, *kinds[name]) for name in outputs],
+        sheet.used(),
+    )
+    imports = [helper.make_opsetid("", opset)]
+    if any(node.domain == TREES for node in sheet.nodes):
+        imports.append(helper.make_opsetid(TREES, 5))
+    proto = helper.make_model(
+        graph,
+        opset_imports=imports,
+        ir_version=ir,
+        producer_name="fuzzytree",
+        producer_version=version(),
+        doc_string=_in_words(made, model),
+    )
+    for key, value in _facts(made, model, outputs, reject).items():
+        proto.metadata_props.add(key=f"fuzzytree.{key}", value=value)
+    return proto
+
+
+def _facts(
+    made: FrameProgram, model: Model, outputs: Sequence[Output], reject: float
+) -> dict[str, str]:
+    """Return the metadata: plain words where possible, JSON for lists and records."""
+    import msgspec
+
+    sensor = made.sensor
+    texts = {
+        "format": FORMAT_VERSION,
+        "version": version(),
+        "name": model.name,
+        "carrier": "frames",
+        "model": "tree" if isinstance(model, FuzzyTree) else "rules",
+        "dtype": "float64",
+        "fingerprint": fingerprint(model),
+    }
+    records: dict[str, object] = {
+        "sensor": msgspec.to_builtins(sensor),
+        "features": list(made.features),
+        "classes": list(model.classes),
+        "states": [state.name.lower() for state in State],
+        "reject": reject,
+        "outputs": list(outputs),
+        "chunk": frames_at_once(sensor),
+    }
+    return texts | {
+        key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
+    }
+
+
+def _in_words(made: FrameProgram, model: Model) -> str:
+    what = "tree" if isinstance(model, FuzzyTree) else "rule base"
+    sensor = made.sensor
+    return (
+        f"Frames of {sensor.rows} x {sensor.columns} cells, row 0 at the top, to the "
+        f"classes of the fuzzy {what} {model.name!r}: a cell counts where it reads "
+        f"more than {sensor.threshold} over its baseline. State 0 is an object, 1 "
+        "nothing on the sensor, 2 none of the known objects."
+    )
+
+
+# --- the graph
+
+
+def _fill(
+    sheet: Sheet,
+    made: FrameProgram,
+    model: Model,
+    outputs: Sequence[Output],
+    reject: float,
+    *,
+    plain: bool,
+) -> None:
+    """Add all nodes of a graph to a sheet."""
+    from fuzzytree.exporters.onnx_axes import is_known, scalar
+    from fuzzytree.exporters.onnx_numbers import NUMBERS
+    from fuzzytree.exporters.onnx_steps import add_steps
+
+    with sheet.about("sums"):
+        columns = _sums(sheet, made)
+    *features, pressed = add_steps(sheet, made.program, columns)
+    zero = scalar(sheet, 0.0, np.float64)
+    is_pressed = sheet.node("Less", zero, pressed, hint="is_pressed")
+    if features:
+        _side_by_side(sheet, features)
+    needed = [name for name in outputs if name != "features"]
+    if not needed:
+        return
+    numbers = NUMBERS["float64"]
+    strengths = ""
+    if isinstance(model, FuzzyTree):
+        from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
+
+        is_plain = plain or needs_plain(model)
+        axes = tree_graph(
+            sheet, model, numbers, model.inputs, is_plain=is_plain, named="winner"
+        )
+    else:
+        from fuzzytree.exporters.onnx_outputs import add_winner
+        from fuzzytree.exporters.onnx_rules import rules_graph
+
+        axes, strengths = rules_graph(sheet, model, numbers, model.inputs)
+        add_winner(sheet, strengths, "winner")
+    answered = _is_answer(sheet, model, axes)
+    known = sheet.node("And", is_pressed, answered, hint="is_known")
+    if reject:
+        is_strong = _is_strong(sheet, strengths, reject)
+        known = sheet.node("And", known, is_strong, hint="is_known")
+    _ends(sheet, model, is_pressed, known, outputs)
+    if "strengths" in outputs:
+        finite = _flat(sheet, is_known(sheet, axes, numbers))
+        finite = sheet.node("And", is_pressed, finite, hint="is_finite")
+        _all_strengths(sheet, model, strengths, finite)
+
+
+def _sums(sheet: Sheet, made: FrameProgram) -> list[str]:
+    """Add the sums as the sheet's source, shape (frames, sums); return their names."""
+    from fuzzytree.exporters.onnx_axes import scalar
+    from fuzzytree.exporters.onnx_steps import np_to_onnx
+
+    sensor = made.sensor
+    double, size = int(np_to_onnx(np.float64)), sensor.rows * sensor.columns
+    shape = sheet.numbers([-1, size], "shape")
+    values = sheet.node("Reshape", "frames", shape, hint="cells")
+    values = sheet.node("Cast", values, hint="cells", to=double)
+    if sensor.full != np.iinfo(frame_type(sensor)).max:
+        full = scalar(sheet, float(sensor.full), np.float64)
+        values = sheet.node("Min", values, full, hint="cells")
+    if offsets(sensor):
+        baseline = np.array([offsets(sensor)], np.float64)
+        offset = sheet.constant(baseline, "baseline")
+        values = sheet.node("Sub", values, offset, hint="cells")
+    is_pressed = ""
+    counted = any(one.of == "count" for one in made.sums)
+    if offsets(sensor) or sensor.threshold or counted:
+        threshold = scalar(sheet, float(sensor.threshold), np.float64)
+        is_pressed = sheet.node("Less", threshold, values, hint="is_cell_pressed")
+    if offsets(sensor) or sensor.threshold:
+        zero = scalar(sheet, 0.0, np.float64)
+        values = sheet.node("Where", is_pressed, values, zero, hint="pressures")
+    return _taken(sheet, made.sums, values, is_pressed)
+
+
+def _taken(
+    sheet: Sheet, sums: Sequence[Sum], values: str, is_pressed: str
+) -> list[str]:
+    """Add what the sums take from the cells: a product, single cells, the others."""
+    from fuzzytree.exporters.onnx_steps import np_to_onnx, reduced
+
+    single = [one for one in sums if one.of == "cells" and sum(one.weights) == 1]
+    single = [one for one in single if max(one.weights) == 1 and min(one.weights) == 0]
+    mixed = [one for one in sums if one.of == "cells" and one not in single]
+    pieces: list[str] = []
+    if mixed:
+        weights = np.array([one.weights for one in mixed], np.float64).T
+        weights = np.ascontiguousarray(weights)
+        pieces.append(sheet.node("MatMul", values, sheet.constant(weights, "weights")))
+    if single:
+        places = sheet.numbers([one.weights.index(1) for one in single], "cells")
+        pieces.append(sheet.node("Gather", values, places, axis=1))
+    others = [one for one in sums if one.of != "cells"]
+    for one in others:
+        if one.of == "count":
+            ones = sheet.node("Cast", is_pressed, to=int(np_to_onnx(np.float64)))
+            pieces.append(sheet.total(ones, axis=1, keepdims=1))
+        else:
+            pieces.append(reduced(sheet, "ReduceMax", values, axis=1, keepdims=1))
+    sheet.source = pieces[0]
+    if len(pieces) > 1:
+        sheet.source = sheet.node("Concat", *pieces, axis=1)
+    return [one.name for one in (*mixed, *single, *others)]
+
+
+def _side_by_side(sheet: Sheet, names: Sequence[str]) -> None:
+    """Put the features, of shape (frames,) each, side by side as the source."""
+    shape = [-1, 1] if len(names) == 1 else [len(names), -1]
+    block = names[0] if len(names) == 1 else sheet.node("Concat", *names, axis=0)
+    is_done = len(names) == 1
+    shaped = sheet.numbers(shape, "shape")
+    block = sheet.node("Reshape", block, shaped, named="features" if is_done else "")
+    if not is_done:
+        block = sheet.node("Transpose", block, perm=[1, 0], named="features")
+    sheet.source = block
+
+
+def _flat(sheet: Sheet, truth: str) -> str:
+    shape = sheet.numbers([-1], "flat")
+    return sheet.node("Reshape", truth, shape, hint="is_row_finite")
+
+
+def _is_answer(sheet: Sheet, model: Model, axes: Axes) -> str:
+    """Return whether the model knows an answer to the features."""
+    from fuzzytree.exporters.onnx_axes import is_known
+    from fuzzytree.exporters.onnx_numbers import NUMBERS
+
+    semantics = model.semantics
+    if isinstance(model, RuleBase) and semantics.uncovered is not None:
+        return _flat(sheet, is_known(sheet, axes, NUMBERS["float64"]))
+    return sheet.node("Less", _whole(sheet, 0), "winner", hint="is_answer")
+
+
+def _is_strong(sheet: Sheet, strengths: str, reject: float) -> str:
+    """Return whether the rule that decides is as strong as the floor, or is none."""
+    from fuzzytree.exporters.onnx_axes import scalar
+    from fuzzytree.exporters.onnx_steps import reduced
+
+    with sheet.about("strongest"):
+        strongest = reduced(sheet, "ReduceMax", strengths, axis=0, keepdims=0)
+        floor = scalar(sheet, reject, np.float64)
+        is_strong = sheet.node("LessOrEqual", floor, strongest)
+        is_none = sheet.node("Equal", "winner", _whole(sheet, 0))
+        return sheet.node("Or", is_none, is_strong)
+
+
+def _ends(
+    sheet: Sheet, model: Model, is_pressed: str, known: str, outputs: Sequence[Output]
+) -> None:
+    """Add label, state and rule."""
+    if "state" in outputs:
+        seen, unknown, nothing = (
+            _whole(sheet, state)
+            for state in (State.OBJECT, State.UNKNOWN, State.NOTHING)
+        )
+        state = sheet.node("Where", known, seen, unknown, hint="state_if_pressed")
+        sheet.node("Where", is_pressed, state, nothing, named="state")
+    if "rule" in outputs:
+        sheet.node("Where", known, "winner", _whole(sheet, 0), named="rule")
+    if "label" in outputs:
+        labels = (
+            [leaf.label for leaf in model.leaves]
+            if isinstance(model, FuzzyTree)
+            else [rule.then for rule in model.rules]
+        )
+        texts = [model.semantics.uncovered or "", *labels, ""]
+        nothing = _whole(sheet, len(texts) - 1)
+        place = sheet.node("Where", known, "winner", nothing, hint="label_number")
+        table = sheet.texts(texts, "labels")
+        sheet.node("Gather", table, place, axis=0, named="label")
+
+
+def _all_strengths(sheet: Sheet, model: Model, strengths: str, finite: str) -> None:
+    """Add the strengths of all rules, 0 where nothing presses."""
+    from fuzzytree.exporters.onnx_axes import scalar
+
+    count = len(model.rules) if isinstance(model, RuleBase) else 0
+    ends = [sheet.numbers([end], "end") for end in (1, 1 + count)]
+    with sheet.about("strengths"):
+        real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
+        real = sheet.node("Where", finite, real, scalar(sheet, 0.0, np.float64))
+    sheet.node("Transpose", real, perm=[1, 0], named="strengths")
+
+
+def _whole(sheet: Sheet, value: int) -> str:
+    return sheet.constant(np.array(int(value), np.int64), "whole")

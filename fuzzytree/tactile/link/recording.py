@@ -1,0 +1,353 @@
+"""Frames on disk: each is written at once, and a damaged file loses what is damaged.
+
+`docs/recordings.md` has the layout, byte by byte.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import os
+import stat
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from fuzzytree.errors import ReadError, WriteError
+from fuzzytree.files import PathLike, reason, write_atomically
+from fuzzytree.tactile.boards import Board
+from fuzzytree.tactile.frames import Counters, Frame
+from fuzzytree.tactile.link.records import (
+    FIXED,
+    LARGEST_BOARD,
+    Record,
+    cell_type,
+    header,
+    layout_of,
+    packed,
+    pieces,
+    unpacked_board,
+    unpacked_sizes,
+)
+from fuzzytree.tactile.sensor import Cells
+
+LARGEST_ARRAY: Final = 2**31
+"""The most bytes of cells that `read_recording` holds at once."""
+
+_CHUNK = 2**20
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """All frames of a recording that are whole.
+
+    Attributes:
+        board: What sent them, with the baseline that was measured.
+        frames: As the board sent them: shape (frames, rows, columns).
+        times: When the last byte of each came, in seconds since the line was opened.
+        numbers: Of each frame; a number that is missing was dropped or damaged.
+        counters: Of the line, at the last frame.
+        damaged: Records in the file that were damaged and are left out.
+        cut_bytes: Bytes at the end that are less than a record.
+        started_ns: When the recording began, in nanoseconds since 1970 (UTC).
+    """
+
+    board: Board
+    frames: Cells
+    times: npt.NDArray[np.float64]
+    numbers: npt.NDArray[np.int64]
+    counters: Counters
+    damaged: int
+    cut_bytes: int
+    started_ns: int
+
+
+class Recorder:
+    """Write frames to a file, so that at most the last one can be lost.
+
+    Each frame goes to the system in one piece: whatever ends this program, it is in
+    the file. A thread asks the disk, without pause while there are new frames, to
+    keep what it has: if the power fails, the frames that came since the last answer
+    are lost (`most_at_risk` tells how many that ever were).
+
+    Args:
+        path: A file that is not there yet.
+        board: What sends the frames.
+        started_ns: When it began, in nanoseconds since 1970 (UTC); now, if None.
+        replace: Whether the file may be there; its content is lost.
+
+    Raises:
+        WriteError: If the file is there or cannot be written.
+
+    Example:
+        >>> import tempfile
+        >>> from fuzzytree.tactile.boards import Marker
+        >>> from fuzzytree.tactile.sensor import Sensor
+        >>> board = Board("mat", Sensor(1, 2), Marker("AA 55"))
+        >>> path = Path(tempfile.mkdtemp()) / "a.ftr"
+        >>> with Recorder(path, board) as recorder:
+        ...     recorder.write(Frame(np.array([[3, 4]]), 0.5, 0), Counters(frames=1))
+        >>> read_recording(path).frames.tolist()
+        [[[3, 4]]]
+    """
+
+    def __init__(
+        self,
+        path: PathLike,
+        board: Board,
+        *,
+        started_ns: int | None = None,
+        replace: bool = False,
+    ) -> None:
+        self._name = os.fspath(path)
+        self._board = board
+        self._wake = threading.Condition()
+        self._written = self._kept = self.most_at_risk = 0
+        self._failure: OSError | None = None
+        self._is_closed = False
+        started = time.time_ns() if started_ns is None else started_ns
+        begin = header(board, started)  # before a file is made
+        write_atomically(path, begin, replace=replace)
+        try:
+            _keep_name(Path(path))
+            flags = os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0)
+            self._file = os.open(path, flags)
+        except OSError as error:
+            raise self._error(error) from error
+        self._syncing = threading.Thread(target=self._sync, daemon=True)
+        self._syncing.start()
+
+    def write(self, frame: Frame, counters: Counters) -> None:
+        """Append a frame.
+
+        Args:
+            frame: Its cells fit the board.
+            counters: What the line has counted so far.
+
+        Raises:
+            TableError: If the frame is of another size, or a cell has no place.
+            WriteError: If it cannot be written; all frames before it are kept.
+        """
+        content = packed(Record(frame, counters), self._board)
+        self._raise_failure()
+        try:
+            self._put(content)
+        except OSError as error:
+            raise self._error(error) from error
+        with self._wake:
+            self._written += 1
+            self.most_at_risk = max(self.most_at_risk, self._written - self._kept)
+            self._wake.notify()
+
+    def close(self) -> None:
+        """Wait until the disk has all of it, and close the file.
+
+        Raises:
+            WriteError: If the disk could not keep it.
+        """
+        if self._is_closed:
+            return
+        with self._wake:
+            self._is_closed = True
+            self._wake.notify()
+        self._syncing.join()
+        os.close(self._file)
+        self._raise_failure()
+
+    def __enter__(self) -> Self:
+        """Return the recorder, which is closed at the end of the block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self.close()
+
+    def _put(self, content: bytes) -> None:
+        rest = memoryview(content)
+        while rest:
+            rest = rest[os.write(self._file, rest) :]
+
+    def _sync(self) -> None:
+        """Ask the disk to keep the file whenever there are new frames."""
+        while True:
+            with self._wake:
+                while self._written == self._kept and not self._is_closed:
+                    self._wake.wait()
+                written = self._written
+                if written == self._kept or self._failure is not None:
+                    return
+            try:
+                _to_disk(self._file)
+            except OSError as error:
+                self._failure = error
+                return
+            with self._wake:
+                self._kept = written
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise self._error(self._failure) from self._failure
+
+    def _error(self, error: OSError | ValueError) -> WriteError:
+        return WriteError(f"{self._name}: cannot be written: {reason(error)}")
+
+
+class RecordingFile:
+    """Read a recording frame by frame, however long it is.
+
+    Iterating begins at the first record. What is damaged is left out and counted.
+
+    Args:
+        path: The file.
+
+    Attributes:
+        board: What sent the frames.
+        started_ns: When the recording began, in nanoseconds since 1970 (UTC).
+        most_frames: How many records the file has room for.
+        damaged: Records that were damaged, of those that were passed.
+        cut_bytes: Bytes at the end that are less than a record, once it was reached.
+
+    Raises:
+        ReadError: If it is no recording, or its header is damaged.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        self._name = os.fspath(path)
+        self.damaged = self.cut_bytes = 0
+        self._file = _open(path)
+        try:
+            self._read_header()
+            self._end = os.fstat(self._file.fileno()).st_size
+        except BaseException:
+            self._file.close()
+            raise
+        self.most_frames = (self._end - self._begin) // self._layout.itemsize
+
+    def __iter__(self) -> Iterator[Record]:
+        """Give the records that are whole, from the first on.
+
+        Raises:
+            ReadError: If it cannot be read, or nearly all of it is damaged.
+        """
+        self.damaged = self.cut_bytes = lost = 0
+        length = self._layout.itemsize
+        for piece in pieces(self._chunks(), self._layout, self._name):
+            if isinstance(piece, int):
+                lost += piece
+            else:
+                self.damaged += -(-lost // length)  # rounded up
+                lost = 0
+                yield piece
+        self.damaged += lost // length
+        self.cut_bytes = lost % length
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        """Return the file, which is closed at the end of the block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self.close()
+
+    def _chunks(self) -> Iterator[bytes]:
+        """Give what was in the file when it was opened."""
+        place = self._begin
+        while chunk := self._read(place, min(_CHUNK, self._end - place)):
+            place += len(chunk)
+            yield chunk
+
+    def _read(self, place: int, size: int) -> bytes:
+        try:
+            self._file.seek(place)
+            return self._file.read(size)
+        except OSError as error:
+            text = f"{self._name}: cannot be read: {reason(error)}"
+            raise ReadError(text) from error
+
+    def _read_header(self) -> None:
+        size = FIXED.itemsize
+        fixed = self._read(0, size)
+        length = min(unpacked_sizes(fixed, self._name), LARGEST_BOARD)
+        self._begin = size + length + 4
+        content = fixed + self._read(size, length + 4)
+        self.board, self.started_ns, counters = unpacked_board(content, self._name)
+        self._layout = layout_of(self.board, counters=counters)
+
+
+def read_recording(path: PathLike) -> Recording:
+    """Return all of a recording.
+
+    Args:
+        path: The file. One that is still being written gives what is there.
+
+    Raises:
+        ReadError: If it is no recording, or its header is damaged, or it is too large
+            to be held at once; `RecordingFile` reads it frame by frame.
+    """
+    with RecordingFile(path) as file:
+        sensor, most = file.board.sensor, file.most_frames
+        shape = (most, sensor.rows, sensor.columns)
+        kind = cell_type(file.board)
+        if math.prod(shape) * kind.itemsize > LARGEST_ARRAY:
+            raise ReadError(
+                f"{os.fspath(path)}: its {most} frames are more than "
+                f"{LARGEST_ARRAY} bytes, too many to be held at once"
+            )
+        frames, count = np.empty(shape, kind), 0
+        times, numbers = np.empty(most, np.float64), np.empty(most, np.int64)
+        record = None
+        for record in file:
+            frames[count], times[count] = record.frame.cells, record.frame.time
+            numbers[count] = record.frame.number
+            count += 1
+        return Recording(
+            file.board,
+            frames[:count],
+            times[:count],
+            numbers[:count],
+            record.counters if record else Counters(),
+            file.damaged,
+            file.cut_bytes,
+            file.started_ns,
+        )
+
+
+def _to_disk(file: int) -> None:
+    """Wait until the disk has what was written to a file."""
+    getattr(os, "fdatasync", os.fsync)(file)
+
+
+def _keep_name(path: Path) -> None:
+    """Ask the disk to keep a file's name, where a folder can be asked."""
+    if os.name != "posix":
+        return
+    with contextlib.suppress(OSError):  # some file systems cannot
+        handle = os.open(path.absolute().parent, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _open(path: PathLike) -> io.FileIO:
+    """Open a file; a pipe or a device is none, and would keep us waiting."""
+    name = os.fspath(path)
+    try:
+        if stat.S_ISREG(Path(path).stat().st_mode):
+            return io.FileIO(path)
+        raise ReadError(f"{name}: is no file")
+    except (OSError, ValueError) as error:
+        if isinstance(error, ReadError):
+            raise
+        raise ReadError(f"{name}: cannot be read: {reason(error)}") from error

@@ -1,0 +1,182 @@
+"""From frames to what lies on the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzytree.errors import TableError
+from fuzzytree.model.contracts import Model, Run
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.runtimes.one_row import load
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import Status
+from fuzzytree.tactile.features.names import feature_of
+from fuzzytree.tactile.features.plain import check_reject
+from fuzzytree.tactile.features.states import State as State
+from fuzzytree.tactile.runtimes.frames import Features, FramePlan
+from fuzzytree.tactile.sensor import Cells, Sensor, saturated
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.model.contracts import FloatArray, IntArray
+
+
+USUAL_FLOOR = 0.001
+"""What is weaker lies beyond all that was learnt, unless one knows better."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """The answers to some frames.
+
+    Attributes:
+        classes: The names of the classes.
+        codes: Shape (frames,): the place of the class in `classes`; -1 for none.
+        states: Shape (frames,): a `State` each.
+        strengths: Shape (classes, frames), in [0, 1]: the strongest rule of each
+            class; 0 where nothing presses.
+        saturated: Shape (frames,): how many cells take no more.
+        features: What the model was asked with.
+    """
+
+    classes: tuple[str, ...]
+    codes: IntArray
+    states: IntArray
+    strengths: FloatArray
+    saturated: IntArray
+    features: Features
+
+    def label(self, frame: int = 0) -> str:
+        """Return the class of a frame, `nothing` or `unknown`."""
+        state = State(int(self.states[frame]))
+        if state is State.OBJECT:
+            return self.classes[int(self.codes[frame])]
+        return state.name.lower()
+
+
+class Recogniser:
+    """A model and a sensor, ready for frames.
+
+    A tree decides by its path; its strengths are those of its raw rules (of its
+    relative rules where it carries no fitted sets). What is weaker than `reject` in
+    the rule that decides is none of the known objects.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        sensor: Whose frames will come.
+        reject: The floor of the strength, 0 to 1; 0 rejects only what no rule covers.
+
+    Raises:
+        TableError: If an input of the model is no feature of a frame.
+        InvalidModelError: If a feature is beyond the sensor.
+        ValueError: If `reject` is no number in 0 to 1, or if the rules are relative:
+            one of them always has the strength 1.
+
+    Example:
+        >>> from fuzzytree.api.verbs import learn
+        >>> small, large = np.eye(4, dtype=np.uint8), np.full((4, 4), 9, np.uint8)
+        >>> sensor = Sensor(4, 4)
+        >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> found = Recogniser(tree, sensor)(np.array([small, large, 0 * small]))
+        >>> [found.label(frame) for frame in range(3)]
+        ['s', 'l', 'nothing']
+    """
+
+    def __init__(self, model: Model, sensor: Sensor, reject: float = 0.0) -> None:
+        check_inputs(model)
+        rules = strength_rules(model)
+        check_reject(rules, reject)
+        self.model, self.sensor, self.reject = model, sensor, reject
+        self.plan = FramePlan(sensor, model.inputs)
+        self._decide: Run = load(model)
+        self._fire: Run | None = load(rules) if rules is not model else None
+        number = {label: place for place, label in enumerate(model.classes)}
+        ends = [r.then for r in model.rules] if isinstance(model, RuleBase) else []
+        if isinstance(model, FuzzyTree):
+            ends = [leaf.label for leaf in model.leaves]
+        self._class_of = np.array([number[label] for label in ends], np.int64)
+        semantics = model.semantics
+        self._uncovered = (
+            -1 if semantics.uncovered is None else number[semantics.uncovered]
+        )
+
+    def __call__(self, frames: Cells) -> Recognition:
+        """Return what frames show, of shape (frames, rows, columns) or one frame.
+
+        Raises:
+            TableError: If the frames are of another size, or no whole numbers.
+        """
+        features = self.plan(frames)
+        outcome = self._decide(features.values)
+        fired = outcome if self._fire is None else self._fire(features.values)
+        strengths = fired.strengths
+        if strengths is None:  # rules that are fired have strengths
+            raise TypeError(f"{self.model.name}: no strengths")
+        rules, is_none = outcome.rule, outcome.rule == 0
+        codes = np.where(is_none, self._uncovered, self._class_of[rules - 1])
+        own = strengths[np.maximum(rules - 1, 0), np.arange(len(rules))]
+        is_unknown = (codes < 0) | (~is_none & (own < self.reject))
+        states = np.where(is_unknown, State.UNKNOWN, State.OBJECT)
+        states = np.where(features.is_pressed, states, State.NOTHING)
+        is_missing = outcome.status == Status.MISSING  # a feature beyond doubles
+        states = np.where(is_missing & features.is_pressed, State.UNKNOWN, states)
+        return Recognition(
+            self.model.classes,
+            np.where(states == State.OBJECT, codes, -1),
+            states.astype(np.int64),
+            self._by_class(strengths, features.is_pressed),
+            saturated(self.sensor, frames),
+            features,
+        )
+
+    def _by_class(
+        self, strengths: FloatArray, is_pressed: npt.NDArray[np.bool_]
+    ) -> FloatArray:
+        found = np.zeros((len(self.model.classes), strengths.shape[1]))
+        np.fmax.at(found, self._class_of, strengths)  # NaN, which is missing, counts 0
+        return np.where(is_pressed, found, 0.0)
+
+
+def usual_floor(model: Model) -> float:
+    """Return the floor of strength below which one usually rejects.
+
+    Far from all that a model has learnt every fitted set is 0, and the class that is
+    nearest means nothing. Relative rules have no such strength: their floor is 0.
+
+    Example:
+        >>> from fuzzytree.api.verbs import learn
+        >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> usual_floor(tree), usual_floor(rules_from_tree(tree))
+        (0.001, 0.0)
+    """
+    return 0.0 if strength_rules(model).kind == "relative" else USUAL_FLOOR
+
+
+def strength_rules(model: Model) -> RuleBase:
+    """Return the rules whose strengths tell how sure a model is."""
+    if isinstance(model, RuleBase):
+        return model
+    has_sets = bool(model.sets) or not model.nodes
+    return rules_from_tree(model, "raw" if has_sets else "relative")
+
+
+def check_inputs(model: Model) -> None:
+    """Refuse a model that asks for other things than features of a frame.
+
+    Raises:
+        TableError: If one of its inputs is no feature; it names the model.
+    """
+    for name in model.inputs:
+        try:
+            feature_of(name)
+        except TableError as error:
+            raise TableError(
+                f"{model.name} asks for other features: {error}"
+            ) from error

@@ -1,0 +1,254 @@
+"""From frame to class: what each way costs, and how far it is from exact arithmetic."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from functools import partial
+
+import msgspec
+import numpy as np
+
+from fuzzytree.benchmarking.clock import Call, Tell, time_calls
+from fuzzytree.benchmarking.machine import after, machine
+from fuzzytree.benchmarking.records import Machine, Timing
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.tactile.features.aimed import aimed_frames
+from fuzzytree.tactile.features.exact import exact_features
+from fuzzytree.tactile.features.plain import plain_answer
+from fuzzytree.tactile.recognition.recogniser import check_inputs
+from fuzzytree.tactile.recognition.runners import (
+    PLAIN,
+    Found,
+    Runner,
+    as_sent,
+    runners,
+    with_strengths,
+)
+from fuzzytree.tactile.recognition.scales import errors
+from fuzzytree.tactile.sensor import Cells, Sensor, pressed
+
+COPY = "floor: the frames copied"
+SESSION = "floor: an empty session call"
+
+_MOST_EXACT = 200
+_MOST_PLAIN = 1_000  # frames in a call of plain Python
+
+
+class Point(msgspec.Struct, frozen=True):
+    """A way from frame to class, measured.
+
+    Attributes:
+        name: As people read it.
+        timings: One for each number of frames in a call.
+        bytes: The size of the file that runs; 0 if there is none.
+        error: The largest error of a feature, as a share of its scale
+            (`fuzzytree.tactile.recognition.scales`); None for a floor.
+        flips: Frames whose class is not that of the exact features, rounded once.
+    """
+
+    name: str
+    timings: tuple[Timing, ...]
+    bytes: int = 0
+    error: float | None = None
+    flips: int = 0
+
+
+class FramesStudy(msgspec.Struct, frozen=True):
+    """Error against run time, from frame to class.
+
+    Attributes:
+        model: The model's name.
+        fingerprint: The SHA-256 of its content.
+        features: What it asks for.
+        sensor: Whose frames they are.
+        data: What the frames are: a file's name, or how they were made.
+        judged: How many frames the errors are of.
+        machine: Where it was measured.
+        points: What was measured, floors at the end.
+        omissions: What was left out and why, in sentences.
+        seed: Of the order of the rounds.
+        seconds: What the whole study took.
+        is_complete: False if the time ran out or the user ended it.
+    """
+
+    model: str
+    fingerprint: str
+    features: tuple[str, ...]
+    sensor: Sensor
+    data: str
+    judged: int
+    machine: Machine
+    points: tuple[Point, ...]
+    omissions: tuple[str, ...]
+    seed: int
+    seconds: float
+    is_complete: bool
+
+
+def time_frames(
+    model: Model,
+    sensor: Sensor,
+    frames: Cells | None = None,
+    *,
+    data: str = "",
+    rows: Sequence[int] = (1, 10_000),
+    reject: float = 0.0,
+    rounds: int = 15,
+    seconds: float = 120.0,
+    seed: int = 0,
+    tell: Tell | None = None,
+) -> FramesStudy:
+    """Measure every way from frame to class, in interleaved rounds, on one thread.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        sensor: Whose frames come.
+        frames: Shape (frames, rows, columns); made ones if none.
+        data: What they are, for the record.
+        rows: How many frames there are in a call.
+        reject: Of raw rules: what is weaker in the rule that decides is unknown.
+        rounds: The most samples of each call.
+        seconds: For all of it, about.
+        seed: Of the order of the rounds, and of made frames.
+        tell: Told how far it is.
+
+    Raises:
+        TableError: If the model asks for other features, or frames do not fit.
+        ValueError: If there is no frame, or no number of frames.
+    """
+    begin = time.perf_counter()
+    check_inputs(model)
+    if frames is None:
+        frames, data = aimed_frames(sensor, 200, seed), f"made frames, seed {seed}"
+    given = as_sent(sensor, frames)
+    if not len(given) or not rows or min(rows) < 1:
+        raise ValueError("there is no frame to measure with")
+    before = machine(["onnx", "onnxruntime"])
+    ways, omissions = runners(model, sensor, reject)
+    more = with_strengths(model, sensor, reject)
+    ways = [ways[0], *([more] if more else []), *ways[1:]]
+    judged = _judged(model, sensor, given, ways, reject)
+    timings: dict[str, list[Timing]] = {}
+    is_complete = True
+    for place, count in enumerate(rows):
+        calls, left_out = _calls(ways, given, count)
+        omissions += left_out
+        share = (seconds - (time.perf_counter() - begin)) / (len(rows) - place)
+        found = time_calls(
+            calls,
+            rows=count,
+            rounds=rounds,
+            seconds=max(share, 1e-3),
+            seed=seed,
+            tell=tell,
+        )
+        for error in found.failures.values():
+            raise error
+        is_complete = is_complete and found.is_complete
+        for name, one in found.timings.items():
+            timings.setdefault(name, []).append(one)
+    sizes = {way.name: way.bytes for way in ways}
+    points = tuple(
+        Point(name, tuple(own), sizes.get(name, 0), *judged.get(name, (None, 0)))
+        for name, own in timings.items()
+    )
+    return FramesStudy(
+        model.name,
+        fingerprint(model),
+        model.inputs,
+        sensor,
+        data,
+        min(len(given), _MOST_EXACT),
+        after(before, [one for point in points for one in point.timings]),
+        points,
+        tuple(dict.fromkeys(omissions)),
+        seed,
+        time.perf_counter() - begin,
+        is_complete,
+    )
+
+
+def _calls(
+    ways: Sequence[Runner], frames: Cells, count: int
+) -> tuple[dict[str, Call], list[str]]:
+    """Return what is timed for so many frames in a call, and what is left out."""
+    many = np.ascontiguousarray(frames.take(np.arange(count) % len(frames), axis=0))
+    calls: dict[str, Call] = {}
+    omissions: list[str] = []
+    for way in ways:
+        if way.name == PLAIN and count > _MOST_PLAIN:
+            omissions.append(
+                f"{PLAIN}: {count:,} frames in a call; it takes them one by one"
+            )
+        else:
+            calls[way.name] = partial(way.call, many)
+    calls[COPY] = many.copy
+    if all(map(importlib.util.find_spec, ("onnx", "onnxruntime"))):
+        calls[SESSION] = _empty_session(many)
+    return calls, omissions
+
+
+def _empty_session(frames: Cells) -> Callable[[], object]:
+    """Return the call of a session that hands the same frames back."""
+    from onnx import helper
+
+    from fuzzytree.exporters.onnx_session import open_bare
+
+    kind = helper.np_dtype_to_tensor_dtype(frames.dtype)
+    shapes = [
+        helper.make_tensor_value_info(name, kind, ["frames", "rows", "columns"])
+        for name in ("frames", "same")
+    ]
+    node = helper.make_node("Identity", ["frames"], ["same"])
+    graph = helper.make_graph([node], "empty", shapes[:1], shapes[1:])
+    imports = [helper.make_opsetid("", 17)]
+    made = helper.make_model(graph, ir_version=8, opset_imports=imports)
+    bare = open_bare(made.SerializeToString())
+    return partial(bare, ["same"], {"frames": frames})
+
+
+def _judged(
+    model: Model,
+    sensor: Sensor,
+    frames: Cells,
+    ways: Sequence[Runner],
+    reject: float,
+) -> dict[str, tuple[float, int]]:
+    """Return the largest error and the flips of each way, on some of the frames."""
+    some = frames[:_MOST_EXACT]
+    exact = [exact_features(sensor, frame, model.inputs) for frame in some]
+    codes = [
+        plain_answer(
+            model,
+            [float(value) for value in values],
+            is_pressed=bool(pressed(sensor, frame).any()),
+            reject=reject,
+        ).code
+        for frame, values in zip(some, exact, strict=True)
+    ]
+    found: dict[str, tuple[float, int]] = {}
+    for way in ways:
+        answers = way.answer(some)
+        largest = _largest(model, sensor, some, answers, exact)
+        found[way.name] = largest, int((answers.codes != np.array(codes)).sum())
+    return found
+
+
+def _largest(
+    model: Model,
+    sensor: Sensor,
+    frames: Cells,
+    found: Found,
+    exact: Sequence[Sequence[Fraction]],
+) -> float:
+    shares = [
+        errors(sensor, frame, model.inputs, values, right)
+        for frame, values, right in zip(
+            frames, found.features.T.tolist(), exact, strict=True
+        )
+    ]
+    return max((share for one in shares for share in one), default=0.0)

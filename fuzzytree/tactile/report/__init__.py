@@ -1,0 +1,1 @@
+"""Reports about frames: text, pages and figures."""

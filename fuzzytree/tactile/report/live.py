@@ -1,0 +1,330 @@
+"""What is recognised, as lines of a terminal: a picture in colour, bars and counts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from rich.cells import cell_len, set_cell_size
+
+from fuzzytree.model.naming import printable
+from fuzzytree.tactile.interpolation import interpolated
+from fuzzytree.tactile.recognition.live import SENTENCES, STATES, Answer, View
+from fuzzytree.tactile.recognition.recogniser import State
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.tactile.sensor import Cells
+
+Look = Literal["full", "256", "plain"]
+"""Colours of 24 bits, the 256 of most terminals, or signs of ASCII without colour."""
+
+SILENT_S = 1.0
+"""After how long without a frame a display says so."""
+
+_RAMP = (" .", "::", "--", "==", "++", "**", "##", "%%", "@@")
+_EIGHTHS = " ▏▎▍▌▋▊▉"
+_BOLD, _DIM, _END = "\x1b[1m", "\x1b[2m", "\x1b[0m"
+_NAME = 18  # the widest column of classes
+_BAR = 150  # the shade of a bar: it can be seen on white and on black
+_SIDE = 34  # columns beside a picture
+
+
+def _palette() -> tuple[tuple[int, int, int], ...]:
+    """Return 256 colours from dark to light, evenly brighter (Green 2011, cubehelix).
+
+    A turn in colour around the line of greys: the picture reads the same in grey.
+    """
+    colours: list[tuple[int, int, int]] = []
+    for number in range(256):
+        light = 0.07 + 0.90 * number / 255
+        angle = 2 * math.pi * (0.2 / 3 + 1 - 0.6 * light)
+        reach = 1.5 * light * (1 - light) / 2
+        cos, sin = reach * math.cos(angle), reach * math.sin(angle)
+        red = light - 0.14861 * cos + 1.78277 * sin
+        green = light - 0.29227 * cos - 0.90649 * sin
+        blue = light + 1.97294 * cos
+        r, g, b = (min(max(round(255 * part), 0), 255) for part in (red, green, blue))
+        colours.append((r, g, b))
+    return tuple(colours)
+
+
+PALETTE = _palette()
+"""The colour of each share of full, from 0 to 255."""
+
+
+def _near_256(colour: tuple[int, int, int]) -> int:
+    """Return the number of the colour of the 6 x 6 x 6 cube that is nearest."""
+    steps = (0, 95, 135, 175, 215, 255)
+    r, g, b = (
+        min(range(6), key=lambda step: abs(steps[step] - part)) for part in colour
+    )
+    return 16 + 36 * r + 6 * g + b
+
+
+_CODES: dict[Look, list[str]] = {
+    "full": [f"2;{r};{g};{b}" for r, g, b in PALETTE],
+    "256": [f"5;{_near_256(colour)}" for colour in PALETTE],
+}
+
+
+def shades(cells: Cells, full: int, times: int) -> npt.NDArray[np.uint8]:
+    """Return what presses as shares of full, from 0 to 255, interpolated.
+
+    Args:
+        cells: Shape (rows, columns), from 0 to `full`.
+        full: What a cell reads that takes no more.
+        times: Points for a cell on each side.
+
+    Returns:
+        Shape (times rows, times columns).
+
+    Example:
+        >>> shades(np.array([[0, 1023]]), 1023, 3)[0].tolist()
+        [0, 0, 102, 153, 255, 255]
+    """
+    values = interpolated(cells, times, dtype=np.float32)
+    values *= 255.0 / full
+    found: npt.NDArray[np.uint8] = np.rint(values).clip(0, 255).astype(np.uint8)
+    return found
+
+
+def picture(
+    cells: Cells, full: int, columns: int, lines: int, *, look: Look, times: int
+) -> list[str]:
+    """Return a frame as lines that fit; the largest number of points that does.
+
+    A line shows two rows of points where there are colours. If not even the cells
+    fit, a point shows the largest of several.
+
+    Args:
+        cells: What presses, of shape (rows, columns).
+        full: What a cell reads that takes no more.
+        columns: The most signs in a line.
+        lines: The most lines.
+        look: With which colours.
+        times: The most points for a cell on each side.
+
+    Example:
+        >>> picture(np.array([[0, 255]]), 255, 80, 9, look="plain", times=1)
+        [' .@@']
+    """
+    wide, high = (columns // 2, lines) if look == "plain" else (columns, 2 * lines)
+    width, height = max(wide, 1), max(high, 1)
+    rows, across = cells.shape
+    fits = min(width // across, height // rows, times)
+    if fits < 1:
+        cells = _coarse(cells, max(-(-across // width), -(-rows // height)))
+    points = shades(cells, full, max(fits, 1))
+    if look == "plain":
+        last = len(_RAMP) - 1
+        signs = [_RAMP[-(-shade * last // 255)] for shade in range(256)]
+        return ["".join(signs[shade] for shade in row) for row in points.tolist()]
+    if len(points) % 2:
+        points = np.vstack([points, np.zeros_like(points[:1])])
+    codes = _CODES[look]
+    pairs = zip(points[::2].tolist(), points[1::2].tolist(), strict=True)
+    return [_halves(upper, lower, codes) for upper, lower in pairs]
+
+
+def _coarse(cells: Cells, step: int) -> Cells:
+    """Return the largest cell of each square of `step` cells on a side."""
+    rows, columns = (-(-side // step) for side in cells.shape)
+    wide = np.zeros((rows * step, columns * step), cells.dtype)
+    wide[: cells.shape[0], : cells.shape[1]] = cells
+    largest: Cells = wide.reshape(rows, step, columns, step).max(axis=(1, 3))
+    return largest
+
+
+def _halves(upper: Sequence[int], lower: Sequence[int], codes: Sequence[str]) -> str:
+    """Return two rows of points as one line, its colours told where they change."""
+    parts: list[str] = []
+    before = ("", "")
+    for up, down in zip(upper, lower, strict=True):
+        colours = codes[up], codes[down]
+        if colours != before:
+            parts.append(f"\x1b[38;{colours[0]};48;{colours[1]}m")
+            before = colours
+        parts.append("▀")
+    return "".join([*parts, _END])
+
+
+def visible(text: str) -> str:
+    """Return a text in which no sign controls the terminal.
+
+    Example:
+        >>> visible("soft" + chr(27) + "[2J")
+        'soft?[2J'
+    """
+    return "".join(sign if sign.isprintable() else "?" for sign in text)
+
+
+def headline(view: View) -> str:
+    """Return what is recognised in a few words: a class, or why there is none."""
+    answer = view.answer
+    if answer is None:
+        return "waiting for the first frame"
+    if answer.state is None:
+        return "a frame that does not fit"
+    if answer.state is State.OBJECT:
+        return visible(answer.label)
+    return SENTENCES[answer.state]
+
+
+def status(view: View) -> str:
+    """Return a sentence about what is wrong now; empty if nothing is."""
+    if view.is_over:
+        return "the source is gone: no more frames"
+    parts = [view.trouble] if view.trouble else []
+    if view.silent_s >= SILENT_S:
+        parts.append(f"no frame for {view.silent_s:.0f} s")
+    return visible("; ".join(parts))
+
+
+def counts(view: View) -> str:
+    """Return the counters that a display shows, those of failures only above 0."""
+    known = {**view.counters, "refused": view.refused}
+    parts = [f"{known.pop('frames')} frames"]
+    parts += [f"{count} {name}" for name, count in known.items() if count]
+    return ", ".join(part.replace(" bytes", " B") for part in parts)
+
+
+def timing(view: View) -> str:
+    """Return the rate, and how long answers took from a frame's last byte."""
+    found = view.latency
+    if found is None:
+        return ""
+    parts = (found.median, found.most, found.largest)
+    median, most, largest = (f"{1e3 * part:.2f}" for part in parts)
+    spread = f"{median} ms (99 %: {most}, largest: {largest})"
+    return f"{view.rate:.1f} frames/s; answer after {spread}"
+
+
+def screen(view: View, columns: int, lines: int, *, look: Look, times: int) -> str:
+    """Return a whole screen: at most `lines` lines of at most `columns` signs.
+
+    Args:
+        view: What to show.
+        columns: The width of the terminal.
+        lines: Its height.
+        look: With which colours.
+        times: The most points for a cell on each side.
+    """
+    bold, dim = (_BOLD, _DIM) if look != "plain" else ("", "")
+    end = _END if bold else ""
+    head = f"{visible(view.source)} -> {visible(view.model)}"
+    foot = [counts(view), timing(view), status(view) or "Ctrl-C ends"]
+    styles = [dim, dim, bold if status(view) else dim]
+    room = max(lines - len(foot) - 2, 1)
+    is_wide = columns >= 2 * _SIDE
+    beside = columns - _SIDE if is_wide else columns
+    above = room if is_wide else max(room - min(len(view.classes), 4) - 2, 1)
+    drawn: list[str] = []
+    if view.cells is not None:
+        drawn = picture(view.cells, view.full, beside, above, look=look, times=times)
+    facts = _facts(view, room if is_wide else room - len(drawn), look=look)
+    body = _side_by_side(drawn, facts) if is_wide else [*drawn, *facts]
+    footer = [
+        f"{style}{_cut(text, columns)}{end}"
+        for style, text in zip(styles, foot, strict=True)
+    ]
+    title = f"{bold}{_cut(head, columns)}{end}"
+    return "\n".join([title, *body[:room], "", *footer][:lines])
+
+
+def _side_by_side(drawn: Sequence[str], facts: Sequence[str]) -> list[str]:
+    """Put facts right of a picture, whose lines are all of one width."""
+    if not drawn:
+        return [*facts]
+    rows = max(len(drawn), len(facts))
+    width = drawn[0].count("▀") or len(drawn[0])
+    left = [*drawn, *[" " * width] * (rows - len(drawn))]
+    right = [*facts, *[""] * (rows - len(facts))]
+    return [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
+
+
+def _facts(view: View, lines: int, *, look: Look) -> list[str]:
+    """Return the answer and the strengths of the classes."""
+    bold, end = ("", "") if look == "plain" else (_BOLD, _END)
+    found = [f"{bold}{_cut(headline(view), _SIDE - 2)}{end}", ""]
+    answer = view.answer
+    if answer is None or not answer.strengths:
+        return found
+    room = max(lines - len(found), 0)
+    places = _strongest(answer, room if room >= len(view.classes) else room - 1)
+    for place in places:
+        name = set_cell_size(visible(view.classes[place]), _name_width(view))
+        own = answer.strengths[place]
+        bar = _bar(own, _SIDE - 9 - _name_width(view), look=look)
+        style = bold if place == answer.code else ""
+        found.append(f"{style}{name} {own:4.2f} {bar}{end if style else ''}")
+    if len(places) < len(view.classes) and room:
+        found.append(f"and {len(view.classes) - len(places)} weaker ones")
+    return found
+
+
+def _name_width(view: View) -> int:
+    return min(max(cell_len(visible(name)) for name in view.classes), _NAME)
+
+
+def _strongest(answer: Answer, count: int) -> list[int]:
+    """Return the places of the strongest classes, in the order of the classes."""
+    order = sorted(
+        range(len(answer.strengths)), key=lambda place: -answer.strengths[place]
+    )
+    return sorted(order[: max(count, 0)])
+
+
+def _bar(share: float, width: int, *, look: Look) -> str:
+    """Return a bar of so many signs for a share of 1."""
+    if look == "plain":
+        return "#" * round(share * width)
+    eighths = round(share * width * 8)
+    bar = "█" * (eighths // 8) + _EIGHTHS[eighths % 8].strip()
+    return f"\x1b[38;{_CODES[look][_BAR]}m{bar}{_END}" if bar else ""
+
+
+def _cut(text: str, columns: int) -> str:
+    return text if cell_len(text) <= columns else set_cell_size(text, columns)
+
+
+LINE_FIELDS = ("time", "frame", "state", "class", "strength", "saturated")
+"""The fields of a line, in order."""
+
+
+def line_facts(answer: Answer) -> dict[str, object]:
+    """Return a recognised object as facts for other programs."""
+    state = "unknown" if answer.state is None else STATES[answer.state]
+    return {
+        "time": round(answer.frame.time, 6),
+        "frame": answer.frame.number,
+        "state": state,
+        "class": answer.label or None,
+        "strength": answer.strength,
+        "saturated": answer.saturated,
+    }
+
+
+def line(answer: Answer) -> str:
+    r"""Return a recognised object as a line of fields with tabs between them.
+
+    A backslash, tab or end of line within a class's name is written as `\\`, `\t`,
+    `\n` or `\r`, as in the text format of PostgreSQL; what else cannot be printed,
+    such as commands for a terminal, as `\x1b` or `\u202e`.
+    """
+    facts = line_facts(answer)
+    facts["class"] = escaped(answer.label)
+    return "\t".join(str(facts[field]) for field in LINE_FIELDS)
+
+
+def escaped(text: str) -> str:
+    r"""Return a text that fits between tabs, and commands no terminal.
+
+    Example:
+        >>> print(escaped("a\tb" + chr(27)))
+        a\tb\x1b
+    """
+    return printable(text.replace("\\", "\\\\"))

@@ -1,0 +1,120 @@
+"""Features of frames, in numpy: exact sums as one product, then the program.
+
+A single frame runs the program in plain Python, which is faster and gives the same
+bits (`one_row.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzytree.runtimes.one_row import row_runner
+from fuzzytree.runtimes.programs import Plan, plan_program, run_program
+from fuzzytree.tactile.features import FrameProgram, frame_program
+from fuzzytree.tactile.sensor import Cells, Sensor, check_frames, pressed
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.model.contracts import FloatArray
+
+_CELLS_AT_ONCE = 1 << 15  # blocks of them stay in the cache
+
+
+@dataclass(frozen=True, slots=True)
+class Features:
+    """The features of some frames.
+
+    Attributes:
+        names: Of the features.
+        values: Shape (features, frames); 0 where nothing presses.
+        is_pressed: Shape (frames,): whether anything presses.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    is_pressed: npt.NDArray[np.bool_]
+
+
+class FramePlan:
+    """What computing features of a sensor's frames needs, made once.
+
+    Args:
+        sensor: The sensor.
+        names: Of the features.
+
+    Raises:
+        TableError: As `fuzzytree.tactile.features.frame_program`.
+        InvalidModelError: The same way.
+
+    Example:
+        >>> plan = FramePlan(Sensor(2, 2), ["force", "area"])
+        >>> plan(np.array([[[255, 0], [255, 0]]])).values.tolist()
+        [[2.0], [2.0]]
+    """
+
+    def __init__(self, sensor: Sensor, names: Sequence[str]) -> None:
+        self.made: FrameProgram = frame_program(sensor, names)
+        self._plan: Plan = plan_program(self.made.program)
+        self._run_row = row_runner(self.made.program)
+        weighted = [one.weights for one in self.made.sums if one.of == "cells"]
+        self._weights = np.array(weighted, np.float64).T.copy()
+
+    def __call__(self, frames: Cells) -> Features:
+        """Return the features of frames of shape (frames, rows, columns), or of one.
+
+        Raises:
+            TableError: If the frames are of another size, or no whole numbers.
+        """
+        sensor = self.made.sensor
+        found = check_frames(sensor, frames)
+        size = sensor.rows * sensor.columns
+        sums = np.empty((len(self.made.sums), len(found)))
+        step = max(_CELLS_AT_ONCE // size, 1)
+        for start in range(0, len(found), step):
+            part = slice(start, start + step)
+            cells = pressed(sensor, found[part]).reshape(-1, size)
+            self._take(cells, sums[:, part])
+        if len(found) == 1 and self._run_row is not None:
+            values = np.array([self._run_row(sums[:, 0].tolist())]).T
+        else:
+            values = run_program(self._plan, sums)
+        return Features(self.made.features, values[:-1], values[-1] > 0.0)
+
+    def _take(self, cells: npt.NDArray[np.int64], sums: FloatArray) -> None:
+        """Fill in the sums of some frames; whole numbers below 2^53 add up exactly."""
+        weighted = (cells.astype(np.float64) @ self._weights).T
+        place = 0
+        for line, one in enumerate(self.made.sums):
+            if one.of == "count":
+                sums[line] = np.count_nonzero(cells, axis=1)
+            elif one.of == "peak":
+                sums[line] = cells.max(axis=1)
+            else:
+                sums[line] = weighted[place]
+                place += 1
+
+
+def features_of(sensor: Sensor, frames: Cells, names: Sequence[str]) -> Features:
+    """Return features of frames.
+
+    Args:
+        sensor: The sensor.
+        frames: Shape (frames, rows, columns), whole numbers; or one frame.
+        names: Of the features; see `fuzzytree.tactile.features.names`.
+
+    Raises:
+        TableError: If a name is no feature's, or the frames do not fit the sensor.
+        InvalidModelError: As `fuzzytree.tactile.features.frame_program`.
+
+    Example:
+        >>> bar = np.zeros((1, 5, 5), np.uint8)
+        >>> bar[0, 2, 1:4] = 255
+        >>> features_of(Sensor(5, 5), bar, ["S1", "angle"]).values.tolist()
+        [[2.0], [0.0]]
+    """
+    return FramePlan(sensor, names)(frames)

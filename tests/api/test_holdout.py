@@ -1,0 +1,150 @@
+"""Folds are stratified, the same each time, and of bounded size."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fuzzytree.api import holdout
+from fuzzytree.api.holdout import Accuracy, accuracy, folds_of, majority, sampled
+from fuzzytree.api.verbs import learn_table
+from fuzzytree.learning import Learnt, Settings, learn_arrays
+from fuzzytree.tables import Table, read_table
+
+
+def _table(rows: int, *, classes: int = 2) -> Table:
+    chance = np.random.default_rng(0)
+    codes = np.arange(rows) % classes
+    values = chance.normal(size=(rows, 2)) + 10.0 * codes[:, None]
+    return read_table(values, target=codes)
+
+
+def _accuracy(table: Table, settings: Settings | None = None) -> Accuracy | None:
+    wanted = settings or Settings()
+    report = learn_table(table, name="t", units={}, settings=wanted).report
+    return accuracy(table, wanted, report)
+
+
+def test_each_fold_holds_each_class_in_its_share() -> None:
+    codes = np.array([0] * 50 + [1] * 10)
+    folds = folds_of(codes, 5, seed=1)
+    for fold in range(5):
+        assert np.bincount(codes[folds == fold]).tolist() == [10, 2]
+
+
+def test_the_folds_depend_on_the_seed_alone() -> None:
+    codes = np.arange(100) % 3
+    assert folds_of(codes, 5, 1).tolist() == folds_of(codes, 5, 1).tolist()
+    assert folds_of(codes, 5, 1).tolist() != folds_of(codes, 5, 2).tolist()
+
+
+def test_a_sample_keeps_the_shares_of_the_classes() -> None:
+    codes = np.array([0] * 900 + [1] * 100)
+    rows = sampled(codes, 100, seed=0)
+    assert np.bincount(codes[rows]).tolist() == [90, 10]
+    assert len(set(rows.tolist())) == 100
+
+
+def test_classes_far_apart_are_told_apart() -> None:
+    found = _accuracy(_table(60))
+    assert found is not None
+    assert found.mean == 1.0
+    assert (found.rows, found.of) == (60, 60)
+
+
+def test_a_large_table_is_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(holdout, "CELLS", 80)
+    found = _accuracy(_table(1000))
+    assert found is not None
+    assert (found.rows, found.of) == (40, 1000)
+
+
+def test_at_most_20_000_rows_are_tested() -> None:
+    found = _accuracy(_table(50_000), Settings(mode="paper"))
+    assert found is not None
+    assert (found.rows, found.of) == (20_000, 50_000)
+
+
+@pytest.mark.parametrize("cells", [119, 120])
+def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
+    monkeypatch: pytest.MonkeyPatch, cells: int
+) -> None:
+    used: list[Settings] = []
+
+    def learn(*args: Any, settings: Settings, **more: Any) -> Learnt:
+        used.append(settings)
+        return learn_arrays(*args, settings=settings, **more)
+
+    table = read_table(
+        np.random.default_rng(0).normal(size=(60, 2)) ** 2,
+        target=np.random.default_rng(1).integers(0, 2, 60),
+    )
+    wanted = Settings(choices=("alpha", "entry"))
+    report = learn_table(table, name="t", units={}, settings=wanted).report
+    monkeypatch.setattr(holdout, "CHOOSING_CELLS", cells)
+    monkeypatch.setattr(holdout, "learn_arrays", learn)
+    found = accuracy(table, wanted, report)
+    assert found is not None
+    assert found.is_nested == (cells == 120)
+    chosen = Settings(
+        patterns_per_class=report.patterns,
+        alpha=float(report.chosen["alpha"]),
+        entry=float(report.chosen["entry"]),
+    )
+    assert used == [wanted if cells == 120 else chosen] * 5
+
+
+def test_patterns_of_a_class_that_a_fold_lacks_are_no_error() -> None:
+    table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
+    found = _accuracy(table, Settings(patterns_per_class={"a": 2, "c": 1}))
+    assert found is not None
+
+
+def test_the_majority_is_the_share_of_the_most_common_class() -> None:
+    table = read_table(np.arange(8.0)[:, None], target=[*"aabbbbcb"])
+    assert majority(table) == 5 / 8
+
+
+def test_too_few_rows_are_not_tested() -> None:
+    assert _accuracy(_table(8)) is None
+
+
+def test_a_class_of_one_row_is_answered_wrong_and_not_an_error() -> None:
+    table = read_table(np.arange(21.0)[:, None], target=["a"] * 10 + ["b"] * 10 + ["c"])
+    found = _accuracy(table)
+    assert found is not None
+    assert found.mean < 1.0
+
+
+def test_progress_is_told_fold_by_fold() -> None:
+    told: list[str] = []
+    table = _table(20)
+    report = learn_table(table, name="t", units={}, settings=Settings()).report
+    accuracy(table, Settings(), report, progress=lambda text, _: told.append(text))
+    assert told == [f"testing fold {k} of 5" for k in range(1, 6)]
+
+
+def test_with_many_classes_fewer_folds_are_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(holdout, "_CLASSES", 4)
+    found = _accuracy(_table(60))
+    assert found is not None
+    assert len(found.folds) == 2
+
+
+def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
+    values = np.zeros((100_000, 20))
+    values[0, 10:] = 1.0
+    columns = tuple(f"x{number}" for number in range(100_000))
+    codes = np.repeat([0, 1], 10)
+    table = Table("wide", columns, values, ("a", "b"), codes)
+    settings = Settings()
+    report = learn_arrays(
+        values.T, codes, columns=columns, classes=["a", "b"], settings=settings
+    ).report
+    found = accuracy(table, settings, report)
+    assert found is not None
+    assert found.folds == (1.0, 1.0)

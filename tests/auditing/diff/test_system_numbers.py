@@ -1,0 +1,409 @@
+"""Numbers of two systems: proved alike, shown to differ, and how far apart at most."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from types import MappingProxyType
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.auditing.diff.difference_records import Difference
+from fuzzytree.auditing.diff.differences import difference, joined_domain
+from fuzzytree.auditing.diff.matching import Curves
+from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
+from fuzzytree.auditing.diff.system_meanings import computed, meant
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Declined,
+    Proved,
+    Witness,
+    point_of,
+)
+from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.findings.records import Settings
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
+    Activation,
+    And,
+    Conclusion,
+    Condition,
+    Defuzzifier,
+    FuzzySystem,
+    Gaussian,
+    Hedge,
+    Is,
+    Label,
+    Linear,
+    Not,
+    Or,
+    RuleBlock,
+    Singleton,
+    SNorm,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    TNorm,
+    Trapezoid,
+)
+from fuzzytree.semantics.inference import infer
+from fuzzytree.testing import random_system
+
+FEW = Settings(rows=100)
+AVERAGE = Defuzzifier("weighted average")
+
+
+def rule(when: Condition, *labels: str, weight: float = 1.0) -> SystemRule:
+    then = tuple(Conclusion("tip", label) for label in labels)
+    return SystemRule(when, then, weight)
+
+
+def tipper(
+    *,
+    inputs: Sequence[SystemInput] = (),
+    outputs: Sequence[SystemOutput] = (),
+    numbers: Mapping[str, float] = MappingProxyType({}),
+) -> FuzzySystem:
+    """Return a system of two inputs and three rules, with some parts changed."""
+    bad = Label("bad", Trapezoid(0.0, 0.0, 2.0, 6.0))
+    good = Label("good", Trapezoid(2.0, 6.0, 10.0, 10.0))
+    values = {"low": 5.0, "middle": 12.5, "high": 25.0, **numbers}
+    labels = tuple(Label(name, Singleton(value)) for name, value in values.items())
+    rules = (
+        rule(Is("food", "bad"), "low"),
+        rule(And((Is("food", "good"), Is("service", "good"))), "high"),
+        rule(Is("service", "bad"), "middle"),
+    )
+    usual = [SystemInput(name, (bad, good), 0.0, 10.0) for name in ("food", "service")]
+    tip = SystemOutput("tip", labels, 0.0, 30.0, AVERAGE, default=0.0)
+    return FuzzySystem(
+        "tipper", tuple(inputs or usual), tuple(outputs or (tip,)), (RuleBlock(rules),)
+    )
+
+
+def told(old: FuzzySystem, new: FuzzySystem, clock: Clock | None = None) -> Difference:
+    domain = joined_domain(old, new, {})
+    return difference(old, new, domain=domain, settings=FEW, clock=clock)
+
+
+def with_rules(system: FuzzySystem, *rules: SystemRule) -> FuzzySystem:
+    block = replace(system.blocks[0], rules=rules)
+    return replace(system, blocks=(block,))
+
+
+ONE, TWO, THREE = tipper().blocks[0].rules
+
+
+# --- proved alike
+
+
+def test_what_no_number_depends_on_leaves_the_operations_the_same() -> None:
+    system = tipper()
+    other = with_rules(system, ONE, replace(TWO, name="second"), THREE)
+    never = rule(Is("food", "bad"), "high", weight=0.0)
+    other = with_rules(other, *other.blocks[0].rules, never)
+    wide = replace(other.inputs[0], unit="points", high=11.0)
+    service = replace(other.inputs[1], labels=other.inputs[1].labels[::-1])
+    other = replace(other, name="b", note="new", inputs=(service, wide))
+    found = told(system, other)
+    assert (found.verdict, found.ok) == ("equal", True)
+    (answer,) = found.answers
+    assert answer.sentence == "both systems compute alike"
+    assert answer.state == Proved(
+        "both perform the same operations on the same numbers"
+    )
+    assert all(change.is_proved for change in found.changes)
+    assert found.changes
+
+
+def test_rules_in_another_order_are_alike_but_for_rounding() -> None:
+    found = told(tipper(), with_rules(tipper(), THREE, ONE, TWO))
+    assert (found.verdict, found.ok) == ("equal", True)
+    first = found.answers[0]
+    assert first.sentence == (
+        "both systems compute alike everywhere on the domain, but for rounding"
+    )
+    assert first.measures[0].value < 1e-13
+    assert not any(answer.is_finding for answer in found.answers)
+
+
+def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
+    points = Label("bad", Points((2.0, 6.0), (1.0, 0.0)))
+    long = Label("bad", Points((2.0, 4.0, 6.0), (1.0, 0.5, 0.0)))
+    one = replace(tipper().inputs[0], labels=(points, tipper().inputs[0].labels[1]))
+    other = replace(one, labels=(long, one.labels[1]))
+    service = tipper().inputs[1]
+    old, new = (tipper(inputs=(each, service)) for each in (one, other))
+    assert computed(old) != computed(new)
+    assert told(old, new).answers[0].state == Proved(
+        "both are one function of real numbers: equal curves in equal rules"
+    )
+
+
+def test_a_range_that_holds_the_domain_moves_no_value() -> None:
+    food, service = tipper().inputs
+    held = tipper(inputs=(replace(food, clips=True), service))
+    found = told(tipper(), held)
+    assert (found.verdict, found.ok) == ("equal", True)
+    assert found.answers[0].sentence == (
+        "both systems compute alike everywhere on the domain"
+    )
+    assert [change.sentence for change in found.changes] == [
+        "values of 'food' are now held in its range"
+    ]
+    short = tipper(inputs=(replace(food, high=5.0, clips=True), service))
+    assert told(tipper(), short).verdict == "changed"
+
+
+def test_columns_that_one_alone_has_are_told_of() -> None:
+    more = (*tipper().inputs, SystemInput("music", (), 0.0, 1.0))
+    found = told(tipper(), tipper(inputs=more))
+    assert found.answers[0].sentence == (
+        "both systems compute alike, where no value is missing"
+    )
+    assert (found.verdict, found.ok) == ("equal", False)  # rows need the column
+
+
+def test_where_order_decides_it_is_no_rounding() -> None:
+    first = RuleBlock((ONE, TWO, THREE), activation=Activation("highest"))
+    highest = replace(tipper(), blocks=(first,))
+    turned = with_rules(highest, THREE, ONE, TWO)
+    assert meant(highest, Curves()) == {}
+    assert told(highest, turned).verdict == "changed"
+
+
+def test_systems_without_a_common_output_are_not_called_alike() -> None:
+    renamed = replace(tipper().outputs[0], name="money")
+    rules = [replace(one, then=(Conclusion("money", "low"),)) for one in (ONE, TWO)]
+    new = replace(tipper(), outputs=(renamed,), blocks=(RuleBlock(tuple(rules)),))
+    found = told(tipper(), new)
+    assert (found.verdict, found.ok, found.answers) == ("open", False, ())
+
+
+# --- shown to differ
+
+
+def test_a_constant_that_changed_has_a_witness_and_a_bound() -> None:
+    old, new = tipper(), tipper(numbers={"high": 25.5})
+    found = told(old, new)
+    assert (found.verdict, found.ok) == ("changed", False)
+    witness = found.answers[0]
+    assert isinstance(witness.state, Witness)
+    point = point_of(witness.state.point)
+    was, now = number_at(old, "tip", point), number_at(new, "tip", point)
+    assert was is not None
+    assert now is not None
+    assert witness.measures[0].exact == str(now - was) == "1/2"
+    assert witness.sentence == "'tip' is 25.5, and was 25.0, in fractions"
+    (bound,) = (a.state for a in found.answers if isinstance(a.state, Bracket))
+    assert (bound.low, bound.high) == (0.5, 0.5)
+    assert bound.why == (
+        "degrees are the same, and no number that rules conclude moves by more"
+    )
+
+
+def test_a_constant_that_is_changed_back_is_no_difference() -> None:
+    changed = tipper(numbers={"high": 25.5})
+    assert told(tipper(), changed).verdict == "changed"
+    assert told(tipper(), tipper(numbers={"high": 25.0})).verdict == "equal"
+
+
+def test_a_curve_that_changed_is_bounded_by_the_numbers() -> None:
+    wide = Label("bad", Trapezoid(0.0, 0.0, 3.0, 7.0))
+    food = replace(tipper().inputs[0], labels=(wide, tipper().inputs[0].labels[1]))
+    found = told(tipper(), tipper(inputs=(food, tipper().inputs[1])))
+    (bound,) = (a.state for a in found.answers if isinstance(a.state, Bracket))
+    assert bound.high == 25.0  # from 0, the default, to 25
+    assert 0.0 < bound.low < 25.0
+    assert bound.why == "both answers lie between the numbers that rules conclude"
+
+
+def test_a_change_too_small_for_probes_stays_open_with_its_bound() -> None:
+    labels = (*tipper().outputs[0].labels, Label("top", Singleton(30.0)))
+    output = replace(tipper().outputs[0], labels=labels)
+    sliver = Label("sliver", Trapezoid(5.0, 5.0 + 1e-12, 5.0 + 2e-12, 5.0 + 3e-12))
+    food = replace(tipper().inputs[0], labels=(*tipper().inputs[0].labels, sliver))
+    old = tipper(inputs=(food, tipper().inputs[1]), outputs=(output,))
+    new = with_rules(old, ONE, TWO, THREE, rule(Is("food", "sliver"), "top"))
+    found = told(old, new)
+    assert found.verdict in ("open", "changed")
+    assert any(
+        isinstance(a.state, Bracket) and a.state.high == 30.0 for a in found.answers
+    )
+
+
+def test_numbers_without_fractions_are_shown_as_they_are_computed() -> None:
+    bell = replace(tipper().inputs[0], labels=(
+        Label("bad", Gaussian(0.0, 2.0)), tipper().inputs[0].labels[1]))  # fmt: skip
+    old = tipper(inputs=(bell, tipper().inputs[1]))
+    new = tipper(inputs=old.inputs, numbers={"low": 6.0})
+    witness = told(old, new).answers[0]
+    assert isinstance(witness.state, Witness)
+    assert witness.sentence.endswith("as the reference computes it")
+    with pytest.raises(NotExactError):
+        number_at(old, "tip", {"food": Fraction(1), "service": Fraction(1)})
+
+
+def test_an_output_that_stays_is_proved_beside_one_that_differs() -> None:
+    output = replace(tipper().outputs[0], name="other")
+    both = (tipper().outputs[0], output)
+    rules = (ONE, SystemRule(TWO.when, (Conclusion("other", "high"),)), THREE)
+    old = with_rules(tipper(outputs=both), *rules)
+    moved = replace(output, labels=(*output.labels[:2], Label("high", Singleton(9.0))))
+    found = told(old, replace(old, outputs=(both[0], moved)))
+    assert found.verdict == "changed"
+    states = {answer.subject: answer.state for answer in found.answers}
+    assert isinstance(states["tip"], Proved)
+    assert isinstance(states["other"], Witness)
+
+
+def test_the_budget_ends_the_comparison_of_numbers() -> None:
+    new, hour = tipper(numbers={"high": 25.5}), [0.0]
+
+    def now() -> float:
+        hour[0] += 0.001
+        return hour[0]
+
+    def tell(text: str, done: float) -> None:
+        if text == "comparing numbers" and done > 0.0:  # behind the probes
+            hour[0] = 999.0
+
+    found = told(tipper(), new, Clock(99.0, now=now, tell=tell))
+    (left,) = (a for a in found.answers if a.subject == "points")
+    assert left.sentence == "36 points were not looked at: the budget was spent"
+    assert left.state == Declined("FTD03", "the budget was spent")
+    assert found.verdict == "changed"
+    whole = told(tipper(), new, Clock(99.0, now=now))
+    assert all(a.subject != "points" for a in whole.answers)
+
+
+def test_a_budget_that_is_spent_before_anything_was_compared_is_told() -> None:
+    now = iter(range(10**9))
+    found = told(
+        tipper(), tipper(numbers={"low": 6.0}), Clock(3.0, now=lambda: next(now))
+    )
+    (answer,) = found.answers
+    assert answer.sentence == (
+        "the numbers of the two were not compared: the budget was spent"
+    )
+    assert found.verdict == "open"
+
+
+# --- no proof and no bound is wrong
+
+
+def made(chance: random.Random) -> FuzzySystem:
+    """Return a system whose numbers are fractions."""
+
+    def curve() -> Trapezoid:
+        return Trapezoid(*sorted(float(chance.randrange(9)) for _ in range(4)))
+
+    inputs = tuple(
+        SystemInput(name, tuple(Label(f"t{k}", curve()) for k in range(3)), 0.0, 8.0,
+                    clips=chance.random() < 0.2)
+        for name in "ab"
+    )  # fmt: skip
+    curves = [
+        Singleton(float(chance.randrange(9)))
+        if chance.random() < 0.6
+        else Linear((float(chance.randrange(-3, 4)), float(chance.randrange(3))), 1.0)
+        for _ in range(3)
+    ]
+    output = SystemOutput(
+        "tip",
+        tuple(Label(f"o{k}", curve) for k, curve in enumerate(curves)),
+        0.0,
+        30.0,
+        chance.choice([AVERAGE, AVERAGE, Defuzzifier("weighted sum")]),
+        default=chance.choice([None, 0.0]),
+        clips=chance.random() < 0.2,
+    )
+
+    def asked() -> Is:
+        hedges: tuple[Hedge, ...] = chance.choice([(), (), ("not",), ("very",)])
+        return Is(chance.choice("ab"), f"t{chance.randrange(3)}", hedges)
+
+    def condition() -> Condition:
+        kind = chance.randrange(4)
+        both = (asked(), asked())
+        return (asked(), And(both), Or(both), Not(And(both)))[kind]
+
+    rules = [
+        rule(condition(), f"o{chance.randrange(3)}", weight=chance.choice([1.0, 0.5]))
+        for _ in range(4)
+    ]
+    conjunction: TNorm = chance.choice(["minimum", "product"])
+    disjunction: SNorm = chance.choice(["maximum", "algebraic sum"])
+    block = RuleBlock(tuple(rules), conjunction, disjunction)
+    return FuzzySystem("made", inputs, (output,), (block,))
+
+
+def altered(system: FuzzySystem, chance: random.Random) -> FuzzySystem:
+    """Return a system with its rules in another order, one changed, or one number."""
+    block, output = system.blocks[0], system.outputs[0]
+    rules = [*block.rules]
+    kind = chance.randrange(5)
+    if kind == 0:
+        chance.shuffle(rules)
+    elif kind == 1:
+        rules[0] = replace(rules[0], weight=0.25)
+    elif kind == 2:
+        first = replace(output.labels[0], curve=Singleton(3.5))
+        moved = replace(output, labels=(first, *output.labels[1:]))
+        return replace(system, outputs=(moved, *system.outputs[1:]))
+    elif kind == 3:
+        asked, *others = system.inputs
+        labels = tuple(replace(label, height=0.5) for label in asked.labels)
+        return replace(system, inputs=(replace(asked, labels=labels), *others))
+    changed = replace(block, rules=tuple(rules))
+    return replace(system, blocks=(changed, *system.blocks[1:]))
+
+
+def check_pair(seed: int, rows: int) -> None:
+    chance = random.Random(seed)
+    old = made(chance) if seed % 2 else random_system(seed)
+    output = old.outputs[0]
+    if not (seed % 2 or output.defuzzifier.is_weighted):
+        return
+    new = altered(old, chance)
+    name, curves = output.name, Curves()
+    domain = domain_of(old)
+    is_same = computed(old, domain)[name] == computed(new, domain)[name]
+    keys = [meant(system, curves, domain).get(name) for system in (old, new)]
+    is_meant = keys[0] is not None and keys[0] == keys[1]
+    bound = most(old, new, name, domain)
+    for _ in range(rows):
+        row = {
+            side.variable: chance.uniform(side.low, side.high) for side in domain.sides
+        }
+        was, now = (infer(system, row).outputs[0] for system in (old, new))
+        is_equal = was == now or (math.isnan(was) and math.isnan(now))
+        gap = 0.0 if is_equal else abs(was - now)
+        rounding = 1e-9 * max(1.0, abs(was))
+        assert is_equal or not is_same
+        assert gap <= rounding or not is_meant
+        if bound is not None and not math.isnan(gap):
+            assert gap <= bound[0] + Fraction(rounding)
+        if seed % 2:
+            point = {key: Fraction(value) for key, value in row.items()}
+            exact = number_at(old, name, point)
+            assert (
+                math.isnan(was)
+                if exact is None
+                else abs(exact - Fraction(was)) <= rounding
+            )
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_proof_and_no_bound_is_wrong(seed: int) -> None:
+    check_pair(seed, 10)
+
+
+@pytest.mark.heavy
+def test_no_proof_and_no_bound_is_wrong_of_many_pairs() -> None:
+    for seed in range(100, 400):
+        check_pair(seed, 25)

@@ -1,0 +1,57 @@
+"""Curves that cross too often for cells are counted before, and asked by boxes."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine import ground as module
+from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
+from fuzzytree.auditing.engine.crowds import crossings
+from fuzzytree.auditing.engine.elements import Element, places
+from fuzzytree.auditing.engine.ground import TooManyCellsError, ground
+from fuzzytree.auditing.engine.states import Bracket, Proved, Witness
+from fuzzytree.auditing.engine.ties import tie
+from fuzzytree.auditing.engine.wins import wins
+from tests.auditing.engine.bases import random_base, random_shape, unit_domain
+
+
+def test_no_more_crossings_are_counted_than_there_are() -> None:
+    chance = random.Random(3)
+    curves = [Element(random_shape(chance, "points"), n % 3 == 0) for n in range(70)]
+    pairs = len(curves) * (len(curves) - 1) // 2
+    assert pairs // 2 < crossings(curves) < len(places(curves))
+    assert crossings(curves[:50]) == 0  # so few are not counted
+
+
+def test_rules_in_too_many_cells_are_asked_by_boxes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    base = random_base(5, 6, 2, kind="points")
+    rivals = [n for n in range(1, 7) if base.rules[n - 1].then != base.rules[0].then]
+    given = ground(base, unit_domain(base))
+    known = [wins(given, n, {*range(1, 7)} - {n}) for n in range(1, 7)]
+    monkeypatch.setattr(module, "MOST_NUMBERS", 100)
+    crowded = ground(replace(base, name="crowded"), unit_domain(base))
+    assert not crowded.is_kept
+    with pytest.raises(TooManyCellsError):
+        _ = crowded.laid
+    for number, state in enumerate(known, 1):
+        found = wins(crowded, number, {*range(1, 7)} - {number})
+        assert isinstance(found, Witness) == isinstance(state, Witness)
+    assert not isinstance(uncovered(crowded), Bracket)
+    assert type(uncovered(crowded)) is type(uncovered(given))
+    assert type(below(crowded, Fraction(1, 10))) is type(below(given, Fraction(1, 10)))
+    assert abs(least_cover(crowded).high - least_cover(given).high) < 1e-5
+    found = tie(crowded, 1, rivals[0])
+    assert isinstance(found, Bracket)
+    assert found.why == "its curves cross more often than can be kept"
+
+
+def test_curves_that_are_many_and_apart_are_kept() -> None:
+    base = random_base(1, 80, 1, kind="points", shared=0.95)
+    assert ground(base, unit_domain(base)).is_kept
+    assert isinstance(wins(ground(base, unit_domain(base)), 1, ()), Witness | Proved)

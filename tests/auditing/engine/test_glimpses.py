@@ -1,0 +1,77 @@
+"""What points show of rules is true in fractions, and never too much."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from fuzzytree.auditing.engine.glimpses import Glimpses, strength_above
+from fuzzytree.auditing.engine.ground import ground, strengths_at
+from fuzzytree.auditing.engine.states import Witness, point_of
+from fuzzytree.auditing.engine.wins import wins
+from fuzzytree.model.rulebase import Conjunction
+from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
+
+
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+def test_a_rule_that_is_seen_to_win_does_so_in_fractions(
+    conjunction: Conjunction,
+) -> None:
+    seen = told = 0
+    for seed in range(6):
+        base = random_base(seed, 9, 3, conjunction, "mixed", odd=0.3, combinations=1)
+        given = ground(base, unit_domain(base))
+        glimpses = Glimpses(given)
+        for rule in range(1, 10):
+            label = base.rules[rule - 1].then
+            rivals = [n for n in range(1, 10) if base.rules[n - 1].then != label]
+            others = [n for n in range(1, 10) if n != rule]
+            pairs = (
+                (glimpses.wins(rule, rivals), rivals),
+                (
+                    glimpses.wins_alone(rule, others),
+                    others,
+                ),
+            )
+            for found, rest in pairs:
+                told += 1
+                if found is None:
+                    continue
+                seen += 1
+                strengths = strengths_at(given, point_of(found.point))
+                assert strengths[rule - 1] > max(strengths[n - 1] for n in rest)
+                assert found.claims[0].rivals == tuple(rest)
+                assert found.claims[1].level == str(strengths[rule - 1])
+    assert told // 2 < seen < told
+
+
+def test_a_rule_that_never_wins_is_not_seen_to() -> None:
+    base = with_hidden_rule(random_base(0, 7, 4))
+    number = len(base.rules)
+    label = base.rules[-1].then
+    rivals = [n for n, rule in enumerate(base.rules, 1) if rule.then != label]
+    glimpses = Glimpses(ground(base, unit_domain(base)))
+    assert not glimpses.is_ahead(number)
+    assert glimpses.wins(number, rivals) is None
+
+
+def test_a_rule_that_is_not_seen_may_win_in_a_sliver() -> None:
+    base = with_hidden_rule(random_base(0, 7, 4), 0.7 - 1e-6)
+    number = len(base.rules)
+    label = base.rules[-1].then
+    rivals = [n for n, rule in enumerate(base.rules, 1) if rule.then != label]
+    given = ground(base, unit_domain(base))
+    assert Glimpses(given).wins(number, rivals) is None
+    assert isinstance(wins(given, number, rivals), Witness)
+
+
+def test_as_few_clauses_are_asked_as_it_takes_to_see_who_is_stronger() -> None:
+    base = random_base(4, 8, 3)
+    given = ground(base, unit_domain(base))
+    point = {name: Fraction(3, 8) for name in base.inputs}
+    strengths = strengths_at(given, point)
+    first = strengths.index(max(strengths)) + 1
+    others = [n for n in range(1, 9) if n != first]
+    assert strength_above(given, point, first, others) == max(strengths) > 0
+    assert strength_above(given, point, others[0], [first]) is None

@@ -1,0 +1,45 @@
+"""Pairs that cannot tie are told apart at once, and no pair that ties is."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from fuzzytree.auditing.engine.ground import ground
+from fuzzytree.auditing.engine.shared import may_tie
+from fuzzytree.auditing.engine.states import Witness
+from fuzzytree.auditing.engine.ties import tie
+from tests.auditing.engine.bases import Kind, random_base, unit_domain
+
+
+@pytest.mark.parametrize("kind", ["points", "band", "mixed"])
+def test_no_pair_that_ties_is_left_out(kind: Kind) -> None:
+    ties = apart = 0
+    for seed in range(4):
+        base = random_base(seed, 7, 2, kind=kind, shared=0.5, odd=0.2)
+        given = ground(base, unit_domain(base))
+        found = may_tie(given)
+        assert (found == found.T).all()
+        for one, other in itertools.combinations(range(7), 2):
+            if not found[one, other]:
+                apart += 1
+            does = isinstance(tie(given, one + 1, other + 1), Witness)
+            ties += does
+            assert found[one, other] or not does
+    assert ties > 1
+    assert apart > 5
+
+
+def test_rules_with_curves_of_their_own_are_apart() -> None:
+    base = random_base(1, 12, 3, kind="lr")
+    found = may_tie(ground(base, unit_domain(base)))
+    assert found.sum() == found.diagonal().sum() == 12
+
+
+def test_curves_that_pass_one_level_on_two_axes_do_not_tie() -> None:
+    # Both are far below 1e-13 there, in a band of levels that is not parted.
+    base = random_base(25, 7, 2, kind="mixed", shared=0.5, odd=0.2)
+    given = ground(base, unit_domain(base))
+    assert not may_tie(given)[1, 2]
+    assert not isinstance(tie(given, 2, 3), Witness)

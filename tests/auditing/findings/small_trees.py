@@ -1,0 +1,132 @@
+"""Small trees, and subjects made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.findings.records import Policy, Settings
+from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.model.rulebase import (
+    Band,
+    Conjunction,
+    Part,
+    Points,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
+from fuzzytree.semantics.lowering import rules_from_tree
+
+
+def bands(name: str, cut: float) -> tuple[Term, Term]:
+    """Return the terms of a node with one cut, without flanks."""
+    return Term(f"{name} low", Band(high=cut)), Term(f"{name} high", Band(low=cut))
+
+
+def one_cut(
+    meeting: float = 0.5, conjunction: Conjunction = "min", *, is_steep: bool = False
+) -> FuzzyTree:
+    """Return a tree that asks x once, at 0.5, and whose fitted sets meet elsewhere.
+
+    Args:
+        meeting: Where the two sets cross; at 0.5 the raw rules decide as the tree does.
+        conjunction: The AND.
+        is_steep: Whether the set of `a` ends soon, so that none covers 0.
+    """
+    low, high = bands("x", 0.5)
+    ends = meeting - 1.0, meeting + 1.0
+    falling = Points(ends, (1.0, 0.0))
+    if is_steep:
+        ends = meeting - 0.25, meeting + 0.25
+        falling = Points((ends[0] - 0.1, ends[0], ends[1]), (0.0, 1.0, 0.0))
+    sets = Sets("x", (Term("a", falling), Term("b", Points(ends, (0.0, 1.0)))))
+    branches = (
+        Branch((low.name,), ("a",), leaf=1),
+        Branch((high.name,), ("b",), leaf=2),
+    )
+    return FuzzyTree(
+        "one cut",
+        ("a", "b"),
+        (Variable("x", (low, high)),),
+        (Node("x", (0.5,), (0, 1), branches),),
+        (Leaf("a", "a"), Leaf("b", "b")),
+        (sets,),
+        Semantics(conjunction),
+    )
+
+
+def two_cuts(second: float, *, combined: bool = False) -> FuzzyTree:
+    """Return a tree that asks x at 0.5, and above it again, or the sum x + y.
+
+    Args:
+        second: The second cut; the leaf between the two is never reached if it is at
+            most 0.5.
+        combined: Whether the second question is about the sum.
+    """
+    first = bands("first", 0.5)
+    again = bands("again", second)
+    asked = "sum" if combined else "x"
+    parts = (Part("x", 1.0), Part("y", 1.0)) if combined else ()
+    variables = (
+        Variable("x", first if combined else (*first, *again)),
+        Variable("y"),
+        *([Variable("sum", again, parts=parts)] if combined else []),
+    )
+    return FuzzyTree(
+        "two cuts",
+        ("a", "b", "c"),
+        variables,
+        (
+            Node(
+                "x",
+                (0.5,),
+                (0, 1),
+                (Branch((first[0].name,), leaf=1), Branch((first[1].name,), node=2)),
+            ),
+            Node(
+                asked,
+                (second,),
+                (0, 1),
+                (Branch((again[0].name,), leaf=2), Branch((again[1].name,), leaf=3)),
+            ),
+        ),
+        (Leaf("a"), Leaf("b"), Leaf("c")),
+    )
+
+
+def subject_of(
+    model: FuzzyTree | RuleBase,
+    *,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    rows: list[list[float]] | None = None,
+    clock: Clock | None = None,
+) -> Subject:
+    """Return a model as it is audited, on [0, 1] for each input unless limited.
+
+    Args:
+        model: The model.
+        limits: Other limits.
+        rows: A list of values for each row.
+        clock: How much time there is.
+    """
+    rules = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
+    ends = dict.fromkeys(rules.inputs, (0.0, 1.0)) | dict(limits or {})
+    semantics = rules.semantics
+    return Subject(
+        rules=rules,
+        policy=Policy(semantics.conjunction, "strongest", semantics.uncovered),
+        domain=Domain(tuple(Side(name, *of) for name, of in ends.items())),
+        settings=Settings(),
+        clock=clock or Clock(),
+        tree=model if isinstance(model, FuzzyTree) else None,
+        raw=rules_from_tree(model, "raw")
+        if isinstance(model, FuzzyTree) and model.sets
+        else None,
+        rows=None if rows is None else Rows("rows", np.array(rows, dtype=float).T),
+    )

@@ -1,0 +1,269 @@
+"""An audit as a whole: what was asked, what was not, ids, places, digest, bytes."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import re
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+import fuzzytree as ft
+from fuzzytree.api.verbs import audited_rows
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.findings.audit import ASKED, FAMILIES, audit
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.limits import LIMITS, digest_of
+from fuzzytree.auditing.findings.records import Audit, Settings
+from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.errors import TableError
+from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
+from fuzzytree.testing import random_system, random_tree
+from tests.cli.conftest import GRASPS, grip
+
+FAR = Domain((Side("force", 3.0, 5.0), Side("slip", 0.0, 1.0)))
+"""Where the grip tree never reaches its first leaf."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    ft.save(grip(), tmp_path / "grip.yaml")
+    (tmp_path / "grasps.csv").write_text(GRASPS, "utf-8")
+    return tmp_path
+
+
+def steep(*order: int) -> RuleBase:
+    """Return three rules, in an order of one's own, of which one asks for nothing."""
+    terms = (Term("low", Band(high=1.0)), Term("high", Band(low=1.0)))
+    rules = (
+        Rule((Clause("x", ("low",)),), "a"),
+        Rule((Clause("x", ("high",)),), "b"),
+        Rule((Clause("x", ("low",)), Clause("x", ("high",))), "c"),
+    )
+    return RuleBase(
+        "steep",
+        ("a", "b", "c"),
+        (Variable("x", terms, low=0.0, high=2.0),),
+        tuple(rules[k] for k in order or (0, 1, 2)),
+    )
+
+
+def test_each_question_is_answered_or_stands_among_what_was_not_asked() -> None:
+    found = audit(grip(), domain=FAR)
+    told = {one.code for one in found.answers}
+    told |= {text.split()[0] for text in found.unasked}
+    assert told >= ASKED
+    assert found.is_complete
+
+
+def test_every_code_belongs_to_one_table_or_another() -> None:
+    elsewhere = {code for code in CODES if code.startswith(("FT8", "FTD"))}
+    assert ASKED | elsewhere == set(CODES)
+    assert not ASKED & elsewhere
+
+
+def test_every_module_that_asks_is_in_the_table_or_asked_by_one() -> None:
+    folder = Path(__file__).parents[3] / "fuzzytree" / "auditing" / "findings"
+    asking = {
+        path.stem
+        for path in folder.glob("*.py")
+        if re.search(r"^def answers\(subject: Subject\)", path.read_text("utf-8"), re.M)
+    }
+    inner = {"conventions"}  # carriers ask it
+    assert asking - inner == {family.module for family in FAMILIES}
+
+
+def test_every_family_answers_with_its_own_codes() -> None:
+    found = audit(grip(), domain=FAR)
+    known = {code for family in FAMILIES for code in family.codes}
+    assert {one.code for one in found.answers} <= known
+
+
+def test_an_audit_read_from_its_json_is_the_same_and_keeps_its_digest() -> None:
+    found = audit(grip(), domain=FAR)
+    again = msgspec.json.decode(msgspec.json.encode(found), type=Audit)
+    assert again == found
+    assert digest_of(again) == found.digest
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [{"rows": 7}, {"answers": ()}, {"limits": LIMITS[1:]}, {"is_complete": False}],
+    ids=str,
+)
+def test_an_edit_changes_the_digest(edit: dict[str, object]) -> None:
+    found = audit(grip(), domain=FAR)
+    assert digest_of(replace(found, **edit)) != found.digest
+
+
+def test_the_same_audit_has_the_same_bytes() -> None:
+    one, other = (msgspec.json.encode(audit(grip(), domain=FAR)) for _ in range(2))
+    assert one == other
+
+
+def test_an_unreachable_leaf_is_found_and_gone_where_it_is_reached() -> None:
+    found = audit(grip(), domain=FAR, select=["FT101"])
+    assert [one.rules for one in found.findings] == [(1,)]
+    wide = Domain((Side("force", 0.0, 5.0), Side("slip", 0.0, 1.0)))
+    assert not audit(grip(), domain=wide, select=["FT101"]).findings
+
+
+def test_answers_stand_in_the_order_of_their_codes_and_have_their_own_ids() -> None:
+    found = audit(grip(), domain=FAR)
+    codes = [one.code for one in found.answers]
+    assert codes == sorted(codes)
+    ids = [one.id for one in found.answers]
+    assert len(set(ids)) == len(ids)
+    assert all(one.id.startswith(one.code) for one in found.answers)
+
+
+def test_an_id_says_what_a_rule_says_and_not_where_it_stands() -> None:
+    box = Domain((Side("x", 0.0, 2.0),))
+    one = audit(steep(0, 1, 2), domain=box, select=["FT101"])
+    other = audit(steep(2, 1, 0), domain=box, select=["FT101"])
+    assert [a.rules for a in one.findings] == [(3,)]
+    assert [a.rules for a in other.findings] == [(1,)]
+    assert one.findings[0].id == other.findings[0].id
+
+
+def test_codes_that_are_left_out_are_told() -> None:
+    found = audit(grip(), domain=FAR, select=["FT10"], ignore=["FT102"])
+    codes = {one.code for one in found.answers}
+    assert "FT101" in codes
+    assert all(code.startswith("FT10") and code != "FT102" for code in codes)
+    assert "FT102 marginal rule: left out by the user" in found.unasked
+    assert "FT301 coverage gap: left out by the user" in found.unasked
+
+
+def test_a_spent_budget_leaves_the_rest_unasked_and_says_so() -> None:
+    times = itertools.chain([0.0], itertools.repeat(10.0))
+    clock = Clock(1.0, now=lambda: next(times))
+    found = audit(grip(), domain=FAR, clock=clock, settings=Settings(budget_s=1.0))
+    assert not found.is_complete
+    assert not found.was_interrupted
+    why = "not asked: the budget of 1 s is spent"
+    assert f"FT101 dead rule: {why}" in found.unasked
+
+
+def test_a_budget_that_ends_midway_keeps_what_was_answered() -> None:
+    whole = audit(grip(), domain=FAR)
+    counts = set[int]()
+    for ticks in (1, 60, 400, 1000, 2000, 4000):
+        times = itertools.chain(itertools.repeat(0.0, ticks), itertools.repeat(10.0))
+        clock = Clock(1.0, now=functools.partial(next, times))
+        part = audit(grip(), domain=FAR, clock=clock)
+        # Of what is left open, a sum of pairs may be told that the whole audit has not.
+        known = {one.id for one in part.answers if one.rules or one.terms}
+        assert known <= {one.id for one in whole.answers}
+        counts.add(len(part.answers))
+    assert len(counts) > 2
+
+
+def test_accepted_findings_are_no_longer_open() -> None:
+    found = audit(grip(), domain=FAR, select=["FT101"])
+    name = found.findings[0].id
+    again = audit(grip(), domain=FAR, select=["FT101"], accepted=[name, "FT101-0"])
+    assert again.accepted == (name,)
+    assert again.open_findings == ()
+    assert again.findings == found.findings
+
+
+def test_answers_know_their_places_and_how_to_ask_again(folder: Path) -> None:
+    found = ft.audit(
+        folder / "grip.yaml",
+        limits={"force": (3.0, 5.0)},
+        select=["FT101"],
+        repeat="fuzzytree audit grip.yaml",
+    )
+    lines = (folder / "grip.yaml").read_text("utf-8").splitlines()
+    place = found.findings[0].places[0]
+    assert lines[place.line - 1][place.column - 1 :].startswith("{leaf: 1,")
+    assert found.findings[0].repeat == "fuzzytree audit grip.yaml --select FT101"
+
+
+def test_rows_come_with_their_classes(folder: Path) -> None:
+    rows = audited_rows(folder / "grasps.csv", grip(), target="grip")
+    assert rows is not None
+    assert rows.values.shape == (2, 4)
+    assert rows.codes is not None
+    assert rows.codes.tolist() == [2, 0, 1, 0]
+    (folder / "more.csv").write_text(GRASPS + "1,4,e,hard\n", "utf-8")
+    rows = audited_rows(folder / "more.csv", grip(), target="grip")
+    assert rows is not None
+    assert rows.codes is not None
+    assert rows.codes.tolist()[-1] == -1
+
+
+def test_rows_without_a_class_of_the_model_are_refused(folder: Path) -> None:
+    message = (
+        f"{folder / 'grasps.csv'}: no row has in column 'note' a class of the model; "
+        "there is firm, loose, soft"
+    )
+    with pytest.raises(TableError) as caught:
+        audited_rows(folder / "grasps.csv", grip(), target="note")
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"force": 1.0}, "the row has no value of 'slip'"),
+        (
+            {"force": 1.0, "slpi": 0.0},
+            "the row has a value of 'slpi', which is no input; "
+            "there is force, slip (did you mean 'slip'?)",
+        ),
+        (
+            {"force": float("nan"), "slip": 0.0},
+            "the row's 'force' must be finite, not nan",
+        ),
+    ],
+)
+def test_a_wrong_row_is_one_sentence(row: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=r".") as caught:
+        audit(grip(), domain=FAR, row=row)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_a_system_is_audited_as_a_view(seed: int) -> None:
+    system = random_system(seed)
+    box = Domain(tuple(Side(name, 0.0, 1.0) for name in system.columns))
+    found = audit(system, domain=box, select=["FT4", "FT5"])
+    assert found.form == "system"
+    assert digest_of(found) == found.digest
+
+
+def test_a_tree_with_rows_counts_them() -> None:
+    rows = Rows("rows", np.array([[3.0, 4.0], [0.0, 1.0]]))
+    assert audit(grip(), domain=FAR, rows=rows, select=["FT205"]).rows == 2
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(6))
+def test_every_random_tree_is_audited_to_its_end(seed: int) -> None:
+    found = audit(random_tree(seed), settings=Settings(rows=500))
+    assert found.is_complete
+    assert digest_of(found) == found.digest
+    assert msgspec.json.decode(msgspec.json.encode(found), type=Audit) == found
+
+
+def test_where_all_is_declined_it_is_said_that_nothing_was_left_to_ask() -> None:
+    root = Path(__file__).resolve().parents[3]
+    tipper = ft.load(root / "examples" / "tipper.fll")
+    assert isinstance(tipper, ft.FuzzySystem)
+    (block,) = tipper.blocks
+    ors = (block.rules[0], block.rules[2])
+    summed = replace(block, rules=ors, disjunction="algebraic sum")
+    found = audit(replace(tipper, blocks=(summed,)), select=["FT101"])
+    assert found.answers
+    assert all(isinstance(one.state, Declined) for one in found.answers)
+    assert found.unasked[0] == (
+        "FT101 dead rule: nothing is left to ask it of, beside what was declined"
+    )

@@ -1,0 +1,292 @@
+"""What is shipped must answer as what was audited, and conventions hold everywhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Declined,
+    Proved,
+    Sampled,
+    Witness,
+    point_of,
+)
+from fuzzytree.auditing.findings import carriers, conventions
+from fuzzytree.auditing.findings.carriers import agreement, told
+from fuzzytree.auditing.findings.conventions import Question, questions
+from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.auditing.findings.support import drawn
+from fuzzytree.checking.comparing import Answers
+from fuzzytree.exporters.onnx import Output, write
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import Points, RuleBase, Term
+from fuzzytree.numerics.exact import exact_answer
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.testing import random_tree
+from tests.auditing.findings.test_support import RULES, subject_of
+from tests.auditing.findings.test_views import A_LOW, block_of, system_of
+
+TREE = random_tree(9, leaves=6, inputs=3, combinations=0.0)  # each leaf is reached
+OTHER = random_tree(4, leaves=6, inputs=3, combinations=0.0)
+ALL: tuple[Output, ...] = ("label", "rule", "strengths", "status")
+POINTS = np.array([[0.1, 0.9], [0.4, 0.2], [0.5, 0.5]])
+
+
+def shipped(model: Model) -> OnnxModel:
+    return open_onnx(write(model).content, "m.onnx")
+
+
+def findings(subject: Subject, *others: Model | OnnxModel) -> list[Answer]:
+    points = drawn(subject.rules, subject.domain, 200, 0)
+    found = agreement(subject, points, *others)
+    return [one for one in told(subject, found, points) if one.is_finding]
+
+
+def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
+    found = [*carriers.answers(subject_of(TREE))]
+    assert not any(one.is_finding for one in found)
+    by_name = {one.subject: one for one in found}
+    assert by_name["carriers, by proof"].sentence == (
+        "2 carriers are equal on every input"
+    )
+    assert isinstance(by_name["carriers, by rows"].state, Proved)
+    assert "onnxruntime float32: raw rules" in by_name["carriers, by rows"].state.how
+    assert {one.code for one in found} == {"FT601", "FT602"}
+
+
+def test_a_damaged_graph_is_found_and_a_right_one_is_not() -> None:
+    subject = subject_of(TREE)
+    assert findings(subject, shipped(TREE)) == []
+    found = findings(subject, shipped(OTHER))
+    assert {one.code for one in found} == {"FT601"}
+    by_rows = next(one for one in found if isinstance(one.state, Witness))
+    assert by_rows.severity == "error"
+    assert by_rows.sentence.startswith("file 1 disagrees with the model in ")
+    assert isinstance(by_rows.state, Witness)
+    point = {name: float(x) for name, x in point_of(by_rows.state.point).items()}
+    (claim,) = by_rows.state.claims
+    assert (claim.kind, claim.of) == ("decides", "tree")
+    assert claim.label == exact_answer(TREE, point).label
+    assert exact_answer(OTHER, point).rule != exact_answer(TREE, point).rule
+    assert {one.name: one.value for one in by_rows.measures}["rows of another class"]
+
+
+def test_shipped_rules_that_part_from_the_model_are_found() -> None:
+    rules = rules_from_tree(TREE)
+    assert findings(subject_of(rules), rules) == []
+    damaged = replace(rules, rules=rules.rules[:-1])
+    assert findings(subject_of(rules), damaged)
+
+
+def test_what_a_number_type_can_change_is_bounded_and_how_often_is_sampled() -> None:
+    rows = Rows("grips.csv", np.array([np.linspace(0.0, 4.0, 50)]))
+    found = {one.subject: one for one in carriers.answers(subject_of(RULES, rows))}
+    facts = found["rules in float32"]
+    assert facts.sentence.startswith(
+        "rules in float32: no decision can differ where the margin exceeds 2 x "
+    )
+    assert isinstance(facts.state, Proved)
+    assert facts.state.how.endswith("for values in the domain")
+    names = {one.name: one.value for one in facts.measures}
+    assert 0.0 < names["largest error seen"] <= names["certified error of a strength"]
+    assert (
+        names["margin that is certain"] == 2.0 * names["certified error of a strength"]
+    )
+    band = found["rules in float32, its band"].state
+    assert isinstance(band, Sampled)
+    assert band.rows == 50
+    assert band.how == "every row of grips.csv"
+
+
+def test_an_error_without_a_bound_lies_between_what_was_seen_and_1() -> None:
+    found = {o.subject: o for o in carriers.answers(subject_of(random_tree(1)))}
+    state = found["relative rules in float32"].state
+    assert isinstance(state, Bracket)
+    assert state.low < state.high == 1.0
+    assert "can round across it" in state.why
+
+
+def test_many_rows_are_drawn_from_by_the_seed() -> None:
+    rows = Rows("grips.csv", np.array([np.linspace(0.0, 4.0, 9000)]))
+    found = {one.subject: one for one in carriers.answers(subject_of(RULES, rows))}
+    band = found["rules in float64, its band"].state
+    assert isinstance(band, Sampled)
+    assert (band.rows, band.how) == (500, "rows drawn from grips.csv, seed 0")
+
+
+def test_what_was_not_compared_is_declined() -> None:
+    text = "onnxruntime float64 is not installed (extra 'onnx')"
+    other = "native float32: rules: term 'low' of 'force' is not wider than rounding"
+    cells = "all cells one by one (1e+09 points): the proof covers them"
+    skipped = Agreement("grip", "", (), skipped=(text, other, cells))
+    found = [*told(subject_of(RULES), skipped, POINTS)]
+    assert [(one.subject, one.state) for one in found] == [
+        ("onnxruntime float64", Declined("FTD08", text)),
+        ("native float32", Declined("FTD08", other)),
+    ]
+    assert found[0].sentence == f"onnxruntime float64 is not compared: {text}"
+
+
+def test_raw_rules_that_differ_from_their_tree_by_design_are_no_finding() -> None:
+    one = Comparison("raw rules", "tree", "rows", 5, "differs by design", 3)
+    found = Agreement("grip", "", (one,))
+    assert [*told(subject_of(TREE), found, POINTS)] == []
+
+
+def test_a_system_is_compared_in_all_runtimes() -> None:
+    found = [*carriers.answers(subject_of(system_of(block_of(A_LOW))))]
+    assert [one.subject for one in found] == [
+        *("carriers, by rows", "carriers, by calls"),
+        *("missing values", "infinite values", "far outside"),
+    ]
+    assert not any(one.is_finding for one in found)
+
+
+def test_a_runtime_of_systems_in_which_nan_is_a_number_is_found() -> None:
+    system = system_of(block_of(A_LOW))
+    subject = subject_of(system)
+    question = asked(subject, "missing values")
+    load = find_runtime("native").load_system
+    assert load is not None
+    right = load(system)(question.values)
+    blind = load(system)(np.nan_to_num(question.values, nan=0.5))
+    (clean,) = conventions.told_of_system(subject, question, [("one", right)] * 2)
+    assert not clean.is_finding
+    pairs = [("native", right), ("blind", blind)]
+    (finding,) = conventions.told_of_system(subject, question, pairs)
+    assert finding.is_finding
+    assert finding.sentence.startswith(
+        "missing values: blind and native differ in which outputs have a number, at a "
+    )
+    assert finding.sentence.endswith("; 12 of 12 probes differ")
+
+
+# --- conventions
+
+
+def tied_rules() -> RuleBase:
+    """Return rules of which two are equally strong wherever they fire."""
+    again = replace(RULES.rules[0], then="hard")
+    return replace(RULES, rules=(*RULES.rules, again))
+
+
+def asked(subject: Subject, name: str) -> Question:
+    return next(one for one in questions(subject) if one.name == name)
+
+
+def answered(
+    subject: Subject, question: Question, carrier: OnnxModel | None
+) -> list[Answer]:
+    """Return what the native runtime and a graph answer to a question."""
+    native = find_runtime("native").load(subject.rules)(question.values)
+    found = [Answers("native: rules", subject.rules, native)]
+    if carrier is not None:
+        outcome = carrier.run(question.values)
+        found.append(Answers("m.onnx: rules", subject.rules, outcome))
+    return [*conventions.told(subject, question, found)]
+
+
+def graph(rules: RuleBase) -> OnnxModel:
+    return open_onnx(write(rules, outputs=ALL).content, "m.onnx")
+
+
+def with_curves(low: Points, high: Points) -> RuleBase:
+    terms = (Term("low", low), Term("high", high))
+    force = replace(RULES.variables[0], terms=terms)
+    return replace(tied_rules(), variables=(force,))
+
+
+LOW = Points((0.0, 1.0), (1.0, 0.0))
+HIGH = Points((1.0, 3.0), (0.0, 1.0))
+PLANTED = {
+    "ties": replace(tied_rules(), rules=RULES.rules),
+    "ends of curves and cuts": with_curves(
+        Points((0.0, math.nextafter(1.0, 2.0)), (1.0, 0.0)), HIGH
+    ),
+    "far outside": with_curves(LOW, Points((1.0, 3.0, 9.0), (0.0, 1.0, 0.0))),
+}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ties",
+        "missing values",
+        "infinite values",
+        "ends of curves and cuts",
+        "far outside",
+    ],
+)
+def test_a_graph_that_breaks_a_convention_is_found_and_a_right_one_is_not(
+    name: str,
+) -> None:
+    rules = tied_rules()
+    subject = subject_of(rules)
+    question = asked(subject, name)
+    assert question.values.shape[1] > 0
+    (clean,) = answered(subject, question, graph(rules))
+    assert not clean.is_finding
+    count = question.values.shape[1]
+    assert clean.sentence == f"{name}: 2 carriers answer {count} probes alike"
+    if name in PLANTED:
+        (finding,) = answered(subject, question, graph(PLANTED[name]))
+        assert finding.is_finding
+        assert finding.severity == "error"
+        assert finding.sentence.startswith(f"{name}: m.onnx: rules answers ")
+
+
+def test_a_runtime_in_which_nan_is_a_number_is_found() -> None:
+    subject = subject_of(RULES)
+    question = asked(subject, "missing values")
+    native = find_runtime("native").load(RULES)
+    blind = native(np.nan_to_num(question.values, nan=0.5))
+    found = [
+        Answers("native: rules", RULES, native(question.values)),
+        Answers("blind: rules", RULES, blind),
+    ]
+    (finding,) = conventions.told(subject, question, found)
+    assert finding.sentence == (
+        "missing values: blind: rules answers 'soft' (rule 1) where native: rules "
+        "answers no class (no rule, missing), at force nan; 6 of 6 probes differ"
+    )
+    assert finding.state == Proved("both were run on the probe force nan")
+
+
+def test_the_witness_of_a_broken_convention_lies_in_the_domain() -> None:
+    subject = subject_of(RULES)
+    values = np.array([[math.nan, 7.0, 2.0]])
+    found = conventions.witness(subject, RULES, values)
+    assert found is not None
+    assert point_of(found.point) == {"force": 2}
+    assert found.claims[0].label == "hard"
+    assert conventions.witness(subject, RULES, values[:, :2]) is None
+
+
+def test_a_question_without_a_probe_says_so_and_one_with_too_many_too() -> None:
+    subject = subject_of(RULES)
+    (none,) = answered(subject, Question("ties", np.empty((1, 0))), None)
+    assert none.sentence == "ties: no probe of it was met"
+    (some,) = answered(subject, Question("ties", np.array([[1.0]]), 3), None)
+    assert isinstance(some.state, Proved)
+    assert some.state.how.endswith("; 3 more probes were left out")
+
+
+def test_probes_are_of_every_kind_and_stay_few() -> None:
+    tree = random_tree(3, leaves=12, inputs=9, combinations=0.0)
+    subject = subject_of(tree)
+    found = {one.name: one for one in questions(subject)}
+    assert all(one.values.shape[1] <= conventions.MOST for one in found.values())
+    assert np.isnan(found["missing values"].values).any(axis=1).all()
+    assert np.isinf(found["infinite values"].values).any(axis=1).all()
+    cuts = {cut for node in tree.nodes for cut in node.cuts}
+    assert cuts & set(found["ends of curves and cuts"].values.ravel().tolist())
+    assert found["far outside"].left_out > 0

@@ -1,0 +1,191 @@
+"""Where a tree and its raw rules differ is found, leaf by leaf and near rows."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+
+import pytest
+
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.nearest import distance
+from fuzzytree.auditing.engine.regions import regions
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Declined,
+    Proved,
+    Witness,
+    point_of,
+)
+from fuzzytree.auditing.engine.wording import percent
+from fuzzytree.auditing.findings.deciders import Both
+from fuzzytree.auditing.findings.disagreement import answers
+from fuzzytree.auditing.findings.nearby import nearest_difference
+from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.rows import points_of
+from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.model.rulebase import Conjunction
+from fuzzytree.numerics.exact import exact_answer
+from fuzzytree.testing import random_tree
+from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
+
+
+def _findings(subject: Subject) -> list[Answer]:
+    return [answer for answer in answers(subject) if answer.is_finding]
+
+
+def _number(answer: Answer, name: str) -> float:
+    return next(one.value for one in answer.measures if one.name == name)
+
+
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+def test_sets_that_meet_off_the_cut_are_found_and_those_at_the_cut_are_not(
+    conjunction: Conjunction,
+) -> None:
+    subject = subject_of(one_cut(0.25, conjunction))
+    [found] = _findings(subject)
+    assert (found.code, found.severity, found.rules) == ("FT203", "warning", (1, 2))
+    assert found.sentence == (
+        "in leaf 1 the tree answers 'a', and somewhere there the raw rules answer 'b'"
+    )
+    assert isinstance(found.state, Witness)
+    assert [claim.of for claim in found.state.claims] == ["tree", "raw rules"]
+    point = {one.input: float(one.decimal) for one in found.state.point}
+    assert 0.25 < point["x"] <= 0.5
+    assert subject.tree is not None
+    assert subject.raw is not None
+    assert exact_answer(subject.tree, point).label == "a"
+    assert exact_answer(subject.raw, point).label == "b"
+    assert _findings(subject_of(one_cut(0.5, conjunction))) == []
+
+
+def test_all_leaves_that_agree_are_told_of_in_one_answer() -> None:
+    [told] = answers(subject_of(one_cut(0.5)))
+    assert told.sentence == "in 2 of 2 leaves the raw rules decide as the tree does"
+    assert told.state == Proved("all other decisions asked in 2 boxes of the leaves")
+
+
+def test_a_part_of_a_leaf_that_no_raw_rule_covers_is_found() -> None:
+    [found] = _findings(subject_of(one_cut(0.5, is_steep=True)))
+    assert found.rules == (1,)
+    assert found.sentence == (
+        "in leaf 1 the tree answers 'a', and somewhere there "
+        "the raw rules answer no class"
+    )
+
+
+def test_the_nearest_disagreement_to_a_row_is_bounded_on_both_sides() -> None:
+    # Both differ on (0.25, 0.5]: rows 1 and 2 are 0.15 and 0.1 away, row 3 is inside.
+    rows = [[0.1], [0.6], [0.3], [7.0]]
+    told = [*answers(subject_of(one_cut(0.25), rows=rows))][-1]
+    assert told.subject == "rows"
+    assert told.sentence == (
+        "of 4 rows (1 incomplete or outside the domain) 1 differ already; around 2 "
+        "others the nearest disagreement is 10 % of each input's range from row 2"
+    )
+    assert _number(told, "row") == 2
+    assert 0.0998 < _number(told, "certified distance, in ranges") <= 0.1
+    assert 0.0999 < _number(told, "distance of the witness, in ranges") < 0.1002
+    assert isinstance(told.state, Witness)
+
+
+@pytest.mark.parametrize("calls", [3, 8, 12, 20, 40])
+def test_a_budget_that_ends_certifies_no_more_than_was_asked(calls: int) -> None:
+    subject = subject_of(one_cut(0.25), rows=[[0.1], [0.6], [0.8]])
+    assert subject.tree is not None
+    assert subject.raw is not None
+    assert subject.rows is not None
+    both = Both(subject.tree, subject.raw, subject.domain, regions(subject.tree))
+    times = iter([0.0] * calls + [9.0] * 10_000)
+    clock = Clock(1.0, now=lambda: next(times))
+    told, *more = nearest_difference(both, points_of(subject, subject.rows), clock)
+    asked = _number(told, "rows asked")
+    assert [one.state for one in more] == (
+        [Declined("FTD03", "the budget was spent")] if 0 < asked < 3 else []
+    )
+    if not asked:
+        assert told.state == Declined(
+            "FTD03", "the budget was spent before the first row"
+        )
+        return
+    assert _number(told, "certified distance, in ranges") <= 0.1
+    assert isinstance(told.state, Witness if asked == 3 else (Bracket, Witness))
+
+
+def test_rows_around_which_nothing_differs_are_told_so() -> None:
+    told = [*answers(subject_of(one_cut(0.5), rows=[[0.1], [0.9]]))][-1]
+    assert told.sentence == (
+        "of 2 rows 0 differ already; no disagreement is known around 2 others"
+    )
+    assert isinstance(told.state, Proved)
+
+
+def test_rows_that_all_differ_leave_nothing_to_seek() -> None:
+    told = [*answers(subject_of(one_cut(0.25), rows=[[0.3]]))][-1]
+    assert told.sentence == (
+        "of 1 rows 1 differ already; the nearest disagreement to others is not sought"
+    )
+    assert told.state == Declined(
+        "FTD06", "no row of the domain is decided alike by both"
+    )
+
+
+def test_of_a_tree_without_sets_nothing_is_asked() -> None:
+    assert [*answers(subject_of(two_cuts(0.75)))] == []
+
+
+def test_a_share_is_told_in_three_digits() -> None:
+    assert percent(Fraction(123456, 1000000)) == "12.3 %"
+
+
+def _sampled(seed: int, points: int) -> None:
+    """Compare the answers of a random tree with many points."""
+    tree = random_tree(seed, leaves=4, inputs=2, combinations=0.0)
+    draw = random.Random(seed)
+    reach = {}
+    for name in tree.inputs:
+        cuts = [abs(c) for n in tree.nodes if n.variable == name for c in n.cuts]
+        reach[name] = 3.0 * max(cuts, default=1.0)
+    limits = {name: (-r, r) for name, r in reach.items()}
+    rows = [[draw.uniform(-r, r) for r in reach.values()] for _ in range(3)]
+    subject = subject_of(tree, limits=limits, rows=rows, clock=Clock(20.0))
+    told = [*answers(subject)]
+    differing = {one.rules[0] for one in told if one.is_finding}
+    assert subject.raw is not None
+    both = Both(tree, subject.raw, subject.domain, regions(tree))
+    near = next(one for one in told if one.subject == "rows")
+    starts = [
+        {name: Fraction(x) for name, x in zip(reach, row, strict=True)} for row in rows
+    ]
+    starts = [start for start in starts if not both.differ(start)]
+    certified = [
+        m.value for m in near.measures if m.name == "certified distance, in ranges"
+    ]
+    for number in range(points):
+        start = starts[number % len(starts)] if starts else None
+        share = draw.random() if start is None else draw.random() ** 3
+        point = {
+            name: Fraction(
+                draw.uniform(-r, r)
+                if start is None
+                else min(r, max(-r, float(start[name]) + draw.uniform(-r, r) * share))
+            )
+            for name, r in reach.items()
+        }
+        if both.differ(point):
+            leaf = exact_answer(tree, {k: float(v) for k, v in point.items()}).rule
+            assert leaf in differing
+            if start is not None:
+                assert distance(subject.domain, start, point) >= certified[0]
+    if isinstance(near.state, (Witness, Bracket)) and near.state.point:
+        assert both.differ(point_of(near.state.point))
+
+
+def test_no_sampled_point_differs_where_nothing_was_to_differ() -> None:
+    _sampled(3, 100)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(8))
+def test_no_point_of_many_differs_where_nothing_was_to_differ(seed: int) -> None:
+    _sampled(seed, 1500)

@@ -1,0 +1,59 @@
+"""Large models: within the budget, with bounded memory, and what is known is told."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.states import Witness
+from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.records import Audit, Settings
+from fuzzytree.model.rulebase import RuleBase
+from tests.auditing.engine.bases import random_base, unit_domain
+
+BUDGET_S = 2.0
+SLACK_S = 1.5  # one step at the end, on a machine that others use too
+
+LARGE: dict[str, RuleBase] = {
+    "200 x 60": random_base(1, 200, 60, kind="points", classes=5),
+    "500 x 2": random_base(1, 500, 2, kind="points"),
+    "500 x 2, product": random_base(1, 500, 2, "product", kind="points"),
+    "5 x 1000": random_base(1, 5, 1000, kind="points"),
+    "60 classes": random_base(1, 120, 6, kind="points", classes=60, shared=0.9),
+}
+
+
+def asked(name: str) -> tuple[Audit, float]:
+    """Return an audit of a large model, and what it took of the processor."""
+    clock = Clock(BUDGET_S, now=time.process_time)
+    start = time.process_time()
+    settings = Settings(budget_s=BUDGET_S)
+    found = audit(
+        LARGE[name], domain=unit_domain(LARGE[name]), settings=settings, clock=clock
+    )
+    return found, time.process_time() - start
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", LARGE)
+def test_an_audit_of_a_large_model_keeps_its_budget(name: str) -> None:
+    # In another thread, where no alarm of the system would end it.
+    found: list[tuple[Audit, float]] = []
+    thread = threading.Thread(target=lambda: found.append(asked(name)))
+    thread.start()
+    thread.join()
+    ((told, taken),) = found
+    assert taken < BUDGET_S + SLACK_S
+    assert not told.is_complete
+    assert any(": not asked: " in one or ": cut short" in one for one in told.unasked)
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", ["500 x 2", "500 x 2, product", "60 classes"])
+def test_most_rules_of_a_large_model_are_seen_to_win(name: str) -> None:
+    found, _ = asked(name)
+    won = [one for one in found.answers if one.code == "FT101"]
+    assert sum(isinstance(one.state, Witness) for one in won) > 20

@@ -1,0 +1,321 @@
+"""What rows say about rules: exact counts, and shares with their intervals."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import Declined, Sampled
+from fuzzytree.auditing.findings import support
+from fuzzytree.auditing.findings.domains import domain_of
+from fuzzytree.auditing.findings.records import Answer, Settings
+from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.auditing.findings.support import answers, counted, drawn, share, wilson
+from fuzzytree.auditing.findings.views import view
+from fuzzytree.model.contracts import Document
+from fuzzytree.model.rulebase import (
+    Clause,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Term,
+    Variable,
+)
+from fuzzytree.model.system import Is, SCurve
+from fuzzytree.numerics.exact import MISSING, TIE, UNCOVERED, exact_answer
+from tests.auditing.engine.bases import random_base
+from tests.auditing.findings.test_views import A_LOW, block_of, system_of
+
+LOW = Term("low", Points((0.0, 1.0), (1.0, 0.0)))
+HIGH = Term("high", Points((1.0, 3.0), (0.0, 1.0)))
+RULES = RuleBase(
+    "grip",
+    ("soft", "hard"),
+    (Variable("force", (LOW, HIGH), low=0.0, high=4.0),),
+    (
+        Rule((Clause("force", ("low",)),), "soft"),
+        Rule((Clause("force", ("high",)),), "hard"),
+    ),
+)
+FORCES = np.array([[0.0, 0.25, 1.0, 1.1, 3.0, 5.0, np.nan]])
+CODES = np.array([0, 1, 0, 1, 1, -1, 0])
+
+
+def subject_of(
+    model: Document, rows: Rows | None = None, settings: Settings | None = None
+) -> Subject:
+    found = view(model, domain_of(model))
+    assert found.rules is not None
+    return Subject(
+        found.rules,
+        found.policy,
+        found.domain,
+        settings or Settings(rows=500),
+        Clock(),
+        found.tree,
+        found.raw,
+        found.system,
+        rows,
+        found.places,
+        found.declined,
+        found.is_whole,
+        found.held,
+    )
+
+
+def asked(subject: Subject) -> dict[str, Answer]:
+    found = {one.subject: one for one in answers(subject)}
+    assert {one.code for one in found.values()} == {"FT701"}
+    return found
+
+
+def sentences(found: dict[str, Answer], *names: str) -> list[str]:
+    return [found[name].sentence for name in names]
+
+
+@pytest.mark.parametrize(
+    ("hits", "rows", "low", "high"),
+    [
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+    ],
+)
+def test_wilson_gives_the_intervals_of_newcombe_1998(
+    hits: int, rows: int, low: float, high: float
+) -> None:
+    assert wilson(hits, rows) == pytest.approx((low, high), abs=5e-5)
+    assert wilson(rows - hits, rows) == pytest.approx((1.0 - high, 1.0 - low), abs=5e-5)
+
+
+def test_an_interval_holds_its_share_and_ends_at_certainty() -> None:
+    assert wilson(0, 7)[0] == 0.0
+    assert wilson(7, 7)[1] == 1.0
+    for hits in range(8):
+        low, high = wilson(hits, 7, 0.5)
+        assert low <= hits / 7 <= high
+        assert wilson(hits, 7, 0.99)[0] <= low
+
+
+@pytest.mark.parametrize(
+    ("hits", "rows", "confidence", "text"),
+    [
+        (1, 0, 0.95, "no share: 1 of 0"),
+        (0, 0, 0.95, "no share: 0 of 0"),
+        (-1, 5, 0.95, "no share: -1 of 5"),
+        (1, 5, 1.0, "the confidence must lie in (0, 1), not 1.0"),
+    ],
+)
+def test_what_is_no_share_is_refused(
+    hits: int, rows: int, confidence: float, text: str
+) -> None:
+    with pytest.raises(ValueError) as caught:  # noqa: PT011
+        wilson(hits, rows, confidence)
+    assert str(caught.value) == text
+
+
+def test_rows_are_told_rule_by_rule_and_together() -> None:
+    found = asked(subject_of(RULES, Rows("grips.csv", FORCES, CODES)))
+    assert sentences(
+        found,
+        *("rows with a missing value", "rows outside the domain", "uncovered rows"),
+        *("weak rows", "tied rows", "close rows", "rule 1", "rule 2"),
+    ) == [
+        "on 1 of 7 rows a value is missing",
+        "on 1 of 7 rows a value is outside the domain",
+        "on 1 of 6 rows no rule fires",
+        "on 2 of 6 rows no rule reaches 0.1",
+        "on 0 of 6 rows rules of two classes tie",
+        "on 0 of 6 rows the two strongest classes are at most 0.01 apart",
+        "rule 1 fires on 2 of 6 rows and wins 2; 1 of these have its class 'soft'",
+        "rule 2 fires on 3 of 6 rows and wins 3; 2 of these have its class 'hard'",
+    ]
+    state = found["rule 2"].state
+    assert state == share(
+        "rows that rule 2 wins and that have its class",
+        2,
+        3,
+        "of every row of grips.csv without a missing value, those that it wins",
+    )
+    findings = [one.subject for one in found.values() if one.is_finding]
+    assert findings == [
+        "rows with a missing value",
+        "rows outside the domain",
+        "uncovered rows",
+        "weak rows",
+    ]
+
+
+def test_a_rule_without_rows_is_found_and_gone_when_it_is_removed() -> None:
+    far = Term("far", Points((3.5, 4.0), (0.0, 1.0)))
+    planted = replace(
+        RULES,
+        variables=(replace(RULES.variables[0], terms=(LOW, HIGH, far)),),
+        rules=(*RULES.rules, Rule((Clause("force", ("far",)),), "soft")),
+    )
+    values = np.array([[0.5, 2.0, 3.0]])
+    found = asked(subject_of(planted, Rows("grips.csv", values)))
+    assert found["rule 3"].is_finding
+    assert found["rule 3"].sentence == "rule 3 fires on none of 3 rows"
+    assert found["rule 3"].rules == (3,)
+    clean = asked(subject_of(RULES, Rows("grips.csv", values)))
+    assert not any(one.is_finding for one in clean.values())
+
+
+def test_a_rule_that_fires_and_never_wins_is_found() -> None:
+    planted = replace(RULES, rules=(*RULES.rules, RULES.rules[0]))
+    values = np.array([[0.5, 2.0]])
+    found = asked(subject_of(planted, Rows("grips.csv", values)))["rule 3"]
+    assert found.is_finding
+    assert found.sentence == "rule 3 fires on 1 of 2 rows and wins none"
+    assert [(one.name, one.value) for one in found.measures] == [
+        ("rows fired", 1),
+        ("rows won", 0),
+    ]
+
+
+@pytest.mark.parametrize("conjunction", ["min", "product"])
+def test_counts_are_those_of_answers_in_fractions(conjunction: str) -> None:
+    rules = random_base(3, 7, 4, conjunction, shared=0.5)  # type: ignore[arg-type]
+    subject = subject_of(rules)
+    values = drawn(subject.rules, subject.domain, 60, 1)
+    values[0, :3] = (np.nan, np.inf, 1e9)
+    found = counted(subject, values)
+    rows = [dict(zip(rules.inputs, row, strict=True)) for row in values.T.tolist()]
+    exact = [exact_answer(rules, row) for row in rows]
+    known = [one for one in exact if one.status != MISSING]
+    covered = [one for one in known if one.status != UNCOVERED]
+    settings = subject.settings
+    assert found.known == len(known)
+    assert found.uncovered == len(known) - len(covered)
+    level, margin = Fraction(settings.epsilon), Fraction(settings.margin)
+    assert found.weak == sum(max(one.strengths) < level for one in known)
+    assert found.tied == sum(not one.margin for one in covered)
+    assert found.close == sum(one.margin <= margin for one in covered)
+    for k in range(len(rules.rules)):
+        assert found.fired[k] == sum(one.strengths[k] > 0 for one in known)
+        assert found.won[k] == sum(one.rule == k + 1 for one in known)
+
+
+def test_rows_exactly_at_an_end_a_level_and_a_margin_are_counted_exactly() -> None:
+    rising = Points((0.0, 3.0), (0.0, 1.0))
+    falling = Points((0.0, 3.0), (1.0, 0.0))
+    terms = (Term("up", rising), Term("down", falling))
+    rules = replace(
+        RULES,
+        variables=(Variable("force", terms, low=-1.0, high=4.0),),
+        rules=(
+            Rule((Clause("force", ("up",)),), "soft"),
+            Rule((Clause("force", ("down",)),), "hard"),
+        ),
+    )
+    tiny = 5e-324
+    values = np.array([[0.0, tiny, 3.0, np.nextafter(3.0, 0.0), 1.5]])
+    exact = [exact_answer(rules, {"force": float(x)}) for x in values[0]]
+    found = counted(subject_of(rules), values)
+    assert found.fired.tolist() == [4, 4]
+    assert found.tied == 1
+    assert [one.status == TIE for one in exact] == [False] * 4 + [True]
+    narrow = Settings(epsilon=0.5, margin=float(exact[3].margin))
+    again = counted(subject_of(rules, settings=narrow), values)
+    assert again.weak == 0
+    assert again.close == sum(one.margin <= Fraction(narrow.margin) for one in exact)
+
+
+def test_points_are_drawn_within_the_domain_and_alike_for_a_seed() -> None:
+    mix = Variable("mix", parts=(Part("force", 1.0), Part("slip", 1.0)))
+    rules = replace(RULES, variables=(*RULES.variables, Variable("slip"), mix))
+    box = Domain((Side("force", 0.0, 1.0), Side("slip", 2.0, 2.0), Side("mix", 2.5, 9)))
+    points = drawn(rules, box, 400, 7)
+    assert 150 < points.shape[1] < 250
+    assert points[0].min() >= 0.5
+    assert (points[1] == 2.0).all()
+    assert np.array_equal(points, drawn(rules, box, 400, 7))
+    assert not np.array_equal(points[:, :9], drawn(rules, box, 400, 8)[:, :9])
+    with pytest.raises(ValueError, match=r"^input 'slip' has no side in the domain$"):
+        drawn(rules, Domain(box.sides[:1]), 5, 0)
+
+
+def test_shares_of_the_domain_are_told_without_rows() -> None:
+    found = asked(subject_of(RULES, settings=Settings(rows=4000, seed=3)))
+    assert isinstance(found["rows"].state, Declined)
+    assert found["rows"].sentence == (
+        "what rows say about the rules is not known: rows are needed (--data TABLE)"
+    )
+    state = found["weak points"].state
+    assert isinstance(state, Sampled)
+    assert state.low <= 0.3 / 4.0 <= state.high  # from 0.9 to 1.2 of 0 to 4
+    assert state.how == "points drawn evenly from the domain, seed 3"
+    assert not any(one.is_finding for one in found.values())
+
+
+def test_a_domain_that_no_point_meets_is_declined() -> None:
+    mix = Variable("mix", parts=(Part("force", 1.0),))
+    rules = replace(RULES, variables=(*RULES.variables, mix))
+    subject = subject_of(rules)
+    box = Domain((*subject.domain.sides, Side("mix", 50.0, 60.0)))
+    found = asked(replace(subject, domain=box))["domain"]
+    assert found.state == Declined(
+        "FTD04", "no drawn point lies within the sides of the combinations"
+    )
+
+
+def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> None:
+    values = np.array([[0.0, 3.5], [0.0, 0.0]])
+    whole = asked(subject_of(system_of(block_of(A_LOW)), Rows("pump", values)))
+    assert whole["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
+    assert whole["uncovered rows"].is_finding
+    assert "tied rows" not in whole
+    part = system_of(block_of(A_LOW, Is("power", "big")))
+    found = asked(subject_of(part, Rows("pump", values)))
+    assert "uncovered rows" not in found
+    assert found["covered rows"].sentence == (
+        "how many rows are covered is not known: rules are left out, and they may "
+        "cover what the others do not"
+    )
+
+
+def test_of_a_curve_between_lines_counts_are_told_where_both_lines_agree() -> None:
+    system = system_of(block_of(A_LOW), low=SCurve(0.0, 4.0))
+    clear, near = (
+        np.array([[0.0, 3.0], [0.0, 0.0]]),
+        np.array([[0.01, 3.0], [0.0, 0.0]]),
+    )
+    found = asked(subject_of(system, Rows("pump", clear)))
+    assert found["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
+    assert found["uncovered rows"].sentence == "on 1 of 2 rows no rule fires"
+    found = asked(subject_of(system, Rows("pump", near)))
+    assert found["rule 1"].sentence == (
+        "on how many rows rule 1 fires is not decided: it fires on 1 of 2 at least, "
+        "and on 2 at most"
+    )
+    assert found["uncovered rows"].sentence == (
+        "how many rows are uncovered is not decided: there are 0 at least, and 1 at "
+        "most"
+    )
+    assert all(
+        isinstance(found[name].state, Declined) for name in ("rule 1", "uncovered rows")
+    )
+
+
+def test_a_spent_budget_stops_the_count() -> None:
+    clock = Clock(1.0, now=iter([0.0, 2.0, 2.0]).__next__)
+    with pytest.raises(OutOfTimeError):
+        counted(replace(subject_of(RULES), clock=clock), FORCES)
+
+
+def test_of_a_model_of_many_clauses_fewer_points_are_drawn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(support, "_MOST_DEGREES", 1)
+    subject = subject_of(RULES, settings=Settings(rows=5000))
+    found = asked(subject)["uncovered points"]
+    assert isinstance(found.state, Sampled)
+    assert found.state.rows == 1000

@@ -1,0 +1,255 @@
+"""Terms: a defect that is planted is found, and gone when it is removed."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.states import Bracket, Declined, Proved
+from fuzzytree.auditing.engine.wording import short
+from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.records import Answer, Settings
+from fuzzytree.model.rulebase import (
+    LR,
+    Band,
+    Clause,
+    Flank,
+    Part,
+    Points,
+    Rule,
+    RuleBase,
+    Shape,
+    Term,
+    Variable,
+)
+from fuzzytree.model.rulebase import Side as Half
+from fuzzytree.numerics.exact import exact_degree
+from tests.auditing.findings.test_views import A_LOW, block_of, system_of
+
+LOW = Term("low", Points((0.0, 1.0, 2.0), (1.0, 1.0, 0.0)))
+HIGH = Term("high", Points((1.0, 2.0, 4.0), (0.0, 1.0, 1.0)))
+
+
+def base(*terms: Term, high: float = 4.0) -> RuleBase:
+    """Return one rule for each term of `force`, which goes from 0 to 4."""
+    return RuleBase(
+        "grip",
+        ("soft", "hard"),
+        (Variable("force", terms, unit="N", low=0.0, high=high),),
+        tuple(
+            Rule((Clause("force", (term.name,)),), ("soft", "hard")[number % 2])
+            for number, term in enumerate(terms)
+        ),
+    )
+
+
+def found(rules: RuleBase, code: str, settings: Settings | None = None) -> list[Answer]:
+    return [*audit(rules, select=[code], settings=settings).findings]
+
+
+CLEAN = base(LOW, HIGH)
+
+
+@pytest.mark.parametrize("code", ["FT401", "FT402", "FT403", "FT404"])
+def test_a_clean_model_has_no_finding_about_terms(code: str) -> None:
+    (answer,) = audit(CLEAN, select=[code]).answers
+    assert not answer.is_finding
+    assert isinstance(answer.state, Proved)
+
+
+def test_a_term_beyond_the_domain_is_empty() -> None:
+    far = Term("far", Points((5.0, 6.0), (0.0, 1.0)))
+    (answer,) = found(base(LOW, HIGH, far), "FT401")
+    assert answer.sentence == (
+        "term 'far' of 'force' is empty: its degree is 0 from 0 to 4"
+    )
+    assert answer.severity == "error"
+    assert not found(base(LOW, HIGH, far, high=6.0), "FT401")
+
+
+def test_a_term_that_is_hardly_reached_is_told_with_its_height() -> None:
+    faint = Term("faint", Points((3.0, 7.0), (0.0, 1.0)))
+    (answer,) = found(base(LOW, HIGH, faint), "FT401")
+    assert answer.sentence == (
+        "term 'faint' of 'force' is hardly reached: "
+        "its largest degree from 0 to 4 is 0.25, at 4"
+    )
+    assert (answer.severity, answer.measures[0].exact) == ("warning", "1/4")
+    assert not found(base(LOW, HIGH, faint), "FT401", Settings(level=0.25))
+
+
+def test_a_step_at_an_open_lower_end_counts_from_above_only() -> None:
+    spike = Term("spike", Points((0.0, 0.0), (1.0, 0.0)))
+    domain = Domain((Side("force", 0.0, 4.0),))
+    rules = base(LOW, HIGH, spike)
+    assert not audit(rules, select=["FT401"], domain=domain).findings
+    opened = Domain((Side("force", 0.0, 4.0, is_open=True),))
+    (answer,) = audit(rules, select=["FT401"], domain=opened).findings
+    assert "'spike' of 'force' is empty" in answer.sentence
+
+
+def test_a_term_of_a_combination_is_asked_on_all_its_inputs_allow() -> None:
+    mix = Variable(
+        "mix",
+        (Term("far", Points((3.0, 4.0), (0.0, 1.0))),),
+        parts=(Part("a", 1.0), Part("b", -1.0)),
+    )
+    inputs = tuple(Variable(name, low=0.0, high=2.0) for name in "ab")
+    rules = RuleBase(
+        "m", ("x",), (*inputs, mix), (Rule((Clause("mix", ("far",)),), "x"),)
+    )
+    (answer,) = found(rules, "FT401")
+    assert "is empty: its degree is 0 from -2 to 2" in answer.sentence
+
+
+@pytest.mark.parametrize(
+    ("shape", "text"),
+    [
+        (
+            Band(0.0, 1.0, right=Flank(1.0, 3.0, (4.0, -3.0))),
+            "is clipped: its polynomial goes 0.3333 above 1 between 1 and 2.333",
+        ),
+        (
+            LR(2.0, Half(1.0, (3.0,), 1.5), Half(1.0, (0.5,), 1.5)),
+            "is clipped: its polynomial goes 2 below 0 between 1 and 1.667",
+        ),
+        (
+            Points((0.0, 1.0, 2.0, 3.0, 4.0), (0.0, 1.0, 0.25, 0.5, 0.0)),
+            "has 2 peaks: between 1 and 3 its degree falls to 0.25, at 2",
+        ),
+        (
+            Points((0.0, 1.0, 2.0), (0.0, 0.75, 0.0)),
+            "has no point of degree 1: its largest degree anywhere is 0.75",
+        ),
+        (
+            Points((3.0, 5.0, 7.0), (0.0, 1.0, 0.0)),
+            "lies outside of the domain for the most part: "
+            "0.125 of its area is from 0 to 4",
+        ),
+    ],
+    ids=["excess", "shortfall", "peaks", "subnormal", "outlying"],
+)
+def test_a_defect_of_shape_is_told(shape: Shape, text: str) -> None:
+    told = found(base(LOW, HIGH, Term("odd", shape)), "FT402")
+    assert [answer.sentence for answer in told] == [f"term 'odd' of 'force' {text}"]
+
+
+def test_what_is_too_small_to_tell_is_counted() -> None:
+    nearly = Band(0.0, 1.0, right=Flank(1.0, 3.0, (2.125, -1.125)))
+    made = audit(base(LOW, HIGH, Term("odd", nearly)), select=["FT402"])
+    (answer,) = made.answers
+    assert not answer.is_finding
+    assert answer.measures[0].value == 1
+
+
+def test_a_dip_has_the_degrees_that_it_is_told_with() -> None:
+    shape = Band(0.0, 1.0, right=Flank(1.0, 8.0, (3.0, -7.2, 5.2)))
+    (answer,) = found(base(LOW, Term("odd", shape), high=9.0), "FT402")
+    measures = {one.name: one.value for one in answer.measures}
+    valley = Fraction(measures["place of the deepest dip"])
+    depth = measures["depth of the deepest dip"]
+    span = answer.region[0]
+    assert span.high is not None
+    peak = exact_degree(shape, Fraction(span.high))
+    assert float(peak - exact_degree(shape, valley)) == pytest.approx(depth, abs=1e-9)
+
+
+def test_two_terms_for_one_thing_are_told_with_their_shared_area() -> None:
+    same = Term("mild", Points((0.0, 1.0, 2.5), (1.0, 1.0, 0.0)))
+    (answer,) = found(base(LOW, HIGH, same), "FT403")
+    assert answer.sentence == (
+        "terms 'low' and 'mild' of 'force' are hard to tell apart: "
+        "they share 0.8571 of their area; 'low' is nowhere above 'mild'"
+    )
+    assert answer.measures[0].exact == "6/7"
+    assert not found(base(LOW, HIGH, same), "FT403", Settings(overlap=0.9))
+
+
+def test_equal_terms_share_all_of_their_area() -> None:
+    (answer,) = found(base(LOW, HIGH, Term("same", LOW.shape)), "FT403")
+    assert answer.sentence.endswith("they share 1 of their area; they are equal")
+
+
+def test_terms_that_cross_are_told_with_the_crossing() -> None:
+    near = Term("near", Points((0.0, 0.5, 3.5), (1.0, 1.0, 0.0)))
+    (answer,) = found(base(LOW, near), "FT403", Settings(overlap=0.5))
+    assert "they cross at 1.25 with degree 0.75" in answer.sentence
+
+
+def test_shares_that_cannot_be_told_from_the_setting_are_a_bracket() -> None:
+    one = Term("one", Band(0.0, 1.0, right=Flank(1.0, 3.0, (0.0, 0.0, 1.0))))
+    other = Term("other", Band(0.0, 1.0, right=Flank(1.0, 3.5, (0.0, 1.5, -0.5))))
+    (answer,) = found(base(one, other), "FT403", Settings(overlap=0.1))
+    exact = next(m.value for m in answer.measures if m.name.startswith("shared"))
+    rules = base(one, other)
+    states = [
+        type(
+            audit(rules, select=["FT403"], settings=Settings(overlap=at))
+            .answers[0]
+            .state
+        )
+        for at in (exact, 0.1)
+    ]
+    assert states == [Bracket, Proved]
+
+
+def test_many_pairs_are_told_up_to_a_number_and_counted() -> None:
+    terms = tuple(Term(f"t{n}", Points((n / 100, 4.0), (1.0, 0.0))) for n in range(8))
+    made = audit(base(*terms), select=["FT403"])
+    *told, rest = made.answers
+    assert (len(told), rest.is_finding) == (20, True)
+    assert rest.sentence == (
+        "0 pairs of terms share less than 0.75 of their area; "
+        "8 pairs besides those told share more"
+    )
+
+
+def test_curves_of_very_many_pieces_are_declined() -> None:
+    values = tuple(float(n) for n in range(2100))
+    many = Points(values, tuple(n % 2 / 1.0 for n in range(2100)))
+    rules = base(Term("a", many), Term("b", many), high=1.0)
+    answer = audit(rules, select=["FT403"]).answers[0]
+    assert isinstance(answer.state, Declined)
+    assert answer.state.code == "FTD05"
+
+
+def test_a_domain_of_one_point_has_no_areas() -> None:
+    made = audit(CLEAN, select=["FT403"], domain=Domain((Side("force", 1.0, 1.0),)))
+    (answer,) = made.answers
+    assert answer.sentence == (
+        "0 pairs of terms share less than 0.75 of their area; "
+        "1 pair have no area on the domain"
+    )
+
+
+def test_what_no_rule_asks_is_told() -> None:
+    idle = Variable("slip", (LOW,), low=0.0, high=4.0)
+    forgotten = replace(CLEAN.variables[0], terms=(LOW, HIGH, Term("mid", LOW.shape)))
+    rules = replace(CLEAN, variables=(forgotten, idle))
+    assert [answer.sentence for answer in found(rules, "FT404")] == [
+        "no rule asks variable 'slip'",
+        "no rule asks term 'mid' of 'force'",
+    ]
+
+
+def test_an_input_of_a_combination_that_is_asked_is_used() -> None:
+    mix = Variable("mix", (LOW,), parts=(Part("a", 1.0), Part("b", 1.0)))
+    inputs = tuple(Variable(name, low=0.0, high=1.0) for name in "ab")
+    rules = RuleBase(
+        "m", ("x",), (*inputs, mix), (Rule((Clause("mix", ("low",)),), "x"),)
+    )
+    assert not found(rules, "FT404")
+
+
+def test_a_system_is_read_itself_and_not_its_view() -> None:
+    system = system_of(block_of(A_LOW))
+    made = audit(system, select=["FT404"])
+    told = [answer.sentence for answer in made.findings]
+    assert all(text.startswith("no rule asks") for text in told)
+
+
+def test_short_numbers_have_four_digits() -> None:
+    assert short(Fraction(2, 3)) == "0.6667"

@@ -1,0 +1,343 @@
+"""Rules of systems as rules that can be asked, and what is left out."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.findings.conditions import MOST_QUESTIONS, MOST_WAYS
+from fuzzytree.auditing.findings.views import View, view
+from fuzzytree.model.rulebase import sentence
+from fuzzytree.model.system import (
+    Activation,
+    And,
+    Conclusion,
+    Condition,
+    Curve,
+    Defuzzifier,
+    Formula,
+    FuzzySystem,
+    Gaussian,
+    Is,
+    Label,
+    Name,
+    Not,
+    Or,
+    Points,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+    Trapezoid,
+)
+from fuzzytree.numerics.exact import exact_answer
+from fuzzytree.semantics.conversion import as_system
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.testing import random_system, random_tree
+
+BOX_INPUTS: Sequence[str] = ("a", "b")
+BOX = Domain((Side("a", 0.0, 4.0), Side("b", 0.0, 4.0)))
+LOW: Curve = Trapezoid(None, 0.0, 1.0, 3.0)
+HIGH: Curve = Trapezoid(1.0, 3.0, 4.0, None)
+ROUNDING = Fraction(1, 2**48)  # of a few products and sums of degrees
+THEN = (Conclusion("power", "big"),)
+A_LOW, A_HIGH = Is("a", "low"), Is("a", "high")
+B_LOW, B_HIGH = Is("b", "low"), Is("b", "high")
+
+
+def block_of(*conditions: Condition | None, **others: object) -> RuleBlock:
+    rules = tuple(SystemRule(one, THEN) for one in conditions)
+    return replace(RuleBlock(rules), **others)
+
+
+def system_of(*blocks: RuleBlock, low: Curve = LOW, clips: bool = False) -> FuzzySystem:
+    labels = (Label("low", low), Label("high", HIGH))
+    inputs = tuple(SystemInput(n, labels, 0.0, 4.0, clips=clips) for n in ("a", "b"))
+    output = SystemOutput(
+        "power",
+        (Label("big", Singleton(1.0)),),
+        None,
+        None,
+        Defuzzifier("weighted average"),
+    )
+    return FuzzySystem("pump", inputs, (output,), blocks)
+
+
+def rules_of(found: View) -> list[str]:
+    return [sentence(one) for one in found.rules.rules] if found.rules else []
+
+
+def reasons(found: View) -> list[str]:
+    return [one.sentence for one in found.declined]
+
+
+def activations(system: FuzzySystem, values: Sequence[float]) -> list[float]:
+    return list(infer(system, dict(zip(BOX_INPUTS, values, strict=True))).activations)
+
+
+def strengths(found: View, values: Sequence[float]) -> list[Fraction]:
+    """Return the strength of each rule in the model: of its strongest way."""
+    assert found.rules is not None
+    row = dict(zip(BOX_INPUTS, values, strict=True))
+    best = [Fraction(0)] * max(found.numbers)
+    answer = exact_answer(found.rules, row).strengths
+    for number, strength in zip(found.numbers, answer, strict=True):
+        best[number - 1] = max(best[number - 1], strength)
+    return best
+
+
+CONDITIONS: tuple[Condition | None, ...] = (
+    None,
+    A_LOW,
+    And((A_LOW, Or((B_LOW, A_HIGH)))),
+    Or((A_LOW, A_HIGH)),
+    Or((And((A_LOW, B_LOW)), And((A_HIGH, B_HIGH)))),
+    Is("a", "low", ("not",)),
+    And((Is("a", None, ("any",)), Is("b", "low", ("not", "not")))),
+    Not(Or((A_LOW, A_HIGH))),
+)
+UNDER_MINIMUM = (
+    Not(And((A_LOW, Or((B_LOW, Not(B_HIGH)))))),
+    Not(Or((A_LOW, And((B_LOW, B_HIGH))))),
+)
+
+
+@pytest.mark.parametrize("norm", ["minimum", "product"])
+def test_rules_of_a_view_are_as_strong_as_those_of_the_system(norm: str) -> None:
+    more = UNDER_MINIMUM if norm == "minimum" else ()
+    system = system_of(block_of(*CONDITIONS, *more, conjunction=norm))
+    found = view(system, BOX)
+    assert found.is_whole
+    assert not found.declined
+    assert found.policy.decision == "all"
+    chance = random.Random(0)
+    for _ in range(200):
+        # quarters: products of two and sums are exact in doubles
+        values = [chance.randrange(-4, 21) / 4.0 for _ in range(2)]
+        right = [Fraction(one) for one in activations(system, values)]
+        assert strengths(found, values) == right
+
+
+def test_a_rule_with_an_or_of_two_inputs_becomes_one_for_each_way() -> None:
+    both = And((A_LOW, Or((B_LOW, A_HIGH))))
+    found = view(system_of(block_of(A_LOW), block_of(both)), BOX)
+    assert rules_of(found) == [
+        "IF a is low THEN power is big",
+        "IF a is low AND b is low THEN power is big",
+        "IF a is low AND a is high THEN power is big",
+    ]
+    assert found.places == (
+        "rule 1 of block 1",
+        "way 1 of rule 1 of block 2",
+        "way 2 of rule 1 of block 2",
+    )
+    assert found.numbers == (1, 2, 2)
+
+
+def test_an_or_of_one_input_stays_one_clause() -> None:
+    found = view(system_of(block_of(Or((A_LOW, A_HIGH)))), BOX)
+    assert rules_of(found) == ["IF a is low or high THEN power is big"]
+
+
+DECLINING = {
+    "rule 1 is not taken over: its 'and' is the einstein product, which has no exact "
+    "method": block_of(And((A_LOW, B_LOW)), conjunction="einstein product"),
+    "rule 1 is not taken over: its 'or' is the algebraic sum, which has no exact "
+    "method": block_of(Or((A_LOW, B_LOW)), disjunction="algebraic sum"),
+    "rule 1 is not taken over: the hedge 'very' of 'any' has no exact method": block_of(
+        Is("a", None, ("not", "very", "any"))
+    ),
+    "rule 1 is not taken over: it asks the output 'power'": block_of(
+        Is("power", "big")
+    ),
+    "rule 1 is not taken over: it negates a product, which has no exact "
+    "method": block_of(
+        Not(And((A_LOW, B_LOW))), And((A_LOW, B_LOW)), conjunction="product"
+    ),
+    "rule 1 is not taken over: it negates an 'or' within rules that multiply": block_of(
+        Not(Or((A_LOW, B_LOW))), And((A_LOW, B_LOW)), conjunction="product"
+    ),
+    f"rule 1 is not taken over: it can hold in more than {MOST_WAYS} ways": block_of(
+        And(tuple(Or((A_LOW, B_LOW, Not(A_LOW), Not(B_LOW))) for _ in range(4))),
+        conjunction="product",
+    ),
+}
+
+
+@pytest.mark.parametrize("text", DECLINING)
+def test_a_rule_without_an_exact_method_is_left_out_and_told(text: str) -> None:
+    block = DECLINING[text]
+    kept = replace(block, rules=(*block.rules, SystemRule(B_HIGH, THEN)))
+    found = view(system_of(kept), BOX)
+    assert reasons(found) == [text]
+    assert found.declined[0].state.__struct_config__.tag == "DECLINED"
+    assert not found.is_whole
+    assert rules_of(found)[-1] == "IF b is high THEN power is big"
+    assert found.numbers[-1] == len(kept.rules)
+
+
+def test_deep_and_long_conditions_end_soon() -> None:
+    deep: Condition = Or((A_LOW, A_HIGH))
+    for _ in range(90):
+        deep = Or((deep, A_LOW))
+    found = view(system_of(block_of(deep)), BOX)
+    assert rules_of(found) == ["IF a is low or high THEN power is big"]
+    long = And((A_LOW,) * (MOST_QUESTIONS + 1))
+    assert reasons(view(system_of(block_of(long)), BOX)) == [
+        f"rule 1 is not taken over: it asks more than {MOST_QUESTIONS} questions"
+    ]
+
+
+def test_rules_of_another_norm_than_most_are_left_out() -> None:
+    both = And((A_LOW, B_LOW))
+    system = system_of(block_of(both, both), block_of(both, conjunction="product"))
+    found = view(system, BOX)
+    assert found.policy.conjunction == "min"
+    assert reasons(found) == [
+        "rule 1 of block 2 is not taken over: its 'and' is the product, and that of "
+        "most rules is another"
+    ]
+
+
+def test_a_curve_without_an_exact_method_is_told_with_its_rules() -> None:
+    system = system_of(block_of(A_LOW, A_HIGH), low=Gaussian(0.0, 1.0))
+    found = view(system, BOX)
+    assert len(rules_of(found)) == 2
+    assert reasons(found) == [
+        "term 'low' of 'a' is asked between two lines 0.00098 apart at most: its curve "
+        "(gaussian) has no exact method; its shape and its overlaps are not asked; "
+        "1 rule asks for it",
+        "term 'low' of 'b' is asked between two lines 0.00098 apart at most: its curve "
+        "(gaussian) has no exact method; its shape and its overlaps are not asked; "
+        "no rule asks for it",
+    ]
+
+
+def test_a_formula_is_not_taken_over_and_leaves_its_rules_out() -> None:
+    system = system_of(block_of(A_LOW, A_HIGH), low=Formula(Name("x")))
+    found = view(system, BOX)
+    assert rules_of(found) == ["IF a is high THEN power is big"]
+    assert reasons(found)[::2] == [
+        "term 'low' of 'a' is not taken over: its curve (formula) has no exact "
+        "method; 1 rule asks for it",
+        "rule 1 is not taken over: the curve of 'low' of 'a' has no exact method",
+    ]
+
+
+def test_a_height_is_carried_where_no_degree_is_rounded() -> None:
+    lines = Points((0.0, 1.0, 2.0), (0.0, 1.0, 0.3))
+    for curve, height, expected in (
+        (LOW, 0.7, ((1.0, 3.0), (0.7, 0.0))),
+        (lines, 0.5, ((0.0, 1.0, 2.0), (0.0, 0.5, 0.15))),
+        (lines, 0.7, None),
+    ):
+        system = system_of(block_of(A_LOW))
+        one = replace(system.inputs[0], labels=(Label("low", curve, height),))
+        found = view(replace(system, inputs=(one, system.inputs[1])), BOX)
+        assert found.rules is not None
+        assert (found.held is not None) is (expected is None)
+        if expected is not None:
+            assert found.rules.variables[0].terms[0].shape == Points(*expected)
+
+
+def test_a_rule_that_cannot_fire_is_a_finding_and_leaves_nothing_open() -> None:
+    never = block_of(Is("a", None, ("not", "any")), A_LOW)
+    off = RuleBlock((SystemRule(A_LOW, THEN, 0.0), SystemRule(A_HIGH, THEN)))
+    for block, why in (
+        (never, "its condition is never true"),
+        (off, "its weight is 0"),
+    ):
+        found = view(system_of(block), BOX)
+        assert [(one.code, one.sentence) for one in found.declined] == [
+            ("FT101", f"rule 1 never fires: {why}")
+        ]
+        assert found.is_whole
+        assert found.numbers == (2,)
+
+
+def test_beyond_the_range_of_a_clipped_input_nothing_is_asked() -> None:
+    wide = Domain((Side("a", -9.0, 4.0), Side("b", 0.0, 9.0)))
+    found = view(system_of(block_of(A_LOW), clips=True), wide)
+    assert [(side.low, side.high) for side in found.domain.sides] == [(0.0, 4.0)] * 2
+    assert reasons(found)[0] == (
+        "input 'a' is not taken over: values outside its range are moved to its ends, "
+        "so it is asked from 0.0 to 4.0"
+    )
+    assert view(system_of(block_of(A_LOW)), wide).domain == wide
+
+
+def test_an_activation_of_only_some_rules_is_told() -> None:
+    found = view(system_of(block_of(A_LOW, activation=Activation("lowest"))), BOX)
+    assert reasons(found) == [
+        "the activation of block 1 is not taken over: it is 'lowest'; only conditions "
+        "are asked"
+    ]
+
+
+def test_without_one_rule_that_can_be_asked_there_are_no_rules() -> None:
+    found = view(system_of(block_of(Is("power", "big"))), BOX)
+    assert found.rules is None
+    assert found.numbers == ()
+
+
+def test_trees_rules_and_systems_that_stand_for_rules_decide_by_the_strongest() -> None:
+    tree = random_tree(0)
+    rules = rules_from_tree(tree)
+    of_tree, of_rules = view(tree, BOX), view(rules, BOX)
+    assert of_tree.rules == of_rules.rules == rules
+    assert of_tree.raw == rules_from_tree(tree, "raw")
+    of_system = view(as_system(rules, "winner"), BOX)
+    assert of_system.policy.decision == "strongest"
+    assert of_system.rules is not None
+    assert len(of_system.rules.rules) == len(rules.rules)
+
+
+def test_random_systems_are_as_strong_as_their_views_within_rounding() -> None:
+    compared = apart = 0
+    for seed in (*range(12), 110):
+        system = random_system(seed)
+        found = view(system, Domain(()))
+        if found.rules is None:
+            continue
+        chance = random.Random(seed)
+        row = {
+            one.name: chance.uniform(one.low or 0.0, one.high or 1.0)
+            for one in system.inputs
+            if not one.parts
+        }
+        right = infer(system, row).activations
+        low, high = both_strengths(found, row)
+        ways = [b.activation.method for b in system.blocks for _ in b.rules]
+        for number in low:
+            if ways[number - 1] == "general":
+                compared += 1
+                apart += low[number] < high[number]
+                exact = Fraction(right[number - 1])
+                assert low[number] - ROUNDING <= exact <= high[number] + ROUNDING
+    assert compared > 20
+    assert apart > 5
+
+
+def both_strengths(
+    found: View, row: Mapping[str, float]
+) -> tuple[dict[int, Fraction], dict[int, Fraction]]:
+    """Return each rule's strength from below and from above, by its number."""
+    assert found.rules is not None
+    both = (found.rules, found.rules)
+    if found.held is not None:
+        both = (found.held.lower, found.held.upper)
+    made: list[dict[int, Fraction]] = []
+    for rules in both:
+        best = dict.fromkeys(found.numbers, Fraction(0))
+        exact = exact_answer(rules, row).strengths
+        for number, strength in zip(found.numbers, exact, strict=True):
+            best[number] = max(best[number], strength)
+        made.append(best)
+    return made[0], made[1]

@@ -1,0 +1,88 @@
+"""The report of a stability study, as a whole text."""
+
+from __future__ import annotations
+
+from fuzzytree.checking.stability.results import (
+    CurveFault,
+    OffsetCost,
+    Stability,
+    Stiff,
+    judged,
+)
+from fuzzytree.report.stability import stability_lines
+
+STUDY = Stability(
+    "grip",
+    "0" * 64,
+    12,
+    30_000,
+    20_000,
+    ("native", "native float32"),
+    (
+        judged(
+            "N3",
+            40,
+            [f"native: tree: {k} of 8 rows" for k in (5, 4, 3, 2, 1, 1)],
+            advice="use another one",
+        ),
+        judged("N7", 3, (), worst=0.01, facts=["1 of 3 sides bulges"]),
+        judged("N10", 0, (), skipped=["a", "b", "b", "c", "d"]),
+    ),
+    (
+        Stiff("force", 0.5, 1e6, 5e-7, 0.12, 0.1, 3, 80, 1e6, "use mixed"),
+        Stiff("slip", 1.0, 2.0, 0.5, 1e-7, 0.0, 0, 80, None, "float32 is safe"),
+    ),
+    (
+        CurveFault(
+            *("force", "low (left)", "raw", 70.0, 0.125, 0.0, None, True),
+            "fit it with fewer points",
+        ),
+    ),
+    offsets=(OffsetCost("rules", 1e-3, None, 1e-7, 2e-16, 0, 80),),
+)
+
+TEXT = """\
+grip: 12 probes, 30000 rows of data, 20000 of them tried
+run by   native, native float32
+
+code  criterion                                cases  worst  verdict
+N3    order, copies and batches change no bit  40     -      FAILS
+N7    curves: condition, overshoot, rise       3      0.01   holds
+N10   error against run time                   -      -      not applicable
+N3: native: tree: 5 of 8 rows
+N3: native: tree: 4 of 8 rows
+N3: native: tree: 3 of 8 rows
+N3: native: tree: 2 of 8 rows
+N3: native: tree: 1 of 8 rows
+N3: and 1 more
+N7: 1 of 3 sides bulges
+N10: not tried: a
+N10: not tried: b
+N10: not tried: c
+N10: not tried: 1 more
+
+input  spread/size  float32 costs  observed  flips    advice
+force  5.0e-07      1.2e-01        1.0e-01   3 of 80  use mixed
+slip   5.0e-01      1.0e-07        0.0e+00   0 of 80  float32 is safe
+
+form   spread/distance  float32  mixed    double   flips in float32
+rules  1e-03            cannot   1.0e-07  2.0e-16  -
+
+curve             form  size  leaves [0, 1]  rises  advice
+force low (left)  raw   70    by 0.12        -      fit it with fewer points
+
+what to do: N3: use another one
+what to do: force: use mixed"""
+
+
+def test_a_report_tells_everything_in_order() -> None:
+    assert "\n".join(stability_lines(STUDY)) == TEXT
+
+
+def test_a_full_report_leaves_nothing_out() -> None:
+    full = list(stability_lines(STUDY, is_full=True))
+    assert "N10: not tried: d" in full
+
+
+def test_a_study_with_a_failure_is_not_ok() -> None:
+    assert not STUDY.ok

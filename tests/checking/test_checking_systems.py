@@ -1,0 +1,216 @@
+"""The check of systems: what it compares, and what it says of what is wrong."""
+
+import math
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.checking import systems as checking_systems
+from fuzzytree.checking.systems import check_system
+from fuzzytree.exporters.onnx import write
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
+    Activation,
+    Conclusion,
+    Defuzzifier,
+    FuzzySystem,
+    Gaussian,
+    Is,
+    Label,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+    SystemRule,
+)
+from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
+from fuzzytree.testing import random_system
+
+
+def washer(time: float = 60.0, output: str = "time") -> FuzzySystem:
+    dirty = Label("dirty", Points((0.0, 10.0), (0.0, 1.0)))
+    how = Defuzzifier("weighted sum")
+    one = SystemOutput(output, (Label("long", Singleton(time)),), None, None, how)
+    rule = SystemRule(Is("dirt", "dirty"), (Conclusion(output, "long"),))
+    inputs = (SystemInput("dirt", (dirty,)),)
+    return FuzzySystem("washer", inputs, (one,), (RuleBlock((rule,)),))
+
+
+def opened(system: FuzzySystem, **facts: object) -> OnnxModel:
+    found = open_onnx(write(system).content, "w.onnx")
+    return replace(found, **facts)
+
+
+def about(found: Agreement, carrier: str, basis: str) -> Comparison:
+    (one,) = (
+        c
+        for c in found.comparisons
+        if (c.carrier, c.basis) == (carrier, basis) and c.verdict != "agrees"
+    )
+    return one
+
+
+def test_every_runtime_is_compared_and_called() -> None:
+    names = ["reference", "native", "onnxruntime float64"]
+    found = check_system(washer(), limit=100, runtimes=names)
+    assert found.ok
+    assert [(c.carrier, c.against, c.basis) for c in found.comparisons] == [
+        ("native", "the inference", "rows"),
+        ("reference", "itself", "calls"),
+        ("native", "itself", "calls"),
+        ("onnxruntime float64", "native", "rows"),
+        ("onnxruntime float64", "itself", "calls"),
+    ]
+    assert {c.origin for c in found.comparisons} == {"equal bits"}
+    assert found.probes == 100
+    (count,) = found.counts
+    assert count.rows == 100
+    assert count.missing > 0
+
+
+def test_rows_of_one_s_own_stand_behind_the_probes() -> None:
+    data = np.array([[1.0, 2.0, 3.0]])
+    found = check_system(washer(), data=data, limit=10, runtimes=["native"])
+    assert (found.counts[0].rows, found.probes) == (13, 10)
+    with pytest.raises(
+        ValueError, match=r"data must have shape \(1, rows\), not \(3,\)"
+    ):
+        check_system(washer(), data=np.zeros(3))
+
+
+def test_files_with_the_system_agree() -> None:
+    found = check_system(
+        washer(), washer(), opened(washer()), names=["a.yaml", "b.onnx"]
+    )
+    assert found.ok
+    told = [(c.carrier, c.against) for c in found.comparisons if c.carrier == "b.onnx"]
+    assert told == [
+        ("b.onnx", "the system's metadata"),
+        ("b.onnx", "a freshly written graph"),
+        ("b.onnx", "native"),
+    ]
+
+
+def test_a_file_with_other_names_agrees() -> None:
+    found = check_system(washer(), washer(output="t"), limit=50)
+    assert found.ok
+    told = [(c.against, c.basis) for c in found.comparisons if c.carrier == "file 1"]
+    assert told == [("the system but for names", "file"), ("native", "rows")]
+
+
+def test_a_file_with_one_more_rule_does_not_agree_by_its_rows_alone() -> None:
+    system = washer()
+    (dirt,) = system.inputs
+    key = Label("key", Points((3.12345, 3.12346, 3.12347), (0.0, 1.0, 0.0)))
+    (block,) = system.blocks
+    rules = (*block.rules, SystemRule(Is("dirt", "key"), block.rules[0].then))
+    other = replace(
+        system,
+        inputs=(replace(dirt, labels=(*dirt.labels, key)),),
+        blocks=(replace(block, rules=rules),),
+    )
+    found = check_system(system, other, limit=50)
+    assert about(found, "file 1", "file").verdict == "rows only"
+    assert not found.ok
+    assert check_system(system, other, limit=50, rows_only=True).ok
+
+
+def test_a_file_with_another_number_is_found_in_its_rows() -> None:
+    found = check_system(washer(), washer(61.0), limit=50, data=np.array([[5.0]]))
+    assert not found.ok
+    one = about(found, "file 1", "rows")
+    assert one.largest_difference == 1.0
+    assert "output 'time'" in one.detail[0]
+    assert "probe" in one.detail[0]
+
+
+def test_the_worst_row_is_told_first_with_its_values() -> None:
+    found = check_system(washer(), washer(61.0), limit=1, data=np.array([[5.0]]))
+    text = "row 1: dirt 5.0: output 'time' 30.5 where 30.0 is right"
+    assert text in about(found, "file 1", "rows").detail
+
+
+def test_a_file_of_another_system_is_told_by_its_facts() -> None:
+    other = random_system(1, formulas="none")
+    found = check_system(washer(), other, opened(other), limit=20)
+    assert [c.detail for c in found.comparisons if c.verdict == "DISAGREES"] == [
+        ("it computes 2 outputs from 3 inputs, and the system 1 from 1",),
+        ("it computes y1, y2 from x1, x2, x3, which are not the system's",),
+    ]
+
+
+def test_a_wrong_fingerprint_and_a_wrong_graph_are_found() -> None:
+    other = opened(washer(61.0))
+    found = check_system(washer(), other, limit=20)
+    wrong = [c.against for c in found.comparisons if c.verdict == "DISAGREES"]
+    assert wrong == ["the system's metadata", "a freshly written graph", "native"]
+
+
+def test_a_file_without_status_is_compared_by_its_numbers() -> None:
+    content = write(washer(), outputs=("outputs",)).content
+    assert check_system(washer(), open_onnx(content, "w.onnx"), limit=60).ok
+
+
+def test_a_slow_runtime_gets_a_share_of_the_rows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(checking_systems, "_SLOW_STEPS", 100)
+    found = check_system(washer(), limit=400, runtimes=["native"])
+    assert found.comparisons[0].rows < 50
+
+
+def shifted(system: FuzzySystem, by: float) -> FuzzySystem:
+    """Return a washer of which each answer is larger by a share."""
+    (output,) = system.outputs
+    (label,) = output.labels
+    assert isinstance(label.curve, Singleton)
+    moved = replace(label, curve=Singleton(label.curve.value * (1.0 + by)))
+    return replace(system, outputs=(replace(output, labels=(moved,)),))
+
+
+def test_a_number_that_is_off_by_a_billionth_is_found_among_unequal_bits() -> None:
+    system = washer()
+    (soaked,) = system.inputs
+    bell = replace(soaked, labels=(Label("dirty", Gaussian(0.0, 1.5)),))
+    system = replace(system, inputs=(bell,))
+    data = np.array([[0.3, 1.0, 2.5]])
+    found = check_system(system, shifted(system, 1e-9), limit=50, data=data)
+    one = about(found, "file 1", "rows")
+    assert one.verdict == "DISAGREES"
+    assert one.differing >= 3
+    assert one.allowed < 1e-11 < one.largest_difference
+
+
+def test_rows_on_an_edge_are_told_apart_from_the_table() -> None:
+    # The rule passes from the very degree of dirt 1 on.
+    system = washer()
+    (soaked,) = system.inputs
+    bell = replace(soaked, labels=(Label("dirty", Gaussian(0.0, 1.5)),))
+    edge = math.exp(-0.5 * (1.0 / 1.5) ** 2)
+    only = Activation("threshold", threshold=edge)
+    (block,) = system.blocks
+    blocks = (replace(block, activation=only),)
+    system = replace(system, inputs=(bell,), blocks=blocks)
+    other = shifted(system, 1e-15)
+    found = check_system(
+        system, other, limit=1, data=np.array([[1.0, 0.5]]), runtimes=["native"]
+    )
+    (told,) = (text for text in found.skipped if text.startswith("file 1"))
+    assert "in 1 of 3 rows last bits decide" in told
+    rows = [c for c in found.comparisons if (c.carrier, c.basis) == ("file 1", "rows")]
+    assert [c.allowed < 1e-12 for c in rows] == [True]
+
+
+def test_a_check_reports_what_it_compares_next_and_how_far_it_is() -> None:
+    system = random_system(2)
+    parts: list[tuple[str, float]] = []
+    check_system(
+        system,
+        system,
+        runtimes=["native"],
+        limit=20,
+        progress=lambda text, share: parts.append((text, share)),
+    )
+    assert parts == [("comparing native", 0.0), ("comparing file 1", 0.5)]

@@ -1,0 +1,268 @@
+import math
+
+import numpy as np
+import pytest
+
+from fuzzytree.checking.comparing import (
+    Answers,
+    Rows,
+    compare_answers,
+    compare_bits,
+    compare_exact,
+    compare_excused,
+    compare_within,
+    labels,
+    margins,
+)
+from fuzzytree.model.agreement import Certified
+from fuzzytree.model.contracts import Dtype, Outcome
+from fuzzytree.model.rulebase import (
+    Band,
+    Clause,
+    Flank,
+    Rule,
+    RuleBase,
+    Semantics,
+    Term,
+    Variable,
+)
+from fuzzytree.numerics.oracle import decide
+from fuzzytree.testing import random_tree
+
+LOW = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+CLAUSE = Clause("x", ("low",))
+RULES = RuleBase(
+    "r",
+    ("a", "b"),
+    (Variable("x", (LOW,)),),
+    (Rule((CLAUSE,), "a"), Rule((CLAUSE,), "b"), Rule((CLAUSE,), "a")),
+    Semantics(uncovered="b"),
+)
+ROWS = Rows(("x",), np.array([[1.0, 2.0, 3.0]]), np.arange(3), 1)
+
+
+def answers(
+    title: str, rule: list[int], status: list[int], strengths: list[list[float]]
+) -> Answers:
+    outcome = Outcome(np.array(rule), np.array(status), np.array(strengths))
+    return Answers(title, RULES, outcome)
+
+
+BASE = answers(
+    "base",
+    [1, 2, 0],
+    [0, 0, 2],
+    [[0.9, 0.2, 0.0], [0.5, 0.4, 0.0], [0.8, 0.1, 0.0]],
+)
+
+
+def test_equal_answers_of_other_strengths_are_told_with_the_rule_that_differs() -> None:
+    assert BASE.outcome.strengths is not None
+    strengths = BASE.outcome.strengths.tolist()
+    strengths[2][1] = 0.125
+    moved = answers("moved", [1, 2, 0], [0, 0, 2], strengths)
+    assert compare_bits(moved, BASE, ROWS).detail == (
+        "only strengths differ: every row has the same class",
+        "row 1: x 2.0: both answer b (rule 2) with 0.4; the strength of rule 3 is "
+        "0.1 in base, 0.125 in moved",
+    )
+
+
+def test_equal_answers_agree() -> None:
+    found = compare_bits(BASE, BASE, ROWS)
+    assert (found.verdict, found.differing, found.flips) == ("agrees", 0, 0)
+
+
+def test_one_ulp_of_a_strength_disagrees_with_equal_bits() -> None:
+    moved = answers(
+        "moved",
+        [1, 2, 0],
+        [0, 0, 2],
+        [[math.nextafter(0.9, 1), 0.2, 0.0], [0.5, 0.4, 0.0], [0.8, 0.1, 0.0]],
+    )
+    found = compare_bits(moved, BASE, ROWS)
+    assert (found.verdict, found.differing) == ("DISAGREES", 1)
+    assert found.largest_difference == math.nextafter(0.9, 1) - 0.9
+    assert found.detail == (
+        "only strengths differ: every row has the same class",
+        "probe 1: x 1.0: base answers a (rule 1) with 0.9, "
+        "moved a (rule 1) with 0.9000000000000001",
+    )
+
+
+def test_a_zero_of_the_other_sign_disagrees_with_equal_bits() -> None:
+    signed = answers(
+        "signed",
+        [1, 2, 0],
+        [0, 0, 2],
+        [[0.9, 0.2, 0.0], [0.5, 0.4, -0.0], [0.8, 0.1, 0.0]],
+    )
+    found = compare_bits(signed, BASE, ROWS)
+    assert (found.verdict, found.differing) == ("DISAGREES", 1)
+    assert found.detail == (
+        "row 2: x 3.0: both answer b (uncovered); the strength of rule 2 is 0.0 in "
+        "base, -0.0 in signed",
+    )
+
+
+def test_another_rule_of_the_same_class_disagrees_with_equal_bits() -> None:
+    other = answers("other", [3, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
+    assert compare_bits(other, BASE, ROWS).verdict == "DISAGREES"
+
+
+def test_nan_equals_nan_and_nothing_else() -> None:
+    nothing = answers("nothing", [0, 0, 0], [3, 3, 3], [[math.nan] * 3] * 3)
+    assert compare_bits(nothing, nothing, ROWS).verdict == "agrees"
+    assert compare_bits(nothing, BASE, ROWS).largest_difference == math.inf
+
+
+def test_classes_may_differ_only_within_twice_the_bound() -> None:
+    # Row 2: b leads by 0.4 - 0.2; a carrier that answers a there needs a bound of 0.1.
+    flipped = answers(
+        "flipped",
+        [1, 1, 0],
+        [0, 0, 2],
+        [[0.9, 0.3, 0.0], [0.5, 0.3, 0.0], [0.8, 0.1, 0.0]],
+    )
+    wide = compare_within(flipped, BASE, ROWS, allowed=np.full(3, 0.11), origin="test")
+    assert (wide.verdict, wide.flips) == ("agrees", 1)
+    assert wide.largest_flip_margin == 0.4 - 0.2
+    narrow = compare_within(
+        flipped, BASE, ROWS, allowed=np.full(3, 0.09), origin="test"
+    )
+    assert (narrow.verdict, narrow.differing) == ("DISAGREES", 1)
+
+
+def test_the_allowed_difference_is_that_of_the_row_with_the_largest_one() -> None:
+    moved = answers(
+        "moved",
+        [1, 2, 0],
+        [0, 0, 2],
+        [[0.90625, 0.2, 0.0], [0.5, 0.40625, 0.0], [0.8, 0.1, 0.5]],
+    )
+    moved.outcome.strengths[0, 1] = 0.25  # type: ignore[index]  # it has strengths
+    allowed = np.array([0.00625000001, 0.2, 1.0])
+    found = compare_within(moved, BASE, ROWS, allowed=allowed, origin="test")
+    assert found.verdict == "agrees"
+    assert (found.largest_difference, found.allowed) == (0.25 - 0.2, 0.2)
+    assert (found.unbounded, found.largest_unbounded) == (1, 0.5)
+
+
+def test_a_difference_by_design_is_told_and_no_fault() -> None:
+    other = answers("other", [2, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
+    told = compare_answers(other, BASE, ROWS, by_design=True)
+    assert (told.verdict, told.flips) == ("differs by design", 1)
+    assert compare_answers(other, BASE, ROWS).verdict == "DISAGREES"
+
+
+def test_an_excused_row_may_differ_and_no_other() -> None:
+    other = answers("other", [2, 2, 0], [0, 0, 2], [[0.9, 0.2, 0.0]] * 3)
+    first = np.array([True, False, False])
+    last = np.array([False, False, True])
+    origin = "test"
+    assert compare_excused(other, BASE, ROWS, excused=first, origin=origin).verdict == (
+        "agrees"
+    )
+    assert compare_excused(other, BASE, ROWS, excused=last, origin=origin).verdict == (
+        "DISAGREES"
+    )
+
+
+def test_labels_follow_the_rule_or_the_declared_answer() -> None:
+    assert labels(BASE).tolist() == [0, 1, 1]
+
+
+def test_a_margin_lies_between_classes_and_not_between_rules() -> None:
+    found = margins(BASE)
+    assert found is not None
+    assert found.tolist() == [0.9 - 0.5, 0.4 - 0.2, 0.0]
+
+
+def test_data_rows_are_numbered_from_one_behind_the_probes() -> None:
+    assert [ROWS.name(0), ROWS.name(1), ROWS.name(2)] == ["probe 1", "row 1", "row 2"]
+    assert ROWS.part(slice(None, None, 2)).name(1) == "row 2"
+
+
+# --- against exact arithmetic
+
+
+NARROW = RuleBase(
+    "r",
+    ("a", "b"),
+    (Variable("x", (LOW, Term("high", Band(low=2.0)))),),
+    (Rule((CLAUSE,), "a"), Rule((Clause("x", ("high",)),), "b")),
+)
+
+
+def held(values: list[float], strengths: list[list[float]], dtype: Dtype) -> Certified:
+    """Hold strengths against the exact ones of `a: low, b: above 2`; one probe."""
+    fired = np.array(strengths)
+    rows = Rows(("x",), np.array([values]), np.arange(len(values)), 1)
+    rule = np.where(fired.max(axis=0) > 0, fired.argmax(axis=0) + 1, 0)
+    status = np.where(rule > 0, 0, 2)
+    found = Answers("mine", NARROW, Outcome(rule, status, fired))
+    return compare_exact(found, decide(NARROW, rows.values), rows, dtype=dtype)
+
+
+def test_exact_strengths_agree_and_the_data_are_counted() -> None:
+    found = held([9.0, 1.0, 2.0], [[0.0, 1.0, 0.5], [1.0, 0.0, 0.0]], "float64")
+    assert (found.verdict, found.on, found.rows) == ("agrees", "data", 2)
+    assert (found.largest, found.flips, found.in_band) == (0.0, 0, 0)
+    assert found.sentence == (
+        "no decision can differ where the margin exceeds 2 x 5.6e-16"
+    )
+
+
+def test_without_data_the_probes_are_counted() -> None:
+    found = held([1.0], [[1.0], [0.0]], "mixed")
+    assert (found.on, found.rows) == ("probes", 1)
+
+
+def test_a_strength_beyond_its_bound_disagrees_and_is_told() -> None:
+    found = held([1.0, 2.0], [[1.0, 0.51], [0.0, 0.0]], "mixed")
+    assert (found.verdict, found.flips) == ("DISAGREES", 0)
+    assert found.detail == (
+        "row 1: x 2.0: exactly a (rule 1), mine a (rule 1) with 0.51; a strength is "
+        "off by 0.01, and 3e-07 is allowed",
+    )
+
+
+def test_a_flip_where_the_margin_is_wide_disagrees() -> None:
+    found = held([1.0, 2.0], [[1.0, 0.0], [0.0, 0.5]], "float64")
+    assert (found.verdict, found.flips) == ("DISAGREES", 1)
+    assert found.largest_flip_margin == pytest.approx(0.5)
+
+
+def test_a_flip_beside_a_step_that_float32_cannot_tell_is_allowed() -> None:
+    above = math.nextafter(2.0, 3.0)
+    values, strengths = [1.0, above], [[1.0, 0.5], [0.0, 0.0]]
+    assert held(values, strengths, "float64").verdict == "DISAGREES"
+    found = held(values, strengths, "float32")
+    assert (found.verdict, found.flips, found.in_band) == ("agrees", 1, 1)
+    assert found.unbounded == 1
+
+
+def test_cover_that_is_lost_and_gained_is_counted() -> None:
+    near = math.nextafter(3.0, 0.0)
+    low = RuleBase("r", ("a",), (Variable("x", (LOW,)),), (Rule((CLAUSE,), "a"),))
+    rows = Rows(("x",), np.array([[near, 3.0]]), np.arange(2), 0)
+    fired = np.array([[0.0, 1e-17]])
+    found = Answers("mine", low, Outcome(np.array([0, 1]), np.array([2, 0]), fired))
+    told = compare_exact(found, decide(low, rows.values), rows, dtype="float64")
+    assert (told.cover_lost, told.cover_gained, told.verdict) == (1, 1, "agrees")
+
+
+def test_a_path_that_leaves_the_tree_far_from_its_cuts_disagrees() -> None:
+    tree = random_tree(1, leaves=2, inputs=1, combinations=0)
+    (cut,) = tree.nodes[0].cuts[:1]
+    values = np.array([[cut, math.nextafter(cut, math.inf), cut + abs(cut)]])
+    rows = Rows(tree.inputs, values, np.arange(3), 0)
+    truth = decide(tree, values)
+    wrong = Outcome(3 - truth.rule, truth.status)
+    found = Answers("mine", tree, wrong)
+    assert labels(found).tolist() != truth.label.tolist()
+    assert compare_exact(found, truth, rows, dtype="float64").verdict == "DISAGREES"
+    near = Rows(tree.inputs, values[:, :2], np.arange(2), 0)
+    part = found.part(slice(0, 2))
+    told = compare_exact(part, decide(tree, near.values), near, dtype="float32")
+    assert (told.verdict, told.flips, told.in_band) == ("agrees", 2, 2)

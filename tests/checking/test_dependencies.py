@@ -1,0 +1,307 @@
+"""What a model needs is told, and a pruned model is held against the model."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from fuzzytree.benchmarking import savings
+from fuzzytree.benchmarking.savings import report, stages, with_all_columns
+from fuzzytree.checking.dependencies import COMBINATIONS, Graph, needs, prove
+from fuzzytree.model.rulebase import Clause, Part, Rule, RuleBase, Semantics, Variable
+from fuzzytree.report.needs import report_lines
+from fuzzytree.semantics.lowering import forms, rules_from_tree
+from fuzzytree.semantics.simplification import USES, Pruned, pruned
+from fuzzytree.testing import random_tree
+from tests.semantics.test_pruning import ALL, FORCE, HARD, PATH, SOFT, base, force
+
+pytestmark = pytest.mark.usefixtures("few_objects")
+
+ROOT = Path(__file__).resolve().parents[2]
+OUTCOMES = ("native", "native mixed", "native float32", "best-first")
+
+
+def graph(model: RuleBase) -> Graph:
+    return next(one for one in needs(model).graphs if one.dtype == "float64")
+
+
+def because(found: Graph) -> dict[str, dict[str, int]]:
+    return {one.what: one.operators for one in found.because}
+
+
+# --- needs
+
+
+def test_an_input_that_nothing_asks_is_told_apart_from_those_that_are_needed() -> None:
+    mix = Variable("mix", (HARD,), parts=(Part("slip", 1.0), Part("speed", 2.0)))
+    known = (FORCE, Variable("slip"), Variable("speed"), Variable("heat"), mix)
+    rules = base((force("soft"),), (Clause("mix", ("hard",)),), variables=known)
+    found = needs(rules)
+    assert found.inputs == ("force", "slip", "speed")
+    assert found.idle_inputs == ("heat",)
+    assert found.combinations == ("mix",)
+    assert [one.where for one in found.idle] == [
+        "term 'firm' of 'force'",
+        "term 'hard' of 'force'",
+        "input 'heat'",
+    ]
+
+
+def test_a_graph_holds_nothing_for_what_the_rules_do_not_have() -> None:
+    found = graph(base((force("soft"),), (force("hard"),)))
+    assert found.left_out == (
+        COMBINATIONS,
+        "negation",
+        "OR of terms",
+        "product as AND",
+        "an answer of its own for missing values",
+        "curves",
+    )
+    assert found.because == ()
+    assert not {"Max", "Concat_2", "Slice"} & found.contents.operators.keys()
+
+
+def test_the_operators_of_an_or_a_negation_and_a_missing_answer_are_told() -> None:
+    rules = base(
+        (force("soft", "hard"),),
+        (force("firm", negated=True),),
+        semantics=Semantics(missing="a"),
+    )
+    found = because(graph(rules))
+    assert found["OR of terms"]["Max"] == 1
+    assert found["negation"]["Sub"] == 1
+    assert found["an answer of its own for missing values"]["Where"] == 1
+    assert "product as AND" not in found
+
+
+def test_the_operators_of_a_product_and_of_combinations_are_told() -> None:
+    mix = Variable("mix", (SOFT,), parts=(Part("force", 1.0), Part("slip", 2.0)))
+    rules = base(
+        (force("soft"), Clause("mix", ("soft",))),
+        (force("hard"), Clause("mix", ("soft",))),
+        variables=(FORCE, Variable("slip"), mix),
+        semantics=Semantics("product"),
+    )
+    found = because(graph(rules))
+    assert found["product as AND"] == {"Min": -1, "Mul": 1}
+    assert found[COMBINATIONS]["Add"] == 1
+
+
+def test_ties_and_strengths_are_in_a_graph_on_request_alone() -> None:
+    found = graph(base((force("soft"),), (force("hard"),)))
+    assert [one.what for one in found.on_request] == [
+        "output status",
+        "output strengths",
+    ]
+    assert found.contents.operators["ArgMax"] == 1
+    assert found.on_request[0].operators["ArgMax"] == 1
+
+
+def test_an_input_of_combinations_alone_is_guarded_by_them() -> None:
+    """No weight is 0, so the sum is not finite where a part is not."""
+    rules = rules_from_tree(random_tree(5, inputs=3, combinations=1.0))
+    assert {v.name for v in rules.variables if v.terms}.isdisjoint(rules.inputs)
+    native = prove(rules, Pruned(rules, (), ()), runtimes=("onnxruntime float64",))
+    assert native.ok
+
+
+def test_the_carriers_of_a_tree_are_those_it_can_serve() -> None:
+    tree = random_tree(1)
+    assert list(forms(tree)) == ["tree", "relative rules", "raw rules"]
+    assert list(forms(pruned(tree).model)) == ["tree", "relative rules"]
+    assert list(forms(tree, ("raw",))) == ["raw rules"]
+    assert list(forms(rules_from_tree(tree), ("raw",))) == ["rules"]
+
+
+# --- the proof
+
+SEEDS = st.integers(0, 10_000)
+
+
+@given(SEEDS)
+@settings(max_examples=12, deadline=None)
+def test_a_pruned_model_answers_with_the_same_bits(seed: int) -> None:
+    tree = random_tree(seed, leaves=1 + seed % 7, inputs=1 + seed % 4)
+    found = prove(
+        tree, pruned(tree, uses=USES), uses=USES, runtimes=OUTCOMES, limit=300
+    )
+    assert found.ok, found
+    for kind in ("relative", "raw"):
+        rules = rules_from_tree(tree, kind)
+        left = pruned(rules, inputs=True, rules=True)
+        held = prove(rules, left, runtimes=OUTCOMES, limit=300)
+        assert held.ok, held
+        assert held.comparisons[0].basis == "proof"
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("seed", range(15))
+def test_pruned_models_answer_alike_in_every_onnx_type(seed: int) -> None:
+    tree = random_tree(seed, leaves=2 + seed % 9, inputs=1 + seed % 5)
+    runtimes = ("onnxruntime float64", "onnxruntime mixed", "python", "reference")
+    assert prove(tree, pruned(tree, uses=USES), uses=USES, runtimes=runtimes).ok
+    raw = rules_from_tree(tree, "raw")
+    assert prove(raw, pruned(raw, rules=True), runtimes=runtimes).ok
+
+
+def test_rows_that_only_the_pruned_model_answers_are_counted_as_a_change() -> None:
+    rules = base(*ALL, variables=(FORCE, Variable("slip")))
+    data = np.array([[1.0, 1.0], [0.0, np.nan]])
+    found = prove(rules, pruned(rules, inputs=True), data=data)
+    assert found.ok
+    same, changed = found.comparisons[1:]
+    assert (same.verdict, same.differing) == ("agrees", 0)
+    assert changed.verdict == "differs by design"
+    assert changed.differing == changed.rows > 0
+
+
+def test_the_strength_of_a_rule_that_is_gone_must_be_zero() -> None:
+    rules = base((force("soft"),), (force("hard"),))
+    one = replace(rules, rules=rules.rules[:1])
+    found = prove(rules, Pruned(one, (), (1,)))
+    proof, rows = found.comparisons
+    assert proof.detail == ("rule 2 may fire and is gone",)
+    assert rows.verdict == "DISAGREES"
+
+
+def test_a_used_term_that_was_dropped_is_caught_by_proof_and_by_rows() -> None:
+    rules = base((force("soft", "firm"),), (force("hard"),))
+    planted = base((force("soft"),), (force("hard"),))
+    found = prove(rules, Pruned(planted, ()))
+    assert [c.verdict for c in found.comparisons] == ["DISAGREES", "DISAGREES"]
+
+
+def test_a_cut_that_was_moved_is_caught() -> None:
+    tree = random_tree(2, leaves=2, inputs=1)
+    other = random_tree(3, leaves=2, inputs=1)
+    assert not prove(tree, Pruned(other, ())).ok
+
+
+def test_data_of_another_shape_is_one_sentence() -> None:
+    rules = base((force("soft"),))
+    message = r"^data must have shape \(1, rows\), not \(2, 3\)$"
+    with pytest.raises(ValueError, match=message):
+        prove(rules, pruned(rules), data=np.zeros((2, 3)))
+
+
+# --- savings
+
+
+def test_a_model_with_all_columns_answers_a_complete_row_alike() -> None:
+    tree = random_tree(4, inputs=2, combinations=0.0)
+    wide = replace(tree, columns=("note", *tree.columns, "weight"))
+    declared = with_all_columns(wide)
+    assert declared.inputs == ("note", *tree.columns, "weight")
+    assert list(stages(wide, wide)) == ["all columns", "as it is", "pruned"]
+    found = prove(declared, pruned(declared, inputs=True), limit=400)
+    assert found.ok
+
+
+def test_a_model_that_needs_every_column_has_two_stages() -> None:
+    rules = base((force("soft"),))
+    assert list(stages(rules, rules)) == ["as it is", "pruned"]
+
+
+def test_a_pruned_model_is_nowhere_larger() -> None:
+    tree = random_tree(6, leaves=6)
+    told = report(tree, pruned(tree, uses=PATH), uses=PATH)
+    before, after = told.sizes[-2:]
+    for one, two in zip(before.files, after.files, strict=True):
+        assert (one.carrier, one.format, one.dtype) == (
+            two.carrier,
+            two.format,
+            two.dtype,
+        )
+        assert two.bytes <= one.bytes
+    assert after.files[0].bytes < before.files[0].bytes
+
+
+def test_costs_are_measured_in_every_stage(tmp_path: Path) -> None:
+    table = tmp_path / "rows.csv"
+    table.write_text("force,slip\n1,2\n3,4\n", "utf-8")
+    rules = replace(base((force("soft"),)), columns=("force", "slip"))
+    made = stages(rules, pruned(rules).model)
+    found, omissions = savings.costs(
+        made, PATH, table=str(table), seconds=60.0, rounds=1
+    )
+    assert omissions == ()
+    names = {(c.stage, c.runtime, c.what) for c in found}
+    whats = [
+        ("native", "one row"),
+        ("native", "10,000 rows"),
+        ("onnxruntime", "open"),
+        ("onnxruntime", "one row"),
+        ("onnxruntime", "10,000 rows"),
+        ("", "read the table"),
+    ]
+    assert names == {(stage, *what) for stage in made for what in whats}
+
+
+def test_a_tree_of_one_leaf_needs_nothing_and_is_timed() -> None:
+    tree = random_tree(1, leaves=1)
+    told = report(tree, pruned(tree), seconds=5.0)
+    assert told.proof.ok
+    assert told.needs.inputs == ()
+    assert {cost.what for cost in told.costs} == {"open", "one row", "10,000 rows"}
+    assert [size.row_bytes for size in told.sizes] == [8 * len(tree.columns), 0, 0]
+
+
+def test_what_the_time_does_not_reach_is_an_omission() -> None:
+    found, omissions = savings.costs(
+        {"as it is": base((force("soft"),))}, PATH, seconds=1e-9
+    )
+    assert found == ()
+    assert "as it is rules native one row: the time was over" in omissions
+
+
+def test_an_interruption_ends_the_measuring_and_is_passed_on() -> None:
+    def interrupt(text: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    rules = base((force("soft"),))
+    with pytest.raises(KeyboardInterrupt):
+        savings.costs({"as it is": rules}, (), seconds=60.0, tell=interrupt)
+
+
+def test_a_table_that_cannot_be_read_is_an_omission() -> None:
+    rules = base((force("soft"),))
+    _, omissions = savings.costs({"as it is": rules}, (), table="no.csv", seconds=0.05)
+    assert omissions[:1] == (
+        "reading no.csv, as it is: no.csv: cannot be read: no such file or directory",
+    )
+
+
+def test_what_float32_cannot_hold_is_an_omission() -> None:
+    huge = replace(HARD, shape=replace(HARD.shape, low=1e300, high=None))
+    rules = base((force("hard"),), variables=(Variable("force", (huge,)),))
+    told = report(rules, pruned(rules))
+    assert len(told.needs.omissions) == len(told.omissions) == 1
+    assert "float32" in told.omissions[0]
+
+
+def test_a_report_fits_its_schema_and_says_the_same_in_words() -> None:
+    tree = random_tree(3, leaves=4)
+    told = report(tree, pruned(tree), seconds=0.2)
+    facts = json.loads(told.to_json())
+    schema = json.loads((ROOT / "schemas" / "needs.schema.json").read_bytes())
+    jsonschema.Draft202012Validator(schema).validate(facts)
+    text = "\n".join(report_lines(told))
+    assert facts["needs"]["model"] in text
+    for one in told.removed:
+        assert one.where in text
+
+
+def test_a_long_list_ends_with_a_count() -> None:
+    rule = Rule((force("soft"),), "a")
+    terms = tuple(replace(SOFT, name=f"soft {k}") for k in range(20))
+    variable = Variable("force", (SOFT, *terms))
+    rules = RuleBase("grip", ("a",), (variable,), (rule,))
+    lines = list(report_lines(report(rules, pruned(rules))))
+    assert "and 8 more" in lines

@@ -1,0 +1,135 @@
+"""What comes back from a file is told apart from what only looks like it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.checking.likeness import is_alike, likeness
+from fuzzytree.model.contracts import Document, Reading, Written
+from fuzzytree.model.rulebase import (
+    Band,
+    Clause,
+    Flank,
+    Points,
+    Rule,
+    RuleBase,
+    Shape,
+    Term,
+    Variable,
+)
+from fuzzytree.model.system import FuzzySystem, Is, Label, Trapezoid
+from fuzzytree.semantics.conversion import as_system
+from fuzzytree.semantics.conversion.straight import straightened
+from fuzzytree.semantics.samples import samples
+
+RULES = samples()["point lists"]
+TREE = samples()["tree"]
+
+
+def _one(shape: Shape) -> RuleBase:
+    variable = Variable("force", (Term("low", shape),))
+    rule = Rule((Clause("force", ("low",)),), "soft")
+    return RuleBase("one", ("soft",), (variable,), (rule,))
+
+
+RAMP = _one(Band(high=2.0, right=Flank(2.0, 4.0)))
+
+
+def _seen(model: Document, other: Document, *remarks: str) -> str:
+    return likeness(model, Written(b"", (), remarks), Reading(other))
+
+
+def test_a_model_is_equal_to_itself() -> None:
+    for model in samples().values():
+        assert _seen(model, model) == "equal"
+        assert is_alike(model, model)
+
+
+def test_no_sample_is_like_another() -> None:
+    known = list(samples().items())
+    alike = [
+        (name, other_name)
+        for name, one in known
+        for other_name, other in known
+        if name != other_name and is_alike(one, other)
+    ]
+    assert alike == []
+
+
+def test_a_rule_that_always_holds_is_like_one_that_asks_what_is_always_so() -> None:
+    always = samples()["a conclusion without a condition"]
+    assert isinstance(always, FuzzySystem)
+    heat, damp = always.inputs
+    label = Label("always", Trapezoid(None, 0.0, 0.0, None))
+    block = always.blocks[0]
+
+    def asking(label: Label) -> FuzzySystem:
+        rules = tuple(
+            replace(one, when=one.when or Is("heat", label.name)) for one in block.rules
+        )
+        return replace(
+            always,
+            inputs=(replace(heat, labels=(*heat.labels, label)), damp),
+            blocks=(replace(block, rules=rules),),
+        )
+
+    assert is_alike(always, asking(label))
+    assert not is_alike(always, asking(replace(label, height=0.5)))
+    assert not is_alike(always, asking(Label("near", Trapezoid(None, 0.0, 9.0, 10.0))))
+
+
+def test_another_name_needs_a_remark() -> None:
+    assert isinstance(RULES, RuleBase)
+    renamed = replace(RULES, name="another")
+    assert _seen(RULES, renamed) == "renamed"
+    assert _seen(RULES, renamed, "the name was changed") == "alike"
+
+
+@pytest.mark.parametrize("scores", ["winner", "rule", "class"])
+def test_rules_are_like_the_systems_that_decide_as_they_do(scores: str) -> None:
+    assert isinstance(RULES, RuleBase)
+    for how in ("winner", "rule", "class"):
+        if how == scores:
+            assert is_alike(RULES, as_system(RULES, how))
+    other = samples()["AND as product"]
+    assert isinstance(other, RuleBase)
+    assert not is_alike(other, as_system(RULES, "winner"))
+
+
+def test_straight_flanks_are_like_their_points() -> None:
+    points = straightened(RAMP)
+    assert points is not None
+    assert _seen(RAMP, points, "lines became points") == "alike"
+    assert is_alike(points, RAMP)
+
+
+def test_a_step_is_like_a_line_to_the_next_double() -> None:
+    step = _one(Points((1.0, 1.0), (0.0, 1.0)))
+    ramp = _one(Points((1.0, math.nextafter(1.0, 2.0)), (0.0, 1.0)))
+    assert is_alike(step, ramp)
+    other = _one(Points((math.nextafter(1.0, 0.0), 1.0), (0.0, 1.0)))
+    assert not is_alike(step, other)  # at 1 itself they differ
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Band(high=2.0, right=Flank(2.0, 4.0, (0.5, 0.5))),
+        Band(high=2.0, right=Flank(2.0, math.nextafter(4.0, 5.0) + 1e-12)),
+        Band(high=math.nextafter(2.0, 3.0), right=Flank(2.0, 4.0)),
+        Band(high=2.0),
+        Points((2.0, 2.0, 3.0, 4.0), (1.0, 1.0, 0.5 + 1e-12, 0.0)),
+        Points((1.9, 4.0), (1.0, 0.0)),
+    ],
+)
+def test_another_curve_is_another_model(shape: Shape) -> None:
+    assert not is_alike(RAMP, _one(shape))
+    assert _seen(RAMP, _one(shape), "a remark") == "other"
+
+
+def test_a_curve_that_is_no_line_is_not_straightened() -> None:
+    assert straightened(_one(Band(high=2.0, right=Flank(2.0, 4.0, (0.5, 0.5))))) is None
+    assert straightened(_one(Points((0.0,), (1.0,)))) is None

@@ -1,0 +1,215 @@
+"""What each format can carry is found by trying, and the page shows what was found.
+
+`python tests/formats/test_formats.py` rewrites the table of `docs/formats.md`.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+from sklearn import datasets
+from sklearn.tree import DecisionTreeClassifier
+
+from fuzzytree import from_sklearn
+from fuzzytree.checking.abilities import MEANINGS, Ability, abilities, dialects_of
+from fuzzytree.checking.converting import export, formed
+from fuzzytree.errors import LossError
+from fuzzytree.exporters import TABLE, all_formats, find_format
+from fuzzytree.learning import learn_arrays
+from fuzzytree.learning.arrays import FloatArray
+from fuzzytree.model.contracts import Document, Loss, Written
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.report.formats import SIGNS, ability_table
+from fuzzytree.semantics.conversion import as_system, flattened
+from fuzzytree.semantics.inference import input_values
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.samples import samples
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "formats.md"
+MARKED = re.compile(r"(<!-- abilities -->\n\n).*?(<!-- end -->\n)", re.DOTALL)
+YAML = find_format("yaml")
+
+
+@functools.cache
+def _tried(form: str) -> tuple[Ability, ...]:
+    return abilities(find_format(form))
+
+
+def _page() -> str:
+    made = ability_table({one.name: _tried(one.name) for one in all_formats()})
+    for form in all_formats():
+        known = {name: abilities(form, dialect=name) for name in dialects_of(form)}
+        lines = zip(*known.values(), strict=True)
+        if any(len({one.outcome for one in line}) > 1 for line in lines):
+            table = ability_table(known, legend=False)
+            made += f"\nThe dialects of {form.name}:\n\n{table}"
+    text = PAGE.read_text("utf-8")
+    return MARKED.sub(lambda found: f"{found[1]}{made}\n{found[2]}", text)
+
+
+def test_the_page_shows_what_was_found() -> None:
+    shown = PAGE.read_text("utf-8")
+    assert shown == _page(), "python tests/formats/test_formats.py rewrites the page"
+
+
+@functools.cache
+def _learnt(name: str, *, by_sklearn: bool) -> tuple[RuleBase, FloatArray]:
+    values, labels = getattr(datasets, f"load_{name}")(return_X_y=True)
+    columns = [f"x{k}" for k in range(values.shape[1])]
+    if by_sklearn:
+        foreign = DecisionTreeClassifier(max_depth=4, random_state=0)
+        tree = from_sklearn(foreign.fit(values, labels), columns=columns)
+    else:
+        classes = [f"c{k}" for k in range(int(labels.max()) + 1)]
+        tree = learn_arrays(values, labels, columns=columns, classes=classes).tree
+        assert any(one.parts for one in tree.variables)
+    return rules_from_tree(tree), values
+
+
+@pytest.mark.parametrize("by_sklearn", [False, True])
+@pytest.mark.parametrize("name", ["iris", "wine", "breast_cancer"])
+@pytest.mark.parametrize("form", ["fcl", "fll", "fis", "fml"])
+def test_a_file_has_the_inputs_that_rules_use_and_no_row_is_outside_their_ranges(
+    form: str, name: str, by_sklearn: bool
+) -> None:
+    rules, table = _learnt(name, by_sklearn=by_sklearn)
+    inputs = as_system(rules).inputs
+    used = flattened(as_system(rules))[0].columns
+    assert set(used) == {one.name for one in rules.variables if one.terms}
+    columns = [f"x{k}" for k in range(table.shape[1])]
+    rows = [
+        input_values(inputs, dict(zip(columns, row, strict=True)))
+        for row in table.tolist()
+    ]
+    format_ = find_format(form)
+    assert format_.read is not None
+    for dialect in dialects_of(format_) or (None,):
+        options = {} if dialect is None else {"dialect": dialect}
+        written = export(rules, form, allow_loss=True, tolerance=0.01, **options)
+        content = written.content.replace(b'"fuzzytree":1', b'"fuzzytree":0')
+        system = format_.read(content, "model").model
+        assert isinstance(system, FuzzySystem)
+        for one, name in zip(system.inputs, used, strict=True):
+            values = [row[name] for row in rows]
+            assert one.low is None or one.low <= min(values)
+            assert one.high is None or max(values) <= one.high
+
+
+def test_there_is_a_sample_of_every_kind_of_model() -> None:
+    kinds = {type(model) for model in samples().values()}
+    assert kinds == {FuzzyTree, RuleBase, FuzzySystem}
+
+
+def test_each_dialect_of_a_format_is_tried() -> None:
+    assert dialects_of(YAML) == ()
+    fcl = find_format("fcl")
+    assert dialects_of(fcl) == ("portable", "iec", "fuzzylite", "jfuzzylogic")
+    one = {"Sugeno, linear": samples()["Sugeno, linear"]}
+    assert abilities(fcl, one)[0].outcome == "refused"
+    assert abilities(fcl, one, dialect="fuzzylite")[0].outcome == "alike"
+
+
+def test_every_outcome_has_a_sign_and_a_meaning() -> None:
+    assert list(SIGNS) == list(MEANINGS)
+    assert len(set(SIGNS.values())) == len(SIGNS)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_a_format_carries_what_it_says(name: str) -> None:
+    form = find_format(name)
+    found = {one.sample: one.outcome for one in _tried(name)}
+    for sample, model in samples().items():
+        kind = {FuzzyTree: "tree", RuleBase: "rules", FuzzySystem: "system"}[
+            type(model)
+        ]
+        if kind in form.carries:
+            assert found[sample] != "no"
+
+
+def test_yaml_carries_trees_and_rules_as_they_are() -> None:
+    for one in _tried("yaml"):
+        model = samples()[one.sample]
+        if not isinstance(model, FuzzySystem):
+            assert one.outcome == "equal"
+
+
+def _outcome(sample: str, *, bound: float | None, read: bool = True) -> str:
+    """Return what is found of a format that has one loss."""
+
+    def write(model: Document, /, *, allow_loss: bool = False) -> Written:
+        written = YAML.write(model)
+        return replace(written, losses=(Loss("all", "is less", bound),))
+
+    form = replace(YAML, write=write, read=YAML.read if read else None)
+    (found,) = abilities(form, {sample: samples()[sample]})
+    return found.outcome
+
+
+def test_a_loss_with_a_bound_is_told_from_one_without() -> None:
+    assert _outcome("tree", bound=1e-3) == "points"
+    assert _outcome("tree", bound=None) == "lossy"
+
+
+def test_a_refusal_is_told_with_its_reason() -> None:
+    def write(model: Document, /, *, allow_loss: bool = False) -> Written:
+        raise LossError("turtles only")
+
+    models = {"tree": samples()["tree"]}
+    found = abilities(replace(YAML, write=write), models)[0]
+    assert (found.outcome, found.reasons) == ("refused", ("turtles only",))
+
+
+def test_what_is_read_back_as_another_model_is_lossy() -> None:
+    def write(model: Document, /, *, allow_loss: bool = False) -> Written:
+        assert isinstance(model, FuzzyTree)
+        return YAML.write(replace(model, leaves=model.leaves[::-1]))
+
+    models = {"tree": samples()["tree"]}
+    found = abilities(replace(YAML, write=write), models)[0]
+    assert (found.outcome, found.reasons) == (
+        "lossy",
+        ("it is read back as another model",),
+    )
+
+
+def test_a_tree_goes_as_rules_and_rules_as_a_system() -> None:
+    tree = samples()["tree"]
+    rules = formed(tree, replace(YAML, carries=("rules",)))
+    assert isinstance(rules, RuleBase)
+    system = formed(tree, replace(YAML, carries=("system",)))
+    assert isinstance(system, FuzzySystem)
+    again = formed(system, replace(YAML, carries=("rules",)))
+    assert isinstance(again, RuleBase)
+    assert len(again.rules) == len(rules.rules)
+
+
+def test_a_system_whose_outputs_are_numbers_is_no_rule_base() -> None:
+    with pytest.raises(LossError) as caught:
+        formed(samples()["Mamdani, centroid"], replace(YAML, carries=("rules",)))
+    carriers = [form.name for form in all_formats() if "system" in form.carries]
+    assert str(caught.value) == (
+        "cannot write fan as yaml: it carries rules, "
+        "and this is a fuzzy system whose outputs are numbers; "
+        f"{', '.join(carriers)} carry one"
+    )
+
+
+def test_a_tree_is_refused_with_what_to_do() -> None:
+    with pytest.raises(LossError) as caught:
+        export(samples()["tree"], "fll")
+    assert str(caught.value) == (
+        "cannot write grip as fll: it carries rules or system, and this is a tree; "
+        "fuzzytree.convert makes rules of it"
+    )
+
+
+if __name__ == "__main__":
+    PAGE.write_text(_page(), "utf-8")
+    sys.exit()

@@ -1,0 +1,66 @@
+"""The page about the YAML file: its examples are read, its limits are true."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from fuzzytree.formats.yaml import layout, nodes
+from fuzzytree.formats.yaml.binding import bind
+from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
+from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.model.rulebase import RuleBase
+
+PAGE = Path(__file__).parents[2] / "docs" / "yaml-format.md"
+TEXT = PAGE.read_text("utf-8")
+BLOCKS = re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)
+
+
+def items(block: str, key: str = "") -> tuple[Node, ...]:
+    """Return the items of a block's list, or of the list under a key."""
+    node, found = compose(block.encode(), "page")
+    assert not found
+    if isinstance(node, MappingNode):
+        pairs = node.pairs
+        node = next(v for k, v in pairs if isinstance(k, Scalar) and k.text == key)
+    assert isinstance(node, ListNode)
+    return node.items
+
+
+def test_the_first_example_is_a_whole_file() -> None:
+    rules = read(BLOCKS[0].encode(), "page")
+    assert isinstance(rules, RuleBase)
+    assert len(rules.rules) == 3
+
+
+def test_every_other_example_fits_the_layout() -> None:
+    _, size, points, clauses, nodes_and_leaves, sets = BLOCKS
+    bound: list[tuple[Node, type[layout.Record]]] = [
+        *((item, layout.VariableOfModel) for item in items(size)),
+        *((item, layout.TermOfVariable) for item in items(points)),
+        *((item, layout.WrittenOut) for item in items(clauses)),
+        *((item, layout.Question) for item in items(nodes_and_leaves, "nodes")),
+        *((item, layout.End) for item in items(nodes_and_leaves, "leaves")),
+        *((item, layout.FittedSets) for item in items(sets, "sets")),
+    ]
+    found: list[nodes.Found] = []
+    for item, kind in bound:
+        assert bind(item, kind, found) is not None
+    assert found == []
+
+
+def test_the_page_states_the_limits_of_the_code() -> None:
+    text = " ".join(TEXT.split())
+    assert f"more than {nodes.MOST_BYTES // 2**20} MiB" in text
+    assert f"{nodes.MOST_NODES:,} entries or {nodes.MOST_LEVELS} levels" in text
+    assert f"names of more than {layout.LONGEST_NAME:,} and" in text
+    assert f"sentences of more than {layout.LONGEST_SENTENCE:,} characters" in text
+
+
+def test_the_page_names_every_key() -> None:
+    kinds = [kind for kind in vars(layout).values() if isinstance(kind, type)]
+    records = [kind for kind in kinds if issubclass(kind, layout.Record)]
+    assert len(records) > 15
+    for record in records:
+        for name in record.__struct_encode_fields__:
+            assert re.search(rf"\b{re.escape(name)}\b", TEXT), name

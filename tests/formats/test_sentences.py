@@ -1,0 +1,95 @@
+"""Sentences: their readings, and which of them are ambiguous."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fuzzytree.formats.yaml.sentences import guess, readings, words
+from fuzzytree.model.rulebase import Clause, clause_text
+
+PLAIN = {"size": words(["low", "high"]), "wet or dry": words(["wet", "dry"])}
+TRAPS = {
+    "a": words(["b", "not b", "b or c", "c", "is b", "b is c"]),
+    "a is b": words(["c", "not c"]),
+    "a is not": words(["b", "c"]),
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "clause"),
+    [
+        ("size is low", Clause("size", ("low",))),
+        ("size is high or low", Clause("size", ("high", "low"))),
+        ("size is not low or high", Clause("size", ("low", "high"), negated=True)),
+        ("wet or dry is wet or dry", Clause("wet or dry", ("wet", "dry"))),
+    ],
+)
+def test_a_sentence_of_plain_names_has_one_reading(text: str, clause: Clause) -> None:
+    assert readings(text, PLAIN) == (clause,)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "size", "size is", "size is ", "size is  low", "Size is low", "size is lo"],
+)
+def test_what_names_nothing_has_no_reading(text: str) -> None:
+    assert readings(text, PLAIN) == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "second"),
+    [
+        ("a is not b", Clause("a", ("not b",)), Clause("a", ("b",), negated=True)),
+        ("a is b or c", Clause("a", ("b", "c")), Clause("a", ("b or c",))),
+        ("a is b is c", Clause("a", ("b is c",)), Clause("a is b", ("c",))),
+    ],
+)
+def test_every_reading_of_an_ambiguous_sentence_is_found(
+    text: str, first: Clause, second: Clause
+) -> None:
+    assert set(readings(text, TRAPS)) == {first, second}
+
+
+NAMES = st.lists(
+    st.sampled_from(["a", "b", "is", "not", "or"]), min_size=1, max_size=4
+).map(" ".join)
+
+
+@settings(max_examples=400, deadline=None, derandomize=True)
+@given(
+    st.dictionaries(
+        NAMES, st.lists(NAMES, min_size=1, max_size=4, unique=True), min_size=1
+    ),
+    st.data(),
+)
+def test_readings_are_those_that_a_search_of_all_clauses_finds(
+    terms: dict[str, list[str]], data: st.DataObject
+) -> None:
+    variable = data.draw(st.sampled_from(sorted(terms)))
+    size = data.draw(st.integers(1, min(3, len(terms[variable]))))
+    chosen = tuple(data.draw(st.permutations(terms[variable]))[:size])
+    text = clause_text(Clause(variable, chosen, data.draw(st.booleans())))
+    longest = text.count(" or ") + 1
+    expected = {
+        Clause(name, several, negated)
+        for name in terms
+        for count in range(1, longest + 1)
+        for several in itertools.product(terms[name], repeat=count)
+        for negated in (False, True)
+        if clause_text(Clause(name, several, negated)) == text
+    }
+    vocabulary = {name: words(labels) for name, labels in terms.items()}
+    found = readings(text, vocabulary)
+    assert len(found) == min(len(expected), 2)
+    assert set(found) <= expected
+
+
+def test_a_guess_prefers_a_variable_that_exists() -> None:
+    assert guess("a is b is d", TRAPS) == Clause("a is b", ("d",))
+    assert guess("size is not lo or hi", PLAIN) == Clause("size", ("lo", "hi"), True)
+    assert guess("sise is low", PLAIN) == Clause("sise", ("low",))
+    assert guess("size low", PLAIN) is None

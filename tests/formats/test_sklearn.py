@@ -1,0 +1,279 @@
+"""A tree of scikit-learn and ours answer alike, at every double that was tried."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import struct
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import fuzzytree
+from fuzzytree.errors import LossError
+from fuzzytree.formats.sklearn import exact_cut, from_sklearn
+from fuzzytree.model.rulebase import Band
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import Status, descend, evaluate
+
+ensemble = pytest.importorskip("sklearn.ensemble")
+trees = pytest.importorskip("sklearn.tree")
+
+
+def single(value: float) -> float:
+    """Round to 32 bits, by the C library and not by numpy."""
+    try:
+        return float(struct.unpack("f", struct.pack("f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+FLOATS = st.floats(allow_nan=False, allow_infinity=False)
+SINGLES = st.floats(width=32, allow_nan=False, allow_infinity=False)
+
+
+@given(FLOATS | SINGLES)
+def test_a_cut_is_the_last_double_that_is_rounded_to_the_threshold_or_below(
+    threshold: float,
+) -> None:
+    cut = exact_cut(threshold)
+    assert single(cut) <= threshold
+    assert single(math.nextafter(cut, math.inf)) > threshold
+
+
+@given(SINGLES)
+def test_a_cut_between_two_floats_is_right_for_either_parity(value: float) -> None:
+    following = single(value + 2.0**-149 + abs(value) * 2.0**-24 * 1.5)
+    if value < following < math.inf:
+        threshold = value / 2 + following / 2
+        cut = exact_cut(threshold)
+        assert single(cut) <= threshold < single(math.nextafter(cut, math.inf))
+
+
+def grown(seed: int, *, scale: float = 1.0, **options: Any) -> Any:
+    chance = np.random.default_rng(seed)
+    values = chance.normal(size=(200, 4)) * scale
+    values[:, 1] = np.round(values[:, 1] / scale) * scale
+    labels = chance.integers(0, 3, 200) + 10
+    options.setdefault("max_leaf_nodes", 30)
+    tree = trees.DecisionTreeClassifier(random_state=seed, **options)
+    return tree.fit(values, labels)
+
+
+def near(value: float) -> list[float]:
+    """The doubles around a threshold, and around the floats beside it."""
+    found: list[float] = []
+    below = np.float32(value)
+    floats = [np.nextafter(below, np.float32(way)) for way in (-np.inf, np.inf)]
+    ends = [float(one) for one in (floats[0], below, floats[1])]
+    middles = [a / 2 + b / 2 for a, b in itertools.pairwise(ends)]
+    for place in (value, *ends, *middles):
+        found += [place, *(math.nextafter(place, way) for way in (-math.inf, math.inf))]
+    return found
+
+
+def rows_of(tree: Any, chance: np.random.Generator) -> np.ndarray[Any, Any]:
+    """Rows whose values stand at or beside the thresholds of the columns."""
+    arrays = tree.tree_
+    marks: list[list[float]] = [[0.0, 1.0, -1.0] for _ in range(tree.n_features_in_)]
+    for column, threshold in zip(arrays.feature, arrays.threshold, strict=True):
+        if column >= 0:
+            marks[column] += near(float(threshold))
+    return np.column_stack([chance.choice(one, 400) for one in marks])
+
+
+OPTIONS: list[dict[str, Any]] = [
+    {},
+    {"max_leaf_nodes": None, "max_depth": 4},
+    {"scale": 1e-3},
+    {"scale": 1e37},
+    {"class_weight": {10: 1.0, 11: 5.0, 12: 0.5}},
+    {"splitter": "random"},
+    {"max_leaf_nodes": 2},
+]
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_tree_answers_as_predict_does_at_and_beside_every_threshold(
+    seed: int, options: dict[str, Any]
+) -> None:
+    tree = grown(seed, **options)
+    ours = from_sklearn(tree)
+    rules = rules_from_tree(ours)
+    rows = rows_of(tree, np.random.default_rng(seed))
+    expected = [str(label) for label in tree.predict(rows).tolist()]
+    reached = tree.apply(rows)
+    counts = tree.tree_.n_node_samples
+    for row, label, node in zip(rows.tolist(), expected, reached, strict=True):
+        given_row = dict(zip(ours.columns, row, strict=True))
+        answer = descend(ours, given_row)
+        assert answer.label == label
+        assert ours.leaves[answer.rule - 1].support == counts[node]
+        found = evaluate(rules, given_row)
+        assert (found.label, found.rule) == (label, answer.rule)
+        assert sorted(found.strengths)[-2:] == [0.0, 1.0]
+
+
+def test_classes_of_equal_weight_are_decided_as_predict_does() -> None:
+    stump = trees.DecisionTreeClassifier(max_depth=1)
+    stump.fit([[0.0], [0.0], [1.0], [1.0]], ["b", "a", "b", "a"])
+    ours = from_sklearn(stump)
+    assert descend(ours, {"x1": 0.0}).label == stump.predict([[0.0]])[0] == "a"
+
+
+def test_soft_flanks_change_no_decision_and_fall_over_the_width() -> None:
+    tree = grown(0, max_leaf_nodes=6)
+    spreads = [1.0, 1.0, 2.0, 1.0]
+    crisp = from_sklearn(tree)
+    ours = from_sklearn(tree, soft=0.25, spreads=spreads)
+    assert ours.nodes == crisp.nodes
+    rules = rules_from_tree(ours)
+    for row in rows_of(tree, np.random.default_rng(1)).tolist():
+        given_row = dict(zip(ours.columns, row, strict=True))
+        answer = evaluate(rules, given_row)
+        assert answer.rule == descend(crisp, given_row).rule
+        assert answer.status == Status.DECIDED
+    for variable in ours.variables:
+        width = 0.25 * spreads[ours.columns.index(variable.name)]
+        for term in variable.terms:
+            assert isinstance(term.shape, Band)
+            flank = term.shape.left or term.shape.right
+            assert flank is not None
+            assert abs(flank.end - flank.start) == pytest.approx(width)
+
+
+def test_widths_can_be_given_for_each_column() -> None:
+    tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], [0, 1])
+    ours = from_sklearn(tree, columns=["force"], soft={"force": 2.0})
+    rules = rules_from_tree(ours)
+    strengths = evaluate(rules, {"force": 1.5}).strengths
+    assert list(strengths) == pytest.approx([0.5, 1.0])
+
+
+def test_names_of_the_table_are_kept() -> None:
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"grip force": [0.0, 1.0], "unused": [0.0, 0.0]})
+    tree = trees.DecisionTreeClassifier().fit(table, ["soft", "firm"])
+    named: dict[str, Any] = {"classes": ["fest", "weich"], "name": "grip"}
+    ours = from_sklearn(tree, **named)
+    assert from_sklearn(tree, soft=1.0, spreads=table.std(), **named) != ours
+    assert ours.columns == ("grip force", "unused")
+    assert ours.inputs == ("grip force",)
+    assert ours.classes == ("fest", "weich")
+    assert ours.name == "grip"
+    assert [leaf.label for leaf in ours.leaves] == ["weich", "fest"]
+
+
+def test_a_tree_without_a_question_has_one_leaf() -> None:
+    tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], [1, 1])
+    ours = from_sklearn(tree)
+    assert ours.nodes == ()
+    assert descend(ours, {}).label == "1"
+
+
+def test_a_missing_value_has_the_answer_that_was_asked_for() -> None:
+    tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], ["a", "b"])
+    for missing in (None, "b"):
+        answer = descend(from_sklearn(tree, missing=missing), {"x1": math.nan})
+        assert (answer.label, answer.status) == (missing, Status.MISSING)
+
+
+def test_a_tree_that_asks_for_missing_values_is_refused() -> None:
+    tree = trees.DecisionTreeClassifier()
+    tree.fit([[math.nan], [math.nan], [1.0], [1.0]], ["a", "a", "b", "b"])
+    with pytest.raises(LossError) as caught:
+        from_sklearn(tree)
+    assert str(caught.value) == ("cannot read a tree that asks whether 'x1' is missing")
+
+
+def test_a_tree_that_learnt_where_missing_values_go_is_refused() -> None:
+    tree = trees.DecisionTreeClassifier()
+    tree.fit([[0.0], [0.0], [0.0], [1.0], [math.nan]], ["a", "a", "a", "b", "b"])
+    with pytest.raises(LossError) as caught:
+        from_sklearn(tree, columns=["force"])
+    assert str(caught.value) == (
+        "cannot read a tree that learnt where missing values of 'force' go"
+    )
+
+
+def test_several_outputs_are_refused() -> None:
+    tree = trees.DecisionTreeClassifier().fit([[0.0], [1.0]], [[0, 1], [1, 0]])
+    with pytest.raises(LossError) as caught:
+        from_sklearn(tree)
+    assert str(caught.value) == (
+        "cannot read a DecisionTreeClassifier with 2 outputs: a tree has one"
+    )
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        trees.DecisionTreeRegressor(),
+        ensemble.RandomForestClassifier(),
+        "tree",
+        type("DecisionTreeClassifier", (), {})(),
+    ],
+    ids=lambda wrong: type(wrong).__name__,
+)
+def test_what_is_no_such_tree_is_refused(wrong: object) -> None:
+    with pytest.raises(TypeError) as caught:
+        from_sklearn(wrong)
+    assert str(caught.value) == (
+        f"from_sklearn reads a DecisionTreeClassifier, and not a {type(wrong).__name__}"
+    )
+
+
+def test_a_tree_that_is_not_fitted_is_refused() -> None:
+    with pytest.raises(ValueError, match="the DecisionTreeClassifier is not fitted"):
+        from_sklearn(trees.DecisionTreeClassifier())
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"columns": ["a"]}, "1 names for 2 columns"),
+        ({"classes": ["a", "b", "c"]}, "3 names for 2 classes"),
+        (
+            {"soft": 1.0},
+            "soft is a number of spreads: give spreads=X.std(axis=0) too, or a width "
+            "for each column",
+        ),
+        ({"soft": 1.0, "spreads": [1.0]}, "1 spreads for 2 columns"),
+        (
+            {"soft": 0.0, "spreads": [1.0, 1.0]},
+            "the width beside a cut of 'x1' must be above 0, not 0.0",
+        ),
+        ({"soft": {}}, "soft: no width for 'x1', which the tree asks"),
+        (
+            {"soft": {"x": 1.0}},
+            "soft: no column 'x'; there is x1, x2 (did you mean 'x2'?)",
+        ),
+        (
+            {"soft": {"x1": 1e-30}},
+            "a width of 1e-30 beside the cut of 'x1' at 0.5000000298023224 is no flank "
+            "in doubles",
+        ),
+    ],
+)
+def test_names_and_widths_that_do_not_fit_are_refused(
+    options: dict[str, Any], text: str
+) -> None:
+    tree = trees.DecisionTreeClassifier().fit([[0.0, 0.0], [1.0, 0.0]], [0, 1])
+    with pytest.raises(ValueError) as caught:  # noqa: PT011
+        from_sklearn(tree, **options)
+    assert str(caught.value) == text
+
+
+def test_the_reader_does_not_import_the_library() -> None:
+    code = "import sys, fuzzytree.formats.sklearn; print('sklearn' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "False\n"
+    assert fuzzytree.from_sklearn is from_sklearn

@@ -1,0 +1,70 @@
+"""The page about fuzzy systems: its example is read, and it names everything."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import get_args
+
+from msgspec import inspect
+
+from fuzzytree.exporters.yaml import write
+from fuzzytree.formats.yaml import system_layout
+from fuzzytree.formats.yaml.layout import TermOfVariable
+from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.model.system import (
+    FUNCTIONS,
+    ActivationMethod,
+    DefuzzifierMethod,
+    FuzzySystem,
+    Grid,
+    Hedge,
+    SNorm,
+    TNorm,
+)
+from fuzzytree.semantics.inference import infer
+
+TEXT = (Path(__file__).parents[2] / "docs" / "systems.md").read_text("utf-8")
+[EXAMPLE] = re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)
+
+
+def test_the_example_is_a_whole_file_that_comes_back() -> None:
+    system = read(EXAMPLE.encode(), "page")
+    assert isinstance(system, FuzzySystem)
+    assert len(system.rules) == 3
+    assert read(write(system).content, "page") == system
+    found = infer(system, {"dirt": 90.0, "load size": 7.0})
+    # The second rule holds with 0.8 and soap has 2 * 90 + (minutes - 30) of it,
+    # against 0.1 of none.
+    minutes, soap = found.outputs
+    assert 80.0 < minutes < 95.0
+    weight = found.activations[1]
+    assert abs(soap - weight * (180.0 + minutes - 30.0) / (weight + 0.1)) < 1e-9
+
+
+def test_the_page_names_every_choice() -> None:
+    choices = [TNorm, SNorm, Hedge, ActivationMethod, DefuzzifierMethod, Grid]
+    for choice in choices:
+        for name in get_args(choice):
+            assert f"`{name}`" in TEXT, name
+    for function in FUNCTIONS:
+        if function.isalnum() and function not in ("negate", "not", "and", "or"):
+            assert f"`{function}`" in TEXT, function
+
+
+def test_the_page_names_every_key_of_its_own() -> None:
+    kinds = [
+        one
+        for one in vars(system_layout).values()
+        if isinstance(one, type) and one.__module__ == system_layout.__name__
+    ]
+    assert len(kinds) > 10
+    for kind in kinds:
+        for key in _keys(kind) - _keys(TermOfVariable):
+            assert re.search(rf"\b{re.escape(key)}\b", TEXT), (kind, key)
+
+
+def _keys(kind: type) -> set[str]:
+    info = inspect.type_info(kind)
+    assert isinstance(info, inspect.StructType)
+    return {field.encode_name for field in info.fields}

@@ -1,0 +1,245 @@
+"""What an audit says of rule bases of others, and of the tree learnt from wines.
+
+`python -m tests.interop.audits > docs/audits.md` writes the page.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from fuzzytree import learn
+from fuzzytree.api.verbs import audited_rows
+from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.records import Answer, Audit, Settings
+from fuzzytree.auditing.findings.views import view
+from fuzzytree.model.contracts import Document
+from tests.interop.corpus_fcl import FCL
+from tests.interop.corpus_fis import FIS
+from tests.interop.corpus_fll import FLL
+
+WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
+CORPORA = (FCL, FIS, FLL)
+LEFT_OUT = ("FT6", "FT7")
+"""Of files of others: docs/corpus.md compares carriers, and there are no rows."""
+
+SETTINGS = Settings(budget_s=600.0)
+
+INTRODUCTION = """\
+# Audits of real rule bases
+
+`fuzzytree audit` is asked about two trees learnt from the 178 wines, with these rows,
+and about every FCL, FIS and FLL file that Debian's packages `fuzzylite` and
+`octave-fuzzy-logic-toolkit` and the Python package `pyfuzzylite` ship.
+`python -m tests.interop.audits > docs/audits.md` writes this page, and
+`tests/interop/test_audits.py` compares it with what is found. The files are not ours
+and are not here; they are read where those packages put them.
+
+- *rules*: of the file. *asked*: those that the audit could take over; see the codes
+  `FTD01` and following for the others. Curves that are no polynomials are asked between
+  two lines about 0.001 apart: FTD02 counts them, and what is not asked of them.
+- *findings*: how often each code was found. `fuzzytree explain CODE` tells what it
+  means. *declined*: how often each reason was given, for a rule or a term each.
+- Files of others are asked on the ranges that they declare. Carriers (FT6) and rows
+  (FT7) are left out of them: [files of others](corpus.md) compares engines.
+- A question that the budget would end is not on this page: every audit is complete.
+
+"""
+
+
+class Case(NamedTuple):
+    """A rule base and its audit."""
+
+    file: str
+    kind: str
+    rules: int
+    asked: int
+    audit: Audit
+
+
+def wines() -> Iterator[Case]:
+    """Yield the audits of trees that are learnt from the wines, with their rows."""
+    for name, tree in (
+        ("plain", learn(WINE, target="cultivar", mode="paper")),
+        ("combined", learn(WINE, target="cultivar")),
+    ):
+        rows = audited_rows(WINE, tree, target="cultivar")
+        found = audit(tree, rows=rows, settings=SETTINGS, ignore=LEFT_OUT[:1])
+        count = len(tree.leaves)
+        yield Case(f"wine, {name} features", "tree", count, count, found)
+
+
+def others() -> Iterator[Case]:
+    """Yield the audit of every file of others."""
+    for corpus in CORPORA:
+        for name, path in corpus.files():
+            model = corpus.read(path.read_bytes(), path.name).model
+            yield _case(name, corpus.kind, model)
+
+
+def _case(name: str, kind: str, model: Document) -> Case:
+    found = audit(model, settings=SETTINGS, ignore=LEFT_OUT)
+    asked = set(view(model, found.domain).numbers)
+    count = len(getattr(model, "rules", ()))
+    return Case(name, kind, count, len(asked), found)
+
+
+def reasons(found: Audit) -> Iterator[str]:
+    """Yield the code of every answer that was declined."""
+    for one in found.answers:
+        if isinstance(one.state, Declined):
+            yield one.state.code
+
+
+def table(found: Sequence[Case]) -> Iterator[str]:
+    """Yield the lines of the table."""
+    yield "| file | format | rules | asked | findings | declined |"
+    yield "|---|---|---|---|---|---|"
+    for case in found:
+        codes = [one.code for one in case.audit.findings]
+        cells = (
+            *(case.file, case.kind, str(case.rules), str(case.asked)),
+            *(_counts(codes), _counts([*reasons(case.audit)])),
+        )
+        yield f"| {' | '.join(cells)} |"
+
+
+def _counts(codes: Sequence[str]) -> str:
+    counts = Counter(codes)
+    return ", ".join(f"{code}: {counts[code]}" for code in sorted(counts))
+
+
+class Told(NamedTuple):
+    """A finding that was checked by hand.
+
+    Attributes:
+        file: Where it was found.
+        begins: How its sentence begins.
+        words: What looking at the file says.
+    """
+
+    file: str
+    begins: str
+    words: str
+
+
+BY_HAND = (
+    Told(
+        "wine, plain features",
+        "rule 2 decides the same without 'flavanoids is high'",
+        "Rule 1, `flavanoids is low`, has the degree 1 wherever that is so, and stands "
+        "first: no rule behind it can win there, with or without saying it again.",
+    ),
+    Told(
+        "fuzzylite mamdani/AllTerms.fll",
+        "term 'H' of 'AllInputTerms' has 2 peaks",
+        "The file says `H Discrete 2 0 2.25 1 2.5 0.5 2.75 1 3 0`: the points go up, "
+        "halfway down, up again. The engine shows all kinds of terms, so it is meant.",
+    ),
+    Told(
+        "fuzzylite mamdani/AllTerms.fll",
+        "rule 4 and rule 5 conflict: both reach 0.6667",
+        "`D` is a triangle that falls from 1 at 1 to 0 at 1.5, `E` a trapezoid that "
+        "rises from 1 to 1.25: 2 (1.5 - x) = 4 (x - 1) at x = 7/6, where both are 2/3.",
+    ),
+    Told(
+        "fuzzylite mamdani/Laundry.fll",
+        "rule 3 and rule 4 conflict: both reach 0.5176",
+        "One says less detergent than usual, the other more. `low` falls along "
+        "0.8 (5 - x) / 3, `high` rises along 0.2 + 0.3 (x - 2): both are 0.5176 at a "
+        "dirt of 3.0588, which is 52/17.",
+    ),
+    Told(
+        "fuzzylite mamdani/SimpleDimmer.fll",
+        "no rule fires where 'Ambient' is 0",
+        "`Ambient` has the range 0 to 1, `DARK` is `Triangle 0 0.25 0.5` and `BRIGHT` "
+        "is `Triangle 0.5 0.75 1`: at 0 and at 1 themselves every degree is 0, and the "
+        "answer is the default, which the file sets to nan.",
+    ),
+    Told(
+        "fuzzylite hybrid/tipper.fll",
+        "rule 2 of block 1 and rule 2 of block 2 have the same antecedent",
+        "The file holds one rule base twice, for an output of Mamdani's kind and for "
+        "one of Sugeno's, so that both can be compared: nothing to mend.",
+    ),
+    Told(
+        "pyfuzzylite mamdani/matlab/shower.fll",
+        "term 'soft' of 'flow' lies outside of the domain for the most part",
+        "The range of `flow` is -1 to 1, and `soft` is `Trapezoid -3 -3 -0.8 0` of "
+        "area 2.6, of which 0.6 are within the range: most of what is drawn can never "
+        "be asked.",
+    ),
+)
+
+
+def by_hand(found: Sequence[Case]) -> Iterator[str]:
+    """Yield the findings that were checked by hand, with what was seen.
+
+    Raises:
+        LookupError: If one of them is not found.
+    """
+    known = {case.file: case.audit for case in found}
+    for one in BY_HAND:
+        same = [
+            answer
+            for answer in known[one.file].findings
+            if answer.sentence.startswith(one.begins)
+        ]
+        if not same:
+            raise LookupError(f"{one.file}: no finding begins with {one.begins!r}")
+        answer = same[0]
+        where = ", ".join(
+            f"{span.variable} from {span.low!r} to {span.high!r}"
+            for span in answer.region
+        )
+        yield f"- `{one.file}`, {answer.code} ({_state(answer)}):"
+        yield f"  {answer.sentence}{f' ({where})' if where else ''}."
+        yield f"  {one.words}"
+
+
+def _state(answer: Answer) -> str:
+    return str(answer.state.__struct_config__.tag)
+
+
+def of_tree(case: Case) -> Iterator[str]:
+    """Yield every finding about a tree, and what its rows say of each rule."""
+    for one in case.audit.answers:
+        if one.is_finding or (one.code == "FT701" and one.rules):
+            yield f"- {one.code} ({_state(one)}): {one.sentence}"
+
+
+def counts(found: Sequence[Case]) -> Iterator[str]:
+    """Yield how many files were asked whole, in part, or not at all."""
+    whole = sum(case.asked == case.rules for case in found)
+    none = sum(case.asked == 0 for case in found)
+    clean = sum(case.asked > 0 and not case.audit.findings for case in found)
+    rules, asked = sum(case.rules for case in found), sum(c.asked for c in found)
+    yield f"{len(found)} files of others: {asked} of their {rules} rules are asked,"
+    yield f"all of them in {whole} files and none in {none}. In {clean} files of which"
+    yield "rules are asked there is no finding."
+
+
+def page(ours: Sequence[Case], files: Sequence[Case]) -> str:
+    """Return the page."""
+    lines = [
+        *("## All of them", "", *counts(files), "", *table([*ours, *files]), ""),
+        *("## Checked by hand", ""),
+        "These findings were held against what the files say.",
+        *("", *by_hand([*ours, *files]), ""),
+        *("## The tree of wines with plain features", ""),
+        *of_tree(ours[0]),
+    ]
+    return INTRODUCTION + "\n".join(lines).rstrip() + "\n"
+
+
+def main() -> None:
+    """Print the page."""
+    sys.stdout.write(page([*wines()], [*others()]))
+
+
+if __name__ == "__main__":
+    main()

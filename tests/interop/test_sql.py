@@ -1,0 +1,165 @@
+"""Databases answer the rows of the wine table with our queries."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import io
+import math
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.checking.comparing import same_bits
+from fuzzytree.exporters.sql import Dialect, write
+from fuzzytree.model.contracts import Model, Outcome
+from fuzzytree.model.rulebase import RuleBase
+from fuzzytree.runtimes import find_runtime
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.tables import read_table
+from fuzzytree.testing import probe_values
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
+
+
+def _models() -> Iterator[tuple[str, Model]]:
+    for name, entry in (("plain", 2.0), ("combined", 25.0)):
+        tree = ft.learn(WINE, target="cultivar", entry=entry)
+        yield f"{name} tree", tree
+        yield f"{name} relative rules", rules_from_tree(tree)
+        yield f"{name} raw rules", rules_from_tree(tree, "raw")
+        product = rules_from_tree(tree, "raw", conjunction="product")
+        yield f"{name} product rules", product
+
+
+MODELS = dict(_models())
+
+
+def _rows(model: Model) -> FloatArray:
+    """Return the wine table, and the rows that matter for the model."""
+    table = read_table(WINE, target="cultivar")
+    columns = [table.columns.index(name) for name in model.inputs]
+    data = np.asarray(table.values[columns], np.float64)
+    assert data.shape[1] == 178
+    return np.hstack([data, probe_values(model, 300)])
+
+
+def _assert_equal(found: list[list[float | None]], right: Outcome) -> None:
+    """Compare rows of rule, status and strengths; an unknown strength is None."""
+    assert [row[0] for row in found] == right.rule.tolist()
+    assert [row[1] for row in found] == right.status.tolist()
+    if right.strengths is not None:
+        given = [[math.nan if s is None else s for s in row[2:]] for row in found]
+        assert same_bits(np.array(given).T, right.strengths).all()
+
+
+def _query(model: Model, dialect: Dialect) -> str:
+    is_rules = isinstance(model, RuleBase)
+    return write(
+        model, dialect=dialect, table="wine", keep=["row"], strengths=is_rules
+    ).content.decode()
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_duckdb_answers_with_our_bits(name: str, library: Callable[[str], str]) -> None:
+    duckdb = importlib.import_module(library("duckdb"))
+    model = MODELS[name]
+    values = _rows(model)
+    connection = duckdb.connect()
+    columns = "".join(f', "{column}" DOUBLE' for column in model.inputs)
+    connection.execute(f"CREATE TABLE wine (row INTEGER{columns})")
+    marks = ",".join("?" * (len(values) + 1))
+    rows = [[number, *row] for number, row in enumerate(values.T.tolist())]
+    connection.executemany(f"INSERT INTO wine VALUES ({marks})", rows)
+    found = sorted(connection.execute(_query(model, "duckdb")).fetchall())
+    right = find_runtime("reference").load(model)(values)
+    _assert_equal([list(row[2:]) for row in found], right)
+
+
+@pytest.fixture(scope="module")
+def postgresql(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[str]]:
+    """Start a server of our own behind a socket, and return how to call psql."""
+    folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
+    if not folders or shutil.which("runuser") is None:
+        if os.environ.get("FUZZYTREE_WITNESSES") == "all":
+            pytest.fail("PostgreSQL is not installed")
+        pytest.skip("PostgreSQL is not installed")
+    place = tmp_path_factory.mktemp("postgresql")
+    for folder in (place, *place.parents[:2]):
+        folder.chmod(0o755)
+    home = place / "server"
+    home.mkdir()
+    shutil.chown(home, "postgres")
+    user = ["runuser", "-u", "postgres", "--"]
+    tool = str(folders[-1])
+    data = str(home / "data")
+    subprocess.run(
+        [*user, f"{tool}/initdb", "-D", data, "-A", "trust", "--locale=C"],
+        check=True, capture_output=True, cwd="/", timeout=120,
+    )  # fmt: skip
+    start = [*user, f"{tool}/pg_ctl", "-D", data, "-w"]
+    options = f"-c listen_addresses='' -c unix_socket_directories='{home}'"
+    subprocess.run(
+        [*start, "-l", str(home / "log"), "-o", options, "start"],
+        check=True, capture_output=True, cwd="/", timeout=120,
+    )  # fmt: skip
+    try:
+        yield [*user, f"{tool}/psql", "-h", str(home), "-X", "-q", "-v",
+               "ON_ERROR_STOP=1", "--csv", "-t", "postgres"]  # fmt: skip
+    finally:
+        subprocess.run([*start, "-m", "immediate", "stop"], check=False, cwd="/")
+
+
+@pytest.mark.heavy
+@pytest.mark.parametrize("name", MODELS)
+def test_postgresql_answers_with_our_bits(name: str, postgresql: list[str]) -> None:
+    model = MODELS[name]
+    values = _rows(model)
+    # Where others answer infinity or 0, PostgreSQL raises an error: see `cannot`.
+    is_usual = ~((np.abs(values) > 1e100) & np.isfinite(values)).any(axis=0)
+    values = values[:, is_usual]
+    right = find_runtime("reference").load(model)(values)
+    columns = "".join(f', "{column}" DOUBLE PRECISION' for column in model.inputs)
+    lines = [
+        f"{number}," + ",".join(map(repr, row))
+        for number, row in enumerate(values.T.tolist())
+    ]
+    script = "\n".join(
+        [
+            f"CREATE TEMP TABLE wine (row INTEGER{columns});",
+            "COPY wine FROM STDIN WITH (FORMAT csv);",
+            *lines,
+            "\\.",
+            _query(model, "postgresql") + "ORDER BY row;",
+        ]
+    )
+    done = subprocess.run(
+        postgresql, input=script, capture_output=True, text=True, cwd="/", timeout=300
+    )
+    assert done.stderr == ""
+    found = [
+        [None if cell == "" else float(cell) for cell in row[2:]]
+        for row in csv.reader(io.StringIO(done.stdout))
+        if row
+    ]
+    _assert_equal(found, right)
+
+
+@pytest.mark.parametrize("dialect", ["sqlite", "duckdb", "postgresql", "spark"])
+def test_a_parser_of_each_dialect_takes_every_query(
+    dialect: Dialect, library: Callable[[str], str]
+) -> None:
+    sqlglot = importlib.import_module(library("sqlglot"))
+    word = {"postgresql": "postgres"}.get(dialect, dialect)
+    for model in MODELS.values():
+        assert len(sqlglot.parse(_query(model, dialect), read=word)) == 1

@@ -1,0 +1,131 @@
+"""The numbers of a fuzzy system as answers: columns, counts, words."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.api.answering import answering
+from fuzzytree.errors import LossError
+from fuzzytree.model.system import FuzzySystem
+from fuzzytree.report.systems import system_lines, system_reasons
+from fuzzytree.runtimes.outputs import Outputs, joined_outputs
+from fuzzytree.semantics.inference import infer
+from fuzzytree.semantics.random_systems import random_rows, random_system
+from fuzzytree.semantics.reference import Status
+from fuzzytree.semantics.samples import samples
+
+FOUND = Outputs(
+    ("fan", "status"),
+    np.array([[1.0, math.nan, 2.5], [0.0, 0.0, math.nan]]),
+    np.array([Status.DECIDED, Status.UNCOVERED, Status.MISSING]),
+    np.array([[0.5, 0.0, math.nan]]),
+)
+TIPPER = Path(__file__).resolve().parents[2] / "examples" / "tipper.fll"
+SYSTEMS = [one for one in samples().values() if isinstance(one, FuzzySystem)]
+
+
+def test_no_number_is_an_empty_cell() -> None:
+    assert FOUND.to_csv(with_activations=True) == (
+        "fan,status,status_,strength of rule 1\n"
+        "1.0,0.0,decided,0.5\n"
+        ",0.0,uncovered,0.0\n"
+        "2.5,,missing,\n"
+    )
+
+
+def test_outputs_become_frames_with_nothing_where_there_is_no_number() -> None:
+    frame = FOUND.to_pandas(with_activations=True)
+    assert frame["fan"].isna().tolist() == [False, True, False]
+    assert frame["strength of rule 1"].dtype == np.float64
+    assert FOUND.to_arrow().to_pydict() == {
+        "fan": [1.0, None, 2.5],
+        "status": [0.0, 0.0, None],
+        "status_": ["decided", "uncovered", "missing"],
+    }
+
+
+def test_an_output_is_found_by_its_name() -> None:
+    assert FOUND["fan"][2] == 2.5
+    with pytest.raises(ValueError, match="not in tuple"):
+        FOUND["heat"]
+
+
+def test_what_was_out_of_the_ordinary_is_counted() -> None:
+    assert str(FOUND) == (
+        "3 rows: fan 1 to 2.5, status 0 to 0; 1 uncovered; 1 with missing values"
+    )
+    assert FOUND.spans() == {"fan": (1.0, 2.5), "status": (0.0, 0.0)}
+
+
+def test_activations_that_were_not_asked_for_are_not_there() -> None:
+    bare = Outputs(("y",), np.array([[1.0]]), np.array([0]))
+    with pytest.raises(ValueError, match="ask for them"):
+        bare.columns(with_activations=True)
+    assert joined_outputs([bare, bare]).activations is None
+    assert len(joined_outputs([bare, bare])) == 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_runtime_gives_the_numbers_of_the_inference(seed: int) -> None:
+    system = random_system(seed, formulas="none")
+    rows = random_rows(system, seed, count=20)
+    table = np.array([[row[name] for name in system.columns] for row in rows])
+    right = np.array([infer(system, row).outputs for row in rows]).T
+    found = ft.run(system, table, columns=system.columns, runtime="reference")
+    assert np.array_equal(found.values, right, equal_nan=True)
+    native = ft.run(system, table, columns=system.columns)
+    assert np.allclose(native.values, right, rtol=1e-9, equal_nan=True)
+    assert native.activations is not None
+    assert native.activations.shape == (len(system.rules), 20)
+
+
+def test_a_runtime_that_runs_no_systems_says_so() -> None:
+    with pytest.raises(LossError) as caught:
+        answering(SYSTEMS[0], "best-first")
+    assert str(caught.value) == (
+        "cannot run fan in best-first: it runs rules, not a fuzzy system"
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_part_of_a_system_is_shown(seed: int) -> None:
+    system = random_system(seed)
+    shown = "\n".join(system_lines(system))
+    for one in system.variables:
+        assert f"\n{one.name}" in shown
+        for label in one.labels:
+            assert f"  {label.name}" in shown
+    for number in range(1, len(system.rules) + 1):
+        assert f"{number}. " in shown
+
+
+def test_reasons_tell_what_fired_and_what_did_not() -> None:
+    system = SYSTEMS[0]
+    table = np.array([[1.0, 1.0], [5.0, 9.9], [math.nan, 1.0], [3.0, 20.0]])
+    found = ft.run(system, table, columns=system.columns)
+    told = system_reasons(system, found)
+    assert told[0] == ("rule 1 (1): IF heat is low and damp is dry THEN fan is slow")
+    assert told[1].startswith("rule 2 (0.25): IF heat is high")
+    assert told[2] == "a value is missing or not finite"
+    assert told[3] == "no rule fires"
+
+
+def test_an_array_as_wide_as_a_system_has_its_columns() -> None:
+    tipper = ft.load(TIPPER)
+    found = ft.run(tipper, np.array([[3.0, 8.0], [9.0, 2.0]]))
+    named = ft.run(
+        tipper, np.array([[8.0, 3.0], [2.0, 9.0]]), columns=["food", "service"]
+    )
+    assert isinstance(found, ft.Outputs)
+    assert isinstance(named, ft.Outputs)
+    assert found.values.tolist() == named.values.tolist()
+    with pytest.raises(ft.FuzzyTreeError) as caught:
+        ft.run(tipper, np.zeros((1, 3)))
+    assert str(caught.value) == (
+        "the array has 3 columns without names, and the model asks for 2: service, food"
+    )

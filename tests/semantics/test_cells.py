@@ -1,0 +1,99 @@
+import math
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from fuzzytree.model.rulebase import Band, Flank, Semantics, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.semantics.cells import (
+    axis_points,
+    cell_count,
+    free_axes,
+    grid,
+    grid_size,
+    node_faults,
+)
+from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.reference import descend, evaluate
+from fuzzytree.testing import random_tree
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_relative_rules_equal_the_tree_in_every_cell(seed: int) -> None:
+    tree = free_axes(random_tree(seed, leaves=2 + seed % 5, inputs=3))
+    rules = rules_from_tree(tree)
+    for points in grid(tree):
+        for column in points.T.tolist():
+            row = dict(zip(tree.inputs, column, strict=True))
+            assert descend(tree, row).rule == evaluate(rules, row).rule
+
+
+def test_the_points_hold_each_cut_and_the_floats_beside_it() -> None:
+    tree = random_tree(4, leaves=6, inputs=2, combinations=0.0)
+    points = axis_points(tree)
+    for node in tree.nodes:
+        for cut in node.cuts:
+            near = {math.nextafter(cut, -math.inf), cut, math.nextafter(cut, math.inf)}
+            assert near <= set(points[node.variable])
+
+
+def test_there_is_a_point_inside_each_interval() -> None:
+    tree = random_tree(4, leaves=9, inputs=2, combinations=0.0)
+    for name, points in axis_points(tree).items():
+        cuts = sorted({c for n in tree.nodes if n.variable == name for c in n.cuts})
+        inside = np.searchsorted(cuts, points, side="left")
+        assert set(inside.tolist()) == set(range(len(cuts) + 1))
+
+
+def test_the_grid_has_as_many_points_as_it_says() -> None:
+    tree = random_tree(7, leaves=8, inputs=3)
+    assert sum(p.shape[1] for p in grid(tree, chunk=100)) == grid_size(tree)
+    assert cell_count(tree) <= grid_size(tree)
+
+
+def test_free_axes_turn_combinations_into_inputs() -> None:
+    tree = random_tree(2, leaves=9, combinations=1.0)
+    free = free_axes(tree)
+    assert set(free.inputs) == {node.variable for node in tree.nodes}
+    assert not any(variable.parts for variable in free.variables)
+
+
+def test_a_tree_of_one_leaf_is_one_cell() -> None:
+    tree = FuzzyTree("t", ("a",), (), (), (Leaf("a"),))
+    assert (cell_count(tree), grid_size(tree)) == (1, 1)
+    assert [points.shape for points in grid(tree)] == [(0, 1)]
+
+
+def test_a_node_whose_terms_are_right_has_no_fault() -> None:
+    assert not list(node_faults(random_tree(3, leaves=40, inputs=5)))
+
+
+def test_a_term_that_stays_one_beyond_its_plateau_is_a_fault() -> None:
+    # Such a tree cannot be made, so the check is given a node that was tampered with.
+    low = Term("low", Band(high=1.0, right=Flank(1.0, 2.0)))
+    high = Term("high", Band(low=1.0, left=Flank(1.0, 0.0)))
+    branches = (Branch(("low",), leaf=1), Branch(("high",), leaf=2))
+    tree = FuzzyTree(
+        "t",
+        ("a", "b"),
+        (Variable("x", (low, high)),),
+        (Node("x", (1.0,), (0, 1), branches),),
+        (Leaf("a"), Leaf("b")),
+        semantics=Semantics(),
+    )
+    wide = replace(high, shape=Band(low=0.5, left=Flank(0.5, 0.0)))
+    faulty = _without_checks(tree, (Variable("x", (low, wide)),))
+    assert list(node_faults(faulty)) == [
+        "node 1: at x = 0.9999999999999999 branch 2 has degree 1.0, "
+        "and branch 1 owns the point",
+        "node 1: at x = 1.0 branch 2 has degree 1.0, and branch 1 owns the point",
+    ]
+
+
+def _without_checks(tree: FuzzyTree, variables: tuple[Variable, ...]) -> FuzzyTree:
+    class Unchecked(FuzzyTree, frozen=True):
+        def __post_init__(self) -> None:
+            pass
+
+    return Unchecked(tree.name, tree.classes, variables, tree.nodes, tree.leaves)

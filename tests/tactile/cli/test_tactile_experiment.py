@@ -1,0 +1,165 @@
+"""`fuzzytree tactile experiment`: what it tells, what it writes, what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
+import numpy as np
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.tactile.board_files.reader import load_board
+from fuzzytree.tactile.presses import Presses, read_presses, write_presses
+from fuzzytree.tactile.recognition import peers
+from fuzzytree.tactile.recognition.recogniser import Recogniser
+from tests.cli.conftest import Call
+
+SCHEMA = Path(__file__).resolve().parents[3] / "schemas" / "experiment.schema.json"
+
+
+@pytest.fixture
+def bars(folder: Path) -> Path:
+    """Write flat and upright bars of three people."""
+    random = np.random.default_rng(2)
+    frames = np.zeros((24, 6, 6), np.uint8)
+    for k, frame in enumerate(frames):
+        place, end = random.integers(0, 4), random.integers(4, 6)
+        line = frame[place] if k % 2 else frame[:, place]
+        line[1:end] = random.integers(90, 200)
+    frames[3, 5, 5] = 30  # a cell that is not at rest
+    label, subject = np.arange(24) % 2, np.arange(24) // 8
+    path = folder / "bars.npz"
+    write_presses(path, Presses(frames, 200, label, ("upright", "flat"), subject))
+    return path
+
+
+def test_an_experiment_tells_rates_table_divisions_and_accuracy(
+    bars: Path, call: Call
+) -> None:
+    code, out, err = call("tactile", "experiment", "bars.npz", "--no-peers")
+    assert code == 0
+    assert not err
+    assert out == (
+        "bars.npz: 24 frames\n"
+        "division  each of 3 subjects is left out in turn, and tested on\n"
+        "sensor    6 x 6 cells, full 200, threshold 0\n"
+        "features  log paper / force, log parts / force, axis, log size, place (24: "
+        "log S1 / force, ..., y)\n"
+        "learnt    default mode, auto patterns a class, L_MAX 10, shrinkage 0.001, "
+        "entry 2; 2 leaves, which ask for 1 to 3 features\n"
+        "\n"
+        "class    frames  right  rate\n"
+        "upright  12      12     100.0 %\n"
+        "flat     12      12     100.0 %\n"
+        "all      24      24     100.0 %\n"
+        "\n"
+        "was \\ taken for  upright  flat\n"
+        "upright          12       .\n"
+        "flat             .        12\n"
+        "\n"
+        "tested     learnt from  frames  right\n"
+        "subject 0  16           8       100.0 %\n"
+        "subject 1  16           8       100.0 %\n"
+        "subject 2  16           8       100.0 %\n"
+        "\n"
+        "accuracy  100.0 %, mean of 3 divisions (100.0 % to 100.0 %, "
+        "standard deviation 0.0)\n"
+        "          50.0 % by the commonest class alone\n"
+    )
+
+
+def test_the_facts_fit_their_schema(bars: Path, call: Call) -> None:
+    code, out, _ = call(
+        "tactile", "experiment", "bars.npz", "--json", "--features", "axis, area"
+    )
+    assert code == 0
+    facts = json.loads(out)
+    jsonschema.validate(facts, json.loads(SCHEMA.read_text("utf-8")))
+    assert facts["names"] == ["cos2", "sin2", "area"]
+    assert [peer["name"] for peer in facts["peers"]] == [*peers.PEERS]
+
+
+def test_a_folder_holds_a_model_that_recognises_the_frames(
+    bars: Path, call: Call
+) -> None:
+    words = ("tactile", "experiment", "bars.npz", "--no-peers", "--patterns", "1")
+    code, _, err = call(*words, "-o", "found")
+    assert code == 0
+    assert "next     fuzzytree show found/tree.yaml" in err
+    tree, board = ft.load("found/tree.yaml"), load_board("found/board.yaml")
+    assert isinstance(tree, ft.FuzzyTree)
+    presses = read_presses(bars)
+    codes = Recogniser(tree, board.sensor)(presses.frames).codes
+    assert codes.tolist() == presses.label.tolist()
+    assert isinstance(ft.load("found/rules.yaml"), ft.RuleBase)
+    table = Path("found/confusion.csv").read_text("utf-8")
+    assert table == (
+        "class,upright,flat,(nothing),(unknown)\nupright,12,0,0,0\nflat,0,12,0,0\n"
+    )
+    first = {path.name: path.read_bytes() for path in Path("found").iterdir()}
+    assert {"tree.svg", "confusion.svg", "frames.png", "report.json"} <= set(first)
+    assert call(*words, "-o", "found", "--quiet") == (
+        0,
+        first["report.txt"].decode(),
+        "",
+    )
+    again = {path.name: path.read_bytes() for path in Path("found").iterdir()}
+    assert again == first
+
+
+def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
+    bars: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(peers, "are_there", lambda: False)
+    code, out, err = call("tactile", "experiment", "bars.npz", "--features", "axis")
+    assert code == 0
+    assert "learner" not in out
+    assert err == (
+        "without other learners: they need scikit-learn: "
+        "pip install 'scikit-learn>=1.6'\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (
+            ["hands"],
+            "there is no task 'hands'; there is paper, postures, postures-17, touch, "
+            "touch-fingers, and FILE.npz for frames of your own",
+        ),
+        (["paper", "--choose", "--repeats", "1"], "paper: settings are chosen by"),
+        (["paper", "--full", "9"], "--full does nothing for 'paper'"),
+        (["touch", "--test", "bars.npz"], "--test does nothing for 'touch'"),
+        (["bars.npz", "--sensor", "ideal"], "--sensor does nothing for 'bars.npz'"),
+        (["bars.npz", "--full", "0"], "full lies in 1 to 65535, not 0"),
+        (["bars.npz", "--label", "kind"], "bars.npz: no class is known"),
+        (["bars.npz", "--test", "bars.npz"], "3 subjects are both in bars.npz and in"),
+        (["bars.npz", "--entry", "-1"], "entry is at least 0, not -1.0"),
+        (["bars.npz", "--features", "S12"], "'S12' is no feature of a frame"),
+        (["bars.npz", "-o", "no/where"], "no/where: cannot be made: there is no no"),
+        (["bars.npz", "-o", "grasps.csv"], "grasps.csv: is a file, and not a folder"),
+        (["none.npz"], "none.npz: "),
+        (["touch", "--data", "."], "capfinger_27x15.npz: is not there"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_cannot_be_done_is_told_in_a_sentence(
+    words: list[str], told: str, bars: Path, call: Call
+) -> None:
+    code, out, err = call("tactile", "experiment", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith(told)
+    assert "Traceback" not in err
+
+
+def test_the_papers_rates_stand_beside(call: Call, folder: Path) -> None:
+    code, out, _ = call(
+        "tactile", "experiment", "--no-peers", "--repeats", "1", "--mode", "paper"
+    )
+    assert code == 0
+    assert "class         frames  right  rate     paper\n" in out
+    assert "89.7 %\n" in out
+    assert "paper mode, 1 pattern a class, L_MAX 4" in out

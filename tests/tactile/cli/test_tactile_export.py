@@ -1,0 +1,149 @@
+"""`fuzzytree tactile export` and `bench`: files from frame to class, and their cost."""
+
+import json
+from pathlib import Path
+
+import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
+import numpy as np
+import onnx
+import pytest
+
+from fuzzytree.api.verbs import save
+from fuzzytree.cli import main
+from fuzzytree.tactile.cli.sensors import frames_of
+from fuzzytree.tactile.presses import Presses, write_presses
+from fuzzytree.tactile.recognition import carriers
+from fuzzytree.tactile.sensor import Sensor
+from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
+
+pytestmark = pytest.mark.usefixtures("few_objects")
+
+SCHEMA = Path(__file__).resolve().parents[3] / "schemas" / "tactile-bench.schema.json"
+NONE = np.zeros(0, np.int64)
+SIZE = ["--sensor", "6x4", "--full", "100"]
+Said = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    tree = learnt_tree(SMALL, ("area", "S1"))
+    save(tree, "tree.yaml")
+    save(raw_rules(tree), "rules.yaml")
+    cells = np.random.default_rng(0).integers(0, 101, (9, 6, 4)).astype(np.uint8)
+    cells[0] = 0
+    write_presses("f.npz", Presses(cells, 100, NONE, (), NONE))
+
+
+def test_a_graph_is_checked_and_written(capsys: Said) -> None:
+    words = ["tactile", "export", "tree.yaml", "pad.onnx", *SIZE, "--data", "f.npz"]
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    lines = out.splitlines()
+    assert lines[1].split()[:3] == ["carrier", "against", "on"]
+    assert "4 show nothing" in out  # three are made
+    assert "exact arithmetic" in lines[2]
+    assert all(line.endswith("agrees") for line in lines[2:8])
+    content = Path("pad.onnx").read_bytes()
+    assert err.startswith(f"wrote    pad.onnx onnx, {len(content)} bytes, sha256 ")
+    onnx.checker.check_model(onnx.load_model_from_string(content))
+
+
+def test_frames_that_were_pressed_above_another_threshold_are_told(
+    capsys: Said,
+) -> None:
+    cells = np.ones((1, 6, 4), np.uint8)
+    write_presses("six.npz", Presses(cells, 100, NONE, (), NONE, threshold=6))
+    for threshold in (4, 6):
+        frames_of("six.npz", Sensor(6, 4, 100, threshold))
+    told = capsys.readouterr().err
+    assert told == "differs  six.npz tells the threshold 6, not 4\n"
+
+
+def test_c_goes_to_standard_output(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
+    words = ["tactile", "export", "rules.yaml", "-", "--to", "c", *SIZE]
+    assert main([*words, "--set", "name=pad", "--set", "reject=0.25", "--quiet"]) == 0
+    out, err = capfdbinary.readouterr()
+    assert b"pad_recognise(const pad_cell *frame)" in out
+    assert b"< 0x1p-2" in out
+    assert err == b""
+
+
+def test_facts_for_programs(capsys: Said) -> None:
+    words = ["tactile", "export", "tree.yaml", "pad.c", *SIZE, "--json", "--quiet"]
+    assert main(words) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["ok"] is True
+    assert found["bytes"] == Path("pad.c").stat().st_size
+    assert found["check"]["shown"]["nothing"] == 3
+
+
+def test_nothing_is_written_where_a_way_disagrees(
+    capsys: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(carriers, "ALLOWED", -1.0)  # nothing is as exact as that
+    words = ["tactile", "export", "tree.yaml", "pad.onnx", *SIZE]
+    assert main(words) == 1
+    assert (
+        capsys.readouterr().err == "1 of 9 comparisons disagrees; nothing is written\n"
+    )
+    assert not Path("pad.onnx").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["pad.txt", *SIZE], "pad.txt: a file from frame to class ends in .onnx or .c"),
+        (["pad.c"], "name the board with --board, or its size: --sensor 16x16"),
+        (["pad.c", "--sensor", "6by4"], "--sensor 6by4: rows and columns are as in "
+         "16x16"),
+        (["pad.c", "--board", "b.yaml", "--full", "9"], "--board tells --sensor, "
+         "--full and --threshold; give one of them"),
+        (["pad.c", *SIZE, "--threshold", "100"], "the threshold lies in 0 to full - 1, "
+         "not 100"),
+        (["pad.c", *SIZE, "--set", "name"], "--set name: must be NAME=VALUE"),
+        (["pad.c", *SIZE, "--set", "opset=17"], "c has no option 'opset'; it has name, "
+         "reject"),
+        (["pad.onnx", *SIZE, "--set", "ir=8", "--set", "ir=9"], "the option 'ir' is "
+         "given twice"),
+        (["pad.onnx", "--sensor", "4x6", "--data", "f.npz"], "f.npz: holds frames of "
+         "6 x 4 cells, and the board has 4 x 6"),
+    ],
+)  # fmt: skip
+def test_mistakes_in_the_command_are_one_sentence(
+    words: list[str], text: str, capsys: Said
+) -> None:
+    assert main(["tactile", "export", "tree.yaml", *words]) == 2
+    assert capsys.readouterr().err.splitlines()[0] == text
+
+
+def test_a_model_for_other_things_is_refused(capsys: Said) -> None:
+    example = Path(__file__).parents[3] / "examples" / "tipper.fll"
+    assert main(["tactile", "export", str(example), "pad.c", *SIZE]) == 2
+    assert capsys.readouterr().err == (
+        f"{example}: frames are asked of a tree or rules, not of this\n"
+    )
+
+
+def test_a_bench_tells_time_error_and_floors(capsys: Said) -> None:
+    words = ["tactile", "bench", "tree.yaml", *SIZE, "--data", "f.npz", "--quiet"]
+    few = ["--rows", "1", "--rows", "2000", "--rounds", "3"]
+    assert main([*words, *few]) == 0
+    out = capsys.readouterr().out
+    for text in (
+        "1 frame in a call",
+        "2,000 frames in a call",
+        "numpy",
+        "onnx",
+        "c   ",
+    ):
+        assert text in out
+    assert "floor: the frames copied" in out
+    assert "left out: plain Python: 2,000 frames in a call" in out
+    assert main([*words, "--rows", "1", "--rounds", "3", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    jsonschema.validate(found, json.loads(SCHEMA.read_text("utf-8")))
+    assert found["judged"] == 9
+    errors = {one["name"]: one["error"] for one in found["points"]}
+    assert max(errors[name] for name in ("numpy", "onnx", "c")) < 1e-14
+    assert errors["floor: the frames copied"] is None

@@ -1,0 +1,442 @@
+"""Pictures of frames, trees and confusions show what they were given, and no more."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import itertools
+import re
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import interpolation
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import fuzzytree as ft
+from fuzzytree.errors import MissingExtraError
+from fuzzytree.model.rulebase import Band, Term, Variable
+from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
+from fuzzytree.report import plots
+from fuzzytree.report.plots.boxes import place
+from fuzzytree.report.plots.saving import drawn
+from fuzzytree.report.plots.trees import COLOURS, MOST_LEAVES, boxes_of, class_colours
+from fuzzytree.report.plots.words import Sheet
+from fuzzytree.tactile.plots import MOST_FRAMES, Axis, colours, draw_frames
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+DRAWN_BY = "3.11.2"
+
+FRAME = np.array([[0, 4], [8, 2]])
+
+
+def images(figure: Figure) -> list[Any]:
+    return [image for axes in figure.axes for image in axes.images]
+
+
+def words(figure: Figure) -> list[Text]:
+    return [text for axes in figure.axes for text in axes.texts if text.get_text()]
+
+
+def said(figure: Figure) -> set[str]:
+    return {text.get_text() for text in words(figure)}
+
+
+def overlapping(figure: Figure) -> list[tuple[str, str]]:
+    """Return all pairs of words that cover each other."""
+    figure.draw_without_rendering()
+    boxes = [(text.get_text(), text.get_window_extent()) for text in words(figure)]
+    return [
+        (one, two)
+        for (one, a), (two, b) in itertools.combinations(boxes, 2)
+        if a.overlaps(b)
+    ]
+
+
+def learnt(classes: int, **settings: Any) -> FuzzyTree:
+    """Return a tree of that many classes on three columns."""
+    chance = np.random.default_rng(1)
+    label = np.repeat(np.arange(classes), 12)
+    table = chance.normal(size=(len(label), 3))
+    table[:, 0] += 9.0 * (label % 5)
+    table[:, 1] += 9.0 * (label // 5)
+    target = [f"class {k}" for k in label]
+    return ft.learn(
+        table, target=target, columns=["a", "b", "c"], name="grid", **settings
+    )
+
+
+def comb(leaves: int) -> FuzzyTree:
+    """Return the deepest tree of that many leaves: each node cuts one off."""
+    nodes: list[Node] = []
+    terms: list[Term] = []
+    for k in range(leaves - 1):
+        low, high = f"below {k}", f"above {k}"
+        terms += [Term(low, Band(None, float(k))), Term(high, Band(float(k), None))]
+        last = Branch((high,), node=k + 2)
+        if k == leaves - 2:
+            last = Branch((high,), leaf=leaves)
+        branches = (Branch((low,), leaf=k + 1), last)
+        nodes.append(Node("x", (float(k),), (0, 1), branches))
+    ends = tuple(Leaf("a" if k % 2 else "b") for k in range(leaves))
+    variable = Variable("x", tuple(terms))
+    return FuzzyTree("comb", ("a", "b"), (variable,), tuple(nodes), ends)
+
+
+def slanted() -> FuzzyTree:
+    """Return a tree of two classes that only a combination of columns tells apart."""
+    chance = np.random.default_rng(2)
+    along, across = chance.normal(0.0, 9.0, 80), chance.normal(0.0, 0.3, 80)
+    across[40:] += 4.0
+    target = ["one"] * 40 + ["two"] * 40
+    table = np.column_stack([along + across, along - across])
+    return ft.learn(table, target=target, columns=["a", "b"])
+
+
+def test_every_dot_of_a_frame_has_the_colour_of_its_cell() -> None:
+    (image,) = images(draw_frames([FRAME], full=8))
+    dots = image.to_rgba(image.get_array(), norm=True)
+    side = dots.shape[0] // 2
+    scale = colours()
+    for (row, column), value in np.ndenumerate(FRAME):
+        found = dots[row * side : (row + 1) * side, column * side : (column + 1) * side]
+        wanted = scale(value / 8.0) if value else (1.0, 1.0, 1.0, 1.0)
+        assert np.allclose(found, wanted)
+
+
+def test_colours_of_pressure_grow_evenly_darker() -> None:
+    rgb = np.asarray(colours()(range(colours().N)))[:, :3]
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    lightness = np.cbrt(linear @ [0.2126, 0.7152, 0.0722])
+    steps = np.diff(lightness)
+    assert (steps < 0.0).all()
+    assert steps.min() > 3.0 * steps.max()
+
+
+def test_all_frames_share_the_scale_of_the_largest() -> None:
+    figure = draw_frames([FRAME, FRAME * 3])
+    assert {image.get_clim() for image in images(figure)[:2]} == {(0.0, 24.0)}
+    assert figure.axes[-1].get_ylabel() == "pressure"
+
+
+def test_the_scale_is_open_where_a_cell_is_above_its_end() -> None:
+    ends = [draw_frames([FRAME], full=end).axes[-1] for end in (8, 7)]
+    patches = [len(axes.patches) for axes in ends]
+    assert patches[1] > patches[0]
+
+
+def test_a_frame_without_pressure_is_white() -> None:
+    (image,) = images(draw_frames([np.zeros((3, 4))]))
+    assert image.get_array().mask.all()
+
+
+def test_the_centre_of_pressure_lies_where_the_features_say() -> None:
+    one = Axis(x=0.5, y=-0.5, angle_deg=90.0, length=1.0)
+    figure = draw_frames([np.ones((6, 6))], axes=[one], cells=[(2, 2)])
+    found = {
+        line.get_gid(): np.asarray(line.get_xydata()) for line in figure.axes[0].lines
+    }
+    assert found["centre"].tolist() == [[4.5, 1.5]]  # the lower right of 2 x 2 cells
+    assert found["axis"].ravel().tolist() == pytest.approx([4.5, -1.5, 4.5, 4.5])
+
+
+def test_frames_of_any_shape_keep_square_cells() -> None:
+    figure = draw_frames([np.ones((4, 8)), np.ones((8, 2)), np.ones((1, 300))])
+    width, height = figure.get_size_inches()
+    for axes, (rows, columns) in zip(figure.axes, [(4, 8), (8, 2)], strict=False):
+        box = axes.get_position()
+        assert box.width * width / columns == pytest.approx(box.height * height / rows)
+
+
+def test_titles_stand_above_their_frames() -> None:
+    figure = draw_frames([FRAME] * 5, titles=list("abcde"), title="five")
+    assert [axes.get_title() for axes in figure.axes[:5]] == list("abcde")
+    assert figure.texts[0].get_text() == "five"
+
+
+def test_titles_are_no_formulas_and_stay_within_the_picture() -> None:
+    name = "$\\frac{" + "wide name " * 50
+    figure = draw_frames([FRAME, FRAME], titles=[name, "$a$"], title=name)
+    figure.draw_without_rendering()
+    (title,) = figure.texts
+    above = figure.axes[0].title
+    for text in (title, above):
+        assert text.get_window_extent().x1 <= figure.bbox.x1
+        assert text.get_text().endswith("…")
+    assert above.get_window_extent().width <= figure.axes[0].get_window_extent().width
+
+
+@pytest.mark.parametrize(
+    ("frames", "options", "text"),
+    [
+        ([], {}, f"a picture has 1 to {MOST_FRAMES} frames, not 0"),
+        ([FRAME, FRAME[0]], {}, "frame 2 of shape (2,) is no matrix of finite numbers"),
+        ([FRAME], {"titles": ["a", "b"]}, "2 titles for 1 frames"),
+        ([FRAME], {"full": 0}, "the end of the scale must be above 0, not 0"),
+    ],
+)
+def test_frames_that_are_none_are_refused(
+    frames: list[npt.NDArray[Any]], options: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(ValueError, match=r".") as caught:
+        draw_frames(frames, **options)
+    assert str(caught.value) == text
+
+
+def test_a_tree_shows_its_questions_terms_and_leaves() -> None:
+    tree = learnt(4, mode="paper")
+    found = said(plots.draw_tree(tree))
+    assert {f"{node.variable}?" for node in tree.nodes} <= found
+    assert {leaf.label for leaf in tree.leaves} <= found
+    assert {f"{leaf.support} rows" for leaf in tree.leaves} <= found
+    terms = {" or ".join(b.terms) for node in tree.nodes for b in node.branches}
+    assert terms <= found
+    assert "grid: 1 node, 4 leaves" in found
+
+
+@pytest.mark.parametrize("classes", [2, 25])
+def test_no_words_of_a_tree_cover_each_other_or_leave_the_picture(classes: int) -> None:
+    figure = plots.draw_tree(learnt(classes, patterns_per_class=2))
+    assert overlapping(figure) == []
+    for text in words(figure):
+        box = text.get_window_extent()
+        assert 0.0 <= box.x0 <= box.x1 <= figure.bbox.x1, text.get_text()
+        assert 0.0 <= box.y0 <= box.y1 <= figure.bbox.y1, text.get_text()
+
+
+def test_a_tree_of_one_leaf_is_that_leaf() -> None:
+    tree = FuzzyTree("all", ("a",), (), (), (Leaf("a", support=1),))
+    assert said(plots.draw_tree(tree)) == {"all: 0 nodes, 1 leaf", "a", "1 row"}
+
+
+def test_a_deep_tree_is_an_outline_whose_branches_meet_no_words() -> None:
+    tree = comb(18)
+    figure = plots.draw_tree(tree)
+    assert figure.get_figheight() > 0.34 * (18 + 17)  # a row for each leaf and node
+    assert overlapping(figure) == []
+    boxes = boxes_of(tree)
+    place(boxes, Sheet())
+    assert [box.y for box in boxes] == sorted(box.y for box in boxes)
+    for box in boxes:
+        for (x, top), (same, bottom) in itertools.pairwise(box.way):
+            if x == same:  # upright: beside all boxes that it passes
+                passed = [b for b in boxes if top < b.y < bottom]
+                assert all(b.words[0] > x and b.x > x for b in passed)
+
+
+def test_a_node_has_the_rows_of_all_that_is_below_it() -> None:
+    boxes = boxes_of(learnt(7))
+    assert boxes[0].rows == 7 * 12
+    assert all(b.rows == sum(c.rows or 0 for c in b.below) for b in boxes if b.below)
+
+
+def test_a_tree_without_known_rows_is_drawn_without_them() -> None:
+    from msgspec.structs import replace
+
+    tree = learnt(3)
+    bare = replace(
+        tree, leaves=tuple(replace(leaf, support=None) for leaf in tree.leaves)
+    )
+    assert not any("row" in text for text in said(plots.draw_tree(bare, title="")))
+
+
+def test_a_class_has_one_colour_in_every_picture() -> None:
+    tree = learnt(12)
+    found = class_colours(tree.classes)
+    assert [found[name] for name in tree.classes[:10]] == list(COLOURS)
+    leaves = {box.colour for box in boxes_of(tree) if box.texts[0] == "class 3"}
+    assert leaves == {found["class 3"]}
+
+
+def test_combinations_are_written_below_the_tree() -> None:
+    tree = slanted()
+    asked = {node.variable for node in tree.nodes}
+    made = [v for v in tree.variables if v.parts and v.name in asked]
+    assert made
+    notes = [text for text in said(plots.draw_tree(tree)) if " \u2248 " in text]
+    assert {note.split(" \u2248 ")[0] for note in notes} == {v.name for v in made}
+
+
+def test_names_with_signs_of_formulas_or_many_letters_do_no_harm() -> None:
+    name = "$\\frac{1}{" + "x" * 1000
+    tree = ft.learn(
+        np.array([[0.0], [0.1], [5.0], [5.1]]), target=["$a", "$a", name, name],
+        columns=["$x_1$"],
+    )  # fmt: skip
+    figure = plots.draw_tree(tree)
+    drawn(figure, ".png")
+    assert "$x_1$?" in said(figure)
+    assert figure.get_figwidth() < 12.0
+
+
+def test_a_tree_of_too_many_leaves_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert MOST_LEAVES == 200
+    monkeypatch.setattr("fuzzytree.report.plots.trees.MOST_LEAVES", 2)
+    with pytest.raises(ValueError, match="at most") as caught:
+        plots.draw_tree(learnt(3))
+    assert str(caught.value) == (
+        "a picture shows at most 2 leaves, and grid has 3; "
+        "learn a smaller tree, or read its rules"
+    )
+
+
+def test_a_tree_of_too_many_levels_is_refused() -> None:
+    tree = comb(90)
+    width, height = place(boxes_of(tree), Sheet())
+    with pytest.raises(ValueError, match="inches") as caught:
+        plots.draw_tree(tree)
+    assert str(caught.value) == (
+        f"a picture of comb would be {width:.0f} x {height:.0f} inches; "
+        "learn a smaller tree, or read its rules"
+    )
+
+
+def test_a_confusion_shows_counts_rates_and_the_whole() -> None:
+    figure = plots.draw_confusion(np.array([[48, 2, 0], [7, 42, 1]]), ["bar", "disc"])
+    assert said(figure) >= {
+        "48", "2", "7", "42", "1", "bar", "disc", "none of them",
+        "96.0 %", "84.0 %", "90.0 %",
+    }  # fmt: skip
+    assert "0" not in said(figure)
+
+
+@pytest.mark.parametrize("count", [1, 2, 12])
+def test_no_words_of_a_confusion_cover_each_other(count: int) -> None:
+    table = np.full((count, count + 1), 3) + np.eye(count, count + 1, dtype=int) * 9990
+    names = [f"rectangle in {k}" for k in range(count)]
+    figure = plots.draw_confusion(table, names, title="all")
+    slanted = {text.get_text() for text in words(figure) if text.get_rotation()}
+    covered = overlapping(figure)
+    # The boxes of slanted names meet; the names, in parallel, do not.
+    assert [pair for pair in covered if not slanted.issuperset(pair)] == []
+
+
+def test_a_class_that_never_was_has_no_rate() -> None:
+    figure = plots.draw_confusion(np.array([[5, 0], [0, 0]]), ["a", "b"])
+    assert {"100.0 %", "-"} <= said(figure)
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        (np.zeros((2, 2)), "a confusion table holds whole numbers of at least 0"),
+        (
+            np.array([[0, -1], [0, 0]]),
+            "a confusion table holds whole numbers of at least 0",
+        ),
+        (np.zeros((3, 3), int), "a table of shape (3, 3) does not fit 2 classes"),
+    ],
+)
+def test_tables_that_are_no_confusion_are_refused(
+    table: npt.NDArray[Any], text: str
+) -> None:
+    with pytest.raises(ValueError, match=r".") as caught:
+        plots.draw_confusion(table, ["a", "b"])
+    assert str(caught.value) == text
+
+
+def pictures() -> list[Figure]:
+    return [
+        draw_frames([FRAME, FRAME], axes=[None, Axis(0.0, 0.0, 45.0)]),
+        plots.draw_tree(learnt(3)),
+        plots.draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
+    ]
+
+
+@pytest.mark.parametrize("suffix", plots.SUFFIXES)
+def test_the_same_pictures_are_the_same_bytes(suffix: str) -> None:
+    for one, two in zip(pictures(), pictures(), strict=True):
+        assert drawn(one, suffix) == drawn(two, suffix)
+
+
+def test_a_users_settings_change_nothing() -> None:
+    import matplotlib as mpl
+
+    plain = [drawn(one, ".svg") for one in pictures()]
+    with mpl.rc_context({"font.size": 20, "axes.grid": True, "image.origin": "lower"}):
+        assert [drawn(one, ".svg") for one in pictures()] == plain
+
+
+def test_drawing_without_matplotlib_says_what_installs_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tree = learnt(2)
+
+    def none(_name: str) -> None:
+        return None
+
+    monkeypatch.setattr(importlib.util, "find_spec", none)
+    draws: list[Callable[[], object]] = [
+        lambda: draw_frames([FRAME]),
+        lambda: plots.draw_tree(tree),
+        lambda: plots.draw_confusion(np.eye(2, dtype=int), ["a", "b"]),
+    ]
+    for draw in draws:
+        with pytest.raises(MissingExtraError, match="pip install 'matplotlib"):
+            draw()
+
+
+@pytest.mark.parametrize("name", ["weights", "a_hand"])
+def test_the_pictures_of_the_docs_are_those_of_their_script(
+    name: str, tmp_path: Path
+) -> None:
+    if importlib.metadata.version("matplotlib") != DRAWN_BY:
+        pytest.skip(f"drawn by matplotlib {DRAWN_BY}, and others place letters apart")
+    again = tmp_path / "again.svg"
+    plots.save(getattr(interpolation, f"picture_of_{name}")(), again)
+    file = DOCS / f"interpolation-{name.removeprefix('a_')}.svg"
+    assert again.read_bytes() == file.read_bytes(), (
+        "python benchmarks/interpolation.py --draw"
+    )
+
+
+def test_the_bilinear_values_of_the_script_are_those_of_a_tent() -> None:
+    cells = np.array([[0.0, 4.0], [8.0, 12.0]])
+    found = interpolation.bilinear(cells, 2)
+    assert found[1].tolist() == [2.0, 3.0, 5.0, 6.0]
+    assert found[:, 0].tolist() == [0.0, 2.0, 6.0, 8.0]
+
+
+def _page() -> str:
+    return (DOCS / "interpolation.md").read_text("utf-8")
+
+
+def test_the_example_of_the_page_gives_the_papers_cells() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", _page(), re.DOTALL)
+    found: dict[str, Any] = {}
+    exec(code.replace("print(", "shown = ("), found)  # our own page
+    assert found["shown"][0].tolist() == [100.0, 83.3, 66.7, 50.0]
+
+
+@pytest.mark.heavy
+def test_the_commands_of_the_page_write_what_they_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from fuzzytree.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
+    (block,) = re.findall(r"```sh\n(.*?)```", _page(), re.DOTALL)
+    for line in block.splitlines():
+        words = shlex.split(line)[1:]
+        assert main(words) == 0
+        assert Path(words[-1]).stat().st_size > 0
+
+
+@pytest.mark.heavy
+def test_the_errors_of_the_page_are_those_that_its_script_finds(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("scipy", reason="scipy is not installed")
+    interpolation.print_errors()
+    assert capsys.readouterr().out in _page()
