@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+from collections import Counter
 from collections.abc import Generator
 
 import pytest
@@ -34,6 +35,20 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
         gc.collect()
         gc.freeze()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave one case in so many of a test with the mark `one_in`; others are heavy."""
+    cases: Counter[str] = Counter()
+    for item in items:
+        mark = item.get_closest_marker("one_in")
+        if mark is None or item.get_closest_marker("heavy") is not None:
+            continue
+        name = item.nodeid.partition("[")[0]
+        if cases[name] % mark.args[0]:
+            item.add_marker("heavy")
+        cases[name] += 1
 
 
 @pytest.fixture(scope="module")

@@ -183,6 +183,7 @@ def test_rows_are_answered_by_tree_and_raw_rules_apart() -> None:
     assert not found.relative_differs.any()
 
 
+@pytest.mark.heavy
 def test_no_further_seed_begins_when_the_time_is_over() -> None:
     found = list(
         agreement.comparisons(["iris"], 5, seconds=1e-9, tell=lambda _text: None)
@@ -461,6 +462,7 @@ def _main(monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
     return command.main()
 
 
+@pytest.mark.heavy
 def test_page_and_pictures_are_made_again_without_measuring_and_alike(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,6 +39,7 @@ def _error(content: bytes) -> str:
     return str(caught.value)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("block", [1, 7, 64, csv_rows.BLOCK])
 def test_rows_are_those_of_the_csv_module_whatever_the_blocks(
     block: int, monkeypatch: pytest.MonkeyPatch

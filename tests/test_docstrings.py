@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import importlib.util
 import pkgutil
+from pathlib import Path
 
 import pytest
 
 import fuzzytree
 
+
+def _has_examples(module: str) -> bool:
+    spec = importlib.util.find_spec(module)
+    assert spec is not None
+    assert spec.origin is not None
+    return ">>> " in Path(spec.origin).read_text("utf-8")
+
+
 MODULES = [
-    found.name
-    for found in pkgutil.walk_packages(fuzzytree.__path__, "fuzzytree.")
-    if not found.name.endswith("__main__")
+    module.name
+    for module in pkgutil.walk_packages(fuzzytree.__path__, "fuzzytree.")
+    if _has_examples(module.name)
 ]
 
 

@@ -137,6 +137,7 @@ def test_partial_fit_does_not_go_on_from_a_pickle_or_a_copy() -> None:
     model.partial_fit(IRIS, SPECIES)
 
 
+@pytest.mark.heavy
 def test_chunks_of_any_size_give_the_tree_of_the_whole_table() -> None:
     order = np.random.default_rng(0).permutation(len(IRIS))
     values, labels = IRIS[order], SPECIES[order]

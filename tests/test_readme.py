@@ -71,6 +71,7 @@ def test_the_first_command_works_in_a_fresh_copy(tmp_path: Path) -> None:
     assert "IF " in done.stdout
 
 
+@pytest.mark.heavy
 def test_every_example_prints_what_the_readme_shows(tmp_path: Path) -> None:
     text = README.read_text("utf-8")
     now = _masked(_rewritten_examples(text, tmp_path))

@@ -67,6 +67,7 @@ def test_at_most_20_000_rows_are_tested() -> None:
     assert (found.rows, found.of) == (20_000, 50_000)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("cells", [119, 120])
 def test_folds_of_a_large_table_take_the_settings_chosen_on_all_rows(
     monkeypatch: pytest.MonkeyPatch, cells: int
@@ -135,6 +136,7 @@ def test_with_many_classes_fewer_folds_are_tried(
     assert len(found.folds) == 2
 
 
+@pytest.mark.heavy
 def test_a_table_of_100_000_columns_is_tested_in_two_folds() -> None:
     values = np.zeros((100_000, 20))
     values[0, 10:] = 1.0

@@ -98,6 +98,7 @@ def in_single(tree: FuzzyTree, values: FloatArray) -> IntArray:
     return np.array(labels)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", DOUBLE)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_peer_in_double_gives_the_trees_classes(name: str, seed: int) -> None:
@@ -352,6 +353,7 @@ def negated(semantics: Semantics, *terms: str) -> RuleBase:
     return RuleBase("negated", ("a", "b", "c"), (x, y), rules, semantics)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("case", range(8))
 def test_an_engine_keeps_the_certified_bound_of_its_lines(

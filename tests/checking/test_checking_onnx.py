@@ -248,11 +248,13 @@ RULES_FILE = write(rules_from_tree(TREE), outputs=ALL).content
 TREE_FILE = write(TREE, plain=True).content
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("name", "place"), tensors(RULES_FILE))
 def test_any_changed_constant_of_a_rules_graph_is_found(name: str, place: int) -> None:
     assert is_found(changed(RULES_FILE, name, place))
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("name", "place"), tensors(TREE_FILE))
 def test_any_changed_constant_of_a_tree_graph_is_found(name: str, place: int) -> None:
     assert is_found(changed(TREE_FILE, name, place))
@@ -269,6 +271,7 @@ def columns(content: bytes) -> list[tuple[str, int]]:
     ]
 
 
+@pytest.mark.heavy
 def test_numbers_moved_by_one_ulp_are_found_by_the_rows_alone() -> None:
     places = columns(RULES_FILE)
     missed = []

@@ -52,6 +52,7 @@ WRITTEN: Sequence[Any] = (
 )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("model", [TREE, RULES, ENDS], ids=["tree", "rules", "ends"])
 @pytest.mark.parametrize(("path", "options"), WRITTEN)
 def test_a_program_of_ours_is_run_and_agrees(

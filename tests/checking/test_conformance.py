@@ -182,6 +182,7 @@ def _with_unnamed_option() -> Format:
     return replace(YAML, write=write)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("broken", "sentence"),
     [

@@ -30,13 +30,18 @@ def steps(call: Call, *words: str) -> list[list[str]]:
     """Take a step and each that is printed as the next one; return those behind it."""
     code, _, err = call(*words)
     assert code != 2, (words, err)
-    found = re.findall(
-        r"next(?::|    ) fuzzytree (.*?)(?: \(.*\))?$", err, re.MULTILINE
+    return taken(call, err)
+
+
+def taken(call: Call, printed: str) -> list[list[str]]:
+    """Take each step that is printed as the next one, and those behind it."""
+    texts = re.findall(
+        r"next(?::|    ) fuzzytree (.*?)(?: \(.*\))?$", printed, re.MULTILINE
     )
-    taken = [shlex.split(text) for text in found]
-    for each in [*taken]:
-        taken += steps(call, *each)
-    return taken
+    found = [shlex.split(text) for text in texts]
+    for each in [*found]:
+        found += steps(call, *each)
+    return found
 
 
 LEARN = ("learn", "few.csv", "--target", "grip", "--no-test")
@@ -48,7 +53,7 @@ def test_what_follows_learning_works_with_every_format(call: Call, suffix: str) 
     if code == 2:  # the format does not hold the tree
         assert "cannot write few as" in err
         return
-    (after,) = steps(call, *LEARN, "-o", f"m{suffix}")
+    (after,) = taken(call, err)
     assert after[:2] == ["check", "m.yaml"]
     assert after[-2:] == ["--data", "few.csv"]
 
@@ -90,6 +95,7 @@ def test_what_follows_learning_names_the_delimiter(call: Call) -> None:
     assert after == ["check", "m m.yaml", *rest]
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize(
     "begin", ["convert grip.yaml", "convert tipper.fll", "needs grip.yaml -o"]
@@ -103,7 +109,7 @@ def test_what_follows_writing_works_with_every_format(
     if code == 2:  # the format or the verb does not take the model
         assert "next" not in err
         return
-    steps(call, *words)
+    taken(call, err)
 
 
 def test_what_a_suffix_does_not_say_is_not_checked(call: Call) -> None:
@@ -114,8 +120,9 @@ def test_what_a_suffix_does_not_say_is_not_checked(call: Call) -> None:
     assert after == ["check", "grip.yaml", "new.onnx"]
 
 
+@pytest.mark.heavy
 def test_the_steps_from_simulated_presses_lead_to_a_checked_tree(call: Call) -> None:
     words = ("tactile", "press", "all", "--count", "4", "-o", "p.npz")
     (features,) = steps(call, *words)
-    taken = steps(call, *features, "-o", "t.csv")
-    assert [each[0] for each in taken] == ["learn", "check"]
+    following = steps(call, *features, "-o", "t.csv")
+    assert [each[0] for each in following] == ["learn", "check"]

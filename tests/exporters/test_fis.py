@@ -53,7 +53,6 @@ from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import evaluate
 from fuzzytree.testing import probes, random_tree
-from tests.seeds import seeds
 
 
 def random_curve(chance: random.Random) -> Curve:
@@ -207,7 +206,8 @@ def test_rules_of_points_are_read_back_equal_where_no_input_is_asked_twice(
         assert reading(written.content, "r.fis").model == rules
 
 
-@pytest.mark.parametrize("seed", seeds(6, 1, 2))
+@pytest.mark.one_in(4)
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 def test_scores_read_back_are_within_the_bounds_of_the_losses(
     seed: int, kind: str

@@ -138,6 +138,7 @@ def test_a_system_is_read_back_alike(seed: int) -> None:
     assert anonymous(found.model) == anonymous(system)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 def test_rules_of_points_are_read_back_equal(seed: int, kind: Kind) -> None:

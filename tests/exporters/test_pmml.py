@@ -235,6 +235,7 @@ def test_a_tree_answers_as_the_reference(seed: int) -> None:
     assert_alike(random_tree(seed, semantics=Semantics(missing=missing)))
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(6))
 def test_rules_have_the_references_bits(seed: int, kind: Kind) -> None:
@@ -273,6 +274,7 @@ def test_points_are_pmmls_own_lists_where_asked(seed: int) -> None:
     assert_alike(rules, curves="points", room=1e-12)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("seed", [1, 2, 4, 6, 8, 12, 15, 16])
 def test_a_system_has_the_references_bits(seed: int) -> None:
     system = random_system(seed)

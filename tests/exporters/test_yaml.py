@@ -34,7 +34,6 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.model.tree import FuzzyTree, Leaf
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
-from tests.seeds import seeds
 
 POSITIVE = Path(__file__).parents[1] / "example-files" / "positive"
 WORDS = (
@@ -61,7 +60,8 @@ def assert_kept(model: Model) -> bytes:
     return content
 
 
-@pytest.mark.parametrize("seed", seeds(30, 0, 5, 10, 15, 20))
+@pytest.mark.one_in(10)
+@pytest.mark.parametrize("seed", range(30))
 def test_every_random_model_comes_back_bit_for_bit(seed: int) -> None:
     labels = itertools.cycle([None, "class 1", "class 2"])
     answers = list(itertools.islice(labels, seed, seed + 2))

@@ -381,6 +381,7 @@ def test_all_mistakes_are_told_at_once() -> None:
     assert len(str(caught.value).splitlines()) == 3
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     "content",
     [

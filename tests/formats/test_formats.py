@@ -54,6 +54,7 @@ def _page() -> str:
     return MARKED.sub(lambda found: f"{found[1]}{made}\n{found[2]}", text)
 
 
+@pytest.mark.heavy
 def test_the_page_shows_what_was_found() -> None:
     shown = PAGE.read_text("utf-8")
     assert shown == _page(), "python tests/formats/test_formats.py rewrites the page"
@@ -73,6 +74,7 @@ def _learnt(name: str, *, by_sklearn: bool) -> tuple[RuleBase, FloatArray]:
     return rules_from_tree(tree), values
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("by_sklearn", [False, True])
 @pytest.mark.parametrize("name", ["iris", "wine", "breast_cancer"])
 @pytest.mark.parametrize("form", ["fcl", "fll", "fis", "fml"])

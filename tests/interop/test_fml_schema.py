@@ -51,6 +51,7 @@ def test_systems_are_valid(lxml: Any, seed: int) -> None:
     validated(lxml, write(random_fml(seed)).content)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("kind", ["relative", "raw"])
 @pytest.mark.parametrize("seed", range(5))
 def test_rules_of_random_trees_are_valid(lxml: Any, seed: int, kind: Kind) -> None:

@@ -158,6 +158,7 @@ def test_ties_go_to_the_first_rule_and_uncovered_rows_to_the_default(
     assert_decided_alike(engine, rules, rows, scores)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("scores", ["rule", "class"])
 def test_scores_are_the_strengths_of_rules(engine: Engine, scores: Scores) -> None:
     rules, _ = pointed(rules_from_tree(random_tree(2, combinations=0.0), "raw"), 1e-2)
@@ -262,6 +263,7 @@ def test_degrees_of_every_term_are_read_as_the_engines_have_them(
 TYPES = ("", " Automatic", " TakagiSugeno", " Tsukamoto")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("kind", TYPES)
 @pytest.mark.parametrize("method", ["WeightedAverage", "WeightedSum"])
 def test_weighted_numbers_of_every_term_are_read_as_the_engines_take_them(

@@ -164,6 +164,7 @@ def test_a_processor_of_32_bits_gives_the_same_bits(
         assert all_right(said)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", ["tree", "relative", "raw product", "system tipper"])
 def test_a_number_that_was_changed_fails_the_self_test(
     tmp_path: Path, program: Need, name: str

@@ -120,6 +120,7 @@ def compared(model: Model, rows: Sequence[Row]) -> int:
     return len(rows)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", models())
 def test_our_evaluator_has_the_bits_of_the_reference_on_probes(
     library: Need, name: str

@@ -91,6 +91,7 @@ def test_two_valued_columns_are_learnt(mode: Mode) -> None:
     assert labels_of(found.tree, values) == [f"c{label}" for label in labels]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("constant", [0.0, 0.1, 1e12, -1e300, 5e-324])
 def test_a_constant_column_is_ignored_and_changes_nothing(
@@ -173,6 +174,7 @@ def assert_a_strange_table_is_learnt(seed: int) -> None:
     assert found[0] == found[1]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", range(30))
 def test_strange_tables_are_learnt_or_refused(seed: int) -> None:
     assert_a_strange_table_is_learnt(seed)
@@ -191,6 +193,7 @@ def patterns_of(values: FloatArray, labels: IntArray) -> Patterns:
     return make_patterns(statistics.moments(sample.units), sample, {})
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("noise", [0.0, 2.0**-40, 2.0**-20, 2.0**-10])
 def test_nearly_equal_columns_get_no_weights_out_of_proportion(noise: float) -> None:
     rng = np.random.default_rng(0)

@@ -134,6 +134,7 @@ def labels_of(tree: FuzzyTree, values: FloatArray) -> list[str | None]:
     ]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", TABLES)
 def test_a_column_times_a_power_of_two_gives_the_tree_in_that_unit(
@@ -164,6 +165,7 @@ def test_a_unit_near_the_ends_of_the_floats_keeps_the_questions_of_one_column(
     assert found == in_units(base, units)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", TABLES)
 def test_neither_order_nor_chunks_nor_merging_change_a_bit(
@@ -207,6 +209,7 @@ def test_a_negative_zero_is_zero() -> None:
     assert found == msgspec.json.encode(learn((positive, labels)))
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("power", [3, 23, 40])
 def test_a_column_moved_by_an_offset_gives_the_moved_tree(
@@ -247,6 +250,7 @@ def assert_an_offset_moves_the_tree(table: Table, power: int, mode: Mode) -> Non
     assert labels_of(found, moved[:200]) == labels_of(base, values[:200])
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("offset", [-0.625, 12345.6875, 1e9 + 1.5])
 def test_any_offset_without_rounding_keeps_every_answer(

@@ -128,6 +128,7 @@ def test_a_feature_that_costs_nothing_ends_no_combination() -> None:
     assert free.report.features_per_node == (3,)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("name", "least"), [("xor", 0.95), ("ring", 0.9), ("checkerboard", 0.9)]
 )

@@ -49,6 +49,7 @@ def counted_by_fractions(values: list[float] | FloatArray, n: int) -> list[int]:
     ]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize("low", [0.0, 0.1, 1e12, -3e-310])
 def test_two_valued_columns_are_counted_exactly(low: float, n: int) -> None:

@@ -108,6 +108,7 @@ def model_of(*shapes: Shape, conjunction: Conjunction = "min") -> RuleBase:
     return RuleBase("one", ("a",), variables, rules, Semantics(conjunction))
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("shape", "tolerance"), CASES)
 def test_no_degree_is_further_off_than_certified(
     shape: Band | LR, tolerance: float
@@ -201,6 +202,7 @@ def test_ten_times_the_accuracy_costs_about_three_times_the_points() -> None:
         assert 2.5 < many / few < 3.3
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("tolerance", [0.3, 1e-2, 1e-4])
 @pytest.mark.parametrize("seed", range(4))
 def test_relative_rules_of_points_decide_like_their_tree_in_every_cell(
@@ -361,6 +363,7 @@ def around(shape: Shape) -> list[Fraction]:
     return [*marks, *map(Fraction, (1e12, 1e12 - 1, 1e12 + 1))]
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("wanted", [1, 2, 4, 7])
 @pytest.mark.parametrize("name", LONG)
 def test_no_lower_curve_is_further_off_than_certified(name: str, wanted: int) -> None:
@@ -380,6 +383,7 @@ def test_a_higher_degree_is_never_further_off(name: str) -> None:
         assert high <= low * 1.02
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("wanted", range(1, 5))
 @pytest.mark.parametrize("name", ["seven", "overshoots", "sides", "smooth"])
 def test_a_lower_curve_keeps_its_ends_and_never_falls(name: str, wanted: int) -> None:

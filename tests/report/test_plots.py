@@ -193,6 +193,7 @@ def test_among_many_points_the_front_alone_is_labelled() -> None:
     assert len(markers(figure)) == 150
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("count", [8, 40, 150])
 def test_labels_lie_apart_and_within_their_axes(count: int) -> None:
     from matplotlib.text import Text
@@ -270,6 +271,7 @@ def test_a_study_whose_errors_are_all_zero_has_strips_alone() -> None:
     assert len(figure.axes) == 1
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("suffix", plots.SUFFIXES)
 def test_the_same_study_gives_the_same_bytes(suffix: str) -> None:
     again = plots.work_precision(small(), rows=1000)

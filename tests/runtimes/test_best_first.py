@@ -156,6 +156,7 @@ def test_a_value_lies_between_the_ends_of_its_cell(family: str) -> None:
     assert np.all(values <= high[cells])
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_few_terms_have_the_largest_degree_of_all_to_the_bit(family: str) -> None:
     rules = rules_of(FAMILIES[family])
@@ -193,6 +194,7 @@ def test_bounds_of_a_clause_are_close_where_its_terms_are() -> None:
     assert np.all(envelope.upper[cells] - envelope.lower[cells] < 0.02)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("conjunction", ["min", "product"])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_winner_is_that_of_firing_at_every_landmark(
@@ -209,6 +211,7 @@ def assert_fired(rules: RuleBase, values: FloatArray) -> None:
     assert np.array_equal(found.status, expected.status)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("conjunction", ["min", "product"])
 @pytest.mark.parametrize("seed", range(3))
 def test_raw_rules_of_a_tree_are_won_as_by_firing(

@@ -193,6 +193,7 @@ ENDS = RuleBase(
 )
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("count", [1, 2, 7, 64])
 @pytest.mark.parametrize("runtime", RUNTIMES, ids=lambda runtime: runtime.name)
 def test_no_strength_is_a_negative_zero(runtime: Runtime, count: int) -> None:
@@ -203,6 +204,7 @@ def test_no_strength_is_a_negative_zero(runtime: Runtime, count: int) -> None:
             assert not np.signbit(found.strengths).any(), end
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("position", range(len(MODELS)), ids=map(name_of, MODELS))
 @pytest.mark.parametrize("runtime", EXACT, ids=lambda runtime: runtime.name)
 def test_a_runtime_in_double_has_the_bits_of_the_reference(
@@ -213,6 +215,7 @@ def test_a_runtime_in_double_has_the_bits_of_the_reference(
     assert_same_answers(run_or_skip(runtime, model, values), expected)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("position", range(len(MODELS)), ids=map(name_of, MODELS))
 @pytest.mark.parametrize(
     "runtime",

@@ -54,6 +54,7 @@ def test_a_runtime_that_runs_systems_says_so() -> None:
     assert {"reference", "native", "onnxruntime float64"} <= set(names)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", range(30))
 def test_numpy_is_as_near_to_the_inference_as_its_library_allows(seed: int) -> None:
     system = random_system(seed, formulas="wild" if seed % 2 else "tame")
@@ -136,6 +137,7 @@ def test_what_onnxruntime_lacks_in_double_is_a_loss() -> None:
     )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "function", ["exp", "log", "sin", "cos", "tanh", "sqrt", "floor", "ceil", "round"]
 )
@@ -152,6 +154,7 @@ def test_functions_of_one_number_are_within_their_units(function: str) -> None:
     assert found.ok, [one.detail for one in found.comparisons]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("function", ["^", "fmod", "%", "min", "max", "/"])
 def test_functions_of_two_numbers_are_within_their_units(function: str) -> None:
     label = Label("f", Formula(Call(function, (Name("a"), Name("b")))))

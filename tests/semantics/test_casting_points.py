@@ -47,7 +47,6 @@ from fuzzytree.semantics.inference.curves import curve_degree
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree
 from fuzzytree.testing import random_tree
-from tests.seeds import seeds
 
 TOLERANCES = (0.3, 1e-2, 1e-4)
 
@@ -76,8 +75,9 @@ def curves(seed: int) -> Iterator[Curve]:
     yield from (Concave(a, b), Concave(b, a), Concave(a, a), Arc(a, b), Arc(b, a))
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("tolerance", TOLERANCES)
-@pytest.mark.parametrize("seed", seeds(8, 0, 3, 6))
+@pytest.mark.parametrize("seed", range(8))
 def test_points_are_no_further_off_than_they_say(seed: int, tolerance: float) -> None:
     chance = random.Random(seed)
     for curve in curves(seed):

@@ -166,6 +166,7 @@ def test_a_changed_byte_that_a_checksum_covers_is_never_taken(name: str) -> None
             assert counters.skipped == len(data)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("name", FAMILIES)
 def test_memory_is_bounded_whatever_comes(name: str) -> None:
     board = FAMILIES[name]

@@ -153,6 +153,7 @@ def _covered_by_two(degree: float, conjunction: Conjunction) -> RuleBase:
     return RuleBase("two", ("a", "b", "c"), (x, y), made, Semantics(conjunction))
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
 @pytest.mark.parametrize("degree", [0.7, 0.71, 0.9])
 def test_a_rule_dead_by_the_union_of_two_others_is_proved(

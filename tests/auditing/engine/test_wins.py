@@ -44,6 +44,7 @@ def _holds(given: Ground, found: Witness, rule: int, rivals: tuple[int, ...]) ->
 KINDS = ["lr", "points", "band", "mixed"]
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shared", [0.0, 0.8])
 @pytest.mark.parametrize("seed", range(2))

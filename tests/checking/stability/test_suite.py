@@ -138,6 +138,7 @@ EXTREME: dict[str, Shape] = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("name", EXTREME)
 def test_numbers_at_the_ends_of_double_can_be_examined(name: str) -> None:
     model = one_rule(Term("t", EXTREME[name]))
