@@ -9,6 +9,7 @@ import math
 import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,18 +89,15 @@ def test_duckdb_answers_with_our_bits(name: str, library: Callable[[str], str]) 
 
 
 @pytest.fixture(scope="module")
-def postgresql(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[str]]:
+def postgresql() -> Iterator[list[str]]:
     """Start a server of our own behind a socket, and return how to call psql."""
     folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
     if not folders or shutil.which("runuser") is None:
         if os.environ.get("FUZZYTREE_WITNESSES") == "all":
             pytest.fail("PostgreSQL is not installed")
         pytest.skip("PostgreSQL is not installed")
-    place = tmp_path_factory.mktemp("postgresql")
-    for folder in (place, *place.parents[:2]):
-        folder.chmod(0o755)
-    home = place / "server"
-    home.mkdir()
+    # No other user may enter the folders of pytest.
+    home = Path(tempfile.mkdtemp(prefix="postgresql-"))
     shutil.chown(home, "postgres")
     user = ["runuser", "-u", "postgres", "--"]
     tool = str(folders[-1])
@@ -119,6 +117,7 @@ def postgresql(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[str]]:
                "ON_ERROR_STOP=1", "--csv", "-t", "postgres"]  # fmt: skip
     finally:
         subprocess.run([*start, "-m", "immediate", "stop"], check=False, cwd="/")
+        shutil.rmtree(home)
 
 
 @pytest.mark.heavy
