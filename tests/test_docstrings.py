@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import importlib
 import importlib.util
+import linecache
 import pkgutil
 from pathlib import Path
 
@@ -29,5 +30,6 @@ MODULES = [
 
 @pytest.mark.parametrize("name", MODULES)
 def test_the_examples_of_a_module_give_what_they_show(name: str) -> None:
+    linecache.clearcache()  # or each example looks whether any source file changed
     failed, _ = doctest.testmod(importlib.import_module(name))
     assert failed == 0
