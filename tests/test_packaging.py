@@ -162,9 +162,10 @@ def _wheel(source: Path, folder: Path, *, from_sdist: bool) -> Path:
 
 def _fresh_environment(folder: Path, *what: str) -> Path:
     """Make an environment, install what is given, and return its Python."""
-    _run([sys.executable, "-m", "venv", str(folder / "env")], folder)
+    _run([sys.executable, "-m", "venv", "--without-pip", str(folder / "env")], folder)
     python = folder / "env" / "bin" / "python"
-    _run([str(python), "-m", "pip", "install", "--quiet", *what], folder)
+    pip = [sys.executable, "-m", "pip", "--python", str(python)]
+    _run([*pip, "install", "--quiet", "--no-compile", *what], folder)
     return python
 
 

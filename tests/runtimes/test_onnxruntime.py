@@ -432,10 +432,11 @@ OLD_SCRIPT = textwrap.dedent("""
 def old_python(folder: Path, version: str) -> Path:
     """Return the Python of a fresh environment with an old onnxruntime."""
     python = folder / "bin" / "python"
+    pip = [sys.executable, "-m", "pip", "--python", str(python)]
     wanted = [f"onnxruntime=={version}", "numpy<2"]
     for command in (
-        [sys.executable, "-m", "venv", str(folder)],
-        [str(python), "-m", "pip", "install", "-q", *wanted],
+        [sys.executable, "-m", "venv", "--without-pip", str(folder)],
+        [*pip, "install", "-q", "--no-compile", *wanted],
     ):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
