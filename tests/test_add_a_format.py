@@ -91,6 +91,7 @@ def test_the_package_installs_as_the_page_says(package: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.heavy
 def test_a_package_that_cannot_be_imported_breaks_nothing_else(package: Path) -> None:
     _declare(package)
     (package / "turtle_rules" / "__init__.py").write_text("import no_such_module\n")

@@ -76,6 +76,7 @@ def test_the_largest_probability_belongs_to_the_prediction_on_every_edge() -> No
     assert ((shares == shares.max(axis=1, keepdims=True)).sum(axis=1) == 1).all()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "labels",
     [
@@ -124,6 +125,7 @@ def test_a_pickle_holds_no_value_of_a_training_row(mode: Mode) -> None:
             assert not [v for v in inner if struct.pack(order + "d", v) in content]
 
 
+@pytest.mark.heavy
 def test_partial_fit_does_not_go_on_from_a_pickle_or_a_copy() -> None:
     model = FuzzyTreeClassifier().partial_fit(IRIS, SPECIES, classes=[0, 1, 2])
     for other in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):

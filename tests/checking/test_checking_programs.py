@@ -123,6 +123,7 @@ def test_a_changed_program_that_is_run_all_the_same_agrees_by_its_rows_only() ->
     assert checked(TREE, "m.py", run_code=True, rows_only=True).ok
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("path", "change", "fault"),
     [
@@ -152,6 +153,7 @@ def test_a_program_that_fails_is_a_disagreement(
     assert fault in rows.detail[0]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("model", "path", "options", "why"),
     [

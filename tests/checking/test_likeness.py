@@ -48,6 +48,7 @@ def test_a_model_is_equal_to_itself() -> None:
         assert is_alike(model, model)
 
 
+@pytest.mark.heavy
 def test_no_sample_is_like_another() -> None:
     known = list(samples().items())
     alike = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -52,13 +53,22 @@ def grip() -> FuzzyTree:
     )
 
 
+@pytest.fixture(scope="session")
+def originals(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a tree, its rules and its ONNX graph, to be copied."""
+    path = tmp_path_factory.mktemp("originals")
+    ft.save(grip(), path / "grip.yaml")
+    ft.save(ft.rules_from_tree(grip()), path / "rules.yaml")
+    ft.save(grip(), path / "grip.onnx")
+    return path
+
+
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(originals: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder, made the current one, with a tree, rules, ONNX and a table."""
     monkeypatch.chdir(tmp_path)
-    ft.save(grip(), "grip.yaml")
-    ft.save(ft.rules_from_tree(grip()), "rules.yaml")
-    ft.save(grip(), "grip.onnx")
+    for path in originals.iterdir():
+        shutil.copyfile(path, tmp_path / path.name)
     (tmp_path / "grasps.csv").write_text(GRASPS, "utf-8")
     return tmp_path
 

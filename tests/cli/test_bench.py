@@ -200,6 +200,7 @@ def test_a_table_without_rows_is_one_sentence(call: Call) -> None:
     assert call("bench", "grip.yaml", "--data", "none.csv", *FAST) == expected
 
 
+@pytest.mark.heavy
 def test_pictures_are_drawn_for_most_rows(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:

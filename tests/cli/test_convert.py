@@ -572,6 +572,7 @@ def test_an_option_that_does_nothing_is_refused(
     assert not Path(output).exists()
 
 
+@pytest.mark.heavy
 def test_points_in_pmml_are_refused_like_other_losses(call: Call) -> None:
     ft.save(ft.rules_from_tree(random_tree(2), "raw"), "r.yaml")
     words = ("convert", "r.yaml", "a.pmml", "--set", "curves=points")

@@ -12,20 +12,26 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.checking.abilities import abilities
+from fuzzytree.checking.abilities import Ability, abilities
 from fuzzytree.cli.doctor import CORE, EXTRAS
-from fuzzytree.exporters import TABLE, all_formats
+from fuzzytree.exporters import TABLE, all_formats, find_format
 from fuzzytree.runtimes import all_runtimes
 from fuzzytree.runtimes.answers import Answers
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-TRIED = functools.cache(abilities)
+
+
+@functools.cache
+def abilities_of_yaml() -> tuple[Ability, ...]:
+    return abilities(find_format("yaml"))
 
 
 @pytest.fixture(autouse=True)
-def _each_format_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fuzzytree.checking.abilities.abilities", TRIED)
+def _one_format_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "fuzzytree.checking.abilities.abilities", lambda *_, **__: abilities_of_yaml()
+    )
 
 
 def _without(monkeypatch: pytest.MonkeyPatch, module: str) -> None:

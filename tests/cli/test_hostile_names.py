@@ -95,6 +95,7 @@ def test_no_name_of_a_file_or_a_column_commands_a_terminal(
             assert not OBEYED.search(path.read_text("utf-8")), path
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("suffix", [one[0] for one in TABLE.values()])
 def test_no_file_name_stands_raw_in_a_file_that_is_written(
     call: Call, suffix: str

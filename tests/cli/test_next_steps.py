@@ -47,6 +47,7 @@ def taken(call: Call, printed: str) -> list[list[str]]:
 LEARN = ("learn", "few.csv", "--target", "grip", "--no-test")
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_what_follows_learning_works_with_every_format(call: Call, suffix: str) -> None:
     code, _, err = call(*LEARN, "-o", f"m{suffix}")

@@ -264,6 +264,7 @@ def test_a_rule_without_a_place_in_fml_is_refused(
     assert str(caught.value) == f"cannot write s as fml:\n  {reason}"
 
 
+@pytest.mark.heavy
 def test_curves_that_fml_lacks_become_points_with_a_bound() -> None:
     rules = rules_from_tree(random_tree(0, combinations=0.0), "raw")
     with pytest.raises(LossError, match="cannot write random 7 as fml without loss"):

@@ -118,6 +118,7 @@ def test_the_text_form_of_a_small_model_is_the_golden_one(case: str) -> None:
     assert text == (GOLDEN / f"{case}.onnxtxt").read_text(encoding="utf-8")
 
 
+@pytest.mark.heavy
 def test_equal_models_give_equal_bytes_in_another_process() -> None:
     code = (
         "import hashlib; from fuzzytree.testing import random_tree; "
@@ -468,6 +469,7 @@ def test_the_table_of_formats_needs_neither_onnx_nor_numpy() -> None:
     assert find_format(".onnx") is FORMAT
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("dtype", ["float64", "mixed", "float32"])
 def test_a_thousand_rules_stay_small_and_quick_to_write(dtype: Dtype) -> None:
     rules = rules_from_tree(random_tree(3, leaves=1000, inputs=11, combinations=0.0))

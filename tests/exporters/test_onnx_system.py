@@ -246,6 +246,7 @@ def test_a_graph_of_many_rules_gives_the_bits_of_the_inference(
     assert found.status.tolist() == right.status.tolist()
 
 
+@pytest.mark.heavy
 def test_four_times_as_many_rules_need_no_more_nodes() -> None:
     counts = [
         contents(write(grid_system(terms), outputs=ALL, verify=False).content).nodes

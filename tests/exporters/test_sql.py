@@ -51,6 +51,7 @@ def same(found: Sequence[tuple[object, ...]], right: Outcome) -> None:
         np.testing.assert_array_equal(strengths, right.strengths)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("seed", range(8))
 def test_sqlite_answers_with_the_bits_of_the_reference(seed: int) -> None:
     semantics = Semantics(

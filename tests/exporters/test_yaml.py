@@ -115,6 +115,7 @@ def test_all_awkward_names_come_back_together() -> None:
     assert_kept(named(AWKWARD, kind="tree"))
 
 
+@pytest.mark.heavy
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(
     st.lists(

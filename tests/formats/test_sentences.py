@@ -59,7 +59,7 @@ NAMES = st.lists(
 ).map(" ".join)
 
 
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(
     st.dictionaries(
         NAMES, st.lists(NAMES, min_size=1, max_size=4, unique=True), min_size=1

@@ -241,6 +241,7 @@ def test_a_part_stands_at_its_line_and_column(
     assert found(text.encode(), name)(path) == place
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("kind", "options"),
     [

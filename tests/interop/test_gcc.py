@@ -147,6 +147,7 @@ def test_every_model_compiles_without_a_warning_and_tests_itself(
             assert all_right(said), (name, command)
 
 
+@pytest.mark.heavy
 def test_a_processor_of_32_bits_gives_the_same_bits(
     tmp_path: Path, program: Need
 ) -> None:

@@ -154,10 +154,8 @@ def systems(kind: str) -> dict[str, FuzzySystem]:
     return {n: m for n in chosen if isinstance(m := models[n], FuzzySystem)}
 
 
-@pytest.mark.parametrize(
-    ("kind", "fewest"),
-    [("samples", 4_000), pytest.param("random", 5_000, marks=pytest.mark.heavy)],
-)
+@pytest.mark.heavy
+@pytest.mark.parametrize(("kind", "fewest"), [("samples", 4_000), ("random", 5_000)])
 def test_node_has_the_numbers_of_every_system_within_derived_bounds(
     program: Need, kind: str, fewest: int
 ) -> None:

@@ -155,6 +155,7 @@ def test_postgresql_answers_with_our_bits(name: str, postgresql: list[str]) -> N
     _assert_equal(found, right)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("dialect", ["sqlite", "duckdb", "postgresql", "spark"])
 def test_a_parser_of_each_dialect_takes_every_query(
     dialect: Dialect, library: Callable[[str], str]

@@ -267,6 +267,7 @@ def test_any_offset_without_rounding_keeps_every_answer(
     assert labels_of(found, moved) == labels_of(base, values)
 
 
+@pytest.mark.heavy
 def test_a_column_at_1e12_with_a_spread_of_1_is_as_good_as_one_at_0() -> None:
     values, labels = blobs(600)
     far = values + 1e12
@@ -277,6 +278,7 @@ def test_a_column_at_1e12_with_a_spread_of_1_is_as_good_as_one_at_0() -> None:
     assert [len(n.cuts) for n in found.nodes] == [len(n.cuts) for n in base.nodes]
 
 
+@pytest.mark.heavy
 def test_columns_twenty_decades_apart_are_combined_as_if_they_were_alike() -> None:
     values, labels = blobs(600)
     base = learn((values, labels)).tree

@@ -60,6 +60,7 @@ def test_two_valued_columns_are_counted_exactly(low: float, n: int) -> None:
             assert counted(values, n) == counted_by_fractions(values, n)
 
 
+@pytest.mark.heavy
 @given(
     st.lists(st.integers(-6, 6), min_size=1, max_size=12),
     st.integers(1, 8),

@@ -77,6 +77,7 @@ def test_unlike_keeps_a_name_that_is_free() -> None:
     assert unlike("a", ["b"]) == "a"
 
 
+@pytest.mark.heavy
 @given(
     st.lists(st.text(max_size=12), max_size=20),
     st.booleans(),
@@ -107,6 +108,7 @@ def test_all_names_are_accepted_unlike_and_restored(
         assert found.restored(value) == name
 
 
+@pytest.mark.heavy
 def test_many_names_that_become_alike_are_told_apart_at_once() -> None:
     start = time.process_time()
     found = Names.of("%" * count for count in range(1, 3000))

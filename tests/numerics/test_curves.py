@@ -123,6 +123,7 @@ def test_stretches_are_the_shapes_that_they_come_from() -> None:
             assert abs(min(height, Fraction(one.top)) - exact) < 1e-15
 
 
+@pytest.mark.heavy
 def test_the_page_prints_what_its_code_prints() -> None:
     text = PAGE.read_text("utf-8")
     found = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, re.DOTALL)

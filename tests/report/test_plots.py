@@ -184,6 +184,7 @@ def test_peers_are_named_where_points_are_few() -> None:
     assert {"simpful", "scikit-learn"} <= names
 
 
+@pytest.mark.heavy
 def test_among_many_points_the_front_alone_is_labelled() -> None:
     made = large(150)
     figure = plots.work_precision(made, rows=1000)
@@ -278,6 +279,7 @@ def test_the_same_study_gives_the_same_bytes(suffix: str) -> None:
     assert drawn(picture(), suffix) == drawn(again, suffix)
 
 
+@pytest.mark.heavy
 def test_a_users_settings_change_nothing() -> None:
     import matplotlib as mpl
 
@@ -430,6 +432,7 @@ def test_times_have_their_units(nanoseconds: float, text: str) -> None:
     assert time_text(nanoseconds) == text
 
 
+@pytest.mark.heavy
 def test_the_picture_of_the_docs_is_that_of_its_study(tmp_path: Path) -> None:
     docs = Path(__file__).resolve().parents[2] / "docs"
     measured = msgspec.json.decode((docs / "bench.json").read_bytes(), type=Study)

@@ -304,6 +304,7 @@ def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     assert str(caught.value) == message
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("moment", [1, 2, 3])
 def test_who_dies_at_the_beginning_leaves_no_file_or_a_recording(
     tmp_path: Path, moment: int

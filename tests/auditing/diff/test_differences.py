@@ -457,6 +457,7 @@ def test_a_distance_of_curves_holds_every_point() -> None:
         assert 0 <= found.low <= found.high <= 1
 
 
+@pytest.mark.heavy
 def test_a_witness_is_kept_for_each_pair_of_classes() -> None:
     found = told(random_tree(1, combinations=0), random_tree(2, combinations=0))
     pairs = {tuple(claim.label for claim in state.claims) for state in found.witnesses}

@@ -77,6 +77,7 @@ def _small_bases(conjunction: Conjunction) -> Iterator[RuleBase]:
         )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("conjunction", CONJUNCTIONS)
 def test_every_witness_holds_and_no_sampled_row_contradicts_a_proof(
     conjunction: Conjunction,

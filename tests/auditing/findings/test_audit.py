@@ -151,6 +151,7 @@ def test_a_spent_budget_leaves_the_rest_unasked_and_says_so() -> None:
     assert f"FT101 dead rule: {why}" in found.unasked
 
 
+@pytest.mark.heavy
 def test_a_budget_that_ends_midway_keeps_what_was_answered() -> None:
     whole = audit(grip(), domain=FAR)
     counts = set[int]()

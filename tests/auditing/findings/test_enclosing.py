@@ -88,6 +88,7 @@ def beyond(curve: Curve, found: Enclosed, count: int) -> list[Fraction]:
     return made
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("curve", CURVES, ids=str)
 def test_a_curve_is_nowhere_beyond_its_lines_and_never_far_from_them(
     curve: Curve,

@@ -216,6 +216,7 @@ HEDGES: tuple[Hedge, ...] = (
 )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     "curve",
     [

@@ -483,6 +483,7 @@ def test_a_clause_that_is_always_true_is_irrelevant() -> None:
     assert told(rules, "FT107") == ["rule 2 decides the same without 'slip is any'"]
 
 
+@pytest.mark.heavy
 def test_a_clause_that_only_others_make_irrelevant_is_proved_by_boxes() -> None:
     # Without its clause rule 3 is as strong as one of the others, which stand first.
     rules = base(

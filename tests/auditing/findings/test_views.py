@@ -299,6 +299,7 @@ def test_trees_rules_and_systems_that_stand_for_rules_decide_by_the_strongest() 
     assert len(of_system.rules.rules) == len(rules.rules)
 
 
+@pytest.mark.heavy
 def test_random_systems_are_as_strong_as_their_views_within_rounding() -> None:
     compared = apart = 0
     for seed in (*range(12), 110):

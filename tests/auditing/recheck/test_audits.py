@@ -166,6 +166,7 @@ def test_the_audit_of_a_rule_that_never_fires_holds() -> None:
 SILENT = ("FT107", [1])
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("terms", [("up",), ("up", "down")])
 def test_the_audit_of_a_rule_with_a_clause_and_its_opposite_holds(
     terms: tuple[str, ...],

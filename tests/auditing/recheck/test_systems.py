@@ -186,6 +186,7 @@ def test_the_ways_of_a_rule_are_numbered_as_the_audit_numbers_them() -> None:
     assert view.silent == ["rule 4"]
 
 
+@pytest.mark.heavy
 def test_strengths_of_a_system_are_those_of_its_inference() -> None:
     checked = 0
     for one in systems(range(8)):

@@ -74,6 +74,7 @@ def test_n4_finds_a_runtime_that_divides_by_nothing(
         assert degenerate(RULES, [sound], rows).verdict == "holds"
 
 
+@pytest.mark.heavy
 def test_n2_finds_a_runtime_that_evaluates_in_raw_values() -> None:
     none = np.empty((2, 0))
     found, _ = offsets(RULES, [defects.RAW_POWERS], none)

@@ -163,6 +163,7 @@ def test_data_of_another_width_are_refused() -> None:
     assert str(caught.value) == "data must have shape (2, rows), not (5, 2)"
 
 
+@pytest.mark.heavy
 def test_the_same_model_gives_the_same_report() -> None:
     again = examine(small_rules(), runtimes=FAST, formats=all_formats())
     assert small_examined() == again
@@ -230,6 +231,7 @@ def test_a_curve_that_costs_too_much_in_float32_asks_for_double() -> None:
 # --- the learner of this package
 
 
+@pytest.mark.heavy
 def test_the_learner_holds() -> None:
     def learn(values: FloatArray, classes: Sequence[str]) -> FuzzyTree:
         return ft.learn(values, target=list(classes))

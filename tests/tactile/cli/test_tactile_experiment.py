@@ -81,6 +81,7 @@ def test_the_facts_fit_their_schema(bars: Path, call: Call) -> None:
     assert [peer["name"] for peer in facts["peers"]] == [*peers.PEERS]
 
 
+@pytest.mark.heavy
 def test_a_folder_holds_a_model_that_recognises_the_frames(
     bars: Path, call: Call
 ) -> None:
