@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+import sys
 from collections import Counter
 from collections.abc import Generator
 
@@ -20,6 +21,10 @@ settings.load_profile("same")
 
 # A shell has the jobs of its background ignore Ctrl-C, which tests send to themselves.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Modules are compiled once, not by each worker and by each program that a test starts.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # scikit-learn leaves checks of its estimators out without it.
 os.environ.setdefault("SCIPY_ARRAY_API", "1")
