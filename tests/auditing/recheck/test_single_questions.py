@@ -286,31 +286,16 @@ def _is_so(grid: Grid, found: Audit, answer: Answer) -> bool:
     return True
 
 
-@pytest.mark.one_in(3)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.one_in(10)
+@pytest.mark.parametrize("seed", range(30))
 def test_every_audit_of_one_question_is_accepted_unedited(seed: int) -> None:
     assert refused(random_rules(seed)) == []
     assert refused(random_numeric_system(seed)) == []
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(6, 60))
-def test_more_audits_of_one_question_are_accepted_unedited(seed: int) -> None:
-    assert refused(random_rules(seed)) == []
-    assert refused(random_numeric_system(seed)) == []
-
-
-@pytest.mark.one_in(4)
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.one_in(12)
+@pytest.mark.parametrize("seed", range(40))
 def test_no_point_of_a_grid_contradicts_what_is_proved(seed: int) -> None:
-    rules = random_rules(seed)
-    grid = Grid(rules)
-    assert [t for code in CODES for t in disproved(grid, audited(rules, code)[0])] == []
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("seed", range(12, 80))
-def test_no_point_of_more_grids_contradicts_what_is_proved(seed: int) -> None:
     rules = random_rules(seed)
     grid = Grid(rules)
     assert [t for code in CODES for t in disproved(grid, audited(rules, code)[0])] == []
