@@ -1,4 +1,4 @@
-"""The paper's claims about speed and reliability, measured; writes docs/claims.md.
+"""The paper's claims about speed and reliability, measured; writes docs/explanation/claims.md.
 
     python benchmarks/claims.py [--quick] [--budget SECONDS] [--folder FOLDER]
 

@@ -1,6 +1,6 @@
 """How fast fuzzy systems of others run, here and in the engines of others.
 
-    python benchmarks/engines.py [--quick] [--write docs/engines.md]
+    python benchmarks/engines.py [--quick] [--write docs/reference/engines.md]
 
 Two systems: the tipper of examples/tipper.fll, and the relative rules of a tree with
 seven leaves and straight flanks, with a number for each rule. Every engine gets the
@@ -607,7 +607,7 @@ ENGINES: Mapping[str, Callable[[FuzzySystem, Path], Engine]] = {
 _HEAD = """\
 # Our runtimes beside the engines of others
 
-`python benchmarks/engines.py --write docs/engines.md`, on a quiet machine. Medians of
+`python benchmarks/engines.py --write docs/reference/engines.md`, on a quiet machine. Medians of
 interleaved rounds; one thread, except where noted. *Times ours* compares 10,000 rows
 with the fastest of our runtimes. *Largest difference* is that of the answers from the
 reference's, on the same rows.

@@ -2,7 +2,7 @@
 
     python benchmarks/footprint.py [--write] [loads] [saved] [timed] [memory]
 
-Prints the tables of docs/needs.md; `--write` puts them there, all or those named. Every
+Prints the tables of docs/how-to/needs.md; `--write` puts them there, all or those named. Every
 verb runs in a process of its own, several times in turn, and the median counts; memory
 is the most that a process ever had, as Linux counts it. Trees are learnt from the wine
 table and from the digits of scikit-learn.
@@ -36,7 +36,7 @@ from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.simplification import pruned
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "needs.md"
+PAGE = ROOT / "docs" / "how-to" / "needs.md"
 WINE = ROOT / "examples" / "wine" / "wine.csv"
 ROUNDS = 7
 MEMORY_ROWS = 1_000_000
@@ -74,7 +74,7 @@ VERBS: Mapping[str, Sequence[str]] = {
 def main() -> None:
     """Print the tables, or write them into the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="into docs/needs.md")
+    parser.add_argument("--write", action="store_true", help="into docs/how-to/needs.md")
     parser.add_argument("tables", nargs="*", help=f"some of {', '.join(TABLES)}")
     arguments = parser.parse_args()
     wrong = [name for name in arguments.tables if name not in TABLES]

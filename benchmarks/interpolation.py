@@ -2,7 +2,7 @@
 
     python benchmarks/interpolation.py [--draw] [--errors] [--times]
 
-`--draw` writes the pictures of docs/interpolation.md; the other two print its tables.
+`--draw` writes the pictures of docs/explanation/interpolation.md; the other two print its tables.
 Without any, all three are done. SciPy and OpenCV are measured where installed.
 """
 

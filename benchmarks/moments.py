@@ -1,7 +1,7 @@
 """Errors of moments against fractions, and what features cost in time.
 
 python benchmarks/moments.py            print both tables
-python benchmarks/moments.py --write    put the errors into docs/moments.md
+python benchmarks/moments.py --write    put the errors into docs/explanation/moments.md
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fuzzytree.tactile.sensor import Cells, Sensor
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "moments.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "explanation" / "moments.md"
 SENSOR = Sensor(32, 32)
 _ROWS, _COLUMNS = np.mgrid[:32, :32]
 

@@ -1,6 +1,6 @@
 """FCL (IEC 61131-7) in four dialects: rule bases and fuzzy systems.
 
-`docs/fcl.md` says which engine reads which dialect, and where they differ.
+`docs/reference/fcl.md` says which engine reads which dialect, and where they differ.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """FIS: rule bases and systems for MATLAB, Octave's fuzzy-logic-toolkit and fuzzylite.
 
-`docs/fis.md` describes the file. A rule asks every input at most once and all of them
+`docs/reference/fis.md` describes the file. A rule asks every input at most once and all of them
 by `and` or all by `or`: what a model asks otherwise becomes terms of its own
 (`fuzzytree.exporters.fis_rules`), or the file is not written.
 """
@@ -91,7 +91,7 @@ def write(
         dialect: For whom the file is: `matlab`, `octave` or `fuzzylite`.
         tolerance: The largest error of a degree where points stand for a curve.
         curves: `standard` counts lists of points, `discretemf`, as a loss: MATLAB and
-            Octave need a small function for them, which `docs/fis.md` shows.
+            Octave need a small function for them, which `docs/reference/fis.md` shows.
 
     Raises:
         LossError: If something would be lost, unless allowed; and always if the rules

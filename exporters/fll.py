@@ -1,6 +1,6 @@
 """FLL: rule bases and systems for fuzzylite 6 and pyfuzzylite 8.
 
-`docs/fll.md` describes the file and says where the two engines differ.
+`docs/reference/fll.md` describes the file and says where the two engines differ.
 """
 
 from __future__ import annotations

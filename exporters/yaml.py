@@ -2,7 +2,7 @@
 
 Nothing is lost: reading what was written gives an equal model, bit for bit. Words and
 numbers are written so that readers of YAML 1.1 and of YAML 1.2 see the same.
-`docs/yaml-format.md` describes the file.
+`docs/reference/yaml-format.md` describes the file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Fuzzy systems as entries of a YAML file; `docs/systems.md` describes it."""
+"""Fuzzy systems as entries of a YAML file; `docs/reference/systems.md` describes it."""
 
 from __future__ import annotations
 

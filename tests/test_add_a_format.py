@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = (ROOT / "docs" / "add-a-format.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "add-a-format.md").read_text("utf-8")
 SHOWN = dict(re.findall(r"<!-- (.+?) -->\n\n```\w+\n(.*?)```\n", PAGE, re.DOTALL))
 TRY = """
 import fuzzytree as ft

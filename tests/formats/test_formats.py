@@ -1,6 +1,6 @@
 """What each format can carry is found by trying, and the page shows what was found.
 
-`python tests/formats/test_formats.py` rewrites the table of `docs/formats.md`.
+`python tests/formats/test_formats.py` rewrites the table of `docs/reference/formats.md`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from fuzzytree.semantics.inference import input_values
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.samples import samples
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "formats.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "formats.md"
 MARKED = re.compile(r"(<!-- abilities -->\n\n).*?(<!-- end -->\n)", re.DOTALL)
 YAML = find_format("yaml")
 

@@ -11,7 +11,7 @@ from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, co
 from fuzzytree.formats.yaml.yaml import read
 from fuzzytree.model.rulebase import RuleBase
 
-PAGE = Path(__file__).parents[2] / "docs" / "yaml-format.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "yaml-format.md"
 TEXT = PAGE.read_text("utf-8")
 BLOCKS = re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)
 

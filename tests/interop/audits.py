@@ -1,6 +1,6 @@
 """What an audit says of rule bases of others, and of the tree learnt from wines.
 
-`python -m tests.interop.audits > docs/audits.md` writes the page.
+`python -m tests.interop.audits > docs/reference/audits.md` writes the page.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tests.interop.corpus_fll import FLL
 WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
 CORPORA = (FCL, FIS, FLL)
 LEFT_OUT = ("FT6", "FT7")
-"""Of files of others: docs/corpus.md compares carriers, and there are no rows."""
+"""Of files of others: docs/reference/corpus.md compares carriers, and there are no rows."""
 
 SETTINGS = Settings(budget_s=600.0)
 
@@ -35,7 +35,7 @@ INTRODUCTION = """\
 `fuzzytree audit` is asked about two trees learnt from the 178 wines, with these rows,
 and about every FCL, FIS and FLL file that Debian's packages `fuzzylite` and
 `octave-fuzzy-logic-toolkit` and the Python package `pyfuzzylite` ship.
-`python -m tests.interop.audits > docs/audits.md` writes this page, and
+`python -m tests.interop.audits > docs/reference/audits.md` writes this page, and
 `tests/interop/test_audits.py` compares it with what is found. The files are not ours
 and are not here; they are read where those packages put them.
 

@@ -1,6 +1,6 @@
 """Every file that fuzzylite, pyfuzzylite and Octave's toolkit ship, in our hands.
 
-`python -m tests.interop.corpus > docs/corpus.md` writes the page.
+`python -m tests.interop.corpus > docs/reference/corpus.md` writes the page.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ INTRODUCTION = f"""\
 Every FCL, FIS and FLL file that Debian's packages `fuzzylite` and
 `octave-fuzzy-logic-toolkit` and the Python package `pyfuzzylite` ship goes through
 our reader, our reference, the engines that it is for, our ONNX file and our writers.
-`python -m tests.interop.corpus > docs/corpus.md` writes this page, and
+`python -m tests.interop.corpus > docs/reference/corpus.md` writes this page, and
 `tests/interop/test_corpus.py` compares it with what is found. The files are not
 ours and are not here; they are read where those packages put them.
 

@@ -27,7 +27,7 @@ function y = discretemf (x, params)
   endfor
 endfunction
 """
-"""`docs/fis.md` shows this function; a test compares the two."""
+"""`docs/reference/fis.md` shows this function; a test compares the two."""
 
 _SCRIPT = """\
 pkg load fuzzy-logic-toolkit

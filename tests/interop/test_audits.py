@@ -9,7 +9,7 @@ import pytest
 
 from tests.interop import audits
 
-PAGE = Path(__file__).parents[2] / "docs" / "audits.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "audits.md"
 
 Need = Callable[[str], str]
 

@@ -15,7 +15,7 @@ from tests.interop.corpus_fll import FLL
 from tests.interop.corpus_rows import EXACT, Row, Tools
 from tests.interop.fuzzylite_exact import compiled
 
-PAGE = Path(__file__).parents[2] / "docs" / "corpus.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "corpus.md"
 COUNTS = {
     "fcl": {"fuzzylite": 18},
     "fis": {"fuzzylite": 29, "Octave": 6},

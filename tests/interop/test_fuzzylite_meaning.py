@@ -2,7 +2,7 @@
 
 It takes degrees up to 1e-6 for 0, and for equal what differs by as much; so systems
 whose norms ask whether a degree is 0 or 1 are given others, and rows in which a rule is
-that weak are left out. `docs/systems.md` lists where else it differs.
+that weak are left out. `docs/reference/systems.md` lists where else it differs.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import pytest
 from fuzzytree.tactile.interpolation import interpolated
 
 FRAMES = np.random.default_rng(4).integers(0, 256, (20, 9, 7), dtype=np.uint8)
-BOUND = 0.10472  # of the range, derived in docs/interpolation.md
+BOUND = 0.10472  # of the range, derived in docs/explanation/interpolation.md
 ROUNDING = 1e-4  # OpenCV computes in float32, of numbers up to 255
 
 Floats = npt.NDArray[np.float64]

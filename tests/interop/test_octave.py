@@ -203,5 +203,5 @@ def test_random_systems_answer_alike_in_octave(program: Need, tmp_path: Path) ->
 
 
 def test_the_page_shows_the_function_for_points_that_is_tested() -> None:
-    page = (ROOT / "docs" / "fis.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "fis.md").read_text(encoding="utf-8")
     assert f"```matlab\n{DISCRETEMF}```" in page

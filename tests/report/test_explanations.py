@@ -15,7 +15,7 @@ from fuzzytree.report.explanations import (
     page_lines,
 )
 
-PAGE = Path(__file__).parents[2] / "docs" / "audit.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "audit.md"
 
 
 def test_every_code_is_explained_within_the_width() -> None:

@@ -76,7 +76,7 @@ def test_what_is_written_is_read_back(
 
 
 def test_the_layout_is_that_of_the_page(tmp_path: Path) -> None:
-    """Read a file with nothing but what `docs/recordings.md` says."""
+    """Read a file with nothing but what `docs/reference/recordings.md` says."""
     content = _record(tmp_path / "a.ftr", 2)
     assert content[:8] == b"\x89FTR\r\n\x1a\n"
     assert np.frombuffer(content, "<u2", 3, 8).tolist() == [1, 3, 4]

@@ -1,6 +1,6 @@
 """The fields of an audit."""
 
-# ruff: noqa: D101 - docs/recheck.md says what the records hold
+# ruff: noqa: D101 - docs/how-to/recheck.md says what the records hold
 
 from __future__ import annotations
 

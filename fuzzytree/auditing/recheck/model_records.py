@@ -1,6 +1,6 @@
 """The fields of a model, in the order of its fingerprint."""
 
-# ruff: noqa: D101 - docs/yaml-format.md says what the records hold
+# ruff: noqa: D101 - docs/reference/yaml-format.md says what the records hold
 
 from __future__ import annotations
 

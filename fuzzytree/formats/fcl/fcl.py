@@ -3,7 +3,7 @@
 Keywords may be in upper or lower case; names must be written alike everywhere. The
 dialect of a file is found out from the file, and told as a remark with the reasons:
 engines mean other things by the same words, and each file is taken as its own engine
-takes it. `docs/fcl.md` lists the differences.
+takes it. `docs/reference/fcl.md` lists the differences.
 """
 
 from __future__ import annotations

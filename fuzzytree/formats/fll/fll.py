@@ -1,6 +1,6 @@
 """FLL files of fuzzylite and pyfuzzylite as systems.
 
-`docs/fll.md` describes the file and says where the two engines mean other things by it.
+`docs/reference/fll.md` describes the file and says where the two engines mean other things by it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The YAML file of a board; `docs/boards.md` describes it."""
+"""The YAML file of a board; `docs/reference/boards.md` describes it."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _LOOK_S = 0.05
     "faults",
     metavar="NAME=VALUE",
     multiple=True,
-    help="What goes wrong (repeat); docs/device.md lists them.",
+    help="What goes wrong (repeat); docs/how-to/device.md lists them.",
 )
 @click.option("--link", metavar="PATH", help="The name of the port.")
 @click.option(

@@ -1,6 +1,6 @@
 """Frames on disk: each is written at once, and a damaged file loses what is damaged.
 
-`docs/recordings.md` has the layout, byte by byte.
+`docs/reference/recordings.md` has the layout, byte by byte.
 """
 
 from __future__ import annotations

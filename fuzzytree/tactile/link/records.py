@@ -1,6 +1,6 @@
 """The bytes of a recording: its header, its records, and what lies between them.
 
-`docs/recordings.md` has the layout, byte by byte.
+`docs/reference/recordings.md` has the layout, byte by byte.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ EXACT = "exact arithmetic"
 
 ALLOWED = 1e-12
 """The largest error of a feature as a share of its scale: some thousand roundings, and
-what the series of angles and logarithms leave out (`docs/moments.md`)."""
+what the series of angles and logarithms leave out (`docs/explanation/moments.md`)."""
 
 _PLAIN_CELLS, _EXACT_CELLS = 512_000, 51_200  # of frames that are asked slowly
 _FEWEST, _TOLD = 10, 3

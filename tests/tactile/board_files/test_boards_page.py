@@ -1,4 +1,4 @@
-"""What `docs/boards.md` shows is what the reader reads."""
+"""What `docs/reference/boards.md` shows is what the reader reads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from fuzzytree.tactile.board_files.reader import load_board, read_board
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "boards.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "reference" / "boards.md").read_text("utf-8")
 BLOCKS = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 
 

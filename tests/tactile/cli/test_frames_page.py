@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.cli import main
 
-PAGE = Path(__file__).parents[3] / "docs" / "frames.md"
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "frames.md"
 
 
 @pytest.mark.heavy

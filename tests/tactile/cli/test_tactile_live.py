@@ -393,7 +393,7 @@ def test_the_commands_of_the_page_do_what_it_says(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = Path(__file__).parents[3].joinpath("docs/live.md").read_text("utf-8")
+    page = Path(__file__).parents[3].joinpath("docs/how-to/live.md").read_text("utf-8")
     monkeypatch.chdir(tmp_path)
     (board,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     Path("mat.yaml").write_text(board, "utf-8")

@@ -155,7 +155,7 @@ def test_what_cannot_be_pressed_is_told(
 
 
 def test_the_documented_settings_are_those_that_there_are() -> None:
-    page = Path(__file__).parents[3] / "docs" / "simulator.md"
+    page = Path(__file__).parents[3] / "docs" / "explanation" / "simulator.md"
     rows = [line for line in page.read_text().splitlines() if line.startswith("| `")]
     told = {row.split("`")[1]: row.split("|")[2].strip() for row in rows}
     for name in Settings.__struct_fields__:
