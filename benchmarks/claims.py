@@ -1,10 +1,11 @@
-"""The paper's claims about speed and reliability, measured; writes docs/explanation/claims.md.
+"""The paper's claims about speed and reliability, measured.
 
     python benchmarks/claims.py [--quick] [--budget SECONDS] [--folder FOLDER]
 
 It takes six minutes on one free core. After Ctrl-C, what was measured by then is
-written. With --quick, a trial of half a minute is written into out/ and not into docs/.
-With --again, the page and its pictures are made from the numbers of the last time.
+written. With --quick, a trial of half a minute is written into out/ and not into
+docs/explanation/. With --again, the page and its pictures are made from the numbers of
+the last time.
 """
 
 from __future__ import annotations
@@ -39,11 +40,13 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="few sizes, one seed")
     parser.add_argument("--again", action="store_true", help="measure nothing")
     parser.add_argument("--budget", type=float, default=400.0, metavar="SECONDS")
-    parser.add_argument("--folder", type=Path, help="docs, or out with --quick")
+    parser.add_argument(
+        "--folder", type=Path, help="docs/explanation, or out with --quick"
+    )
     options = parser.parse_args()
     if not options.budget > 0:
         parser.error(f"the budget must be more than 0 seconds, not {options.budget:g}")
-    folder = options.folder or ROOT / ("out" if options.quick else "docs")
+    folder = options.folder or ROOT / ("out" if options.quick else "docs/explanation")
     if options.again:
         claims = from_json((folder / "claims.json").read_bytes())
     else:

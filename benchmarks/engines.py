@@ -607,10 +607,10 @@ ENGINES: Mapping[str, Callable[[FuzzySystem, Path], Engine]] = {
 _HEAD = """\
 # Our runtimes beside the engines of others
 
-`python benchmarks/engines.py --write docs/reference/engines.md`, on a quiet machine. Medians of
-interleaved rounds; one thread, except where noted. *Times ours* compares 10,000 rows
-with the fastest of our runtimes. *Largest difference* is that of the answers from the
-reference's, on the same rows.
+`python benchmarks/engines.py --write docs/reference/engines.md`, on a quiet machine.
+Medians of interleaved rounds; one thread, except where noted. *Times ours* compares
+10,000 rows with the fastest of our runtimes. *Largest difference* is that of the
+answers from the reference's, on the same rows.
 
 """
 

@@ -2,10 +2,10 @@
 
     python benchmarks/footprint.py [--write] [loads] [saved] [timed] [memory]
 
-Prints the tables of docs/how-to/needs.md; `--write` puts them there, all or those named. Every
-verb runs in a process of its own, several times in turn, and the median counts; memory
-is the most that a process ever had, as Linux counts it. Trees are learnt from the wine
-table and from the digits of scikit-learn.
+Prints the tables of docs/how-to/needs.md; `--write` puts them there, all or those
+named. Every verb runs in a process of its own, several times in turn, and the median
+counts; memory is the most that a process ever had, as Linux counts it. Trees are learnt
+from the wine table and from the digits of scikit-learn.
 """
 
 from __future__ import annotations
@@ -74,7 +74,9 @@ VERBS: Mapping[str, Sequence[str]] = {
 def main() -> None:
     """Print the tables, or write them into the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="into docs/how-to/needs.md")
+    parser.add_argument(
+        "--write", action="store_true", help="into docs/how-to/needs.md"
+    )
     parser.add_argument("tables", nargs="*", help=f"some of {', '.join(TABLES)}")
     arguments = parser.parse_args()
     wrong = [name for name in arguments.tables if name not in TABLES]

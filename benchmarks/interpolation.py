@@ -2,8 +2,9 @@
 
     python benchmarks/interpolation.py [--draw] [--errors] [--times]
 
-`--draw` writes the pictures of docs/explanation/interpolation.md; the other two print its tables.
-Without any, all three are done. SciPy and OpenCV are measured where installed.
+`--draw` writes the pictures of docs/explanation/interpolation.md; the other two print
+its tables. Without any, all three are done. SciPy and OpenCV are measured where
+installed.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCS = ROOT / "docs"
+DOCS = ROOT / "docs" / "explanation"
 HAND = ROOT / "examples" / "tactile" / "hand.npz"  # a press of the simulator
 TIMES = (3, 5, 7)
 SIDE = 16

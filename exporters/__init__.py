@@ -1,8 +1,8 @@
 """Writers of models, one module per format, and the table of formats.
 
 A format is a module here with a constant `FORMAT` (see
-`fuzzytree.model.contracts.Format`) and a line in `TABLE`; `docs/how-to/add-a-format.md` shows
-how to add one. Packages of others offer theirs by the entry point group
+`fuzzytree.model.contracts.Format`) and a line in `TABLE`; `docs/how-to/add-a-format.md`
+shows how to add one. Packages of others offer theirs by the entry point group
 `fuzzytree.formats`. A module is imported when its format is asked for, and a package of
 others only for a format that is not ours.
 """

@@ -1,7 +1,7 @@
 """FIS: rule bases and systems for MATLAB, Octave's fuzzy-logic-toolkit and fuzzylite.
 
-`docs/reference/fis.md` describes the file. A rule asks every input at most once and all of them
-by `and` or all by `or`: what a model asks otherwise becomes terms of its own
+`docs/reference/fis.md` describes the file. A rule asks every input at most once and all
+of them by `and` or all by `or`: what a model asks otherwise becomes terms of its own
 (`fuzzytree.exporters.fis_rules`), or the file is not written.
 """
 

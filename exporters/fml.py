@@ -1,8 +1,9 @@
 """FML (IEEE 1855-2016): rule bases and systems as XML that is valid by the schema.
 
-`docs/reference/fml.md` describes the file. Every name is an XML ID, unlike all others of the
-document: terms are called `variable.term`. The standard's numbers have 32 bits; the
-file holds all digits of the doubles, and a remark says what a reader may make of them.
+`docs/reference/fml.md` describes the file. Every name is an XML ID, unlike all others
+of the document: terms are called `variable.term`. The standard's numbers have 32 bits;
+the file holds all digits of the doubles, and a remark says what a reader may make of
+them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """ONNX: a tree, rules or a fuzzy system as a graph that any ONNX runtime executes.
 
 A tree gives the graph that follows its path, a rule base the graph that fires all its
-rules, and a fuzzy system that of all its operations. See `docs/reference/onnx.md` for the graphs,
-their cost and the versions that run them.
+rules, and a fuzzy system that of all its operations. See `docs/reference/onnx.md` for
+the graphs, their cost and the versions that run them.
 """
 
 from __future__ import annotations

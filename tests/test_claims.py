@@ -409,7 +409,7 @@ def test_the_page_is_made_of_a_stored_result_byte_for_byte() -> None:
 
 
 def test_the_committed_page_tells_the_committed_numbers() -> None:
-    folder = ROOT / "docs"
+    folder = ROOT / "docs" / "explanation"
     claims = from_json((folder / "claims.json").read_bytes())
     assert not claims.is_quick
     assert page(claims) == (folder / "claims.md").read_text("utf-8")
@@ -418,7 +418,7 @@ def test_the_committed_page_tells_the_committed_numbers() -> None:
 @pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["speed", "agreement"])
 def test_the_committed_picture_shows_the_committed_numbers(name: str) -> None:
-    folder = ROOT / "docs"
+    folder = ROOT / "docs" / "explanation"
     claims = from_json((folder / "claims.json").read_bytes())
     drawn_by = claims.machine.versions["matplotlib"]
     if importlib.metadata.version("matplotlib") != drawn_by:

@@ -22,7 +22,7 @@ def test_each_example_prints_what_stands_below_it(
     for module in NEEDED[page]:
         pytest.importorskip(module)
     monkeypatch.chdir(ROOT)
-    text = (ROOT / "docs" / page).read_text("utf-8")
+    text = next((ROOT / "docs").rglob(page)).read_text("utf-8")
     blocks = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, re.DOTALL)
     names: dict[str, object] = {}
     for code, shown in blocks:

@@ -1,6 +1,7 @@
 """What each code of an audit means, in the terminal and in `docs/how-to/audit.md`.
 
-`python -m fuzzytree.report.explanations docs/how-to/audit.md` rewrites that page's last part.
+`python -m fuzzytree.report.explanations docs/how-to/audit.md` rewrites that page's last
+part.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """What each format can carry is found by trying, and the page shows what was found.
 
-`python tests/formats/test_formats.py` rewrites the table of `docs/reference/formats.md`.
+`python tests/formats/test_formats.py` rewrites the table of
+`docs/reference/formats.md`.
 """
 
 from __future__ import annotations

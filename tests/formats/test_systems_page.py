@@ -24,7 +24,9 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.semantics.inference import infer
 
-TEXT = (Path(__file__).parents[2] / "docs" / "reference" / "systems.md").read_text("utf-8")
+TEXT = (Path(__file__).parents[2] / "docs" / "reference" / "systems.md").read_text(
+    "utf-8"
+)
 [EXAMPLE] = re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)
 
 

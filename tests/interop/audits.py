@@ -25,7 +25,7 @@ from tests.interop.corpus_fll import FLL
 WINE = Path(__file__).parents[2] / "examples" / "wine" / "wine.csv"
 CORPORA = (FCL, FIS, FLL)
 LEFT_OUT = ("FT6", "FT7")
-"""Of files of others: docs/reference/corpus.md compares carriers, and there are no rows."""
+"""Codes that need rows or runtimes: docs/reference/corpus.md compares engines."""
 
 SETTINGS = Settings(budget_s=600.0)
 

@@ -193,10 +193,10 @@ def alike(system: FuzzySystem) -> FuzzySystem:
 
     Left out is what it lacks: our own shapes, some hedges, NOT around several
     conditions, rules without a condition, other grids; then what it means otherwise,
-    see `docs/reference/systems.md`: rules of degree 0 conclude too (so no hedge may raise 0, and
-    an S curve takes the place of the curves that are infinite there), weighted numbers
-    are summed for each label before they are weighted, and degrees above 1 are bounded
-    later. Maxima become centroids: theirs hang on the last digit.
+    see `docs/reference/systems.md`: rules of degree 0 conclude too (so no hedge may
+    raise 0, and an S curve takes the place of the curves that are infinite there),
+    weighted numbers are summed for each label before they are weighted, and degrees
+    above 1 are bounded later. Maxima become centroids: theirs hang on the last digit.
     """
     outputs = tuple(map(_output_alike, system.outputs))
     inputs = tuple(

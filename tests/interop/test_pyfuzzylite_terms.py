@@ -1,6 +1,7 @@
 """What a system means, against pyfuzzylite 8, part by part and whole.
 
-Where the two differ on purpose a test says so; `docs/reference/systems.md` gives the reasons.
+Where the two differ on purpose a test says so; `docs/reference/systems.md` gives the
+reasons.
 """
 
 from __future__ import annotations

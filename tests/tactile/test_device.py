@@ -259,7 +259,9 @@ def test_a_blob_holds_only_what_the_board_can_send(
 def test_the_page_names_every_fault_and_its_example_runs(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "how-to" / "device.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "device.md").read_text(
+        "utf-8"
+    )
     for fault in msgspec.structs.fields(Faults):
         assert f"| `{fault.name}=" in page
     (script,) = re.findall("```python\n(.*?)```", page, re.DOTALL)

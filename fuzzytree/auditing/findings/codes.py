@@ -1,6 +1,7 @@
 """The questions of an audit and the reasons for declining, each with a stable code.
 
-After a change, `python -m fuzzytree.report.explanations docs/how-to/audit.md` rewrites a page.
+After a change, `python -m fuzzytree.report.explanations docs/how-to/audit.md` rewrites
+a page.
 """
 
 from __future__ import annotations

@@ -3,10 +3,10 @@
     python -m fuzzytree.auditing.recheck audit.json model.yaml
 
 This folder needs Python 3.11 and nothing else, and imports nothing of the rest of
-fuzzytree: copy it, read it, run it alone (docs/how-to/recheck.md). It reads the audit and the
-model itself, evaluates every witness again in fractions, decides again what it can, and
-says what it could not. Exit 0: all holds; 1: something does not, and all of that is
-listed; 2: it could not be run.
+fuzzytree: copy it, read it, run it alone (docs/how-to/recheck.md). It reads the audit
+and the model itself, evaluates every witness again in fractions, decides again what it
+can, and says what it could not. Exit 0: all holds; 1: something does not, and all of
+that is listed; 2: it could not be run.
 
 Read it in this order: the records (`audit_records`, `model_records`) and how files
 become them (`building`, `yaml`, `facts`, `models`, `conditions`, `systems`, `places`);

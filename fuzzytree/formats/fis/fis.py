@@ -1,8 +1,8 @@
 """FIS files of MATLAB, Octave and fuzzylite as systems.
 
-`docs/reference/fis.md` describes the file and says where the three mean other things by it. What
-a file does not say itself (its dialect) is found out from words that only one of them
-has; MATLAB's meaning is the default.
+`docs/reference/fis.md` describes the file and says where the three mean other things by
+it. What a file does not say itself (its dialect) is found out from words that only one
+of them has; MATLAB's meaning is the default.
 """
 
 from __future__ import annotations

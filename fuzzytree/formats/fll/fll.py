@@ -1,6 +1,7 @@
 """FLL files of fuzzylite and pyfuzzylite as systems.
 
-`docs/reference/fll.md` describes the file and says where the two engines mean other things by it.
+`docs/reference/fll.md` describes the file and says where the two engines mean other
+things by it.
 """
 
 from __future__ import annotations

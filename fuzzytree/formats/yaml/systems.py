@@ -1,4 +1,4 @@
-"""Nodes of a YAML file to a fuzzy system; `docs/reference/systems.md` describes the file."""
+"""Nodes of a YAML file to a fuzzy system; see `docs/reference/systems.md`."""
 
 from __future__ import annotations
 

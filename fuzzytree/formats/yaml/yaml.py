@@ -1,4 +1,4 @@
-"""YAML to a rule base, a tree or a system; see `docs/reference/yaml-format.md` for the file."""
+"""YAML to a rule base, a tree or a system; see `docs/reference/yaml-format.md`."""
 
 from __future__ import annotations
 

@@ -6,8 +6,8 @@ performs the same operations in the same order. Only `exp`, `cos`, `log`, powers
 functions of formulas are the C library's, good to a few units in the last place.
 
 Nothing here fails: what has no value is NaN, which no comparison holds for, and which
-`minimum`, `maximum` and all arithmetic pass on. `docs/reference/systems.md` says the same in
-words and formulas.
+`minimum`, `maximum` and all arithmetic pass on. `docs/reference/systems.md` says the
+same in words and formulas.
 """
 
 from __future__ import annotations

@@ -74,7 +74,8 @@ def command(
     """Interpolate FRAMES, a numpy archive (.npz) or a recording, by fuzzy numbers.
 
     An archive gets an array `frames` of what presses on each cell, and an array
-    `times_N` of each number of times. `docs/explanation/interpolation.md` has the mathematics.
+    `times_N` of each number of times. `docs/explanation/interpolation.md` has the
+    mathematics.
     """
     from fuzzytree.report.plots.saving import SUFFIXES
     from fuzzytree.tactile.sensor import pressed

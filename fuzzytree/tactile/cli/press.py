@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     "changes",
     metavar="NAME=VALUE",
     multiple=True,
-    help="A number of the simulator (repeat); docs/explanation/simulator.md lists them.",
+    help="Number of the simulator (repeat); see docs/explanation/simulator.md.",
 )
 @click.option(
     "--means", is_flag=True, help="Print mean invariants beside the paper's Table 2."

@@ -3,7 +3,8 @@
 A frame of whole numbers has exact sums `sum of g x^p y^q` about a cell of its own;
 doubles hold them as long as they stay below 2^53, in any order of addition. They are
 moved to the cell next to the centre of pressure, exactly, and from there by less than
-a cell to the centre itself, which is where rounding begins (see `docs/explanation/moments.md`).
+a cell to the centre itself, which is where rounding begins (see
+`docs/explanation/moments.md`).
 """
 
 from __future__ import annotations

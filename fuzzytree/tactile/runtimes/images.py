@@ -2,7 +2,8 @@
 
 Their sums are not exact, so the centre of pressure is found first and the moments are
 taken about it, in double, with a bound of what rounding can have done (see
-`docs/explanation/moments.md`). Everything after the moments is the program of whole frames.
+`docs/explanation/moments.md`). Everything after the moments is the program of whole
+frames.
 """
 
 from __future__ import annotations

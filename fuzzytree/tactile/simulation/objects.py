@@ -183,7 +183,7 @@ _FINGERS = (  # from the thumb: where it begins in x, where it points to, its le
 
 
 def _hand(turned_deg: float) -> Object:
-    """Return a right hand from its back: fitted once to Table 2 (docs/explanation/simulator.md)."""
+    """Return a right hand from its back, fitted once to Table 2 of the paper."""
     palm = rectangle(5.85, 6.99)
     low = -3.495
     heel = Part(((-2.925, low - 1.0), (2.925, low - 1.0), (2.925, low), (-2.925, low)))
