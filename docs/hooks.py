@@ -1,0 +1,173 @@
+"""The generated parts of the documentation, for `<!-- generated: NAME -->` in a page.
+
+mkdocs calls `on_page_markdown` for each page. Verbs and options come from click,
+formats and runtimes from their tables, findings from the codes of the audit, and the
+API from the public names of `fuzzytree`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import click
+import griffe
+
+import fuzzytree
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.limits import LIMITS
+from fuzzytree.cli import program
+from fuzzytree.model.contracts import Runtime
+from fuzzytree.exporters import all_formats
+from fuzzytree.model.options import options_of
+from fuzzytree.runtimes import all_runtimes
+
+MARK = re.compile(r"<!-- generated: (\w+) -->")
+
+
+class Examples(griffe.Extension):
+    """Renders the section `Example:` of a docstring as code, like `Examples:`."""
+
+    def on_object(self, *, obj: griffe.Object, **_: object) -> None:
+        """Rename the section in the docstring of an object."""
+        if obj.docstring:
+            obj.docstring.value = obj.docstring.value.replace(
+                "Example:\n", "Examples:\n"
+            )
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Return a page with its marks replaced by what they name."""
+    return MARK.sub(lambda mark: "\n".join(PARTS[mark[1]]()), markdown)
+
+
+def verbs() -> Iterator[str]:
+    """Yield every verb with its usage and its options."""
+    yield from _commands(program, click.Context(program, info_name="fuzzytree"), 2)
+
+
+def _commands(group: click.Group, parent: click.Context, level: int) -> Iterator[str]:
+    for name in group.list_commands(parent):
+        command = group.get_command(parent, name)
+        assert command is not None
+        context = click.Context(command, info_name=name, parent=parent)
+        yield f"{'#' * level} {context.command_path}\n"
+        yield f"{_prose(command.help or '')}\n"
+        if isinstance(command, click.Group):
+            yield from _commands(command, context, level + 1)
+            continue
+        usage = " ".join(command.collect_usage_pieces(context))
+        yield f"```text\n{context.command_path} {usage}\n```\n"
+        records = (one.get_help_record(context) for one in command.params)
+        rows = [(f"`{one[0]}`", one[1]) for one in records if one and one[1]]
+        yield _table(("option", "meaning"), rows)
+
+
+def formats() -> Iterator[str]:
+    """Yield the table of formats."""
+    rows = [
+        (
+            one.name,
+            ", ".join(f"`{suffix}`" for suffix in one.suffixes),
+            ", ".join(one.carries) if one.read else "",
+            ", ".join(one.carries),
+            one.extra or "",
+        )
+        for one in all_formats()
+    ]
+    yield _table(("format", "suffix", "reads", "writes", "extra"), rows)
+
+
+def options() -> Iterator[str]:
+    """Yield the options of each writer."""
+    for form in all_formats():
+        rows = [
+            (
+                f"`{one.name}`",
+                f"`{one.default}`" if one.default not in (None, ()) else "",
+                ", ".join(f"`{choice}`" for choice in one.choices),
+                one.help,
+            )
+            for one in options_of(form)
+        ]
+        if rows:
+            yield f"### {form.name}\n"
+            yield _table(("option", "default", "choices", "meaning"), rows)
+
+
+def runtimes() -> Iterator[str]:
+    """Yield the table of runtimes."""
+    rows = [
+        (
+            one.name,
+            ", ".join(one.runs),
+            one.dtype,
+            _promise(one),
+            one.extra or "",
+            "; ".join(one.cannot),
+        )
+        for one in all_runtimes()
+    ]
+    head = ("runtime", "runs", "numbers", "strengths", "extra", "cannot run")
+    yield _table(head, rows)
+
+
+def _promise(runtime: Runtime) -> str:
+    if runtime.bound is not None or runtime.name == f"native {runtime.dtype}":
+        return "within a derived bound"
+    if runtime.dtype == "float64":
+        return "equal bits"
+    return f"equal bits with native {runtime.dtype}"
+
+
+def findings() -> Iterator[str]:
+    """Yield what each code of an audit means."""
+    rows = [
+        (f"[{one.code}](#{one.code.lower()})", one.severity, one.title)
+        for one in CODES.values()
+    ]
+    yield _table(("code", "severity", "finding"), rows)
+    for one in CODES.values():
+        where = "" if one.decision == "any" else ", where the strongest rule decides"
+        yield f"## {one.code}\n"
+        yield f"**{one.title.capitalize()}** ({one.severity}{where}). {one.what}\n"
+        yield f"*Why.* {one.why}\n\n```text\n{one.example}\n```\n"
+        yield f"*What to do.* {one.remedy}\n"
+
+
+def limits() -> Iterator[str]:
+    """Yield what no audit establishes."""
+    yield from (f"- {text}" for text in LIMITS)
+
+
+def api() -> Iterator[str]:
+    """Yield a mark of mkdocstrings for each public name."""
+    for name in fuzzytree.__all__:
+        if not name.startswith("_"):
+            yield f"::: fuzzytree.{name}\n"
+
+
+def _prose(text: str) -> str:
+    """Return a help text as Markdown; its unwrapped parts become blocks."""
+    parts = []
+    for part in inspect.cleandoc(text).replace("\f", "").split("\n\n"):
+        kept = part.startswith("\b\n")
+        parts.append(f"```text\n{part[2:]}\n```" if kept else part)
+    return "\n\n".join(parts)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(_on_one_line, line))} |\n" for line in lines)
+
+
+def _on_one_line(cell: str) -> str:
+    text = " ".join(cell.split())
+    return text if text.startswith("`") else text.replace("|", "\\|")
+
+
+PARTS: dict[str, Callable[[], Iterator[str]]] = {
+    part.__name__: part
+    for part in (verbs, formats, options, runtimes, findings, limits, api)
+}

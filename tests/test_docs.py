@@ -1,0 +1,236 @@
+"""The documentation: links, names, generated parts, and tables that the code gives.
+
+`python tests/test_docs.py` rewrites the tables of agreement and accuracy.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import runpy
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+import fuzzytree
+from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.exporters import all_formats
+from fuzzytree.runtimes import all_runtimes
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+AT_THE_TOP = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
+PAGES = [*AT_THE_TOP, *sorted(DOCS.rglob("*.md"))]
+KINDS = {"tutorials", "how-to", "reference", "explanation"}
+BARRED = re.compile(
+    r"\b(?:told|tells|asked|asks|held|whoever|carriers?)\b", re.IGNORECASE
+)
+TABLE = re.compile(r"<!-- (\w+) -->\n\n(.*?)\n<!-- end -->\n", re.DOTALL)
+HOOKS = runpy.run_path(str(DOCS / "hooks.py"))
+
+
+def test_every_page_is_of_one_kind_and_in_the_navigation() -> None:
+    listed = re.findall(r"\S+\.md", (ROOT / "mkdocs.yml").read_text("utf-8"))
+    pages = [path.relative_to(DOCS) for path in DOCS.rglob("*.md")]
+    assert sorted(map(str, pages)) == sorted(listed)
+    assert {path.parts[0] for path in pages if len(path.parts) > 1} == KINDS
+
+
+def test_every_link_of_a_page_leads_to_a_file() -> None:
+    for page in PAGES:
+        for target in re.findall(
+            r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text("utf-8")
+        ):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_every_path_that_a_page_names_exists() -> None:
+    pattern = (
+        r"`((?:examples|benchmarks|fuzzytree|exporters|schemas|tests)/[\w./-]*\w)`"
+    )
+    for page in PAGES:
+        for path in re.findall(pattern, page.read_text("utf-8")):
+            if "turtle" not in path and path != "fuzzytree/1":
+                assert (ROOT / path).exists(), f"{page.name}: {path}"
+
+
+def test_every_module_that_a_page_names_can_be_imported() -> None:
+    for page in PAGES:
+        for name in set(re.findall(r"`(fuzzytree(?:\.\w+)+)", page.read_text("utf-8"))):
+            if name != "fuzzytree.formats":  # the group of entry points
+                assert _resolves(name), f"{page.name}: {name}"
+
+
+def _resolves(name: str) -> bool:
+    parts = name.split(".")
+    for length in range(len(parts), 0, -1):
+        try:
+            found: object = importlib.import_module(".".join(parts[:length]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[length:]:
+            if not hasattr(found, part):
+                return False
+            found = getattr(found, part)
+        return True
+    return False
+
+
+def test_the_pages_use_the_words_of_the_glossary() -> None:
+    quoted = r"```.*?```|`[^`]*`|<!-- (\w+) -->\n\n.*?<!-- end -->"
+    for page in PAGES:
+        if page.name != "glossary.md":
+            prose = re.sub(quoted, "", page.read_text("utf-8"), flags=re.DOTALL)
+            assert not BARRED.findall(prose), page.name
+
+
+def test_the_classes_that_the_glossary_names_exist() -> None:
+    text = (DOCS / "glossary.md").read_text("utf-8")
+    defined = {
+        node.name
+        for folder in ("fuzzytree", "exporters")
+        for path in (ROOT / folder).rglob("*.py")
+        for node in ast.parse(path.read_text("utf-8")).body
+        if isinstance(node, ast.ClassDef)
+    }
+    assert set(re.findall(r"`([A-Z][a-z]\w+)`", text)) <= defined
+
+
+def test_the_architecture_names_every_room_and_module_at_the_top() -> None:
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    named = set(re.findall(r"`([\w./]+(?:/|\.py))`", text))
+    assert all((ROOT / path).exists() for path in named if "NAME" not in path)
+    rooms = {
+        f"{path.relative_to(ROOT)}/" if path.is_dir() else f"{path.relative_to(ROOT)}"
+        for path in (ROOT / "fuzzytree").iterdir()
+        if not path.is_symlink() and not path.name.startswith("__")
+    } - {"fuzzytree/py.typed"}
+    assert rooms | {"exporters/", "schemas/"} <= named
+
+
+def test_the_reading_path_is_for_an_afternoon() -> None:
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    path = text.split("reading path", 1)[1].split("## Where", 1)[0]
+    files = re.findall(r"`([\w./]+\.py)`", path)
+    lines = sum((ROOT / file).read_text("utf-8").count("\n") for file in files)
+    assert 4_000 < lines < 6_000
+
+
+@pytest.mark.parametrize(
+    ("part", "names"),
+    [
+        ("findings", list(CODES)),
+        ("formats", [one.name for one in all_formats()]),
+        ("runtimes", [one.name for one in all_runtimes()]),
+        ("verbs", ["fuzzytree learn", "fuzzytree tactile live"]),
+        ("api", [name for name in fuzzytree.__all__ if name[0] != "_"]),
+    ],
+)
+def test_a_generated_part_names_everything(part: str, names: list[str]) -> None:
+    text = HOOKS["on_page_markdown"](f"<!-- generated: {part} -->")
+    assert all(name in text for name in names)
+
+
+@pytest.mark.heavy
+def test_the_differences_of_the_wine_tree_are_what_the_code_gives() -> None:
+    assert _shown("differences") == TABLES["differences"]()
+
+
+@pytest.mark.heavy
+def test_the_accuracies_are_what_the_code_gives() -> None:
+    """Other processors add in another order, which may turn a row or two of a table."""
+    shown, found = _shown("accuracy").split(), TABLES["accuracy"]().split()
+    assert len(shown) == len(found)
+    for one, two in zip(shown, found, strict=True):
+        if re.fullmatch(r"\d+\.\d", one):
+            assert abs(float(one) - float(two)) <= 1.2, (one, two)
+        elif not one.isdigit():
+            assert one == two
+
+
+def _shown(name: str) -> str:
+    return dict(TABLE.findall(HOMES[name].read_text("utf-8")))[name]
+
+
+def _differences() -> str:
+    """Return how far the runtimes' strengths lie apart on the wine tree."""
+    import fuzzytree as ft
+    from fuzzytree.runtimes import all_runtimes
+
+    table = ROOT / "examples" / "wine" / "wine.csv"
+    tree = ft.learn(table, target="cultivar", name="wine")
+    # A compiler is not there for everyone.
+    names = [one.name for one in all_runtimes() if not one.programs]
+    rows = [
+        (
+            one.carrier.split(":")[0],
+            one.against,
+            str(one.rows),
+            f"{one.largest_difference:.2g}",
+            f"{one.allowed:.2g}",
+        )
+        for one in ft.check(tree, data=table, runtimes=names).comparisons
+        if one.carrier.endswith(": relative rules") and one.basis == "rows"
+    ]
+    return _table("runtime", "against", "rows", "largest difference", "allowed", rows)
+
+
+def _accuracy() -> str:
+    """Return the accuracy of both modes beside three classifiers."""
+    from sklearn import datasets
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+    from sklearn.model_selection import StratifiedKFold, cross_val_score
+    from sklearn.naive_bayes import GaussianNB
+    from sklearn.tree import DecisionTreeClassifier
+
+    from fuzzytree.estimator import FuzzyTreeClassifier
+
+    folds = StratifiedKFold(10, shuffle=True, random_state=0)
+    learners = {
+        "fuzzytree": FuzzyTreeClassifier(),
+        "paper mode": FuzzyTreeClassifier(mode="paper"),
+        "DecisionTree": DecisionTreeClassifier(random_state=0),
+        "GaussianNB": GaussianNB(),
+        "LDA": LinearDiscriminantAnalysis(),
+    }
+    rows: list[tuple[str, ...]] = []
+    for name in ("iris", "wine", "breast_cancer", "digits"):
+        values, labels = getattr(datasets, f"load_{name}")(return_X_y=True)
+        with warnings.catch_warnings():
+            # Columns of digits that never vary make LDA warn.
+            warnings.simplefilter("ignore")
+            shares = [
+                cross_val_score(one, values, labels, cv=folds).mean()
+                for one in learners.values()
+            ]
+        leaves = len(FuzzyTreeClassifier().fit(values, labels).tree_.leaves)
+        cells = (f"{100 * share:.1f}" for share in shares)
+        rows.append((name.replace("_", " "), *cells, str(leaves)))
+    return _table("table", *learners, "leaves of fuzzytree", rows)
+
+
+def _table(*parts: str | Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown; the last part is its rows, the others its head."""
+    *head, rows = parts
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "differences": _differences,
+    "accuracy": _accuracy,
+}
+HOMES = {
+    "differences": DOCS / "explanation" / "agreement.md",
+    "accuracy": DOCS / "explanation" / "learner.md",
+}
+
+
+if __name__ == "__main__":
+    for name, table in TABLES.items():
+        text = HOMES[name].read_text("utf-8")
+        made = f"<!-- {name} -->\n\n{table()}\n<!-- end -->\n"
+        HOMES[name].write_text(TABLE.sub(lambda _, made=made: made, text), "utf-8")
