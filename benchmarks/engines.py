@@ -1,4 +1,4 @@
-"""How fast fuzzy systems of others run, here and in the engines of others.
+"""How fast fuzzy systems run, here and in third-party engines.
 
     python benchmarks/engines.py [--quick] [--write docs/reference/engines.md]
 
@@ -82,7 +82,7 @@ class Engine(NamedTuple):
 
 
 def main() -> None:
-    """Print the tables, and write them if asked to."""
+    """Print the tables, and write them on request."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
     parser.add_argument("--write", metavar="FILE", help="a page with the tables")
@@ -128,8 +128,8 @@ def _decided(system: FuzzySystem, rounds: int, folder: Path) -> str:
     engine = _fuzzylite(system, folder)
     others = statistics.median(engine.loop(values, rounds) if engine.loop else [0])
     return (
-        "Who wants the decision of these rules and not a number can have it from the "
-        "tree that they equal,\nby proof and on all of these rows: in C "
+        "If you need the decision of these rules and not a number, use the tree that "
+        "they equal,\nby proof and on all of these rows: in C "
         f"{mine.median_ns / ROWS:.1f} ns a row, {others / mine.median_ns:.0f} times as "
         "fast as fuzzylite's C++ fires the rules."
     )
@@ -377,7 +377,7 @@ void loop(const double *rows, long count, long width, double *answers) {
 """
 
 
-# --- engines of others
+# --- third-party engines
 
 
 def _fuzzylite(system: FuzzySystem, folder: Path) -> Engine:
@@ -605,12 +605,12 @@ ENGINES: Mapping[str, Callable[[FuzzySystem, Path], Engine]] = {
 }
 
 _HEAD = """\
-# Our runtimes beside the engines of others
+# Our runtimes beside third-party engines
 
 `python benchmarks/engines.py --write docs/reference/engines.md`, on a quiet machine.
 Medians of interleaved rounds; one thread, except where noted. *Times ours* compares
 10,000 rows with the fastest of our runtimes. *Largest difference* is that of the
-answers from the reference's, on the same rows.
+outputs from the reference's, on the same rows.
 
 """
 

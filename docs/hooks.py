@@ -18,8 +18,8 @@ import fuzzytree
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.limits import LIMITS
 from fuzzytree.cli import program
-from fuzzytree.model.contracts import Runtime
 from fuzzytree.exporters import all_formats
+from fuzzytree.model.contracts import Runtime
 from fuzzytree.model.options import options_of
 from fuzzytree.runtimes import all_runtimes
 

@@ -352,7 +352,7 @@ def test_conclusions_follow_the_numbers() -> None:
         "Timed, the ratio grows like n nowhere, and is n, within a factor of 2, "
         "nowhere.",
         "For a single row, overhead decides at first.",
-        '"Less reliable" is not what is seen, rather the opposite.',
+        '"Less reliable" is not what was measured, rather the opposite.',
     ]
     assert _conclusions(mixed)[1] == (
         "Timed, the ratio grows like n in reference row by row, and is n, within a "

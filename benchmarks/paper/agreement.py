@@ -103,7 +103,7 @@ def _all_tables(
 def _cross_validated(
     values: Floats, labels: Integers, mode: Mode, seed: int
 ) -> tuple[dict[Conjunction, Seen], list[int]]:
-    """Return what is seen of each row when it is held back, and the trees' leaves."""
+    """Return the predictions of each row out of its fold, and the trees' leaves."""
     folds = StratifiedKFold(FOLDS, shuffle=True, random_state=seed)
     found = {
         name: Seen(*(np.zeros(len(labels), np.bool_) for _ in Seen._fields))

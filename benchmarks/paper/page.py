@@ -25,6 +25,7 @@ from paper.summary import KINDS, in_short
 from paper.text import (
     bullet,
     duration,
+    half_text,
     listed,
     middle,
     p_value,
@@ -33,7 +34,6 @@ from paper.text import (
     spanned,
     table,
     three,
-    told_half,
 )
 
 FLAT = 0.05  # an exponent of less in size is no growth worth a word
@@ -86,7 +86,7 @@ def _speed(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
         "How many times as long as the tree a rule base takes for a row, in the same "
         f"runtime. Trees are {PRIMARY}: two to five branches a node, every leaf "
         "equally likely. scikit-fuzzy runs no trees and stands against `native`; the "
-        "reference answers batches row by row. A dash: not measured, see below."
+        "reference runs batches row by row. A dash: not measured, see below."
     )
     for is_batch in (False, True):
         for kind in KINDS:
@@ -183,7 +183,7 @@ def _laws(found: Sequence[Line]) -> str:
                 "batch" if is_batch else "one row",
                 *(_law(members.get(family)) for family in FAMILIES),
                 spanned(shares),
-                told_half(members.get(PRIMARY)),
+                half_text(members.get(PRIMARY)),
             ]
         )
     bs = [f"b, {family}" for family in FAMILIES]
@@ -204,16 +204,15 @@ def _growth_text(found: Sequence[Line]) -> str:
     if not known:
         return paragraph("There are too few sizes to fit a law.")
     words = [growth(law) for _, law in known]
-    told = [
+    kinds = [
         f"{words.count(word)} grow {word}"
         for word in ("like n", "slower than n", "faster than n")
     ]
     exponents = [law.exponent for _, law in known]
     return paragraph(
-        f"As far as these intervals tell, of {len(known)} ratios {listed(told)}; b is "
-        f"between {min(exponents):.2f} and {max(exponents):.2f}. An interval knows how "
-        "far the points lie off a straight line, not whether the line is in truth a "
-        "curve."
+        f"Within these intervals, of {len(known)} ratios {listed(kinds)}; b is "
+        f"between {min(exponents):.2f} and {max(exponents):.2f}. An interval measures "
+        "how far the points lie off a straight line, not whether the law is a line."
     )
 
 
@@ -252,20 +251,19 @@ def _reliability(claims: Claims) -> Iterator[str]:
     yield paragraph(
         "Each table is cut into ten folds, stratified and shuffled, "
         f"{'once' if seeds == 1 else f'{seeds} times with different seeds'}; each fold "
-        "is answered by a tree that was learnt from the other nine, and by the raw "
-        "rules of that tree. Accuracies and shares are per cent of all answers. "
-        "*Differ*: both answer, differently (with Wilson's 95 % interval for as many "
+        "is predicted by a tree learned from the other nine, and by the raw rules of "
+        "that tree. Accuracies and shares are per cent of all predictions. "
+        "*Differ*: both predict, differently (with Wilson's 95 % interval for as many "
         "trials as the table has rows). *Uncovered*: no raw rule fires; the tree's "
-        "right answers among them in brackets."
+        "right predictions among them in brackets."
     )
     yield _comparisons(found)
     yield paragraph(
-        "*Votes*: each row counts once, for whoever was right more often over the "
-        "seeds, so that no row is counted as several; the tree's share of them, in per "
-        "cent, is given as Wilson's 95 % interval. p is that of the exact McNemar "
-        f"test on the votes, corrected by Holm's method for all {len(found)} tests; "
-        f"below {LEVEL:g} a winner is named. Rows that one tree answers share its "
-        "luck, which no test of this kind sees."
+        "*Votes*: each row counts once, for the model that was right more often over "
+        "the seeds; the tree's share of them, in per cent, is Wilson's 95 % interval. "
+        "p is that of the exact McNemar test on the votes, corrected by Holm's method "
+        f"for all {len(found)} tests; below {LEVEL:g} a winner is named. Rows of one "
+        "tree are not independent, which no test of this kind detects."
     )
     yield _reliable_text(claims.comparisons, found)
 
@@ -332,12 +330,12 @@ def _reliable_text(comparisons: Sequence[Comparison], found: Sequence[Verdict]) 
     return "\n".join(
         bullet(sentence)
         for sentence in (
-            f"Counting rows without an answer as wrong {verdict}.",
+            f"Counting rows without a prediction as wrong {verdict}.",
             f"The relative rules differ from their tree in {differs:,} of {answers:,} "
-            "answers.",
-            f"Raw rules are decided by their order among equals in {ties:,} answers; "
+            "predictions.",
+            f"Raw rules are decided by their order among equals in {ties:,} rows; "
             f"{tied:,} of these are among the {apart:,} that differ from the tree's.",
-            f"With min, raw rules are right in {by_and['min']:,} answers, with product "
+            f"With min, raw rules are right in {by_and['min']:,} rows, with product "
             f"in {by_and['product']:,}.",
         )
     )
@@ -347,11 +345,11 @@ def _search(claims: Claims, found: Sequence[Line]) -> Iterator[str]:
     chosen = [line for line in found if line.what == "best-first"]
     if not chosen:
         return
-    yield "## What best-first makes of the trade"
+    yield "## Best-first and the trade"
     yield paragraph(
         "The paper trades reliability for speed: all rules, or one path. Best-first "
         "need not: a rule is never stronger than its beginning, so what cannot win is "
-        "not fired, and the answer is the rule base's own, tie and all. Below, its "
+        "not fired, and the result is the rule base's own, tie and all. Below, its "
         "time over the tree's, and how many times as fast it is as firing in "
         "`native`."
     )
@@ -381,7 +379,7 @@ def _search_table(chosen: Sequence[Line]) -> str:
 
 
 def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
-    told = []
+    sentences = []
     for line in chosen:
         start = first_gain(line)
         gain = (
@@ -394,18 +392,18 @@ def _search_text(claims: Claims, chosen: Sequence[Line]) -> str:
         if law:
             is_flat = abs(law.exponent) < FLAT
             grows = ", whatever n" if is_flat else f", growing as n^{law.exponent:.2f}"
-        told.append(
+        sentences.append(
             f"{line.kind.capitalize()} rules of {line.family} trees, "
             f"{'in batches' if line.is_batch else 'row by row'}: {gain}; "
             f"{spanned(line.ratios)} times the tree's time{grows}."
         )
     checked = sum(size.checked for size in claims.sizes)
-    told.append(_trade(claims))
-    told.append(
-        f"On all {checked:,} rows that were compared, best-first gave the answers of "
+    sentences.append(_trade(claims))
+    sentences.append(
+        f"On all {checked:,} rows that were compared, best-first gave the results of "
         "firing, and relative rules those of the tree."
     )
-    return "\n".join(bullet(sentence) for sentence in told)
+    return "\n".join(bullet(sentence) for sentence in sentences)
 
 
 def _trade(claims: Claims) -> str:
@@ -413,12 +411,13 @@ def _trade(claims: Claims) -> str:
     winners = {verdict.winner for verdict in verdicts(claims.comparisons)}
     if "raw rules" in winners:
         return (
-            "Where raw rules are right more often, this is the price of their answers."
+            "Where raw rules are right more often, this is the price of their "
+            "predictions."
         )
     return (
-        "On no table above are raw rules surely right more often than the tree, so the "
-        "trade is not there to be made. The search is for those who want the answer of "
-        "all raw rules for another reason."
+        "On no table above are raw rules surely right more often than the tree, so "
+        "there is no such trade. The search is useful if you need the result of all "
+        "raw rules for another reason."
     )
 
 
@@ -441,9 +440,9 @@ def _method(claims: Claims) -> Iterator[str]:
     )
     yield paragraph(
         "Rows are standard normal in 11 columns; rules are joined by min. *Multiway* "
-        "trees are made to a plan. *Grown* ones are binary and were grown by "
-        "scikit-learn on 100,000 rows of three noisy classes, then carried over. All "
-        "carriers of a size are timed in interleaved rounds, each round in another "
+        "trees follow a plan. *Grown* ones are binary and were grown by "
+        "scikit-learn on 100,000 rows of three noisy classes, then imported. All "
+        "representations of a size are timed in interleaved rounds, each in another "
         "order; a ratio is the median of the quotients of the rounds. One row at a "
         "time: 64 rows in turn, of firing as many as take 0.02 s. Batches: 10,000 "
         "rows, of firing as many as make 10 million strengths (1,000 at 10,000 rules), "

@@ -154,9 +154,7 @@ def agreement(claims: Claims) -> Figure:
     found = verdicts(claims.comparisons)
     height = 1.8 + 0.3 * len(found)
     figure = Figure(figsize=(10.0, height), layout="constrained", facecolor="white")
-    figure.suptitle(
-        "Raw rules and their tree on rows that were held back", color=INK, fontsize=13
-    )
+    figure.suptitle("Raw rules and their tree on test rows", color=INK, fontsize=13)
     left, right = figure.subplots(1, 2, width_ratios=(3, 2), sharey=True)
     for axis in (left, right):
         _plain(axis)

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from fuzzytree.model.rulebase import Kind
 from paper.judging import ABOUT, PRIMARY, Line, Verdict, counted, growth, verdicts
 from paper.records import Claims, Size
-from paper.text import bullet, listed, place, short_name, spanned, three, told_half
+from paper.text import bullet, half_text, listed, place, short_name, spanned, three
 
 KINDS: tuple[Kind, ...] = ("raw", "relative")
 
@@ -53,7 +53,7 @@ def _timed_in_short(found: Sequence[Line]) -> str:
         for where, members in groups.items()
         if all(line.is_about_n for line in members)
     ]
-    told = []
+    parts = []
     for is_batch, rows in ((False, "One row at a time"), (True, "In batches")):
         ranges = [
             f"{spanned(share for line in members for share in line.shares)} in "
@@ -62,11 +62,11 @@ def _timed_in_short(found: Sequence[Line]) -> str:
             if members[0].is_batch == is_batch
         ]
         if ranges:
-            told.append(f"{rows}: {listed(ranges)}.")
+            parts.append(f"{rows}: {listed(ranges)}.")
     return (
         f"**Timed, the ratio grows like n {_places(like, groups)}, and is n, within a "
         f"factor of {ABOUT:g}, {_places(right, groups)}.** Of n times the tree's time, "
-        f"firing raw rules takes this much. {' '.join(told)}"
+        f"firing raw rules takes this much. {' '.join(parts)}"
     )
 
 
@@ -85,14 +85,14 @@ def _overhead_in_short(found: Sequence[Line]) -> str:
         and line.half is not None
     ]
     if not known:
-        return "**Overhead** cannot be told from so few sizes."
+        return "**Overhead** cannot be estimated from so few sizes."
     is_seen = any((line.half or 0.0) > line.sizes[0] for line in known)
     head = "decides at first" if is_seen else "does not decide"
-    told = [f"{told_half(line)} in {short_name(line)}" for line in known]
+    parts = [f"{half_text(line)} in {short_name(line)}" for line in known]
     return (
         f"**For a single row, overhead {head}.** The fixed cost of a call is more than "
         "half of the time of firing raw rules up to this many rules: "
-        f"{listed(told)}."
+        f"{listed(parts)}."
     )
 
 
@@ -102,7 +102,7 @@ def _reliable_in_short(found: Sequence[Verdict]) -> str:
         for name in ("tree", "raw rules", "open")
     )
     if tree and not raw:
-        head = '"Less reliable" is not what is seen, rather the opposite.'
+        head = '"Less reliable" is not what was measured, rather the opposite.'
     elif raw and not tree:
         head = '"Less reliable" is confirmed.'
     elif tree and raw:
@@ -110,7 +110,7 @@ def _reliable_in_short(found: Sequence[Verdict]) -> str:
     else:
         head = '"Less reliable" can neither be confirmed nor denied here.'
     return (
-        f"**{head}** In {len(found)} comparisons on rows that were held back, the tree "
+        f"**{head}** In {len(found)} comparisons on test rows, the tree "
         f"is right more often in {tree}, the raw rules in {raw}; {is_open} are open "
         "(exact McNemar tests, corrected for their number)."
     )
@@ -126,17 +126,17 @@ def _search_in_short(found: Sequence[Line]) -> Iterator[str]:
         return
     relative, raw = chosen["relative"], chosen["raw"]
     last = raw.prices[-1]
-    told = [
+    parts = [
         f"For {line.kind} rules its price {'is' if line.is_near_tree else 'is not'} "
         f"nearly the tree's: {spanned(line.ratios)} times it in batches"
         for line in (relative, raw)
     ]
     if last.to_firing:
-        told.append(
+        parts.append(
             f"At {raw.sizes[-1]:,} raw rules that is {three(last.to_firing.median)} "
             "times as fast as firing"
         )
     yield (
         "**Best-first gives the answers of all rules while firing few.** "
-        f"{'. '.join(told)}."
+        f"{'. '.join(parts)}."
     )

@@ -56,7 +56,7 @@ def percent(count: int, total: int) -> str:
 
 
 def p_value(value: float) -> str:
-    """Return a p-value; what is far below any level is not told to its digits."""
+    """Return a p-value; what is far below any level is not parts to its digits."""
     if value < 1e-4:
         return "< 0.0001"
     return f"{value:.2g}" if value < 0.1 else f"{value:.2f}"
@@ -93,7 +93,7 @@ def bullet(sentences: str) -> str:
     )
 
 
-def told_half(line: Line | None) -> str:
+def half_text(line: Line | None) -> str:
     """Return up to how many rules overhead is more than half of the time."""
     half = line.half if line else None
     if half is None:

@@ -12,7 +12,7 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
     """Yield where fuzzylite 6 finds other numbers for an output of its own dialects.
 
     Args:
-        output: As it is read; `docs/reference/witnesses.md` tells how the two were
+        output: As it is read; `docs/reference/interop.md` tells how the two were
         compared.
 
     Example:

@@ -1,4 +1,4 @@
-"""What an audit says of rule bases of others, and of the tree learnt from wines.
+"""Audits of third-party rule bases and of the tree learned from the wines.
 
 `python -m tests.interop.audits > docs/reference/audits.md` writes the page.
 """
@@ -32,21 +32,22 @@ SETTINGS = Settings(budget_s=600.0)
 INTRODUCTION = """\
 # Audits of real rule bases
 
-`fuzzytree audit` is asked about two trees learnt from the 178 wines, with these rows,
-and about every FCL, FIS and FLL file that Debian's packages `fuzzylite` and
+`fuzzytree audit` audits two trees learned from the 178 wines, with these rows, and
+every FCL, FIS and FLL file that Debian's packages `fuzzylite` and
 `octave-fuzzy-logic-toolkit` and the Python package `pyfuzzylite` ship.
 `python -m tests.interop.audits > docs/reference/audits.md` writes this page, and
-`tests/interop/test_audits.py` compares it with what is found. The files are not ours
-and are not here; they are read where those packages put them.
+`tests/interop/test_audits.py` compares it with new results. The files are read where
+those packages install them.
 
-- *rules*: of the file. *asked*: those that the audit could take over; see the codes
-  `FTD01` and following for the others. Curves that are no polynomials are asked between
-  two lines about 0.001 apart: FTD02 counts them, and what is not asked of them.
-- *findings*: how often each code was found. `fuzzytree explain CODE` tells what it
-  means. *declined*: how often each reason was given, for a rule or a term each.
-- Files of others are asked on the ranges that they declare. Carriers (FT6) and rows
-  (FT7) are left out of them: [files of others](corpus.md) compares engines.
-- A question that the budget would end is not on this page: every audit is complete.
+- *rules*: of the file. *audited*: those with an exact counterpart; see the codes
+  `FTD01` and following for the others. Membership functions that are not polynomial are
+  enclosed by two linear bounds about 0.001 apart: FTD02 counts them.
+- *findings*: the count of each code. `fuzzytree explain CODE` explains it. *declined*:
+  the count of each reason, for a rule or a term each.
+- The domain of a third-party file is the ranges that it declares. Codes about other
+  representations (FT6) and rows (FT7) are left out: [third-party files](corpus.md)
+  compares engines.
+- Every audit on this page is complete.
 
 """
 
@@ -57,7 +58,7 @@ class Case(NamedTuple):
     file: str
     kind: str
     rules: int
-    asked: int
+    audited: int
     audit: Audit
 
 
@@ -74,7 +75,7 @@ def wines() -> Iterator[Case]:
 
 
 def others() -> Iterator[Case]:
-    """Yield the audit of every file of others."""
+    """Yield the audit of every third-party file."""
     for corpus in CORPORA:
         for name, path in corpus.files():
             model = corpus.read(path.read_bytes(), path.name).model
@@ -83,9 +84,9 @@ def others() -> Iterator[Case]:
 
 def _case(name: str, kind: str, model: Document) -> Case:
     found = audit(model, settings=SETTINGS, ignore=LEFT_OUT)
-    asked = set(view(model, found.domain).numbers)
+    audited = set(view(model, found.domain).numbers)
     count = len(getattr(model, "rules", ()))
-    return Case(name, kind, count, len(asked), found)
+    return Case(name, kind, count, len(audited), found)
 
 
 def reasons(found: Audit) -> Iterator[str]:
@@ -97,12 +98,12 @@ def reasons(found: Audit) -> Iterator[str]:
 
 def table(found: Sequence[Case]) -> Iterator[str]:
     """Yield the lines of the table."""
-    yield "| file | format | rules | asked | findings | declined |"
+    yield "| file | format | rules | audited | findings | declined |"
     yield "|---|---|---|---|---|---|"
     for case in found:
         codes = [one.code for one in case.audit.findings]
         cells = (
-            *(case.file, case.kind, str(case.rules), str(case.asked)),
+            *(case.file, case.kind, str(case.rules), str(case.audited)),
             *(_counts(codes), _counts([*reasons(case.audit)])),
         )
         yield f"| {' | '.join(cells)} |"
@@ -113,13 +114,13 @@ def _counts(codes: Sequence[str]) -> str:
     return ", ".join(f"{code}: {counts[code]}" for code in sorted(counts))
 
 
-class Told(NamedTuple):
+class Verified(NamedTuple):
     """A finding that was checked by hand.
 
     Attributes:
         file: Where it was found.
         begins: How its sentence begins.
-        words: What looking at the file says.
+        words: What the text of the file says.
     """
 
     file: str
@@ -128,56 +129,55 @@ class Told(NamedTuple):
 
 
 BY_HAND = (
-    Told(
+    Verified(
         "wine, plain features",
         "rule 2 decides the same without 'flavanoids is high'",
         "Rule 1, `flavanoids is low`, has the degree 1 wherever that is so, and stands "
         "first: no rule behind it can win there, with or without saying it again.",
     ),
-    Told(
+    Verified(
         "fuzzylite mamdani/AllTerms.fll",
         "term 'H' of 'AllInputTerms' has 2 peaks",
         "The file says `H Discrete 2 0 2.25 1 2.5 0.5 2.75 1 3 0`: the points go up, "
         "halfway down, up again. The engine shows all kinds of terms, so it is meant.",
     ),
-    Told(
+    Verified(
         "fuzzylite mamdani/AllTerms.fll",
         "rule 4 and rule 5 conflict: both reach 0.6667",
         "`D` is a triangle that falls from 1 at 1 to 0 at 1.5, `E` a trapezoid that "
         "rises from 1 to 1.25: 2 (1.5 - x) = 4 (x - 1) at x = 7/6, where both are 2/3.",
     ),
-    Told(
+    Verified(
         "fuzzylite mamdani/Laundry.fll",
         "rule 3 and rule 4 conflict: both reach 0.5176",
         "One says less detergent than usual, the other more. `low` falls along "
         "0.8 (5 - x) / 3, `high` rises along 0.2 + 0.3 (x - 2): both are 0.5176 at a "
         "dirt of 3.0588, which is 52/17.",
     ),
-    Told(
+    Verified(
         "fuzzylite mamdani/SimpleDimmer.fll",
         "no rule fires where 'Ambient' is 0",
         "`Ambient` has the range 0 to 1, `DARK` is `Triangle 0 0.25 0.5` and `BRIGHT` "
         "is `Triangle 0.5 0.75 1`: at 0 and at 1 themselves every degree is 0, and the "
         "answer is the default, which the file sets to nan.",
     ),
-    Told(
+    Verified(
         "fuzzylite hybrid/tipper.fll",
         "rule 2 of block 1 and rule 2 of block 2 have the same antecedent",
-        "The file holds one rule base twice, for an output of Mamdani's kind and for "
+        "The file has one rule base twice, for an output of Mamdani's kind and for "
         "one of Sugeno's, so that both can be compared: nothing to mend.",
     ),
-    Told(
+    Verified(
         "pyfuzzylite mamdani/matlab/shower.fll",
         "term 'soft' of 'flow' lies outside of the domain for the most part",
         "The range of `flow` is -1 to 1, and `soft` is `Trapezoid -3 -3 -0.8 0` of "
-        "area 2.6, of which 0.6 are within the range: most of what is drawn can never "
-        "be asked.",
+        "area 2.6, of which 0.6 are within the range: most of the term is never used.",
     ),
 )
 
 
 def by_hand(found: Sequence[Case]) -> Iterator[str]:
-    """Yield the findings that were checked by hand, with what was seen.
+    """Yield the findings that were checked by hand, with the evidence.
 
     Raises:
         LookupError: If one of them is not found.
@@ -213,14 +213,14 @@ def of_tree(case: Case) -> Iterator[str]:
 
 
 def counts(found: Sequence[Case]) -> Iterator[str]:
-    """Yield how many files were asked whole, in part, or not at all."""
-    whole = sum(case.asked == case.rules for case in found)
-    none = sum(case.asked == 0 for case in found)
-    clean = sum(case.asked > 0 and not case.audit.findings for case in found)
-    rules, asked = sum(case.rules for case in found), sum(c.asked for c in found)
-    yield f"{len(found)} files of others: {asked} of their {rules} rules are asked,"
-    yield f"all of them in {whole} files and none in {none}. In {clean} files of which"
-    yield "rules are asked there is no finding."
+    """Yield how many files were audited whole, in part, or not at all."""
+    whole = sum(case.audited == case.rules for case in found)
+    none = sum(case.audited == 0 for case in found)
+    clean = sum(case.audited > 0 and not case.audit.findings for case in found)
+    rules, audited = sum(case.rules for case in found), sum(c.audited for c in found)
+    yield f"{len(found)} third-party files: {audited} of {rules} rules are audited,"
+    yield f"all of them in {whole} files and none in {none}. {clean} files with audited"
+    yield "rules have no finding."
 
 
 def page(ours: Sequence[Case], files: Sequence[Case]) -> str:
@@ -228,7 +228,7 @@ def page(ours: Sequence[Case], files: Sequence[Case]) -> str:
     lines = [
         *("## All of them", "", *counts(files), "", *table([*ours, *files]), ""),
         *("## Checked by hand", ""),
-        "These findings were held against what the files say.",
+        "These findings were compared with the text of the files.",
         *("", *by_hand([*ours, *files]), ""),
         *("## The tree of wines with plain features", ""),
         *of_tree(ours[0]),

@@ -14,41 +14,48 @@ from pathlib import Path
 from tests.interop.corpus_fcl import FCL
 from tests.interop.corpus_fis import FIS
 from tests.interop.corpus_fll import FLL
-from tests.interop.corpus_rows import EXACT, OTHERS, PRINTED, ROWS, Row, Tools, rows_of
+from tests.interop.corpus_rows import (
+    EXACT,
+    OTHERS,
+    PRINTED,
+    ROWS,
+    Row,
+    Tools,
+    rows_of,
+)
 from tests.interop.fuzzylite_exact import compiled
 
 ALL = (FCL, FIS, FLL)
 ENGINES = ("fuzzylite 6", "pyfuzzylite 8", "Octave")
 
 INTRODUCTION = f"""\
-# Files of others
+# Third-party files
 
 Every FCL, FIS and FLL file that Debian's packages `fuzzylite` and
 `octave-fuzzy-logic-toolkit` and the Python package `pyfuzzylite` ship goes through
-our reader, our reference, the engines that it is for, our ONNX file and our writers.
+our reader, our reference, the engine that it is for, our ONNX file and our writers.
 `python -m tests.interop.corpus > docs/reference/corpus.md` writes this page, and
-`tests/interop/test_corpus.py` compares it with what is found. The files are not
-ours and are not here; they are read where those packages put them.
+`tests/interop/test_corpus.py` compares it with new results. The files are read where
+those packages install them.
 
-- *read as*: the dialect that the reader found.
-- *rules*: those that were read. The engine loaded as many; only where a rule of
-  Octave has hedges in two conclusions it is two here.
+- *read as*: the dialect that the reader recognised.
+- *rules*: those that were read. The engine loaded as many; a rule of Octave with
+  hedges in two conclusions counts as two here.
 - *losses*: how many the reader lists.
-- *table*: the largest difference of our answers from the table of answers beside the
-  file, in about 100 of its rows. It has nine decimals: half a unit of the last is
-  alike.
-- *fuzzylite 6*, *pyfuzzylite 8*, *Octave*: the largest difference of our answers from
-  those of the engine, in {ROWS} random rows. *onnx*: of onnxruntime's answers by our
-  ONNX file from ours. Up to {EXACT:g} is rounding, and alike.
-- All differences are relative to the largest answer, or to 1. `inf`: one of the two
-  answers no number.
-- *{" ".join(OTHERS)}*: written to these formats as their writers are unless told
-  more. `=`: without a loss. `L`: with losses, which the writer lists. `x`: refused,
+- *table*: the largest difference of our outputs from the table beside the file, in
+  about 100 of its rows. It has nine decimals: half a unit of the last one agrees.
+- *fuzzylite 6*, *pyfuzzylite 8*, *Octave*: the largest difference of our outputs from
+  those of the engine, in {ROWS} random rows. *onnx*: of onnxruntime's outputs by our
+  ONNX file from ours. Up to {EXACT:g} is rounding, and agrees.
+- All differences are relative to the largest output, or to 1. `inf`: one of the two
+  has no number.
+- *{" ".join(OTHERS)}*: written to these formats with the default options of their
+  writers. `=`: without a loss. `L`: with losses, which the writer lists. `x`: refused,
   with the reason.
-- *why not alike*: in the words of our reader, which tells it to everybody who reads
-  such a file, or what was found by trying: fuzzylite 6 is compiled with 1e-16 instead
-  of 1e-6 for the distance of equal numbers, systems get as many samples as the FLL
-  file beside them has, and fuzzylite is asked for the rows of the table.
+- *why not alike*: the remark of our reader, or the result of an experiment: fuzzylite 6
+  is compiled with 1e-16 instead of 1e-6 for the distance of equal numbers, systems get
+  as many samples as the FLL file beside them has, and fuzzylite evaluates the rows of
+  the table.
 
 """
 
@@ -99,7 +106,7 @@ def counts(rows: Sequence[Row]) -> Iterator[str]:
     reasons = sum(bool(row.reason) for row in others)
     yield ""
     yield (
-        f"{len(rows) - len(others)} files are alike everywhere; {reasons} of the other "
+        f"{len(rows) - len(others)} files agree everywhere; {reasons} of the other "
         f"{len(others)} have a reason."
     )
 

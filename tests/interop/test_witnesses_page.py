@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-PAGE = FOLDER.parents[1] / "docs" / "reference" / "witnesses.md"
+PAGE = FOLDER.parents[1] / "docs" / "reference" / "interop.md"
 
 
 def test_every_test_that_the_page_names_exists_and_none_is_forgotten() -> None:

@@ -24,7 +24,7 @@ from fuzzytree.numerics.curves import (
 )
 from fuzzytree.numerics.exact import exact_degree
 
-PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "approximation.md"
+PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "bounds.md"
 CURVES = st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=8)
 SHARES = [Fraction(number, 32) for number in range(33)]
 
