@@ -1,8 +1,4 @@
-"""The questions of an audit and the reasons for declining, each with a stable code.
-
-After a change, `python -m fuzzytree.report.explanations docs/how-to/audit.md` rewrites
-a page.
-"""
+"""The questions of an audit and the reasons for declining, each with a stable code."""
 
 from __future__ import annotations
 
