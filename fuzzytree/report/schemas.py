@@ -22,7 +22,6 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "bench.schema.json": "fuzzytree.benchmarking.records:Study",
         "check.schema.json": "fuzzytree.model.agreement:Agreement",
         "diff.schema.json": "fuzzytree.auditing.diff.difference_records:Difference",
-        "experiment.schema.json": "fuzzytree.tactile.recognition.experiment:Study",
         "learn.schema.json": "fuzzytree.api.holdout:Summary",
         "needs.schema.json": "fuzzytree.benchmarking.savings:Report",
         "stability.schema.json": "fuzzytree.checking.stability.results:Stability",

@@ -18,7 +18,6 @@ ACTIONS = (
     "export",
     "check",
     "bench",
-    "experiment",
 )
 """Each action is the `command` of the module `fuzzytree.tactile.cli.ACTION`."""
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 
+import experiment_peers as peers
 import numpy as np
 import pytest
+from experiment_choosing import CANDIDATES, Candidate, chosen
+from experiment_peers import PEERS, peer_answers
+from experiment_splits import leave_one_out
+from experiment_study import experiment
+from experiment_tasks import Task, known_task
 
 from fuzzytree.errors import LearningError, MissingExtraError, TableError
 from fuzzytree.learning import Settings
-from fuzzytree.tactile.recognition import peers
-from fuzzytree.tactile.recognition.choosing import CANDIDATES, Candidate, chosen
-from fuzzytree.tactile.recognition.experiment import experiment
-from fuzzytree.tactile.recognition.peers import PEERS, peer_answers
-from fuzzytree.tactile.recognition.splits import leave_one_out
-from fuzzytree.tactile.recognition.tasks import Task, known_task
 from fuzzytree.tactile.sensor import Sensor
 
 has_sklearn = pytest.mark.skipif(

@@ -6,13 +6,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from experiment_peers import peer_answers
+from experiment_simulated import IDEAL, paper_task
+from experiment_study import Study, experiment
+from experiment_tasks import known_task
 
 from fuzzytree.learning import Settings
 from fuzzytree.tactile.features.sets import names_of
-from fuzzytree.tactile.recognition.experiment import Study, experiment
-from fuzzytree.tactile.recognition.peers import peer_answers
-from fuzzytree.tactile.recognition.simulated import IDEAL, paper_task
-from fuzzytree.tactile.recognition.tasks import known_task
 from fuzzytree.tactile.runtimes.frames import features_of
 
 pytestmark = pytest.mark.heavy

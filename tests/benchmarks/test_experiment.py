@@ -1,22 +1,41 @@
-"""`fuzzytree tactile experiment`: what it tells, what it writes, what it refuses."""
+"""`benchmarks/experiment.py`: what it prints, what it writes, what it refuses."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
+import experiment_peers as peers
 import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import numpy as np
 import pytest
+from experiment import main
+from experiment_study import Study
 
 import fuzzytree as ft
+from fuzzytree.schemas.generation import of_result
 from fuzzytree.tactile.board_files.reader import load_board
 from fuzzytree.tactile.presses import Presses, read_presses, write_presses
-from fuzzytree.tactile.recognition import peers
 from fuzzytree.tactile.recognition.recogniser import Recogniser
-from tests.cli.conftest import Call
+from tests.cli.conftest import folder
 
-SCHEMA = Path(__file__).resolve().parents[3] / "schemas" / "experiment.schema.json"
+__all__ = ["folder"]
+Call = Callable[..., tuple[int, str, str]]
+
+SCHEMA = Path(__file__).resolve().parents[2] / "benchmarks" / "experiment.schema.json"
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    """Return a function that runs the command: exit code, stdout, stderr."""
+
+    def run(*words: str) -> tuple[int, str, str]:
+        code = main(words)
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
 
 
 @pytest.fixture
@@ -38,7 +57,7 @@ def bars(folder: Path) -> Path:
 def test_an_experiment_tells_rates_table_divisions_and_accuracy(
     bars: Path, call: Call
 ) -> None:
-    code, out, err = call("tactile", "experiment", "bars.npz", "--no-peers")
+    code, out, err = call("bars.npz", "--no-peers")
     assert code == 0
     assert not err
     assert out == (
@@ -70,10 +89,12 @@ def test_an_experiment_tells_rates_table_divisions_and_accuracy(
     )
 
 
+def test_the_schema_is_the_one_that_the_code_generates() -> None:
+    assert SCHEMA.read_bytes() == of_result(Study)
+
+
 def test_the_facts_fit_their_schema(bars: Path, call: Call) -> None:
-    code, out, _ = call(
-        "tactile", "experiment", "bars.npz", "--json", "--features", "axis, area"
-    )
+    code, out, _ = call("bars.npz", "--json", "--features", "axis, area")
     assert code == 0
     facts = json.loads(out)
     jsonschema.validate(facts, json.loads(SCHEMA.read_text("utf-8")))
@@ -85,7 +106,7 @@ def test_the_facts_fit_their_schema(bars: Path, call: Call) -> None:
 def test_a_folder_holds_a_model_that_recognises_the_frames(
     bars: Path, call: Call
 ) -> None:
-    words = ("tactile", "experiment", "bars.npz", "--no-peers", "--patterns", "1")
+    words = ("bars.npz", "--no-peers", "--patterns", "1")
     code, _, err = call(*words, "-o", "found")
     assert code == 0
     assert "next     fuzzytree show found/tree.yaml" in err
@@ -113,8 +134,8 @@ def test_a_folder_holds_a_model_that_recognises_the_frames(
 def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
     bars: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(peers, "are_there", lambda: False)
-    code, out, err = call("tactile", "experiment", "bars.npz", "--features", "axis")
+    monkeypatch.setattr("experiment.are_there", lambda: False)
+    code, out, err = call("bars.npz", "--features", "axis")
     assert code == 0
     assert "learner" not in out
     assert err == (
@@ -150,16 +171,14 @@ def test_without_scikit_learn_the_experiment_goes_on_and_says_so(
 def test_what_cannot_be_done_is_told_in_a_sentence(
     words: list[str], told: str, bars: Path, call: Call
 ) -> None:
-    code, out, err = call("tactile", "experiment", *words)
+    code, out, err = call(*words)
     assert (code, out) == (2, "")
     assert err.startswith(told)
     assert "Traceback" not in err
 
 
 def test_the_papers_rates_stand_beside(call: Call, folder: Path) -> None:
-    code, out, _ = call(
-        "tactile", "experiment", "--no-peers", "--repeats", "1", "--mode", "paper"
-    )
+    code, out, _ = call("--no-peers", "--repeats", "1", "--mode", "paper")
     assert code == 0
     assert "class         frames  right  rate     paper\n" in out
     assert "89.7 %\n" in out

@@ -1,15 +1,25 @@
-"""`fuzzytree tactile experiment`: learn, test on what was not learnt from, compare."""
+"""The paper's experiment: learn, test on what was not learnt from, and compare.
+
+python benchmarks/experiment.py --help
+"""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 import msgspec
 from click.core import ParameterSource
+from experiment_choosing import CANDIDATES
+from experiment_peers import PEERS, are_there
+from experiment_report import confusion_csv, experiment_lines
+from experiment_simulated import IDEAL, TABLE_3, paper_task
+from experiment_study import Outcome, experiment
+from experiment_tasks import KNOWN, Task, file_task, known_task
 
 from fuzzytree.cli.talk import (
     answer,
@@ -21,13 +31,9 @@ from fuzzytree.cli.talk import (
     say_rows,
     wrong_options,
 )
-from fuzzytree.errors import WriteError, install_hint
+from fuzzytree.errors import FuzzyTreeError, WriteError, install_hint
 from fuzzytree.files import write_atomically
-
-if TYPE_CHECKING:
-    from fuzzytree.learning import Settings
-    from fuzzytree.tactile.recognition.experiment import Outcome
-    from fuzzytree.tactile.recognition.tasks import Task
+from fuzzytree.learning import Settings
 
 _FRAMES_SHOWN = 7
 _TIMES = (1, 3, 5, 7)
@@ -46,7 +52,7 @@ _ONLY = {
 """The kinds of task that an option is for."""
 
 
-@click.command("experiment", short_help="Learn, test and compare on frames.")
+@click.command("experiment.py")
 @click.argument("task", metavar="[TASK]", default="paper")
 @click.option(
     "--features", metavar="NAMES", help="Names and sets of features, with commas."
@@ -120,11 +126,6 @@ def command(
     frames of one's own with `label`, `label_names` and `subject`. Each subject is left
     out in turn and tested on; frames are never divided at random.
     """
-    from fuzzytree.tactile.recognition.choosing import CANDIDATES
-    from fuzzytree.tactile.recognition.experiment import experiment
-    from fuzzytree.tactile.recognition.peers import PEERS, are_there
-    from fuzzytree.tactile.report.experiment import experiment_lines
-
     _check_options(task)
     if output is not None:
         _check_folder(Path(output))
@@ -171,8 +172,6 @@ def _check_options(task: str) -> None:
     Raises:
         click.UsageError: If one was given.
     """
-    from fuzzytree.tactile.recognition.tasks import KNOWN
-
     context = click.get_current_context()
     kind = "paper" if task == "paper" else "file" if task.endswith(".npz") else "known"
     if kind == "known" and task not in KNOWN:
@@ -185,8 +184,6 @@ def _check_options(task: str) -> None:
 
 
 def _paper(sensor: str, seed: int, repeats: int) -> Task:
-    from fuzzytree.tactile.recognition.simulated import IDEAL, paper_task
-
     if sensor == "ideal":
         about = "the paper's seven objects on an even and linear sensor"
         return paper_task(seed=seed, repeats=repeats, physics=IDEAL, about=about)
@@ -201,8 +198,6 @@ def _real(
     threshold: int | None,
     data: str | None,
 ) -> Task:
-    from fuzzytree.tactile.recognition.tasks import KNOWN, file_task, known_task
-
     if task in KNOWN or not task.endswith(".npz"):
         return known_task(task, data)
     return file_task(task, test=test, label=label, full=full, threshold=threshold)
@@ -216,16 +211,12 @@ def _changed(settings: Settings, given: Mapping[str, object]) -> Settings:
     Raises:
         ValueError: If one is out of its range.
     """
-    from fuzzytree.learning import Settings
-
     asked = {name: value for name, value in given.items() if value is not None}
     base = Settings() if asked.get("mode", settings.mode) != settings.mode else settings
     return msgspec.structs.replace(base, **asked)
 
 
 def _printed(task: str) -> dict[str, int]:
-    from fuzzytree.tactile.recognition.simulated import TABLE_3
-
     return dict(TABLE_3) if task == "paper" else {}
 
 
@@ -249,7 +240,6 @@ def _write(
     from fuzzytree.semantics.lowering import rules_from_tree
     from fuzzytree.tactile.board_files.writer import board_text
     from fuzzytree.tactile.boards import Board, Marker
-    from fuzzytree.tactile.report.experiment import confusion_csv
 
     folder.mkdir(exist_ok=True)
     board = Board(task.name[:60], task.sensor, Marker("AA 55", task.sensor.bits))
@@ -316,3 +306,24 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
     figure = draw_frames(shown, titles=titles, columns=len(cells))
     found["frames.png"] = drawn(figure, ".png")
     return found
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code.
+
+    Args:
+        arguments: The words after the program's name; those of the process if None.
+    """
+    try:
+        command.main(arguments, standalone_mode=False)
+    except click.ClickException as error:
+        say(error.format_message())
+        return 2
+    except FuzzyTreeError as error:
+        say(str(error))
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

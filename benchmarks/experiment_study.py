@@ -8,6 +8,11 @@ from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
+from experiment_choosing import Candidate, chosen
+from experiment_pairing import Pairing, paired
+from experiment_peers import peer_answers
+from experiment_splits import Split
+from experiment_tasks import Task
 
 from fuzzytree.errors import LearningError, TableError
 from fuzzytree.learning import Learnt, Settings, learn_arrays
@@ -16,12 +21,7 @@ from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.features import costs
 from fuzzytree.tactile.features.names import feature_of
 from fuzzytree.tactile.features.sets import names_of
-from fuzzytree.tactile.recognition.choosing import Candidate, chosen
-from fuzzytree.tactile.recognition.pairing import Pairing, paired
-from fuzzytree.tactile.recognition.peers import peer_answers
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
-from fuzzytree.tactile.recognition.splits import Split
-from fuzzytree.tactile.recognition.tasks import Task
 from fuzzytree.tactile.runtimes.frames import Features, features_of
 
 if TYPE_CHECKING:
@@ -161,8 +161,8 @@ def experiment(
             unless given.
         settings: How to learn; the task's unless given.
         choose: Settings to choose from in each division, by the subjects that are
-            learnt from alone; `fuzzytree.tactile.recognition.choosing.CANDIDATES`, say.
-        peers: Which of `fuzzytree.tactile.recognition.peers.PEERS` to compare with.
+            learnt from alone; `experiment_choosing.CANDIDATES`, say.
+        peers: Which of `experiment_peers.PEERS` to compare with.
         seed: Of the peers that draw numbers.
         progress: Told what is done and which share of it.
 

@@ -6,8 +6,9 @@ import csv
 import io
 from collections.abc import Iterator, Mapping
 
+from experiment_study import NOTHING, UNKNOWN, Study
+
 from fuzzytree.report.text import aligned, counted
-from fuzzytree.tactile.recognition.experiment import NOTHING, UNKNOWN, Study
 
 _WIDEST = 12  # classes; a larger table is in the CSV file
 _NAMES_TOLD = 12

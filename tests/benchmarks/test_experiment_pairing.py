@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-
-from fuzzytree.tactile.recognition.pairing import paired, sign_test
+from experiment_pairing import paired, sign_test
 
 
 def test_units_are_counted_by_who_is_better() -> None:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
+from experiment_splits import in_groups
 
 from fuzzytree.learning import Settings, learn_arrays
 from fuzzytree.model.rulebase import Value
 from fuzzytree.runtimes.native import load
-from fuzzytree.tactile.recognition.splits import in_groups
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, IntArray

@@ -7,10 +7,9 @@ import io
 
 import msgspec
 import pytest
-
-from fuzzytree.tactile.recognition.experiment import Peer, Study, Trial
-from fuzzytree.tactile.recognition.pairing import paired
-from fuzzytree.tactile.report.experiment import confusion_csv, experiment_lines
+from experiment_pairing import paired
+from experiment_report import confusion_csv, experiment_lines
+from experiment_study import Peer, Study, Trial
 
 STUDY = Study(
     "touch",

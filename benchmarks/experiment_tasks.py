@@ -11,12 +11,12 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
+from experiment_splits import Split, check_apart, leave_one_out
 
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.learning import Settings
 from fuzzytree.tactile.presses import LIMIT, Presses, read_presses
-from fuzzytree.tactile.recognition.splits import Split, check_apart, leave_one_out
 from fuzzytree.tactile.sensor import Cells, Sensor
 
 if TYPE_CHECKING:
@@ -151,8 +151,8 @@ CHOSEN_ON: Mapping[str, tuple[int, ...]] = MappingProxyType(
 
 
 def data_folder() -> Path:
-    """Return where the project keeps its frames: beside the package, in a checkout."""
-    return Path(__file__).resolve().parents[3] / "examples" / "tactile" / "data"
+    """Return where the project keeps its frames."""
+    return Path(__file__).resolve().parents[1] / "examples" / "tactile" / "data"
 
 
 def known_task(name: str, folder: PathLike | None = None) -> Task:
@@ -172,9 +172,8 @@ def known_task(name: str, folder: PathLike | None = None) -> Task:
     path = Path(data_folder() if folder is None else folder) / known.file
     if not path.is_file():
         raise ReadError(
-            f"{path}: is not there: the frames of {name!r} are no part of the "
-            "installed package\n  fetch examples/tactile/data of the project, and "
-            "name the folder with --data"
+            f"{path}: is not there: the frames of {name!r} lie in "
+            "examples/tactile/data; name the folder with --data"
         )
     found = hashlib.sha256(read_bounded(path, LIMIT)).hexdigest()
     if found != known.sha256:

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from fuzzytree.errors import ReadError, TableError
-from fuzzytree.tactile.presses import Presses, write_presses
-from fuzzytree.tactile.recognition.tasks import (
+from experiment_tasks import (
     CHOSEN_ON,
     KNOWN,
     data_folder,
     file_task,
     known_task,
 )
+
+from fuzzytree.errors import ReadError, TableError
+from fuzzytree.tactile.presses import Presses, write_presses
 
 
 def saved(path: Path, *, subject: list[int] | None, names: str = "ab") -> Path:
@@ -71,9 +71,8 @@ def test_frames_that_are_not_there_are_told_with_what_to_do(tmp_path: Path) -> N
     with pytest.raises(ReadError) as told:
         known_task("touch", tmp_path)
     assert str(told.value) == (
-        f"{tmp_path}/capfinger_27x15.npz: is not there: the frames of 'touch' are no "
-        "part of the installed package\n  fetch examples/tactile/data of the project, "
-        "and name the folder with --data"
+        f"{tmp_path}/capfinger_27x15.npz: is not there: the frames of 'touch' lie in "
+        "examples/tactile/data; name the folder with --data"
     )
 
 

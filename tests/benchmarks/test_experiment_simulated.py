@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from experiment_simulated import TABLE_3, paper_task
+from experiment_study import experiment
 
-from fuzzytree.tactile.recognition.experiment import experiment
-from fuzzytree.tactile.recognition.simulated import TABLE_3, paper_task
 from fuzzytree.tactile.simulation.objects import OBJECTS
 
 

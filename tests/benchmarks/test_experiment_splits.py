@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from experiment_splits import check_apart, in_groups, leave_one_out
 
 from fuzzytree.errors import TableError
-from fuzzytree.tactile.recognition.splits import check_apart, in_groups, leave_one_out
 
 
 def test_no_subject_is_on_both_sides_and_every_frame_is_tested_once() -> None:
