@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
 import click
 import msgspec
 from click.core import ParameterSource
+from commands import run
 from experiment_choosing import CANDIDATES
 from experiment_peers import PEERS, are_there
 from experiment_report import confusion_csv, experiment_lines
@@ -31,7 +32,7 @@ from fuzzytree.cli.talk import (
     say_rows,
     wrong_options,
 )
-from fuzzytree.errors import FuzzyTreeError, WriteError, install_hint
+from fuzzytree.errors import WriteError, install_hint
 from fuzzytree.files import write_atomically
 from fuzzytree.learning import Settings
 
@@ -308,22 +309,5 @@ def _pictures(task: Task, outcome: Outcome, *, quiet: bool) -> dict[str, bytes]:
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code.
-
-    Args:
-        arguments: The words after the program's name; those of the process if None.
-    """
-    try:
-        command.main(arguments, standalone_mode=False)
-    except click.ClickException as error:
-        say(error.format_message())
-        return 2
-    except FuzzyTreeError as error:
-        say(str(error))
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run(command))

@@ -25,7 +25,6 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
         "learn.schema.json": "fuzzytree.api.holdout:Summary",
         "needs.schema.json": "fuzzytree.benchmarking.savings:Report",
         "stability.schema.json": "fuzzytree.checking.stability.results:Stability",
-        "tactile-bench.schema.json": "fuzzytree.tactile.recognition.timing:FramesStudy",
     }
 )
 """Each file's name and the record that it describes, as MODULE:CLASS."""

@@ -10,7 +10,8 @@ import experiment_peers as peers
 import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import numpy as np
 import pytest
-from experiment import main
+from commands import run as run_command
+from experiment import command
 from experiment_study import Study
 
 import fuzzytree as ft
@@ -31,7 +32,7 @@ def call(capsys: pytest.CaptureFixture[str]) -> Call:
     """Return a function that runs the command: exit code, stdout, stderr."""
 
     def run(*words: str) -> tuple[int, str, str]:
-        code = main(words)
+        code = run_command(command, words)
         out, err = capsys.readouterr()
         return code, out, err
 

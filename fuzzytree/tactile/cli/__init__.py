@@ -17,7 +17,6 @@ ACTIONS = (
     "interpolate",
     "export",
     "check",
-    "bench",
 )
 """Each action is the `command` of the module `fuzzytree.tactile.cli.ACTION`."""
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from fuzzytree.errors import install_hint
 from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes.c import COMPILERS, compiled
 from fuzzytree.runtimes.one_row import load
 from fuzzytree.tactile.exporters.c_frames import write_frames_c
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
     from fuzzytree.tactile.exporters.onnx_frames import Output
 
 NUMPY, ONNX, C, PLAIN = "numpy", "onnx", "c", "plain Python"
-STRENGTHS = "numpy with strengths"
 
 _ANSWERS: tuple[Output, ...] = ("label", "state", "rule")
 
@@ -136,17 +134,6 @@ def _numpy(model: Model, sensor: Sensor, reject: float) -> Runner:
         return decide(recogniser.plan(frames).values)
 
     return Runner(NUMPY, answer, call)
-
-
-def with_strengths(model: Model, sensor: Sensor, reject: float = 0.0) -> Runner | None:
-    """Return numpy as `Recogniser` has it: with the strengths of a tree's rules.
-
-    None for a rule base, which has no answer without them.
-    """
-    if isinstance(model, RuleBase):
-        return None
-    plain = _looked_at(_numpy(model, sensor, reject), sensor)
-    return replace(plain, name=STRENGTHS, call=Recogniser(model, sensor, reject))
 
 
 def _plain(model: Model, sensor: Sensor, reject: float) -> Runner:

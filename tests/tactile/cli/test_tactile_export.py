@@ -1,9 +1,8 @@
-"""`fuzzytree tactile export` and `bench`: files from frame to class, and their cost."""
+"""`fuzzytree tactile export`: files from frame to class."""
 
 import json
 from pathlib import Path
 
-import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import numpy as np
 import onnx
 import pytest
@@ -18,7 +17,6 @@ from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
 
 pytestmark = pytest.mark.usefixtures("few_objects")
 
-SCHEMA = Path(__file__).resolve().parents[3] / "schemas" / "tactile-bench.schema.json"
 NONE = np.zeros(0, np.int64)
 SIZE = ["--sensor", "6x4", "--full", "100"]
 Said = pytest.CaptureFixture[str]
@@ -123,27 +121,3 @@ def test_a_model_for_other_things_is_refused(capsys: Said) -> None:
     assert capsys.readouterr().err == (
         f"{example}: frames are asked of a tree or rules, not of this\n"
     )
-
-
-def test_a_bench_tells_time_error_and_floors(capsys: Said) -> None:
-    words = ["tactile", "bench", "tree.yaml", *SIZE, "--data", "f.npz", "--quiet"]
-    few = ["--rows", "1", "--rows", "2000", "--rounds", "3"]
-    assert main([*words, *few]) == 0
-    out = capsys.readouterr().out
-    for text in (
-        "1 frame in a call",
-        "2,000 frames in a call",
-        "numpy",
-        "onnx",
-        "c   ",
-    ):
-        assert text in out
-    assert "floor: the frames copied" in out
-    assert "left out: plain Python: 2,000 frames in a call" in out
-    assert main([*words, "--rows", "1", "--rounds", "3", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    jsonschema.validate(found, json.loads(SCHEMA.read_text("utf-8")))
-    assert found["judged"] == 9
-    errors = {one["name"]: one["error"] for one in found["points"]}
-    assert max(errors[name] for name in ("numpy", "onnx", "c")) < 1e-14
-    assert errors["floor: the frames copied"] is None

@@ -1,12 +1,19 @@
-"""`fuzzytree tactile bench`: what each way from frame to class costs, and its error."""
+"""What each way from frame to class costs, and its error against exact arithmetic.
+
+python benchmarks/tactile_bench.py MODEL --sensor 16x16
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import click
+from commands import run
+from tactile_timing import FramesStudy, Point, time_frames
 
+from fuzzytree.benchmarking.records import Timing
 from fuzzytree.cli.talk import (
     answer,
     answer_json,
@@ -16,6 +23,8 @@ from fuzzytree.cli.talk import (
     say,
     wrong_options,
 )
+from fuzzytree.report.bench import machine_rows
+from fuzzytree.report.text import aligned, duration
 from fuzzytree.tactile.cli.sensors import (
     asked_model,
     frames_of,
@@ -24,7 +33,7 @@ from fuzzytree.tactile.cli.sensors import (
 )
 
 
-@click.command("bench", short_help="Measure run time and error, frame to class.")
+@click.command("tactile_bench.py")
 @click.argument("model", metavar="MODEL")
 @sensor_options
 @click.option("--data", metavar="FRAMES", help="Frames of your own; made ones if none.")
@@ -77,15 +86,12 @@ def command(
     seed: int,
     as_json: bool,
     quiet: bool,
-) -> int:
+) -> None:
     """Measure every way from a board's frames to the classes of MODEL, one thread.
 
     NumPy, ONNX, C and plain Python answer the same frames in interleaved rounds;
     errors are those against exact arithmetic.
     """
-    from fuzzytree.tactile.recognition.timing import time_frames
-    from fuzzytree.tactile.report.frames import study_lines
-
     sensor = wanted_sensor(board, size, full, threshold)
     asked = asked_model(model)
     frames = frames_of(data, sensor, quiet=quiet)
@@ -109,4 +115,51 @@ def command(
     flips = sum(point.flips for point in found.points)
     if flips:
         say(f"{flips} answers are not those of the exact features")
-    return 0
+
+
+def study_lines(found: FramesStudy) -> Iterator[str]:
+    """Yield a study of frames: what and where, a table for each number of frames."""
+    sensor = found.sensor
+    yield f"{found.model}: from frame to class, in {found.seconds:.0f} s"
+    yield from aligned(
+        [
+            ("features", ", ".join(found.features) or "none"),
+            ("frames", f"{found.data}; {sensor.rows} x {sensor.columns} cells"),
+            *machine_rows(found.machine),
+        ]
+    )
+    rows = {one.rows for point in found.points for one in point.timings}
+    for count in sorted(rows):
+        timed = [
+            (point, one)
+            for point in found.points
+            for one in point.timings
+            if one.rows == count
+        ]
+        yield ""
+        yield f"{count:,} frame{'' if count == 1 else 's'} in a call, 1 thread"
+        yield from aligned([_HEAD, *(_row(*one, found) for one in timed)])
+    yield ""
+    yield "time is that of a frame: the median, and the ends of its 95 % interval;"
+    yield "error is the largest of a feature, as a share of its scale; flips are"
+    yield "classes that are not those of the exact features"
+    yield from (f"left out: {text}" for text in found.omissions)
+    if not found.is_complete:
+        yield "ended early: some was measured less often"
+
+
+_HEAD = ("way", "time", "from", "to", "error", "flips", "file")
+
+
+def _row(point: Point, timing: Timing, found: FramesStudy) -> tuple[str, ...]:
+    ends = (timing.median_ns, timing.low_ns, timing.high_ns)
+    times = (duration(one / timing.rows) for one in ends)
+    is_floor = point.error is None
+    error = "" if point.error is None else f"{point.error:.2g}"
+    flips = "" if is_floor else f"{point.flips} of {found.judged}"
+    size = f"{point.bytes:,} bytes" if point.bytes else ""
+    return (point.name, *times, error, flips, size)
+
+
+if __name__ == "__main__":
+    sys.exit(run(command))

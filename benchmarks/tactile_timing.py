@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 
@@ -15,22 +16,22 @@ from fuzzytree.benchmarking.clock import Call, Tell, time_calls
 from fuzzytree.benchmarking.machine import after, machine
 from fuzzytree.benchmarking.records import Machine, Timing
 from fuzzytree.model.contracts import Model
-from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.rulebase import RuleBase, fingerprint
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.plain import plain_answer
-from fuzzytree.tactile.recognition.recogniser import check_inputs
+from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
     PLAIN,
     Found,
     Runner,
     as_sent,
     runners,
-    with_strengths,
 )
 from fuzzytree.tactile.recognition.scales import errors
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
+STRENGTHS = "numpy with strengths"
 COPY = "floor: the frames copied"
 SESSION = "floor: an empty session call"
 
@@ -129,8 +130,9 @@ def time_frames(
         raise ValueError("there is no frame to measure with")
     before = machine(["onnx", "onnxruntime"])
     ways, omissions = runners(model, sensor, reject)
-    more = with_strengths(model, sensor, reject)
-    ways = [ways[0], *([more] if more else []), *ways[1:]]
+    if not isinstance(model, RuleBase):  # rules have no prediction without strengths
+        whole = Recogniser(model, sensor, reject)
+        ways.insert(1, replace(ways[0], name=STRENGTHS, call=whole))
     judged = _judged(model, sensor, given, ways, reject)
     timings: dict[str, list[Timing]] = {}
     is_complete = True
