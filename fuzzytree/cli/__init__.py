@@ -172,7 +172,7 @@ def _usage_text(error: click.ClickException) -> str:
     if not message.endswith("..."):
         message = message.removesuffix(".")
     context = error.ctx if isinstance(error, click.UsageError) else None
-    hint = f"\n  {context.command_path} --help tells more" if context else ""
+    hint = f"\n  {context.command_path} --help lists the options" if context else ""
     return message + hint
 
 

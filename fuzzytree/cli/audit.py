@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -28,6 +28,7 @@ from fuzzytree.cli.talk import (
     progress_bar,
     quiet_option,
     say,
+    verbose_option,
     wrong_options,
 )
 from fuzzytree.files import check_places, write_atomically
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from fuzzytree.auditing.findings.configuration import FailOn
     from fuzzytree.auditing.findings.records import Audit
     from fuzzytree.auditing.findings.subject import Material
+
+_MOST_LIMITS = 3  # undeclared ranges that are reported one by one
 
 Form = Literal["text", "json", "sarif", "github"]
 
@@ -91,6 +94,7 @@ For example:
 )
 @delimiter_option
 @allow_loss_option
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -108,6 +112,7 @@ def command(
     results: tuple[str, ...],
     delimiter: str | None,
     allow_loss: bool,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
     within: Literal["model", "data"],
@@ -130,6 +135,7 @@ def command(
     """
     from fuzzytree.api import verbs
     from fuzzytree.auditing.findings.baselines import baseline_of, gone, read_baseline
+    from fuzzytree.report.audit import audit_lines, verdict_text
 
     if target is not None and data is None:
         raise click.UsageError(
@@ -167,10 +173,22 @@ def command(
             repeat=repeating(model, data, target, config, asked),
             progress=tell,
         )
-    _tell_domain(found, quiet=quiet)
     form = "json" if as_json else form
     known_ids = accepted if path else None
-    text = _told(found, form, material, known_ids, is_whole=is_whole)
+    lost = [*gone(accepted, found)]
+    if form == "text":
+        text = "\n".join(
+            audit_lines(
+                found,
+                _lines_of(material),
+                gone=lost,
+                is_coloured=_is_coloured(),
+                is_verbose=verbose,
+                is_whole=is_whole,
+            )
+        )
+    else:
+        text = _for_programs(found, form, known_ids)
     wrote: list[str] = []
     try:  # a reader who leaves early costs no file, and a full disk not the text
         if output is not None:
@@ -188,45 +206,28 @@ def command(
             answer_styled(text)
         for one in wrote:
             say(f"wrote    {one}", quiet=quiet)
-    lost = [*gone(accepted, found)]
+    _tell_domain(found, quiet=quiet)
     for name in lost:
         say(f"gone     {name} {printable(accepted[name])}", quiet=quiet)
     fails = write_baseline is None and _fails(found, fail_on or known.fail_on)
-    _tell_verdict(found, lost, quiet=quiet and not fails)
+    if form != "text" or output is not None:
+        say(verdict_text(found, lost), quiet=quiet and not fails)
     return 130 if found.was_interrupted else int(fails)
 
 
-# --- what is told
-
-
-def _told(
-    found: Audit,
-    form: Form,
-    material: Material,
-    baseline: Mapping[str, str] | None,
-    *,
-    is_whole: bool,
-) -> str:
-    """Return an audit in the form that was asked for."""
-    from fuzzytree.report.annotations import annotation_lines
-    from fuzzytree.report.audit import audit_lines
-    from fuzzytree.report.sarif import sarif
-
+def _for_programs(found: Audit, form: Form, baseline: Mapping[str, str] | None) -> str:
+    """Return an audit as JSON, SARIF or annotations of a code host."""
     match form:
-        case "json":
-            return printable_json(found.to_json())
         case "sarif":
+            from fuzzytree.report.sarif import sarif
+
             return printable_json(sarif(found, baseline))
         case "github":
+            from fuzzytree.report.annotations import annotation_lines
+
             return "\n".join(annotation_lines(found))
-        case "text":
-            lines = audit_lines(
-                found,
-                _lines_of(material),
-                is_coloured=_is_coloured(),
-                is_whole=is_whole,
-            )
-            return "\n".join(lines)
+        case _:
+            return printable_json(found.to_json())
 
 
 def _lines_of(material: Material) -> list[str]:
@@ -244,21 +245,21 @@ def _is_coloured() -> bool:
 
 
 def _tell_domain(found: Audit, *, quiet: bool) -> None:
-    """Say which limits nobody declared."""
+    """Report the limits that the model does not declare."""
     guessed = [one for one in found.domain.sides if one.origin == "curves"]
-    for one in guessed[:10]:
+    for one in guessed[:_MOST_LIMITS]:
         say(
-            f"limits   {one.variable!r} declares no range; asked from {one.low!r} to "
-            f"{one.high!r}, by the span of its curves; --limits NAME=LOW:HIGH sets it",
+            f"limits   {one.variable!r} declares no range; audited from {one.low!r} to "
+            f"{one.high!r}, where its curves change; --limits NAME=LOW:HIGH sets it",
             quiet=quiet,
         )
+    if len(guessed) > _MOST_LIMITS:
+        say(f"limits   and {len(guessed) - _MOST_LIMITS} more", quiet=quiet)
     unused = [one.variable for one in found.domain.sides if one.origin == "unused"]
     if unused:
         names = ", ".join(map(repr, unused[:10])) + (", ..." if unused[10:] else "")
         said = "no range is known, and nothing depends on it"
         say(f"limits   {names}: {said}; any number will do", quiet=quiet)
-    if len(guessed) > 10:
-        say(f"limits   and {len(guessed) - 10} more so", quiet=quiet)
 
 
 def _write_page(found: Audit, material: Material, page: str) -> None:
@@ -287,9 +288,3 @@ def _fails(found: Audit, least: FailOn | None) -> bool:
     }
     failing = grave[least or "warning"]
     return any(answer.severity in failing for answer in found.open_findings)
-
-
-def _tell_verdict(found: Audit, lost: Sequence[str], *, quiet: bool) -> None:
-    from fuzzytree.report.audit import verdict_text
-
-    say(verdict_text(found, lost), quiet=quiet)

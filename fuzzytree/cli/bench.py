@@ -20,6 +20,7 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say,
     table_source,
+    verbose_option,
     wrong_options,
 )
 from fuzzytree.errors import MissingExtraError, install_hint
@@ -94,6 +95,7 @@ INTERRUPTED = 130
     "--full", "is_full", is_flag=True, help="List variants that are beaten, too."
 )
 @delimiter_option
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -110,6 +112,7 @@ def command(
     plots: Sequence[str],
     is_full: bool,
     delimiter: str | None,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -142,7 +145,7 @@ def command(
             seed=seed,
             progress=tell,
         )
-    lines = study_lines(found, is_full=is_full)
+    lines = study_lines(found, is_verbose=verbose, is_full=is_full)
     if not found.points:  # a file of an earlier study is worth more
         output, plots = None, ()
     try:
@@ -155,16 +158,16 @@ def command(
             answer("\n".join(lines))
     for place in (*([output] if output else []), *_draw(found, plots)):
         say(f"wrote    {place}", quiet=quiet)
-    return _ending(found, quiet=quiet)
+    return _ending(found, as_json=as_json, quiet=quiet)
 
 
-def _ending(found: Study, *, quiet: bool) -> int:
-    """Say how it ended, and return the exit code."""
+def _ending(found: Study, *, as_json: bool, quiet: bool) -> int:
+    """Report what went wrong, and return the exit code."""
     from fuzzytree.benchmarking.study import faults
 
     if found.is_interrupted:
-        known = "what was measured by then is told"
-        nothing = "nothing was measured by then, and files are as they were"
+        known = "the result has what was measured before"
+        nothing = "nothing was measured, and files are as they were"
         say(f"interrupted; {known if found.points else nothing}")
         return INTERRUPTED
     if not found.points:
@@ -174,7 +177,8 @@ def _ending(found: Study, *, quiet: bool) -> int:
     if wrong:
         say(wrong[-1])
         return 1
-    say(found.advice[-1] if found.advice else "measured", quiet=quiet)
+    if as_json:
+        say(found.advice[-1] if found.advice else "measured", quiet=quiet)
     return 0
 
 

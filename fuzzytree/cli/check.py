@@ -8,8 +8,7 @@ import click
 
 from fuzzytree.cli.talk import (
     allow_loss_option,
-    answer,
-    answer_json,
+    answer_result,
     data_option,
     delimiter_option,
     json_option,
@@ -17,8 +16,8 @@ from fuzzytree.cli.talk import (
     quiet_option,
     rows_only_option,
     runtimes_option,
-    say,
     table_source,
+    verbose_option,
     wrong_options,
 )
 
@@ -42,6 +41,7 @@ from fuzzytree.cli.talk import (
     help="Run a program even if its text is not what is written now.",
 )
 @allow_loss_option
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -55,6 +55,7 @@ def command(
     rows_only: bool,
     run_code: bool,
     allow_loss: bool,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -80,9 +81,7 @@ def command(
             allow_loss=allow_loss,
             progress=show,
         )
-    if as_json:
-        answer_json(found.to_json())
-    else:
-        answer("\n".join(text.agreement_lines(found, is_full=is_full)))
-    say(text.verdict_text(found), quiet=quiet and found.ok)
+    lines = text.agreement_lines(found, is_verbose=verbose, is_full=is_full)
+    is_silent = quiet and found.ok
+    answer_result(found.to_json, lines, as_json=as_json, is_silent=is_silent)
     return 0 if found.ok else 1

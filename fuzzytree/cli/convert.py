@@ -24,9 +24,11 @@ from fuzzytree.cli.talk import (
     progress_bar,
     quiet_option,
     say,
+    say_first,
     say_rows,
     setting,
     standard_input,
+    verbose_option,
     wrong_options,
 )
 from fuzzytree.errors import LossError
@@ -64,6 +66,7 @@ if TYPE_CHECKING:
 @click.option(
     "--allow-loss", is_flag=True, help="Read and write what is lost as near as can be."
 )
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -78,6 +81,7 @@ def command(
     tolerance: str | None,
     settings: Sequence[str],
     allow_loss: bool,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -96,7 +100,6 @@ def command(
         options = _options(form, given)
     found, used = read_source(source, read_as)
     head = f"{used}: {document_text(found.model)}"
-    say_rows(("read", source, head), quiet=quiet)
     return carry(
         found,
         source,
@@ -105,7 +108,9 @@ def command(
         output,
         choice=Choice(carrier, kind, conjunction),
         options=options,
+        notes=[("read", source, head)],
         allow_loss=allow_loss,
+        verbose=verbose,
         as_json=as_json,
         quiet=quiet,
     )
@@ -164,11 +169,13 @@ def carry(
     *,
     choice: Choice,
     options: Mapping[str, Option],
+    notes: Sequence[tuple[str, str, str]] = (),
     allow_loss: bool,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Write what was read in another format, and tell what was done; 1 for a refusal.
+    """Write a model in another format, and report its proof; return 1 for a refusal.
 
     Args:
         found: What was read.
@@ -178,9 +185,11 @@ def carry(
         output: The file to write; `-` is standard output.
         choice: The form of the model.
         options: Of the writer.
+        notes: Lines to print behind those of the file and its proof.
         allow_loss: Whether to write although something is lost.
-        as_json: Whether the facts are told as JSON.
-        quiet: Whether nothing is told but errors.
+        verbose: Whether to list all losses and remarks, and not only the first.
+        as_json: Whether to print the facts as JSON.
+        quiet: Whether to print nothing but errors.
     """
     from fuzzytree.checking.converting import carrier_of, export, proved
     from fuzzytree.cli.carriers import carried
@@ -205,8 +214,6 @@ def carry(
         "format": form.name,
         "carrier": carrier_of(model),
     }
-    for remark in found.remarks:
-        say(f"remark   {remark}", quiet=quiet)
     with progress_bar(quiet=quiet) as show:
         show(f"writing {form.name}", 0.0)
         with wrong_options():
@@ -216,7 +223,7 @@ def carry(
             show(f"comparing {form.name} with the model", 0.5)
             proof = proved(model, form, written, dtype=options.get("dtype"))
     if proof is None:
-        _refuse(found, refusal)
+        _refuse(found, refusal, verbose=verbose)
         if as_json and output != "-":
             losses = export(model, form.name, allow_loss=True, **options).losses
             answer_json({**facts, "file": None, "losses": losses})
@@ -225,12 +232,6 @@ def carry(
         answer_bytes(written.content)
     else:
         write_atomically(output, written.content)
-    for loss in (*found.losses, *written.losses):
-        say(f"lost     {loss_text(loss)}", quiet=quiet)
-    for remark in written.remarks:
-        say(f"remark   {remark}", quiet=quiet)
-    for sentence in proof.coverage.sentences if proof.coverage else ():
-        say(f"remark   {sentence}", quiet=quiet)
     digest = hashlib.sha256(written.content).hexdigest()
     size = len(written.content)
     after = next_check((source, read_as), (output, form.name))
@@ -239,12 +240,19 @@ def carry(
     if carrier_of(model) == "system" != carrier_of(found.model):
         after = ""  # numbers are not compared with classes
     shows = " (shows what the losses change)" if written.losses else ""
+    lost = [f"lost     {loss_text(one)}" for one in (*found.losses, *written.losses)]
+    coverage = proof.coverage.sentences if proof.coverage else ()
+    remarks = (*found.remarks, *written.remarks, *coverage)
     say_rows(
         ("wrote", output, f"{form.name}, {size} bytes, sha256 {digest}"),
         _proof_row(proof),
-        *([("next", f"{after}{shows}", "")] if after else []),
+        *notes,
         quiet=quiet,
     )
+    for lines in (lost, [f"remark   {text}" for text in remarks]):
+        say_first(lines, verbose=verbose, quiet=quiet)
+    if after:
+        say(f"next     {after}{shows}", quiet=quiet)
     if as_json and output != "-":
         answer_json(
             {
@@ -282,16 +290,22 @@ def _written(
         return Written(b""), str(error).replace("allow_loss=True", "--allow-loss")
 
 
-def _refuse(found: Reading, refusal: str) -> None:
-    """Say what would be lost, and that nothing is written."""
+def _refuse(found: Reading, refusal: str, *, verbose: bool) -> None:
+    """Report what would be lost, and that nothing is written."""
     from fuzzytree.model.losses import loss_text
 
-    for loss in found.losses:
-        say(f"lost     {loss_text(loss)}")
+    losses = [f"lost     {loss_text(loss)}" for loss in found.losses]
+    if "--allow-loss" in refusal:
+        head, *refused = refusal.splitlines()
+        say(head)
+        say_first(refused[:-1], verbose=verbose)
+        say_first(losses, verbose=verbose)
+        say_first(refused[-1:])
+        return
+    say(refusal or "nothing is written; pass --allow-loss to write what remains")
+    say_first(losses, verbose=verbose)
     if refusal:
-        say(refusal)
-    if "--allow-loss" not in refusal:
-        say("nothing is written; pass --allow-loss to write what is left")
+        say("nothing is written; pass --allow-loss to write what remains")
 
 
 def _proof_row(proof: Proof) -> tuple[str, str, str]:

@@ -9,14 +9,13 @@ import click
 from fuzzytree.cli.audit_options import limits_of
 from fuzzytree.cli.talk import (
     allow_loss_option,
-    answer,
-    answer_json,
+    answer_result,
     delimiter_option,
     json_option,
     progress_bar,
     quiet_option,
-    say,
     table_source,
+    verbose_option,
     wrong_options,
 )
 
@@ -40,6 +39,7 @@ from fuzzytree.cli.talk import (
 )
 @delimiter_option
 @allow_loss_option
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -50,6 +50,7 @@ def command(
     budget: float,
     delimiter: str | None,
     allow_loss: bool,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -60,7 +61,7 @@ def command(
     changes, or another change breaks who calls the model.
     """
     from fuzzytree.api import verbs
-    from fuzzytree.report.diff import diff_lines, verdict_text
+    from fuzzytree.report.diff import diff_lines
 
     with wrong_options(), progress_bar(quiet=quiet) as tell:
         found = verbs.diff(
@@ -73,9 +74,7 @@ def command(
             allow_loss=allow_loss,
             progress=tell,
         )
-    if as_json:
-        answer_json(found.to_json())
-    else:
-        answer("\n".join(diff_lines(found)))
-    say(verdict_text(found), quiet=quiet and found.verdict == "equal" and found.ok)
+    is_silent = quiet and found.verdict == "equal" and found.ok
+    lines = diff_lines(found, is_verbose=verbose)
+    answer_result(found.to_json, lines, as_json=as_json, is_silent=is_silent)
     return 0 if found.ok else 1

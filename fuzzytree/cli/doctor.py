@@ -11,7 +11,7 @@ from types import MappingProxyType
 import click
 
 import fuzzytree
-from fuzzytree.cli.talk import answer, answer_json, json_option
+from fuzzytree.cli.talk import answer, answer_json, json_option, verbose_option
 from fuzzytree.errors import FuzzyTreeError, install_hint
 
 CORE = ("numpy", "pyarrow", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark")
@@ -51,6 +51,9 @@ EXTRAS: Mapping[str, Mapping[str, str]] = MappingProxyType(
 )
 """The packages of each extra and their modules; a test compares it with the project."""
 
+FOR_TESTS = ("witnesses", "peers")
+"""The extras that only the test suite and the benchmarks use."""
+
 
 def missing_extras() -> set[str]:
     """Return the extras of which a package is not installed."""
@@ -61,10 +64,15 @@ def missing_extras() -> set[str]:
     }
 
 
-@click.command("doctor", short_help="Tell what is installed and whether it works.")
+@click.command("doctor", short_help="Report what is installed and whether it works.")
+@verbose_option
 @json_option
-def command(as_json: bool) -> int:
-    """Tell versions and extras, and learn, write, read and run a small model."""
+def command(verbose: bool, as_json: bool) -> int:
+    """Report versions and extras; learn, write, read and run a small model.
+
+    Exit 1 if the small model fails. The packages that only the test suite and the
+    benchmarks use are listed by `--verbose`.
+    """
     from fuzzytree.report import text
 
     packages = [*CORE, *(name for extra in EXTRAS.values() for name in extra)]
@@ -78,13 +86,16 @@ def command(as_json: bool) -> int:
     if as_json:
         answer_json({"versions": versions, "missing": missing, "faults": faults})
         return 1 if faults else 0
-    answer("\n".join(text.aligned(versions.items())))
-    for extra in missing:
-        answer(f"extra {extra!r} is not installed; it needs {install_hint(extra)}")
     for fault in faults:
-        answer(f"self-test: {fault}")
+        answer(f"self-test failed: {fault}")
     if not faults:
-        answer("self-test: learning, writing, reading and running agree")
+        answer("self-test passed: learning, writing, reading and running agree")
+    hidden = {n for extra in FOR_TESTS for n in EXTRAS[extra] if not verbose}
+    shown = [item for item in versions.items() if item[0] not in hidden]
+    answer("\n".join(text.aligned(shown)))
+    for extra in missing:
+        if verbose or extra not in FOR_TESTS:
+            answer(f"extra {extra!r} is not installed; it needs {install_hint(extra)}")
     return 1 if faults else 0
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import click
 
-from fuzzytree.cli.talk import answer, answer_json, json_option
+from fuzzytree.cli.talk import answer, answer_json, json_option, verbose_option
 
 
 @click.command("explain", short_help="Say what a code of an audit means.")
 @click.argument("code", metavar="[CODE]", required=False)
+@verbose_option
 @json_option
-def command(code: str | None, as_json: bool) -> None:
+def command(code: str | None, verbose: bool, as_json: bool) -> None:
     """Say what CODE means, why it matters, and what to do; list all codes without.
 
     CODE is a code such as FT101, the id of a finding such as FT101-1a2b3c4d, or how
@@ -36,4 +37,4 @@ def command(code: str | None, as_json: bool) -> None:
     if as_json:
         answer_json(begin)
     else:
-        answer("\n".join(code_lines(begin)))
+        answer("\n".join(code_lines(begin, is_whole=verbose or code is not None)))

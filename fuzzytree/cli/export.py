@@ -11,7 +11,7 @@ from fuzzytree.cli.carriers import (
     wanted_format,
 )
 from fuzzytree.cli.convert import Choice, carry, read_source
-from fuzzytree.cli.talk import json_option, quiet_option, wrong_options
+from fuzzytree.cli.talk import json_option, quiet_option, verbose_option, wrong_options
 from fuzzytree.model.contracts import Carrier
 from fuzzytree.model.rulebase import Conjunction, Kind
 
@@ -45,6 +45,7 @@ from fuzzytree.model.rulebase import Conjunction, Kind
 @click.option(
     "--allow-loss", is_flag=True, help="Write what is lost as near as it can."
 )
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -62,6 +63,7 @@ def command(
     readable: bool,
     plain: bool,
     allow_loss: bool,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -95,6 +97,7 @@ def command(
         choice=Choice(carrier, kind, conjunction),
         options=options,
         allow_loss=allow_loss,
+        verbose=verbose,
         as_json=as_json,
         quiet=quiet,
     )

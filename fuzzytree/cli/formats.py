@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import answer, answer_json, json_option, wrong_options
+from fuzzytree.cli.talk import (
+    answer,
+    answer_json,
+    json_option,
+    verbose_option,
+    wrong_options,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,48 +24,49 @@ if TYPE_CHECKING:
 
 @click.command("formats", short_help="List formats and runtimes.")
 @click.option("--format", "name", metavar="NAME", help="Everything about one format.")
+@verbose_option
 @json_option
-def command(name: str | None, as_json: bool) -> None:
+def command(name: str | None, verbose: bool, as_json: bool) -> None:
     """List the formats and the runtimes, with what each can and cannot carry.
 
-    Each format writes and reads a small model of each kind; the table tells what came
-    of it.
+    With `--verbose`, each format writes and reads a small model of each kind, and a
+    table shows the results.
     """
     from fuzzytree.cli.doctor import missing_extras
     from fuzzytree.exporters import all_formats, find_format
     from fuzzytree.exporters.plugins import all_plugins
     from fuzzytree.report import formats as shown
-    from fuzzytree.report import text
     from fuzzytree.runtimes import all_runtimes
 
     missing = missing_extras()
     if name is not None:
         with wrong_options():
-            _tell_one(find_format(name), missing, as_json=as_json)
+            _answer_one(find_format(name), missing, verbose=verbose, as_json=as_json)
         return
     plugins = all_plugins()
     others = [one.format for one in plugins if one.format is not None]
     formats, runtimes = (*all_formats(), *others), all_runtimes()
-    found = {one.name: _abilities(one, missing) for one in formats}
+    found = {
+        one.name: _abilities(one, missing) for one in formats if as_json or verbose
+    }
     if as_json:
         answer_json(
             {
                 "formats": [_facts(one, found[one.name], missing) for one in formats],
-                "runtimes": [text.runtime_facts(one, missing) for one in runtimes],
+                "runtimes": [shown.runtime_facts(one, missing) for one in runtimes],
                 "plugins": [_plugin_facts(one) for one in plugins],
             }
         )
         return
-    answer("\n".join(text.format_lines(formats, missing)))
+    lines = shown.overview_lines(formats, runtimes, missing, is_verbose=verbose)
+    answer("\n".join(lines))
     if plugins:
         answer("formats of other packages:")
-        answer(
-            "\n".join(f"  {one.name}: {one.fault or one.package}" for one in plugins)
-        )
-    answer("")
-    answer("\n".join(shown.ability_lines(found)))
-    answer("")
-    answer("\n".join(text.runtime_lines(runtimes, missing)))
+        rows = (f"  {one.name}: {one.fault or one.package}" for one in plugins)
+        answer("\n".join(rows))
+    if verbose:
+        answer("")
+        answer("\n".join(shown.ability_lines(found)))
 
 
 def _abilities(
@@ -83,29 +90,35 @@ def _abilities(
         return f"it raises {type(error).__name__}: {error}"
 
 
-def _tell_one(form: Format, missing: set[str], *, as_json: bool) -> None:
+def _answer_one(
+    form: Format, missing: set[str], *, verbose: bool, as_json: bool
+) -> None:
     from fuzzytree.checking.abilities import dialects_of
     from fuzzytree.model.options import options_of
     from fuzzytree.report import formats as shown
 
     found = _abilities(form, missing)
-    dialects = {name: _abilities(form, missing, name) for name in dialects_of(form)}
+    wanted = dialects_of(form) if verbose or as_json else ()
+    dialects = {name: _abilities(form, missing, name) for name in wanted}
     if as_json:
         known = {k: v for k, v in dialects.items() if not isinstance(v, str)}
         answer_json({**_facts(form, found, missing), "dialects": known})
         return
-    answer("\n".join(shown.detail_lines(form, found, options_of(form), dialects)))
+    lines = shown.detail_lines(
+        form, found, options_of(form), dialects, is_verbose=verbose
+    )
+    answer("\n".join(lines))
 
 
 def _facts(
     form: Format, found: Sequence[Ability] | str, missing: set[str]
 ) -> dict[str, object]:
     from fuzzytree.model.options import options_of
-    from fuzzytree.report import text
+    from fuzzytree.report import formats as shown
 
     is_known = not isinstance(found, str)
     return {
-        **text.format_facts(form, missing),
+        **shown.format_facts(form, missing),
         "options": options_of(form),
         "abilities": found if is_known else [],
         "not_tried": "" if is_known else found,

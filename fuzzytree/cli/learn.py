@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -28,6 +27,7 @@ from fuzzytree.cli.talk import (
     quiet_option,
     say_rows,
     table_source,
+    verbose_option,
     wrong_options,
 )
 from fuzzytree.files import check_place, read_bounded, write_atomically
@@ -38,6 +38,7 @@ from fuzzytree.model.rulebase import Conjunction, Kind
 if TYPE_CHECKING:
     from fuzzytree.api.holdout import Accuracy, Summary
     from fuzzytree.learning import Learnt, Settings
+    from fuzzytree.learning.findings import LearningReport
     from fuzzytree.tables import Table
 
 
@@ -130,6 +131,7 @@ def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
 @conjunction_option
 @click.option("--no-test", is_flag=True, help="Learn only, without cross-validation.")
 @delimiter_option
+@verbose_option
 @json_option
 @quiet_option
 @_with_settings
@@ -145,6 +147,7 @@ def command(
     conjunction: Conjunction | None,
     no_test: bool,
     delimiter: str | None,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
     **chosen: object,
@@ -178,26 +181,28 @@ def command(
         name="standard input" if table == "-" else None,
     )
     is_silent = quiet or output == "-"
-    width = max(map(len, (found.name, output, "accuracy")))
-    tell_rows = functools.partial(say_rows, width=width, quiet=is_silent)
-    tell_rows(("read", found.name, _timed(_read_text(found), begin)))
+    read = ("read", found.name, _timed(_read_text(found), begin))
     noticed = dict(remarks(found, lambda column: f"--ignore {shlex.quote(column)}"))
-    tell_rows(*(("remark", column, f"has {text}") for column, text in noticed.items()))
     begin = time.perf_counter()
     title = name or ("tree" if table == "-" else printable(Path(table).stem))
-    with wrong_options(), progress_bar(quiet=is_silent) as tell:
+    with wrong_options(), progress_bar(quiet=is_silent) as show:
         learnt = learn_table(
-            found, name=title, units=units_of, settings=settings, progress=tell
+            found, name=title, units=units_of, settings=settings, progress=show
         )
-    tell_rows(*_learnt_rows(learnt, begin))
+    rows = [_tree_row(learnt, begin), read]
+    rows += [("remark", column, f"has {text}") for column, text in noticed.items()]
+    rows += _report_rows(learnt.report, is_verbose=verbose)
     tested = None
     if not no_test:
         begin = time.perf_counter()
-        with progress_bar(quiet=is_silent) as tell:
+        with progress_bar(quiet=is_silent) as show:
             tested = accuracy(
-                found, settings, learnt.report, seed=settings.seed, progress=tell
+                found, settings, learnt.report, seed=settings.seed, progress=show
             )
-        tell_rows(("tested", "accuracy", _timed(_tested_text(tested, found), begin)))
+        said = _timed(_accuracy_text(tested, found), begin)
+        rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
+    width = max(map(len, (output, *(thing for _, thing, _ in rows))))
+    say_rows(*rows, width=width, quiet=is_silent)
     model = carried(
         learnt.tree, form, carrier=carrier, kind=kind, conjunction=conjunction
     )
@@ -208,7 +213,8 @@ def command(
     write_atomically(output, content)
     rest = [] if table == "-" else ["--data", table]
     rest += ["--delimiter", delimiter] if rest and delimiter else []
-    tell_rows(*_written_rows(model, output, form, rest))
+    written = _written_rows(model, output, form, rest)
+    say_rows(*written, width=width, quiet=is_silent)
     if as_json:
         answer_json(_summary(found, noticed, learnt, tested, settings.seed, output))
 
@@ -238,7 +244,7 @@ def _written_rows(
     yield "wrote", output, ""
     beside, content = files[0][0], export(model, "yaml").content
     if Path(beside).exists() and read_bounded(beside) != content:
-        yield "kept", beside, "it is there already, and holds another model"
+        yield "kept", beside, "the file exists already, with another model"
         return
     write_atomically(beside, content)
     after = next_check(*files, more=rest) or next_check(files[0], more=rest)
@@ -330,54 +336,66 @@ def _read_text(table: Table) -> str:
     return f"{text} ({shown})" if shown else text
 
 
-def _tested_text(tested: Accuracy | None, table: Table) -> str:
+def _accuracy_text(tested: Accuracy | None, table: Table) -> str:
     from fuzzytree.api.holdout import majority
     from fuzzytree.report.text import counted
 
     baseline = f"majority class {majority(table):.3f}"
     if tested is None:
-        return f"too few rows for a test ({baseline})"
+        return f"too few rows for cross-validation ({baseline})"
     folds = counted(len(tested.folds), "fold")
     part = (
         f" on {tested.rows:,} of {tested.of:,} rows" if tested.rows < tested.of else ""
     )
     how = "" if tested.is_nested else ", settings chosen on all rows"
     span = f"{min(tested.folds):.3f} to {max(tested.folds):.3f}"
-    return f"{tested.mean:.3f} ({baseline}; {folds}{part}{how}: {span})"
+    return f"cross-validated ({baseline}; {folds}{part}{how}: {span})"
 
 
 def _timed(text: str, begin: float) -> str:
     return f"{text}, {time.perf_counter() - begin:.2f} s"
 
 
-def _learnt_rows(learnt: Learnt, begin: float) -> list[tuple[str, str, str]]:
-    """Return lines about the tree, and about what was left out of the table."""
+def _tree_row(learnt: Learnt, begin: float) -> tuple[str, str, str]:
     from fuzzytree.report.text import counted, depth
 
-    tree, report = learnt.tree, learnt.report
+    tree = learnt.tree
     size = f"depth {depth(tree)}, {len(tree.inputs)} of {len(tree.columns)} columns"
-    leaves = counted(len(tree.leaves), "leaf", "leaves")
-    rows = [("learnt", leaves, _timed(size, begin))]
+    return "learnt", counted(len(tree.leaves), "leaf", "leaves"), _timed(size, begin)
+
+
+def _report_rows(
+    report: LearningReport, *, is_verbose: bool
+) -> list[tuple[str, str, str]]:
+    """Return lines about what the learner left out or changed."""
+    from fuzzytree.report.text import counted
+
+    rows: list[tuple[str, str, str]] = []
     if report.rows_dropped:
         text = counted(report.rows_dropped, "row")
         rows.append(("dropped", text, "a value is missing or not finite"))
     if report.rows_sampled < report.rows:
         text = counted(report.rows_sampled, "row")
-        told = "for patterns, combinations, sets and the support of leaves"
-        rows.append(("sampled", text, told))
+        used = "for patterns, combinations, sets and the support of leaves"
+        rows.append(("sampled", text, used))
     if report.features_ignored:
         text = counted(len(report.features_ignored), "column")
-        names = ", ".join(report.features_ignored[:8])
-        more = ", ..." if len(report.features_ignored) > 8 else ""
-        rows.append(("ignored", text, f"constant or too large: {names}{more}"))
+        names = _names(report.features_ignored, is_verbose=is_verbose)
+        rows.append(("ignored", text, f"constant or too large: {names}"))
     if report.classes_without_rows:
         text = counted(len(report.classes_without_rows), "class", "classes")
-        names = ", ".join(report.classes_without_rows[:8])
-        rows.append(("forgot", text, f"no usable row is left of: {names}"))
+        names = _names(report.classes_without_rows, is_verbose=is_verbose)
+        rows.append(("no rows", text, f"no usable row is left of: {names}"))
     if report.inseparable:
         text = counted(report.inseparable, "pattern")
-        rows.append(("merged", text, "nothing tells their classes apart"))
+        rows.append(("merged", text, "no input distinguishes their classes"))
     if report.repairs:
         text = counted(report.sets, "set")
-        rows.append(("repaired", text, "; ".join(report.repairs)))
+        why = "; ".join(report.repairs) if is_verbose else "--verbose lists the reasons"
+        rows.append(("adjusted", text, why))
     return rows
+
+
+def _names(names: Sequence[str], *, is_verbose: bool) -> str:
+    shown = names if is_verbose else names[:8]
+    return ", ".join(shown) + (", ..." if len(shown) < len(names) else "")

@@ -18,6 +18,7 @@ from fuzzytree.cli.talk import (
     say,
     say_rows,
     table_source,
+    verbose_option,
     wrong_options,
 )
 from fuzzytree.files import check_place
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     help="Measure for so long what opening, answering and reading cost.",
 )
 @delimiter_option
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -63,6 +65,7 @@ def command(
     drop: Sequence[str],
     seconds: float | None,
     delimiter: str | None,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -105,7 +108,7 @@ def command(
     if as_json:
         answer_json(told.to_json())
     else:
-        answer("\n".join(report_lines(told)))
+        answer("\n".join(report_lines(told, is_verbose=verbose)))
     if not told.ok:
         wrong = sum(c.verdict == "DISAGREES" for c in told.proof.comparisons)
         say(f"the pruned model differs in {wrong} ways; nothing is written")

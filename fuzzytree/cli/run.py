@@ -111,7 +111,7 @@ def command(
         answer = verbs.answering(found, runtime, with_strengths=is_weighed)
     source = table_source(table)
     name = "standard input" if table == "-" else table
-    tally = _Tally(_tells_ties(found))
+    tally = _Tally(_has_status(found))
     with _opened(output) as stream:
         batches = answer(source, delimiter=delimiter, name=name, with_others=keep)
         write = _json_writer(stream) if as_json else _csv_writer(stream, safe_csv)
@@ -157,7 +157,7 @@ def _add(columns: Columns, more: Columns, name: str) -> None:
     columns.update(more)
 
 
-def _tells_ties(model: Document | OnnxModel) -> bool:
+def _has_status(model: Document | OnnxModel) -> bool:
     if isinstance(model, FuzzyTree | RuleBase | FuzzySystem):
         return True
     return "status" in model.outputs
@@ -259,8 +259,8 @@ def _json_writer(stream: TextIO) -> Callable[[Columns], None]:
 class _Tally:
     """Counts what was answered, over all pieces."""
 
-    def __init__(self, tells_ties: bool) -> None:
-        self.tells_ties = tells_ties
+    def __init__(self, has_status: bool) -> None:
+        self.has_status = has_status
         self.rows = self.cells = self.extras = 0
         self.is_numeric = False
         self.remarks: list[tuple[str, str]] = []
@@ -298,15 +298,17 @@ class _Tally:
             for name, (low, high) in self.spans.items()
         ]
         _, ties, uncovered, missing = (self.statuses.get(k, 0) for k in range(4))
-        tied = f"{ties} decided by the order of the rules, "
-        if self.is_numeric:
-            tied = ""
-        elif not self.tells_ties:
-            tied = "ties not told, "
-        odd = f"{tied}{uncovered} uncovered, {missing} without a needed value"
+        status = [
+            f"{counted(uncovered, 'row')} with no rule fired",
+            f"{counted(missing, 'row')} with a missing input",
+        ]
+        if not self.is_numeric:
+            by_order = f"{counted(ties, 'row')} decided by the order of the rules"
+            unknown = "ties: not reported by this file"
+            status.insert(0, by_order if self.has_status else unknown)
         say_rows(
-            ("answered", counted(self.rows, "row"), ", ".join(counts)),
-            ("of them", odd, ""),
+            ("predicted", counted(self.rows, "row"), ", ".join(counts)),
+            ("status", "; ".join(status), ""),
             *(("remark", name, f"has {text}") for name, text in self.remarks),
             *([("ignored", counted(self.extras, "column"), "")] if self.extras else []),
             *([("wrote", output, "")] if output != "-" else []),

@@ -7,16 +7,15 @@ from collections.abc import Sequence
 import click
 
 from fuzzytree.cli.talk import (
-    answer,
-    answer_json,
+    answer_result,
     data_option,
     delimiter_option,
     json_option,
     progress_bar,
     quiet_option,
     runtimes_option,
-    say,
     table_source,
+    verbose_option,
     wrong_options,
 )
 
@@ -35,6 +34,7 @@ from fuzzytree.cli.talk import (
     "--rows", "is_full", is_flag=True, help="Tell all that was left out, too."
 )
 @delimiter_option
+@verbose_option
 @json_option
 @quiet_option
 def command(
@@ -44,6 +44,7 @@ def command(
     runtimes: Sequence[str],
     is_full: bool,
     delimiter: str | None,
+    verbose: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -65,14 +66,8 @@ def command(
             runtimes=runtimes or None,
             progress=tell,
         )
-    if as_json:
-        answer_json(found.to_json())
-    else:
-        answer("\n".join(stability_lines(found, is_full=is_full)))
-    failed = [one.code for one in found.criteria if one.verdict == "FAILS"]
-    if failed:
-        say(f"{', '.join(failed)} {'fails' if len(failed) == 1 else 'fail'}")
-        return 1
-    held = sum(one.verdict == "holds" for one in found.criteria)
-    say(f"{held} of {len(found.criteria)} criteria hold, and none fails", quiet=quiet)
-    return 0
+    is_failed = any(one.verdict == "FAILS" for one in found.criteria)
+    lines = stability_lines(found, is_verbose=verbose or is_full)
+    is_silent = quiet and not is_failed
+    answer_result(found.to_json, lines, as_json=as_json, is_silent=is_silent)
+    return int(is_failed)

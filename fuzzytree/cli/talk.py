@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
 import click
@@ -20,10 +20,14 @@ if TYPE_CHECKING:
 Name = TypeVar("Name", str, str | None)
 
 _PATIENCE_S = 0.5  # before a bar appears
+_MOST_LINES = 8  # of a list on stderr, unless all are printed
 
 quiet_option = click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 json_option = click.option(
     "--json", "as_json", is_flag=True, help="Print the facts as JSON to stdout."
+)
+verbose_option = click.option(
+    "--verbose", is_flag=True, help="Print every part of the result, not only counts."
 )
 delimiter_option = click.option(
     "--delimiter",
@@ -64,13 +68,44 @@ def say(text: str, *, quiet: bool = False) -> None:
 def say_rows(*rows: tuple[str, str, str], width: int = 0, quiet: bool = False) -> None:
     """Write lines of a verb, a thing and what is known of it, aligned."""
     width = max([width, *(len(thing) for _, thing, facts in rows if facts)])
+    lead = max([8, *(len(verb) for verb, _, _ in rows)])
     for verb, thing, facts in rows:
-        say(f"{verb:8} {thing:{width}} {facts}".rstrip(), quiet=quiet)
+        say(f"{verb:{lead}} {thing:{width}} {facts}".rstrip(), quiet=quiet)
+
+
+def say_first(
+    lines: Sequence[str], *, verbose: bool = False, quiet: bool = False
+) -> None:
+    """Write the first lines of a list to stderr, and how many more there are."""
+    shown = lines if verbose else lines[:_MOST_LINES]
+    for line in shown:
+        say(line, quiet=quiet)
+    if len(shown) < len(lines):
+        rest = len(lines) - len(shown)
+        say(f"         and {rest} more; --verbose lists all", quiet=quiet)
 
 
 def answer(text: str) -> None:
     """Write lines to stdout; what a terminal might obey is written as an escape."""
     click.echo(printable_lines(text))
+
+
+def answer_result(
+    facts: Callable[[], str], lines: Iterable[str], *, as_json: bool, is_silent: bool
+) -> None:
+    """Write a result to stdout: as lines, or as JSON with its verdict on stderr.
+
+    Args:
+        facts: Returns the result as JSON.
+        lines: The result for people; the first line is the verdict.
+        as_json: Which of the two to write.
+        is_silent: Whether the verdict beside JSON is left out.
+    """
+    if as_json:
+        answer_json(facts())
+        say(next(iter(lines)), quiet=is_silent)
+    else:
+        answer("\n".join(lines))
 
 
 def answer_styled(text: str) -> None:

@@ -24,6 +24,8 @@ WIDTH: Final = 100
 MOST_FINDINGS: Final = 200
 """That are told one by one."""
 
+_MOST_SHORT = 8  # findings, unless all are printed
+_MOST_EVIDENCE = 2  # of them that are printed with their evidence
 _MOST_CALM = 40  # lines of answers that are no findings, unless all are wanted
 _MOST_ALIKE = 3  # of one code that are open
 _MOST_INPUTS = 12  # of a point or region on the terminal
@@ -39,14 +41,16 @@ _COLOURS: Mapping[str, str] = {
     "SAMPLED": "36;1",
     "DECLINED": "2",
 }
-_ORIGINS: Mapping[str, str] = {
+ORIGINS: Mapping[str, str] = {
     "model": "the model's range",
     "data": "the rows",
     "spreads": "spreads around the fitted sets",
     "curves": "the span of the curves",
     "unused": "any number: nothing depends on it",
-    "limits": "given",
+    "limits": "--limits",
 }
+"""Where the ends of a variable's domain come from."""
+
 _GRAVE: Mapping[Severity, tuple[str, str]] = {
     "error": ("error", "errors"),
     "warning": ("warning", "warnings"),
@@ -66,32 +70,42 @@ def audit_lines(
     audit: Audit,
     source: Sequence[str] = (),
     *,
+    gone: Collection[str] = (),
     is_coloured: bool = False,
+    is_verbose: bool = True,
     is_whole: bool = False,
 ) -> Iterator[str]:
-    """Yield an audit: what was asked where, the findings, the table, the limits.
+    """Yield an audit: its verdict, its findings, and how much was decided.
 
     Findings come gravest first. Of the other answers those that are open, BRACKET and
-    DECLINED, are told one by one, and the rest is counted.
+    DECLINED, are printed one by one, and the rest is counted.
 
     Args:
         audit: The audit.
         source: The lines of the model's file, for the line that a finding is about.
+        gone: Accepted ids that are no longer found.
         is_coloured: Whether codes, severities and states have colours.
-        is_whole: Whether every answer is told one by one.
+        is_verbose: Whether to print the evidence of each finding, the questions by
+            code and the limits of the audit, and not only counts of them.
+        is_whole: Whether every answer is printed one by one.
     """
     audit = as_in_file(audit)
     paint = _painted if is_coloured else _plain
-    gravity = [*_GRAVE].index
+    yield from _wrapped(verdict_text(audit, gone), WIDTH, "  ")
+    findings = sorted(
+        audit.open_findings, key=lambda one: [*_GRAVE].index(one.severity)
+    )
+    if not (is_verbose or is_whole):
+        yield from _short(audit, findings, paint)
+        return
     yield from _head(audit)
     yield ""
-    told = sorted(audit.open_findings, key=lambda one: gravity(one.severity))
-    for answer in told if is_whole else told[:MOST_FINDINGS]:
+    for answer in findings if is_whole else findings[:MOST_FINDINGS]:
         yield from _finding(answer, audit, source, paint)
         yield ""
-    if len(told) > MOST_FINDINGS and not is_whole:
-        rest = counted(len(told) - MOST_FINDINGS, "more finding")
-        yield f"and {rest}; --all tells each"
+    if len(findings) > MOST_FINDINGS and not is_whole:
+        rest = counted(len(findings) - MOST_FINDINGS, "more finding")
+        yield f"and {rest}; --all lists each"
         yield ""
     if audit.accepted:
         yield f"{counted(len(audit.accepted), 'accepted finding')} of the baseline"
@@ -101,11 +115,39 @@ def audit_lines(
     yield from _declined(audit, is_whole=is_whole)
     if audit.unasked:
         yield ""
-        yield "not asked, or not to the end"
+        yield "not examined, or not to the end"
         yield from (line for text in gathered(audit.unasked) for line in _item(text))
     yield ""
     yield "this audit does not establish"
     yield from (line for text in audit.limits for line in _item(text))
+
+
+def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[str]:
+    """Yield the gravest findings, the first with their evidence, and counts."""
+    yield _title(audit)
+    for result in audit.results:
+        yield f"results  {_name(result.file.name)}: {result_text(result)}"
+    for place, answer in enumerate(findings[:_MOST_SHORT]):
+        yield from _sentence(answer, audit, paint)
+        if place < _MOST_EVIDENCE and answer.severity != "info":
+            yield from _evidence(answer, paint, only=2)
+    if len(findings) > _MOST_SHORT:
+        codes = Counter(one.code for one in findings[_MOST_SHORT:])
+        said = ", ".join(f"{code} ({count})" for code, count in codes.items())
+        rest = counted(len(findings) - _MOST_SHORT, "more finding")
+        yield from _wrapped(f"{rest}: {said}; --verbose lists all", WIDTH, "  ")
+    given = [o for o in audit.answers if (o.code, o.subject) == ("FT204", "row")]
+    yield from _brief("the row of --row", given, paint)
+    states = Counter(state_word(one.state) for one in audit.answers)
+    told = [f"{states[word]} {word}" for word in _STATE_WORDS if states[word]]
+    yield f"{counted(len(audit.answers), 'question')}: {', '.join(told) or 'none'}"
+    if audit.unasked:
+        yield f"not examined, or not to the end: {counted(len(audit.unasked), 'item')}"
+    limits = counted(len(audit.limits), "thing")
+    yield (
+        f"this audit does not establish {limits}; --verbose lists them, with the "
+        "evidence of each finding"
+    )
 
 
 def summary_lines(audit: Audit) -> Iterator[str]:
@@ -150,13 +192,17 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
 # --- parts
 
 
-def _head(audit: Audit) -> Iterator[str]:
+def _title(audit: Audit) -> str:
     policy = audit.policy
     decides = "the strongest rule decides"
     if policy.decision == "all":
         decides = "every rule takes part"
     means = f"AND is {policy.conjunction}, {decides}"
-    yield f"{_name(audit.model)}: audited as {audit.form}; {means}"
+    return f"{_name(audit.model)}: audited as {audit.form}; {means}"
+
+
+def _head(audit: Audit) -> Iterator[str]:
+    yield _title(audit)
     if audit.data is not None:
         yield f"rows     {audit.rows} of {_name(audit.data.name)}"
     for result in audit.results:
@@ -166,7 +212,7 @@ def _head(audit: Audit) -> Iterator[str]:
         (
             f"  {_name(one.variable)}",
             f"{number(one.low)} to {number(one.high)}",
-            _ORIGINS[one.origin],
+            ORIGINS[one.origin],
         )
         for one in sides[:_MOST_INPUTS]
     ]
@@ -185,16 +231,27 @@ def _name(text: str) -> str:
 def _finding(
     answer: Answer, audit: Audit, source: Sequence[str], paint: _Paint
 ) -> Iterator[str]:
-    place = answer.places[0] if answer.places else None
-    where = _where(place, audit)
+    yield from _sentence(answer, audit, paint)
+    if answer.places:
+        yield from _quoted(answer.places[0], source)
+    yield from _evidence(answer, paint)
+
+
+def _sentence(answer: Answer, audit: Audit, paint: _Paint) -> Iterator[str]:
+    """Yield where a finding is, and what it says."""
+    where = _where(answer.places[0] if answer.places else None, audit)
     name = f"{answer.code} {answer.severity}:"
     lead = f"{where}: {name}" if where else name
     first, *rest = _wrapped(f"{lead} {answer.sentence}", WIDTH, "  ")
     yield first.replace(name, paint(name, answer.severity), 1)
     yield from rest
-    if place is not None:
-        yield from _quoted(place, source)
-    for title, text in _facts(answer):
+
+
+def _evidence(
+    answer: Answer, paint: _Paint, *, only: int | None = None
+) -> Iterator[str]:
+    """Yield how a finding is known: all facts, or only the first few."""
+    for title, text in [*_facts(answer)][:only]:
         begin, *rest = _wrapped(text, WIDTH - 11) or [""]
         yield f"  {paint(f'{title:8}', title)} {begin}".rstrip()
         yield from (f"           {line}" for line in rest)
@@ -315,7 +372,7 @@ def _calm(audit: Audit, paint: _Paint, *, is_whole: bool) -> Iterator[str]:
     if sure := len(rest) - len(unsure):
         verb = "is no finding" if sure == 1 else "are no findings"
         what = "more answer" if given or shown else "answer"
-        yield f"{counted(sure, what)} {verb}; --all tells each"
+        yield f"{counted(sure, what)} {verb}; --all lists each"
         yield ""
 
 
@@ -332,7 +389,7 @@ def _brief(
         yield f"  {answer.code} {paint(f'{word:8}', word)} {first}".rstrip()
         yield from (f"{' ' * 17}{line}" for line in rest)
     if more:
-        yield f"  and {more} more; --all tells each"
+        yield f"  and {more} more; --all lists each"
     yield ""
 
 
@@ -361,7 +418,7 @@ def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
     for text in texts if is_whole else texts[:_MOST_CALM]:
         yield from _item(text)
     if len(texts) > _MOST_CALM and not is_whole:
-        yield f"- and {len(texts) - _MOST_CALM} more; --all tells each"
+        yield f"- and {len(texts) - _MOST_CALM} more; --all lists each"
 
 
 def gathered(unasked: Sequence[str]) -> Iterator[str]:

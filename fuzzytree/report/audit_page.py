@@ -24,7 +24,7 @@ from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.report.audit import gathered
+from fuzzytree.report.audit import ORIGINS, gathered
 from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
     anchors,
@@ -74,15 +74,6 @@ _MOST_DECLINED = 100  # reasons that are listed
 _Section = tuple[str, str, Markup]  # its anchor, its title, its content
 
 _FORMS = {"tree": "a tree", "rules": "a rule base", "system": "a fuzzy system"}
-
-_ORIGINS = {
-    "model": "the model's range",
-    "data": "the rows",
-    "spreads": "spreads around the fitted sets",
-    "curves": "the span of the curves",
-    "unused": "any number: nothing depends on it",
-    "limits": "given",
-}
 
 
 def page(
@@ -319,7 +310,7 @@ def _repeat(audit: Audit) -> Markup:
             side.variable,
             tag("code", f"{'above ' if side.is_open else ''}{side.low!r}"),
             tag("code", repr(side.high)),
-            _ORIGINS[side.origin],
+            ORIGINS[side.origin],
         )
         for side in audit.domain.sides[:MOST_QUESTIONS]
     ]

@@ -23,6 +23,11 @@ _HEAD = (
     *("time a row", "+-", "speed", "floor x"),
     *("error", "certified", "flips", "at edges"),
 )
+_UNBEATEN = (
+    *("computes", "rows", "threads", "fastest unbeaten", "time a row", "speed"),
+    *("error", "certified", "flips"),
+)
+_MOST_UNBEATEN = 18  # rows of the short table
 Timed = dict[str, tuple[Point, Timing]]
 """What was measured at one number of rows and threads, by name."""
 
@@ -35,16 +40,72 @@ _LEGEND = (
 )
 
 
-def study_lines(found: Study, *, is_full: bool = False) -> Iterator[str]:
-    """Yield a study: what and where, the tables, what was left out, the advice.
+def study_lines(
+    found: Study, *, is_verbose: bool = False, is_full: bool = False
+) -> Iterator[str]:
+    """Yield a study: what to use, the unbeaten candidates, how many were left out.
 
     Args:
         found: The study.
-        is_full: Whether to list variants too that something beats in both run time
-            and error.
+        is_verbose: Whether to print every table, omission and advice.
+        is_full: Whether to list variants too that are beaten in both run time and
+            error; it includes the rest.
     """
-    yield f"{found.model}: error against run time, in {found.seconds:.0f} s"
-    yield from aligned([("rows", found.data), *machine_rows(found.machine)])
+    yield from _wrapped(found.advice[-1] if found.advice else _nothing(found), "")
+    yield f"{found.model}: {found.data}; {found.seconds:.0f} s"
+    if is_verbose or is_full:
+        yield from _tables(found, is_full=is_full)
+        return
+    if found.points:
+        yield from aligned([_UNBEATEN, *_unbeaten(found)][: _MOST_UNBEATEN + 1])
+    yield from _more("doubtful: ", found.warnings[:2], len(found.warnings) - 2)
+    names = {one.name for one in found.omissions}
+    if names:
+        yield f"{counted(len(names), 'candidate')} left out"
+    yield "--verbose lists every time, error, omission and advice"
+
+
+def _nothing(found: Study) -> str:
+    return "measured" if found.points else "nothing could be measured"
+
+
+def _more(title: str, shown: Sequence[str], rest: int) -> Iterator[str]:
+    for text in shown:
+        yield from _wrapped(f"{title}{text}", "")
+    if rest > 0:
+        yield f"{title}{rest} more; --verbose lists all"
+
+
+def _unbeaten(found: Study) -> Iterator[tuple[str, ...]]:
+    """Yield the fastest unbeaten candidate of each question and number of rows."""
+    timed = {
+        (point.name, one.rows, one.threads): (point, one)
+        for point in found.points
+        for one in point.timings
+    }
+    for front in found.fronts:
+        key = (front.rows, front.threads)
+        members = [timed[name, *key] for name in front.names if (name, *key) in timed]
+        if not members:
+            continue
+        point, timing = min(
+            members, key=lambda one: (one[0].kind == "variant", one[1].median_ns)
+        )
+        here = {name: one for (name, *size), one in timed.items() if (*size,) == key}
+        time, _, speed, _ = _time_cells(timing, here, front.question)
+        yield (
+            front.question,
+            f"{front.rows:,}",
+            str(front.threads),
+            point.name.removesuffix(f": {front.question}"),
+            time,
+            speed,
+            *_errors(point)[:3],
+        )
+
+
+def _tables(found: Study, *, is_full: bool) -> Iterator[str]:
+    yield from aligned(machine_rows(found.machine))
     for rows, threads in _sizes(found.points):
         yield ""
         yield f"{rows:,} row{'' if rows == 1 else 's'}, {counted(threads, 'thread')}"
@@ -187,11 +248,16 @@ def _section(name: str, lines: Iterable[str]) -> Iterator[str]:
         if not position:
             yield ""
             yield name
-        yield from textwrap.wrap(
-            line,
-            _WIDTH,
-            initial_indent="  ",
-            subsequent_indent="    ",
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
+        yield from _wrapped(line, "  ")
+
+
+def _wrapped(line: str, indent: str) -> Iterator[str]:
+    """Yield a sentence in lines of which the later ones are indented further."""
+    yield from textwrap.wrap(
+        line,
+        _WIDTH,
+        initial_indent=indent,
+        subsequent_indent=f"{indent}  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

@@ -15,42 +15,49 @@ from fuzzytree.report.svg_regions import span_text
 from fuzzytree.report.text import counted
 
 WIDTH: Final = 100
-MOST_CHANGES: Final = 40
-"""That are told one by one; `--json` tells all."""
 
+_MOST_ANSWERS = 6  # answers about decisions, unless all are printed
+_MOST_CHANGES = 6
 _MOST_INPUTS = 12  # of a point or a region
 _INDENT = " " * 11
 
 
-def diff_lines(found: Difference) -> Iterator[str]:
-    """Yield a difference: the two models, their decisions, and what has changed.
+def diff_lines(found: Difference, *, is_verbose: bool = False) -> Iterator[str]:
+    """Yield a difference: its verdict, the decisions, and what has changed.
 
     Args:
         found: The difference.
+        is_verbose: Whether to print every change, and the point of every witness.
     """
+    yield verdict_text(found)
     yield _model_text("old", found.old)
     yield _model_text("new", found.new)
     if found.data is not None:
         yield f"rows     {found.rows} of {found.data.name}"
-    shown = [
-        f"{side.variable} {side.low:.6g} to {side.high:.6g}"
-        for side in found.domain.sides[:_MOST_INPUTS]
-    ]
-    more = len(found.domain.sides) - len(shown)
-    shown += [f"{more} more"] if more > 0 else []
-    yield from _lines("domain  ", ", ".join(shown) or "no inputs", indent=" " * 9)
-    yield ""
+    if is_verbose:
+        shown = [
+            f"{s.variable} {s.low:.6g} to {s.high:.6g}" for s in found.domain.sides
+        ]
+        yield from _lines("domain  ", ", ".join(shown) or "no inputs", indent=" " * 9)
     yield "decisions"
-    for answer in found.answers:
-        yield from _answer_lines(answer)
+    answers = sorted(found.answers, key=lambda one: isinstance(one.state, Witness))
+    most = len(answers) if is_verbose else _MOST_ANSWERS
+    points = 0  # of witnesses that are printed
+    for answer in answers[:most]:
+        points += isinstance(answer.state, Witness)
+        yield from _answer_lines(answer, has_point=is_verbose or points <= 1)
+    yield from _more(len(answers) - most, "answer")
     if found.changes:
-        yield ""
         yield "changes"
-    for change in found.changes[:MOST_CHANGES]:
-        yield from _change_lines(change)
-    if len(found.changes) > MOST_CHANGES:
-        rest = counted(len(found.changes) - MOST_CHANGES, "more change")
-        yield f"  and {rest}; --json tells all"
+    most = len(found.changes) if is_verbose else _MOST_CHANGES
+    for change in found.changes[:most]:
+        yield from _change_lines(change, has_place=is_verbose)
+    yield from _more(len(found.changes) - most, "change")
+
+
+def _more(count: int, noun: str) -> Iterator[str]:
+    if count > 0:
+        yield f"  and {counted(count, f'more {noun}')}; --verbose lists all"
 
 
 def verdict_text(found: Difference) -> str:
@@ -69,8 +76,8 @@ def verdict_text(found: Difference) -> str:
             return f"decisions are proved equal; {counts}"
         case "open":
             return (
-                "nothing was seen to be answered otherwise, and it is NOT proved that "
-                f"nothing is; {counts}"
+                "no row was found that is classified differently, and it is NOT proved "
+                f"that there is none; {counts}"
             )
 
 
@@ -82,7 +89,7 @@ def _counts_text(changes: Sequence[Change]) -> str:
         if grade in grades
     ]
     if not told:
-        return "nothing is said otherwise"
+        return "nothing else has changed"
     return f"{counted(len(grades), 'change')}: {', '.join(told)}"
 
 
@@ -91,9 +98,11 @@ def _model_text(title: str, model: Compared) -> str:
     return printable(f"{title:8} {of}{model.form} {model.name!r}")
 
 
-def _answer_lines(answer: Answer) -> Iterator[str]:
+def _answer_lines(answer: Answer, *, has_point: bool) -> Iterator[str]:
     word = state_word(answer.state)
     yield from _lines(f"  {word:8}", answer.sentence)
+    if not has_point:
+        return
     match answer.state:
         case Witness(point=point):
             yield from _lines(f"{_INDENT}at", _point_text(point), indent=_INDENT)
@@ -119,12 +128,12 @@ def _point_text(point: Sequence[Coordinate]) -> str:
     return ", ".join(shown) or "any row"
 
 
-def _change_lines(change: Change) -> Iterator[str]:
+def _change_lines(change: Change, *, has_place: bool) -> Iterator[str]:
     places = " -> ".join(map(_place_text, filter(None, (change.old, change.new))))
     doubt = "" if change.is_proved else " (not proved)"
     text = f"{change.sentence}{doubt}"
     yield from _lines(f"  {change.grade:12}", text, indent=" " * 15)
-    if places:
+    if places and has_place:
         yield printable(f"{' ' * 15}{places}")
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 
 from fuzzytree.auditing.findings.codes import Code
 from fuzzytree.report.audit import WIDTH
-from fuzzytree.report.text import aligned
+from fuzzytree.report.text import aligned, counted
 
 
 def explanation_lines(code: Code) -> Iterator[str]:
@@ -28,7 +28,18 @@ def explanation_lines(code: Code) -> Iterator[str]:
             ) or [""]
 
 
-def code_lines(codes: Iterable[Code]) -> Iterator[str]:
-    """Yield codes with their severities and titles."""
-    rows = [("code", "severity", "a finding says")]
-    yield from aligned([*rows, *((c.code, c.severity, c.title) for c in codes)])
+def code_lines(codes: Sequence[Code], *, is_whole: bool = True) -> Iterator[str]:
+    """Yield codes with their severities and titles, after their number.
+
+    Args:
+        codes: The codes.
+        is_whole: Whether to list the codes of declined questions, and not only count.
+    """
+    declined = [one for one in codes if one.code.startswith("FTD")]
+    shown = codes if is_whole else [one for one in codes if one not in declined]
+    yield f"{counted(len(codes), 'code')}; `fuzzytree explain CODE` explains one"
+    rows = [("code", "severity", "finding")]
+    yield from aligned([*rows, *((c.code, c.severity, c.title) for c in shown)])
+    if len(shown) < len(codes):
+        count = counted(len(declined), "code")
+        yield f"FTD..  {count} of declined questions: `fuzzytree explain FTD`"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import textwrap
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fuzzytree.checking.abilities import MEANINGS, Ability
-from fuzzytree.model.contracts import Format
+from fuzzytree.model.contracts import Format, Runtime
 from fuzzytree.model.options import OptionFacts
-from fuzzytree.report.text import aligned
+from fuzzytree.report.text import aligned, counted
 
 Found = Mapping[str, tuple[Ability, ...] | str]
 """The abilities of each format, or why there are none."""
@@ -24,6 +26,92 @@ SIGNS = {
     "no": "-",
 }
 """What stands for each outcome in the table."""
+
+
+def overview_lines(
+    formats: Sequence[Format],
+    runtimes: Sequence[Runtime],
+    missing: set[str],
+    *,
+    is_verbose: bool = False,
+) -> Iterator[str]:
+    """Yield the formats and the runtimes, after how many there are.
+
+    Args:
+        formats: All of them.
+        runtimes: All of them.
+        missing: The extras that are not installed.
+        is_verbose: Whether to print the table of runtimes and all limits, too.
+    """
+    extras = {one.extra for one in formats} | {one.extra for one in runtimes}
+    wanted = sorted(missing.intersection(map(str, extras)))
+    count = f"{counted(len(formats), 'format')}, {counted(len(runtimes), 'runtime')}"
+    said = f"missing extras: {', '.join(wanted)}" if wanted else "no extra is missing"
+    yield f"{count}; {said}"
+    rows = [("format", "suffix", "reads", "writes", "extra")]
+    for one in formats:
+        carried = ", ".join(one.carries)
+        reads = carried if one.read else "-"
+        suffixes = " ".join(one.suffixes)
+        rows.append((one.name, suffixes, reads, carried, _extra(one.extra, missing)))
+    yield from aligned(rows)
+    if not is_verbose:
+        names = ", ".join(
+            f"{one.name} (not installed)" if one.extra in missing else one.name
+            for one in runtimes
+        )
+        yield from textwrap.wrap(f"runtimes: {names}", 96, subsequent_indent="  ")
+        yield "--verbose lists what each cannot express, and which models it carries"
+        return
+    yield "cannot:"
+    yield from _limits((one.name, one.cannot) for one in formats)
+    yield ""
+    rows = [("runtime", "runs", "numbers", "agreement", "extra")]
+    for run in runtimes:
+        promise = "equal bits" if run.bound is None else "within a derived bound"
+        extra = _extra(run.extra, missing)
+        rows.append((run.name, ", ".join(run.runs), run.dtype, promise, extra))
+    yield from aligned(rows)
+    yield "cannot:"
+    yield from _limits((one.name, one.cannot) for one in runtimes)
+
+
+def format_facts(one: Format, missing: set[str]) -> dict[str, object]:
+    """Return a line of the table of formats for programs."""
+    return {
+        "name": one.name,
+        "suffixes": one.suffixes,
+        "reads": one.carries if one.read else (),
+        "writes": one.carries,
+        "cannot": one.cannot,
+        "extra": one.extra,
+        "is_installed": one.extra not in missing,
+    }
+
+
+def runtime_facts(one: Runtime, missing: set[str]) -> dict[str, object]:
+    """Return a line of the table of runtimes for programs."""
+    return {
+        "name": one.name,
+        "runs": one.runs,
+        "dtype": one.dtype,
+        "equal_bits": one.bound is None,
+        "cannot": one.cannot,
+        "extra": one.extra,
+        "is_installed": one.extra not in missing,
+    }
+
+
+def _extra(extra: str | None, missing: set[str]) -> str:
+    if extra is None:
+        return "-"
+    return f"{extra} (not installed)" if extra in missing else extra
+
+
+def _limits(found: Iterable[tuple[str, tuple[str, ...]]]) -> Iterator[str]:
+    for name, cannot in found:
+        for text in cannot:
+            yield f"  {name}: {text}"
 
 
 def ability_lines(found: Found) -> Iterator[str]:
@@ -68,6 +156,8 @@ def detail_lines(
     found: tuple[Ability, ...] | str,
     options: Sequence[OptionFacts],
     dialects: Found,
+    *,
+    is_verbose: bool = False,
 ) -> Iterator[str]:
     """Yield everything that is known of one format.
 
@@ -76,6 +166,7 @@ def detail_lines(
         found: What it can carry, or why that is not known.
         options: The options of its writer.
         dialects: What it can carry in each of its dialects, if it has several.
+        is_verbose: Whether to print the outcome for each kind of model.
     """
     reads = "read and written" if form.read else "written"
     computes = f", computes in {form.dtype}" if form.dtype else ""
@@ -92,7 +183,14 @@ def detail_lines(
     if isinstance(found, str):
         yield found
         return
-    rows = [(f"  {one.sample}", *_told(one)) for one in found]
+    if not is_verbose:
+        counts = Counter(one.outcome for one in found)
+        yield f"{counted(len(found), 'kind')} of models; --verbose lists them"
+        yield from aligned(
+            (f"  {count}", name, MEANINGS[name]) for name, count in counts.items()
+        )
+        return
+    rows = [(f"  {one.sample}", *_outcome(one)) for one in found]
     yield from aligned(rows)
     if dialects:
         yield ""
@@ -111,7 +209,7 @@ def _default(one: OptionFacts) -> str:
     return f"{shown} (or {', '.join(others)})" if others else shown
 
 
-def _told(one: Ability) -> tuple[str, str]:
+def _outcome(one: Ability) -> tuple[str, str]:
     reason = " ".join(one.reasons[0].split())[:_LONGEST] if one.reasons else ""
     if len(one.reasons) > 1:
         reason += f" (and {len(one.reasons) - 1} more)"

@@ -7,34 +7,56 @@ from collections.abc import Iterator, Mapping, Sequence
 from fuzzytree.benchmarking.clock import times_faster
 from fuzzytree.benchmarking.savings import Cost, File, Report, Size
 from fuzzytree.checking.dependencies import Because, Graph, Needs
-from fuzzytree.model.agreement import Agreement
 from fuzzytree.report.text import agreement_lines, aligned, counted, duration
 from fuzzytree.semantics.simplification import Removed
 
-_MOST = 12  # things told one by one; --json tells all
+_MOST = 6  # parts printed one by one, unless all are
 
 
-def report_lines(found: Report) -> Iterator[str]:
-    """Yield what a model needs, what was left out, the proof, and what it saves."""
-    yield from _head(found.needs)
-    yield ""
-    yield from _removed_lines("left out", found.removed)
-    more = [one for one in found.needs.idle if one not in found.removed]
+def report_lines(found: Report, *, is_verbose: bool = False) -> Iterator[str]:
+    """Yield which inputs a model needs, what can be left out, the proof, the sizes.
+
+    Args:
+        found: The report.
+        is_verbose: Whether to print each comparison, graph and file.
+    """
+    needs = found.needs
+    most = None if is_verbose else _MOST
+    yield _verdict(found)
+    yield from _head(needs)
+    yield from _removed_lines("left out", found.removed, most)
+    more = [one for one in needs.idle if one not in found.removed]
     if more:
-        yield from _removed_lines("left in, and could go on request", more)
-    yield ""
-    yield from _proof_lines(found.proof)
-    if found.needs.graphs:
+        yield from _removed_lines("left in, and could go on request", more, most)
+    yield from agreement_lines(found.proof, is_verbose=is_verbose)
+    if is_verbose and needs.graphs:
         yield ""
-        yield from _graph_lines(found.needs.graphs)
+        yield from _graph_lines(needs.graphs)
     yield ""
-    yield from aligned(_size_rows(found.sizes))
+    rows = [*_size_rows(found.sizes)]
+    yield from aligned(rows if is_verbose else rows[:_SIZES])
     if found.costs:
         yield ""
         yield from aligned(_cost_rows(found.costs))
         yield "median of one call in one thread; in brackets the 95 % interval"
-    for text in dict.fromkeys([*found.needs.omissions, *found.omissions]):
-        yield f"not told: {text}"
+    missing = [*dict.fromkeys([*needs.omissions, *found.omissions])]
+    yield from (f"not reported: {text}" for text in missing[:most])
+    if missing[len(missing) if most is None else most :]:
+        yield f"and {len(missing) - _MOST} more; --verbose lists all"
+
+
+_SIZES = 5  # rows of the table of sizes: head, columns, bytes, terms, the first file
+
+
+def _verdict(found: Report) -> str:
+    """Return how many inputs are needed, and what can be left out."""
+    needs = found.needs
+    of = f" of {needs.columns} columns" if needs.columns else ""
+    count = len(found.removed)
+    parts = f"{counted(count, 'part')} can be left out" if count else "all parts needed"
+    wrong = sum(c.verdict == "DISAGREES" for c in found.proof.comparisons)
+    agrees = "" if not wrong else f"; the pruned model differs in {wrong} comparisons"
+    return f"{needs.model}: needs {len(needs.inputs)}{of}; {parts}{agrees}"
 
 
 def _head(needs: Needs) -> Iterator[str]:
@@ -42,34 +64,25 @@ def _head(needs: Needs) -> Iterator[str]:
     what = "fuzzy tree" if needs.carrier == "tree" else "rule base"
     sizes = [counted(needs.rules, *ends), counted(needs.terms, "term")]
     sizes += [counted(needs.sets, "fitted set")] if needs.sets else []
-    yield f"{needs.model}: {what}, {', '.join(sizes)}"
-    of = f" of {needs.columns} columns" if needs.columns else ""
-    names = ", ".join(needs.inputs) or "none"
-    yield f"needs    {len(needs.inputs)}{of}: {names}"
+    yield f"model    {what}, {', '.join(sizes)}"
+    yield f"needs    {', '.join(needs.inputs) or 'no input'}"
     if needs.combinations:
-        yield f"asks     {', '.join(needs.combinations)}"
+        yield f"tests    {', '.join(needs.combinations)}"
     if needs.idle_inputs:
-        yield f"guards   {', '.join(needs.idle_inputs)} (nothing asks them)"
+        yield f"guards   {', '.join(needs.idle_inputs)} (no rule or node tests them)"
 
 
-def _removed_lines(title: str, removed: Sequence[Removed]) -> Iterator[str]:
+def _removed_lines(
+    title: str, removed: Sequence[Removed], most: int | None
+) -> Iterator[str]:
     if not removed:
         yield f"{title}: nothing"
         return
     rows = [(title, "why", "changes")]
-    rows += [(one.where, one.why, one.changes or "nothing") for one in removed[:_MOST]]
+    rows += [(one.where, one.why, one.changes or "nothing") for one in removed[:most]]
     yield from aligned(rows)
-    if len(removed) > _MOST:
-        yield f"and {len(removed) - _MOST} more"
-
-
-def _proof_lines(proof: Agreement) -> Iterator[str]:
-    rows = [c.rows for c in proof.comparisons if c.basis == "rows"]
-    data = max(rows, default=0) - proof.probes
-    text = f"held against the model: {counted(proof.probes, 'probe')}"
-    yield text + (f", {counted(data, 'row')} of data" if data > 0 else "")
-    _, *lines = agreement_lines(proof)
-    yield from lines
+    if len(rows) <= len(removed):
+        yield f"and {len(removed) - len(rows) + 1} more; --verbose lists all"
 
 
 # --- graphs

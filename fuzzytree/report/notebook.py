@@ -9,7 +9,7 @@ from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.report.audit import audit_lines, verdict_text
+from fuzzytree.report.audit import audit_lines
 from fuzzytree.report.audit_checks import agreement_section
 from fuzzytree.report.audit_model import sentence_of
 from fuzzytree.report.markup import Markup, folded, joined, table, tag, text
@@ -56,8 +56,8 @@ def agreement_html(found: Agreement) -> Markup:
 
 def audit_html(found: Audit) -> Markup:
     """Return an audit: its verdict, and all else as it is printed."""
-    said = tag("p", verdict_text(found))
-    return joined([said, _lines(audit_lines(found))])
+    verdict, *rest = audit_lines(found)
+    return joined([tag("p", verdict), _lines(rest)])
 
 
 def _lines(lines: Iterable[str]) -> Markup:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fuzzytree.auditing.engine.wording import (  # for other reports too
@@ -10,7 +11,6 @@ from fuzzytree.auditing.engine.wording import (  # for other reports too
 )
 from fuzzytree.auditing.engine.wording import number_text
 from fuzzytree.model.agreement import Agreement, Certified, Comparison
-from fuzzytree.model.contracts import Format, Runtime
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -289,47 +289,89 @@ def _side_text(side: Side) -> str:
 # --- checks
 
 
-def agreement_lines(found: Agreement, *, is_full: bool = False) -> Iterator[str]:
-    """Yield a check as a table, with the worst rows of what disagrees.
+def agreement_lines(
+    found: Agreement, *, is_verbose: bool = False, is_full: bool = False
+) -> Iterator[str]:
+    """Yield a check: its verdict, counts of what agrees, and all that does not.
 
     Args:
         found: The check.
-        is_full: Whether to tell also each way of calling that did not fail, and rows
-            that differ as they may.
+        is_verbose: Whether each comparison has a line, and not only a count.
+        is_full: Whether to print the rows that differ by an allowed amount, too.
     """
-    yield _basis_text(found)
-    calm = [c for c in found.comparisons if c.basis == "calls" and not c.differing]
-    shown = [c for c in found.comparisons if is_full or c not in calm]
-    yield from aligned([_COMPARISON, *map(_comparison_row, shown)])
-    if calm and not is_full:
-        yield (
-            f"{counted(len(calm), 'carrier')} called without rows, row by row, in "
-            "another memory order and with a wrong width: none fails"
-        )
+    yield f"{found.model}: {verdict_text(found)} ({_basis_text(found)})"
+    wrong = [c for c in found.comparisons if c.verdict in ("DISAGREES", "rows only")]
+    if is_verbose or is_full:
+        shown: Sequence[Comparison] = found.comparisons
+        yield from aligned([_COMPARISON, *map(_comparison_row, shown)])
+    else:
+        yield from aligned([_GROUP, *_groups(found.comparisons)])
+        shown = wrong[:_MOST_WRONG]
+        if shown:
+            yield from aligned([_COMPARISON, *map(_comparison_row, shown)])
+        yield from _more(len(wrong) - len(shown), "comparison")
     for comparison in shown:
-        is_wrong = comparison.verdict in ("DISAGREES", "rows only")
-        if comparison.detail and (is_full or is_wrong):
-            yield f"{comparison.carrier} against {comparison.against}:"
+        if comparison.detail and (is_full or comparison in wrong):
+            yield f"{comparison.carrier} compared with {comparison.against}:"
             yield from (f"  {line}" for line in comparison.detail)
     for count in found.counts:
         yield (
-            f"{count.carrier}: of {counted(count.rows, 'row')} {count.ties} tied, "
-            f"{count.uncovered} uncovered, {count.missing} with missing values"
+            f"{count.carrier}: {counted(count.rows, 'row')}, {count.ties} tied, "
+            f"{count.uncovered} with no rule fired, "
+            f"{count.missing} with a missing input"
         )
     if found.coverage is not None:
         yield from found.coverage.sentences
-    yield from (f"not examined: {text}" for text in found.skipped)
-    if found.certificates:
-        yield from aligned([_CERTIFIED, *map(_certified_row, found.certificates)])
-    for one in found.certificates:
-        if one.verdict == "DISAGREES":
-            yield f"{one.carrier} against exact arithmetic:"
-            yield from (f"  {line}" for line in one.detail)
+    most = len(found.skipped) if is_verbose else _MOST_SKIPPED
+    yield from (f"not examined: {text}" for text in found.skipped[:most])
+    yield from _more(len(found.skipped[most:]), "item", "not examined")
+    yield from _bound_lines(found.certificates, is_verbose=is_verbose)
 
 
+def _groups(comparisons: Sequence[Comparison]) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each representation: how many were compared with it."""
+    groups: dict[str, list[Comparison]] = {}
+    for one in comparisons:
+        title = one.against.rpartition(": ")[2]
+        name = "calls of all kinds" if one.basis == "calls" else title
+        groups.setdefault(name, []).append(one)
+    for name, members in groups.items():
+        verdicts = Counter(one.verdict for one in members)
+        largest = max(one.largest_difference for one in members)
+        said = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
+        said = said.replace("agrees", "agree")
+        yield name, str(len(members)), f"{largest:.2g}", said
+
+
+def _bound_lines(bounds: Sequence[Certified], *, is_verbose: bool) -> Iterator[str]:
+    """Yield the bounds of rounding errors: in a table, or as a count."""
+    wrong = [one for one in bounds if one.verdict == "DISAGREES"]
+    if wrong or (is_verbose and bounds):
+        shown = bounds if is_verbose else wrong[:_MOST_WRONG]
+        yield from aligned([_CERTIFIED, *map(_certified_row, shown)])
+    elif bounds:
+        largest = max((one.largest or 0.0 for one in bounds), default=0.0)
+        yield (
+            f"{counted(len(bounds), 'rounding bound')} checked against exact "
+            f"arithmetic, none is exceeded; largest error {largest:.2g}"
+        )
+    for one in wrong:
+        yield f"{one.carrier} compared with exact arithmetic:"
+        yield from (f"  {line}" for line in one.detail)
+
+
+def _more(count: int, noun: str, after: str = "not shown") -> Iterator[str]:
+    """Yield how many things are not shown, if there are any."""
+    if count > 0:
+        yield f"{counted(count, f'more {noun}')} {after}; --verbose lists all"
+
+
+_MOST_WRONG = 8  # comparisons that do not agree, unless all are printed
+_MOST_SKIPPED = 3
+_GROUP = ("compared with", "comparisons", "largest difference", "result")
 _COMPARISON = (
-    "carrier",
-    "against",
+    "representation",
+    "compared with",
     "on",
     "rows",
     "largest difference",
@@ -342,24 +384,28 @@ def verdict_text(found: Agreement) -> str:
     """Return how many comparisons of a check disagree, and how many bounds fail."""
     wrong = sum(one.verdict == "DISAGREES" for one in found.comparisons)
     broken = sum(one.verdict == "DISAGREES" for one in found.certificates)
+    verb = "disagree" if wrong > 1 else "disagrees"
     count = counted(len(found.comparisons), "comparison")
-    said = f"{count}, and none disagrees"
-    if wrong:
-        said = f"{wrong} of {count} {'disagrees' if wrong == 1 else 'disagree'}"
+    said = f"{wrong or 'none'} of {count} {verb}"
     rows_only = sum(one.verdict == "rows only" for one in found.comparisons)
     if rows_only:
         said += f"; in {counted(rows_only, 'file')} only the rows agree"
         said += "" if found.rows_only else ", which --rows-only accepts"
     if broken:
-        verb = "does" if broken == 1 else "do"
-        said += f"; {counted(broken, 'bound')} {verb} not hold"
+        said += f"; {counted(broken, 'rounding bound')} exceeded"
     return said
 
 
 def _basis_text(found: Agreement) -> str:
-    rows = max((c.rows for c in found.counts), default=found.probes)
+    rows = max(
+        (
+            found.probes,
+            *(one.rows for one in found.counts),
+            *(one.rows for one in found.comparisons if one.basis == "rows"),
+        )
+    )
     data = rows - found.probes
-    text = f"{found.model}: {counted(found.probes, 'probe')}"
+    text = counted(found.probes, "probe")
     text += f", {counted(data, 'row')} of data" if data else ""
     return text + (f", {counted(found.cells, 'cell')}" if found.cells else "")
 
@@ -392,7 +438,7 @@ def _comparison_row(one: Comparison) -> tuple[str, ...]:
 
 
 _CERTIFIED = (
-    "against exact arithmetic",
+    "compared with exact arithmetic",
     "largest error",
     "inside the band",
     "flips",
@@ -416,74 +462,3 @@ def _certified_row(one: Certified) -> tuple[str, ...]:
         one.verdict,
         one.sentence,
     )
-
-
-# --- formats and runtimes
-
-
-def format_lines(formats: Sequence[Format], missing: set[str]) -> Iterator[str]:
-    """Yield the table of formats.
-
-    Args:
-        formats: All of them.
-        missing: The extras that are not installed.
-    """
-    rows = [("format", "suffix", "reads", "writes", "extra")]
-    for one in formats:
-        carried = ", ".join(one.carries)
-        reads = carried if one.read else "-"
-        suffixes = " ".join(one.suffixes)
-        rows.append((one.name, suffixes, reads, carried, _extra(one.extra, missing)))
-    yield from aligned(rows)
-    yield "cannot:"
-    yield from _limits((one.name, one.cannot) for one in formats)
-
-
-def runtime_lines(runtimes: Sequence[Runtime], missing: set[str]) -> Iterator[str]:
-    """Yield the table of runtimes; arguments as `format_lines`."""
-    rows = [("runtime", "runs", "numbers", "agreement", "extra")]
-    for one in runtimes:
-        promise = "equal bits" if one.bound is None else "within a derived bound"
-        runs = ", ".join(one.runs)
-        rows.append((one.name, runs, one.dtype, promise, _extra(one.extra, missing)))
-    yield from aligned(rows)
-    yield "cannot:"
-    yield from _limits((one.name, one.cannot) for one in runtimes)
-
-
-def format_facts(one: Format, missing: set[str]) -> dict[str, object]:
-    """Return a line of the table of formats for programs."""
-    return {
-        "name": one.name,
-        "suffixes": one.suffixes,
-        "reads": one.carries if one.read else (),
-        "writes": one.carries,
-        "cannot": one.cannot,
-        "extra": one.extra,
-        "is_installed": one.extra not in missing,
-    }
-
-
-def runtime_facts(one: Runtime, missing: set[str]) -> dict[str, object]:
-    """Return a line of the table of runtimes for programs."""
-    return {
-        "name": one.name,
-        "runs": one.runs,
-        "dtype": one.dtype,
-        "equal_bits": one.bound is None,
-        "cannot": one.cannot,
-        "extra": one.extra,
-        "is_installed": one.extra not in missing,
-    }
-
-
-def _extra(extra: str | None, missing: set[str]) -> str:
-    if extra is None:
-        return "-"
-    return f"{extra} (not installed)" if extra in missing else extra
-
-
-def _limits(found: Iterable[tuple[str, tuple[str, ...]]]) -> Iterator[str]:
-    for name, cannot in found:
-        for text in cannot:
-            yield f"  {name}: {text}"

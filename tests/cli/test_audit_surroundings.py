@@ -95,7 +95,8 @@ def test_a_model_and_a_table_may_be_pipes_for_each_is_read_once(call: Call) -> N
         os.mkfifo(pipe)
         threading.Thread(target=feed, args=(source, pipe), daemon=True).start()
     words = ("--data", "pipe.csv", "--target", "grip", "--page", "page.html")
-    code, out, _ = call("audit", "pipe.yaml", *words, "--select", "FT501,FT701")
+    words += ("--verbose", "--select", "FT501,FT701")
+    code, out, _ = call("audit", "pipe.yaml", *words)
     assert code == 0
     assert "\nrows     4 of pipe.csv\n" in out
     assert "pipe.yaml" in Path("page.html").read_text("utf-8")
@@ -169,7 +170,7 @@ def test_a_dash_is_standard_output_for_the_findings_alone(call: Call) -> None:
     assert call("audit", "grip.yaml", *ASKED, "--output", "-") == plain
     message = (
         "`-` is stdout, where the findings go; name a file\n"
-        "  fuzzytree audit --help tells more\n"
+        "  fuzzytree audit --help lists the options\n"
     )
     for option in ("--page", "--write-baseline"):
         assert call("audit", "grip.yaml", *ASKED, option, "-") == (2, "", message)

@@ -69,7 +69,7 @@ def test_an_unknown_verb_is_a_sentence_with_a_guess(call: Call) -> None:
         2,
         "",
         f"no verb 'chekc'; there is {', '.join(VERBS)} (did you mean 'check'?)\n"
-        "  fuzzytree --help tells more\n",
+        "  fuzzytree --help lists the options\n",
     )
 
 
@@ -78,11 +78,11 @@ def test_an_unknown_option_is_a_sentence_with_a_guess(call: Call) -> None:
     assert (code, out) == (2, "")
     assert err.startswith("no such option '--strenths'")
     assert "'--strengths'" in err
-    assert err.endswith("\n  fuzzytree run --help tells more\n")
+    assert err.endswith("\n  fuzzytree run --help lists the options\n")
 
 
 def test_a_missing_argument_is_a_sentence(call: Call) -> None:
-    message = "missing argument 'MODEL'\n  fuzzytree run --help tells more\n"
+    message = "missing argument 'MODEL'\n  fuzzytree run --help lists the options\n"
     assert call("run") == (2, "", message)
 
 

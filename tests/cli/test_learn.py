@@ -21,7 +21,7 @@ from tests.cli.conftest import Call
 ROOT = Path(__file__).resolve().parent.parent.parent
 WINE = str(ROOT / "examples" / "wine" / "wine.csv")
 SCHEMAS = ROOT / "schemas"
-HELP = "\n  fuzzytree learn --help tells more\n"
+HELP = "\n  fuzzytree learn --help lists the options\n"
 FEW = "a,grip\n" + "".join(f"{k},{'soft' if k < 6 else 'firm'}\n" for k in range(12))
 
 
@@ -45,11 +45,11 @@ def test_five_lines_tell_what_happened(call: Call) -> None:
     code, out, err = call("learn", "few.csv", "--target", "grip", "-o", "few.yaml")
     assert (code, out) == (0, "")
     assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
-        "read     few.csv  12 rows, 1 column, 2 classes, 0 s\n"
-        "learnt   2 leaves depth 1, 1 of 1 columns, 0 s\n"
-        "repaired 2 sets   sides whose polynomial rises: 2\n"
-        "tested   accuracy 0.900 (majority class 0.500; 5 folds: 0.500 to "
+        "accuracy 0.900    cross-validated (majority class 0.500; 5 folds: 0.500 to "
         "1.000), 0 s\n"
+        "learnt   2 leaves depth 1, 1 of 1 columns, 0 s\n"
+        "read     few.csv  12 rows, 1 column, 2 classes, 0 s\n"
+        "adjusted 2 sets   --verbose lists the reasons\n"
         "wrote    few.yaml next: fuzzytree check few.yaml --data few.csv\n"
     )
     tree = ft.load("few.yaml")
@@ -62,14 +62,14 @@ def test_what_was_left_out_is_told(call: Call) -> None:
     text = "\n".join(["a,same,grip", *lines, "NA,7,soft", "3,7,", ""])
     Path("t.csv").write_text(text, "utf-8")
     words = ("learn", "t.csv", "--target", "grip", "-o", "t.yaml", "--no-test")
-    err = call(*words)[2]
+    err = call(*words, "--verbose")[2]
     assert re.sub(r"[0-9.]+ s$", "0 s", err, flags=re.MULTILINE) == (
+        "learnt   2 leaves depth 1, 1 of 2 columns, 0 s\n"
         "read     t.csv    13 rows, 2 columns, 2 classes "
         "(1 missing cell, 1 row without a class left out), 0 s\n"
-        "learnt   2 leaves depth 1, 1 of 2 columns, 0 s\n"
         "dropped  1 row    a value is missing or not finite\n"
         "ignored  1 column constant or too large: same\n"
-        "repaired 2 sets   sides whose polynomial rises: 2\n"
+        "adjusted 2 sets   sides whose polynomial rises: 2\n"
         "wrote    t.yaml   next: fuzzytree check t.yaml --data t.csv\n"
     )
 
@@ -89,9 +89,9 @@ def test_a_large_table_is_tested_on_a_sample(call: Call) -> None:
     lines = [f"{a},{b},{k % 2}" for k, (a, b) in enumerate(numbers)]
     Path("t.csv").write_text("\n".join(["a,b,grip", *lines, ""]), "utf-8")
     err = call("learn", "t.csv", "--target", "grip", "-o", "t.yaml")[2]
-    assert re.sub(r", [0-9.]+ s$", "", err.splitlines()[-2]) == (
-        "tested   accuracy 1.000 (majority class 0.500; 5 folds on 20,000 of 21,000 "
-        "rows, settings chosen on all rows: 1.000 to 1.000)"
+    assert re.sub(r", [0-9.]+ s$", "", err.splitlines()[0]) == (
+        "accuracy 1.000      cross-validated (majority class 0.500; 5 folds on 20,000 "
+        "of 21,000 rows, settings chosen on all rows: 1.000 to 1.000)"
     )
 
 
@@ -105,7 +105,7 @@ def test_an_identifier_is_remarked_on_before_learning(call: Call) -> None:
         "--ignore 'row id' leaves it out"
     )
     assert code == 0
-    assert err.splitlines()[1] == f"remark   row id   has {said}"
+    assert err.splitlines()[2] == f"remark   row id   has {said}"
     assert json.loads(out)["remarks"] == {"row id": said}
     assert "remark" not in call(*words, "--ignore", "row id")[2]
 

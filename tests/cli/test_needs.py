@@ -24,18 +24,18 @@ def _here(folder: Path) -> None:
 
 
 def test_a_tree_tells_its_inputs_its_proof_and_its_sizes(call: Call) -> None:
-    code, out, err = call("needs", "grip.yaml", "--data", "grasps.csv")
+    words = ("needs", "grip.yaml", "--data", "grasps.csv")
+    code, out, err = call(*words, "--verbose")
     assert (code, err) == (0, "")
     lines = out.splitlines()
-    assert lines[:5] == [
-        "grip: fuzzy tree, 3 leaves, 4 terms",
-        "needs    2 of 3 columns: force, slip",
-        "",
+    assert lines[:4] == [
+        "grip: needs 2 of 3 columns; all parts needed",
+        "model    fuzzy tree, 3 leaves, 4 terms",
+        "needs    force, slip",
         "left out: nothing",
-        "",
     ]
-    assert lines[5].startswith("held against the model: ")
-    assert lines[5].endswith(" probes, 4 rows of data")
+    assert lines[4].startswith("grip: none of 3 comparisons disagrees (")
+    assert lines[4].endswith(" probes, 4 rows of data)")
     assert "pruned                           the model       proof  2" in out
     assert "size                         all columns      as it is" in out
     assert "columns read                 3                2                2" in out
@@ -48,8 +48,9 @@ def test_a_pruned_file_is_written_and_checks(call: Call) -> None:
     assert err == "wrote    left.yaml next: fuzzytree check tree.yaml left.yaml\n"
     assert ft.load("left.yaml") == pruned(random_tree(4, leaves=5)).model
     code, out, _ = call(
-        "check", "tree.yaml", "left.yaml", "--runtime", "native", "--limit", "200"
-    )
+        "check", "tree.yaml", "left.yaml", "--runtime", "native", "--limit", "200",
+        "--verbose",
+    )  # fmt: skip
     assert code == 0
     (line,) = (one for one in out.splitlines() if "path and relative rules" in one)
     assert line.split()[0] == "left.yaml"
@@ -75,7 +76,7 @@ def test_what_is_dropped_on_request_is_said(call: Call) -> None:
     ft.save(wide, "wide.yaml")
     code, out, _ = call("needs", "wide.yaml")
     assert code == 0
-    assert "guards   heat (nothing asks them)" in out
+    assert "guards   heat (no rule or node tests them)" in out
     assert "left in, and could go on request" in out
     code, out, err = call("needs", "wide.yaml", "--drop", "inputs", "-o", "less.yaml")
     assert code == 0
@@ -132,7 +133,7 @@ def test_a_pruned_model_that_differs_is_not_written(
         (
             ("needs", "grip.yaml", "--for", "raw"),
             "uses: tree 'grip' carries no fitted sets, so it has no raw rules\n"
-            "  fuzzytree needs --help tells more\n",
+            "  fuzzytree needs --help lists the options\n",
         ),
         (("needs", "no.yaml"), "no.yaml: cannot be read: no such file or directory\n"),
         (
@@ -147,12 +148,12 @@ def test_a_pruned_model_that_differs_is_not_written(
         (
             ("needs", "grip.yaml", "-o", "left.doc"),
             f"no format '.doc'; there is {', '.join(TABLE)}\n"
-            "  fuzzytree needs --help tells more\n",
+            "  fuzzytree needs --help lists the options\n",
         ),
         (
             ("needs", "grip.yaml", "--time", "0"),
             "invalid value for '--time': 0.0 is not in the range x>0.0\n"
-            "  fuzzytree needs --help tells more\n",
+            "  fuzzytree needs --help lists the options\n",
         ),
     ],
 )
@@ -174,5 +175,5 @@ def test_without_onnx_the_rest_is_told(
     monkeypatch.setattr("fuzzytree.benchmarking.savings.write_onnx", missing)
     code, out, _ = call("needs", "grip.yaml")
     assert code == 0
-    assert "not told: tree in float64: writing onnx needs the extra 'onnx'" in out
+    assert "not reported: tree in float64: writing onnx needs the extra 'onnx'" in out
     assert "tree yaml" in out

@@ -78,7 +78,7 @@ def test_another_model_beside_a_program_is_kept(call: Call) -> None:
     assert code == 0
     assert err.endswith(
         "wrote    m.sql\n"
-        "kept     m.yaml   it is there already, and holds another model\n"
+        "kept     m.yaml   the file exists already, with another model\n"
     )
     assert Path("m.yaml").read_text("utf-8") == "mine"
 

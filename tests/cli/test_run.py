@@ -17,10 +17,10 @@ ANSWERS = (
     "class,rule,status\nsoft,1,decided\nfirm,3,decided\nloose,2,decided\n,0,missing\n"
 )
 TALLY = (
-    "answered 4 rows firm 1, loose 1, soft 1, no class 1\n"
-    "of them  0 decided by the order of the rules, 0 uncovered, "
-    "1 without a needed value\n"
-    "ignored  2 columns\n"
+    "predicted 4 rows firm 1, loose 1, soft 1, no class 1\n"
+    "status    0 rows decided by the order of the rules; 0 rows with no rule fired; "
+    "1 row with a missing input\n"
+    "ignored   2 columns\n"
 )
 
 
@@ -37,7 +37,9 @@ def test_rows_are_answered_on_stdout_and_counted_on_stderr(
 
 
 def test_an_onnx_file_answers_like_the_tree_but_tells_no_ties(call: Call) -> None:
-    tally = TALLY.replace("0 decided by the order of the rules", "ties not told")
+    tally = TALLY.replace(
+        "0 rows decided by the order of the rules", "ties: not reported by this file"
+    )
     assert call("run", "grip.onnx", "grasps.csv") == (0, ANSWERS, tally)
 
 
@@ -61,7 +63,7 @@ def test_many_pieces_give_the_answers_of_one(
 def test_a_file_appears_with_all_answers(call: Call) -> None:
     code, out, err = call("run", "grip.yaml", "grasps.csv", "-o", "out.csv")
     assert (code, out) == (0, "")
-    assert err == TALLY + "wrote    out.csv\n"
+    assert err == TALLY + "wrote     out.csv\n"
     assert Path("out.csv").read_text("utf-8") == ANSWERS
 
 
@@ -107,7 +109,7 @@ def test_a_file_without_strengths_cannot_tell_them(call: Call) -> None:
     assert err == (
         "--strengths class: grip.onnx does not tell them; export it with "
         "--outputs label,rule,status,strengths, or run the YAML file\n"
-        "  fuzzytree run --help tells more\n"
+        "  fuzzytree run --help lists the options\n"
     )
 
 
@@ -127,7 +129,7 @@ def test_why_needs_the_rules(call: Call) -> None:
     assert code == 2
     assert err == (
         "--why: grip.onnx does not hold the rules in words; run the YAML file\n"
-        "  fuzzytree run --help tells more\n"
+        "  fuzzytree run --help lists the options\n"
     )
 
 
@@ -180,7 +182,7 @@ def test_an_onnx_file_has_its_own_runtime(call: Call) -> None:
     assert err == (
         "runtime 'native': an ONNX file runs in onnxruntime; other runtimes need "
         "the YAML file\n"
-        "  fuzzytree run --help tells more\n"
+        "  fuzzytree run --help lists the options\n"
     )
 
 
@@ -228,4 +230,4 @@ def test_blanks_around_names_are_left_out_with_a_remark(call: Call) -> None:
     code, _, said = call("run", "grip.yaml", "blanks.csv")
     text = "blanks around its name, which are left out (and 1 more)"
     assert code == 0
-    assert f"remark   ' force' has {text}" in said.splitlines()
+    assert f"remark    ' force' has {text}" in said.splitlines()

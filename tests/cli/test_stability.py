@@ -21,12 +21,16 @@ def _here(folder: Path) -> None:
 
 
 def test_a_sound_model_holds(call: Call) -> None:
-    code, out, err = call("stability", "grip.yaml", "--data", "grasps.csv", *NATIVE)
+    words = ("stability", "grip.yaml", "--data", "grasps.csv", "--verbose")
+    code, out, err = call(*words, *NATIVE)
     assert code == 0, out
-    assert out.splitlines()[0].endswith(" probes, 4 rows of data")
-    assert out.splitlines()[1] == "run by   native, native float32"
+    first, second = out.splitlines()[:2]
+    said = "grip: 10 of 11 stability checks pass, none fails ("
+    assert first.startswith(said)
+    assert first.endswith(" probes, 4 rows of data; 2 runtimes)")
+    assert second == "runtimes: native, native float32"
     assert "FAILS" not in out
-    assert err == "10 of 11 criteria hold, and none fails\n"
+    assert err == ""
 
 
 def test_a_bulging_curve_fails(call: Call) -> None:
@@ -36,7 +40,8 @@ def test_a_bulging_curve_fails(call: Call) -> None:
     assert code == 1
     assert out.splitlines()[-1].startswith("what to do: N7: learn with fewer points")
     assert "rules: a odd (right): the polynomial leaves [0, 1] by" in out
-    assert err == "N7 fails\n"
+    assert out.startswith("one: 1 of 1 stability check fails: N7 (")
+    assert err == ""
 
 
 def test_json_tells_the_same_facts(call: Call) -> None:

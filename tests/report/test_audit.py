@@ -19,11 +19,14 @@ from fuzzytree.report.audit import (
 from tests.report.audits import LINES, every_state
 
 WHOLE = """\
+2 findings: 1 error, 1 warning beside 1 accepted; not complete: the budget is spent \
+(--budget
+  SECONDS); `fuzzytree explain FT101` tells what to do
 grip: audited as rules; AND is min, the strongest rule decides
 rows     4 of grasps.csv
 domain
   force  0 to 5  the model's range
-  slip   0 to 1  given
+  slip   0 to 1  --limits
 
 grip.yaml:4:3: FT101 error: rule 2 never wins
     |
@@ -43,7 +46,7 @@ grip.yaml: FT202 warning: rules 1 and 2 are equally strong on a part of the doma
 
 1 accepted finding of the baseline
 
-1 answer is no finding; --all tells each
+1 answer is no finding; --all lists each
 
 code   question      asked  found  proved  witness  bracket  sampled  declined
 FT101  dead rule     1      1      1       -        -        -        -
@@ -56,7 +59,7 @@ all                  5      3      1       1        1        1        1
 declined
 - FT401 term 'low' of 'force': FTD02: its curve (gaussian) has no exact method
 
-not asked, or not to the end
+not examined, or not to the end
 - FT102 marginal rule: cut short: the budget of 60 s is spent
 - FT103, FT104: left out by the user
 - FT107 irrelevant clause: not asked: the budget of 60 s is spent
@@ -82,7 +85,7 @@ def test_what_is_open_is_told_and_the_rest_counted_unless_all_are_wanted() -> No
     assert f"\nopen\n{bracket}\n2 more answers are no findings; --all" in short
     assert "rule 1 wins 3 of 4 rows" not in short
     many = replace(audit, answers=(open_one,) * 5)
-    assert f"\nopen\n{bracket * 3}  and 2 more; --all tells each\n" in "\n".join(
+    assert f"\nopen\n{bracket * 3}  and 2 more; --all lists each\n" in "\n".join(
         audit_lines(many)
     )
     whole = "\n".join(audit_lines(audit, LINES, is_whole=True))
@@ -143,9 +146,9 @@ def test_the_head_shows_no_name_as_it_should_not_be_shown() -> None:
     data = Source(evil, "b" * 64)
     lines = [*audit_lines(replace(audit, model=evil, domain=domain, data=data))]
     assert all(line.isprintable() for line in lines)
-    assert lines[0].startswith(r"\x1b[31m\u202e\n: audited as rules")
-    assert lines[1] == r"rows     4 of \x1b[31m\u202e\n"
-    assert lines[4] == f"  {'L' * 59}…  0 to 1  given"
+    start = lines.index(r"rows     4 of \x1b[31m\u202e\n")
+    assert lines[start - 1].startswith(r"\x1b[31m\u202e\n: audited as rules")
+    assert lines[start + 3] == f"  {'L' * 59}…  0 to 1  --limits"
 
 
 def test_a_place_beyond_the_file_has_no_caret() -> None:
@@ -171,7 +174,7 @@ def test_findings_beyond_the_most_are_counted() -> None:
         replace(audit.answers[0], id=f"FT101-{k:08x}") for k in range(MOST_FINDINGS + 2)
     )
     lines = [*audit_lines(replace(audit, answers=many), LINES)]
-    assert "and 2 more findings; --all tells each" in lines
+    assert "and 2 more findings; --all lists each" in lines
     whole = [*audit_lines(replace(audit, answers=many), LINES, is_whole=True)]
     assert sum("FT101 error:" in line for line in whole) == MOST_FINDINGS + 2
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
-UNHELD = (
+UNCHECKED = (
     "the version, the table, how many rows and how long, how proofs were made, why "
     "something is open or was not asked, the commands"
 )
@@ -41,6 +41,10 @@ class Report:
 
     def lines(self) -> Iterator[str]:
         """Yield the report, line by line."""
+        many = len(self.wrong)
+        what = f"{many} {'points are' if many != 1 else 'point is'} wrong"
+        yield what if many else "the audit is right as far as it was checked again"
+        yield from (f"WRONG: {text}" for text in self.wrong)
         counts = dict(sorted(self.counts.items()))
         for (state, _), codes in self.undecided.items():
             name = OTHERS.get(state, f"answers {state}, not decided again")
@@ -52,8 +56,4 @@ class Report:
         for (_, why), codes in self.undecided.items():
             size = f" ({len(codes)} answers)" if len(codes) > 1 else ""
             yield f"  {', '.join(dict.fromkeys(codes))}{size}: {why}"
-        yield f"held against nothing: {UNHELD}"
-        yield from (f"DOES NOT HOLD: {text}" for text in self.wrong)
-        many = len(self.wrong)
-        what = f"{many} {'points do' if many != 1 else 'point does'} not hold"
-        yield what if many else "the audit holds as far as it was checked again"
+        yield f"read, and compared with nothing: {UNCHECKED}"

@@ -66,7 +66,7 @@ def command(
     )
     if as_json:
         answer_json({"check": found, "ok": found.ok})
+        say(verdict_text(found), quiet=quiet and found.ok)
     else:
-        answer("\n".join(agreement_lines(found, is_full=False)))
-    say(verdict_text(found), quiet=quiet and found.ok)
+        answer("\n".join(agreement_lines(found)))
     return 0 if found.ok else 1

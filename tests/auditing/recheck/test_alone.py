@@ -71,7 +71,7 @@ def test_alone_it_tells_what_does_not_hold(tmp_path: Path) -> None:
     (tmp_path / "grip.yaml").write_bytes(model)
     ran = alone(tmp_path, f"..{os.sep}audit.json", f"..{os.sep}grip.yaml")
     assert (ran.returncode, ran.stderr) == (1, "")
-    assert "DOES NOT HOLD: the policy is not the model's\n" in ran.stdout
+    assert "WRONG: the policy is not the model's\n" in ran.stdout
 
 
 def test_alone_it_tells_how_it_is_called(tmp_path: Path) -> None:

@@ -42,12 +42,12 @@ STUDY = Stability(
 )
 
 TEXT = """\
-grip: 12 probes, 30000 rows of data, 20000 of them tried
-run by   native, native float32
-
-code  criterion                                cases  worst  verdict
+grip: 1 of 3 stability checks fails: N3 (12 probes, 30000 rows of data, 20000 of them \
+tried; 2 runtimes)
+runtimes: native, native float32
+code  stability check                          cases  worst  verdict
 N3    order, copies and batches change no bit  40     -      FAILS
-N7    curves: condition, overshoot, rise       3      0.01   holds
+N7    curves: condition, overshoot, rise       3      0.01   passes
 N10   error against run time                   -      -      not applicable
 N3: native: tree: 5 of 8 rows
 N3: native: tree: 4 of 8 rows
@@ -59,29 +59,28 @@ N7: 1 of 3 sides bulges
 N10: not tried: a
 N10: not tried: b
 N10: not tried: c
-N10: not tried: 1 more
-
+N10: not tried: d
 input  spread/size  float32 costs  observed  flips    advice
 force  5.0e-07      1.2e-01        1.0e-01   3 of 80  use mixed
 slip   5.0e-01      1.0e-07        0.0e+00   0 of 80  float32 is safe
-
 form   spread/distance  float32  mixed    double   flips in float32
 rules  1e-03            cannot   1.0e-07  2.0e-16  -
-
 curve             form  size  leaves [0, 1]  rises  advice
 force low (left)  raw   70    by 0.12        -      fit it with fewer points
-
 what to do: N3: use another one
 what to do: force: use mixed"""
 
 
 def test_a_report_tells_everything_in_order() -> None:
-    assert "\n".join(stability_lines(STUDY)) == TEXT
+    assert "\n".join(stability_lines(STUDY, is_verbose=True)) == TEXT
 
 
-def test_a_full_report_leaves_nothing_out() -> None:
-    full = list(stability_lines(STUDY, is_full=True))
-    assert "N10: not tried: d" in full
+def test_a_short_report_has_the_failures_and_the_inputs_that_need_care() -> None:
+    short = list(stability_lines(STUDY))
+    assert short[0] == TEXT.partition("\n")[0]
+    assert not any("not tried" in line or "sides bulges" in line for line in short)
+    assert "float32 is safe for 1 of 2 inputs" in short
+    assert any(line.startswith("force  ") for line in short)
 
 
 def test_a_study_with_a_failure_is_not_ok() -> None:

@@ -108,7 +108,8 @@ def test_files_of_one_class_each_become_one_table(
     ]
     refused = {
         ("cup.ftr", "pen=pen.ftr"): "of several files, each has a class: "
-        "CLASS=cup.ftr, not cup.ftr\n  fuzzytree tactile features --help tells more\n",
+        "CLASS=cup.ftr, not cup.ftr\n"
+        "  fuzzytree tactile features --help lists the options\n",
         ("cup=cup.ftr", "f=f.npz"): "of f=f.npz and cup=cup.ftr, only one tells "
         "subjects\n",
         ("cup=cup.ftr", "f=g.npz"): "f=g.npz: is of another sensor (6 x 6 cells, full "

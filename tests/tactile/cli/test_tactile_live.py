@@ -174,7 +174,7 @@ def test_a_source_and_a_board_that_do_not_go_together_are_told(
     call: Call, words: tuple[str, ...], text: str
 ) -> None:
     code, _, err = call(*words, "--model", "area.yaml")
-    hint = "fuzzytree tactile live --help tells more"
+    hint = "fuzzytree tactile live --help lists the options"
     assert (code, err) == (2, f"{text}\n  {hint}\n")
 
 

@@ -23,7 +23,7 @@ from fuzzytree.tactile.link.recording import Recorder
 from fuzzytree.tactile.sensor import Cells, Sensor
 from tests.cli.conftest import Call
 
-HELP = "\n  fuzzytree tactile simulate --help tells more\n"
+HELP = "\n  fuzzytree tactile simulate --help lists the options\n"
 SIMULATE = ("tactile", "simulate", "mat.yaml")
 MAT = Board("mat", Sensor(4, 6, full=200), Marker("AA 55"), start=Start(frames=3))
 
