@@ -19,9 +19,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+<<<<<<< /tmp/outw/cmp/c
 from fuzzytree.report.plots import save
 from fuzzytree.report.plots.labels import SIZE
+=======
+from fuzzytree.report.plots import draw_frames, save
+>>>>>>> /tmp/outw/cmp/m
 from fuzzytree.report.plots.saving import style
+from fuzzytree.report.plots.words import SIZE
 from fuzzytree.tactile.given import given_frames
 from fuzzytree.tactile.interpolation import interpolated
 from fuzzytree.tactile.plots import colours, draw_frames

@@ -15,15 +15,31 @@ from fuzzytree.report.text import counted, number
 MOST_LEAVES = 120
 """Of a tree that is drawn; a larger one is told as an outline."""
 
-_WIDE, _HIGH = 176.0, 52.0  # of a box
+WIDE, HIGH = 176.0, 52.0
+"""Of a box, in points."""
+
 _ACROSS, _DOWN = 60.0, 26.0  # between boxes
-_EDGE = 8.0
+EDGE = 8.0
+"""Around a picture, in points."""
+
 _LEAST, _MOST = 1.5, 9.0  # points: how thick a branch is
 _PALETTE = 10
 
 
-class _Box(msgspec.Struct):
-    """A node or a leaf, its branch, and where it stands."""
+class Box(msgspec.Struct):
+    """A node or a leaf, its branch, and where it stands.
+
+    Attributes:
+        level: How many branches lead to it.
+        title: The variable of a node, the class or pattern of a leaf.
+        note: Where a node cuts, or the rule and the rows of a leaf.
+        branch: The terms and values of the branch that leads to it.
+        code: The number of a leaf's class; None for a node.
+        counts: The rows that reach it, by class; empty if they are not known.
+        middle: How far below the top its middle is, in points.
+        above: The node whose branch leads to it.
+        below: Where its own branches lead.
+    """
 
     level: int
     title: str
@@ -32,12 +48,13 @@ class _Box(msgspec.Struct):
     code: int | None = None  # of the class of a leaf
     counts: Counts = ()
     middle: float = 0.0
-    above: _Box | None = None
-    below: list[_Box] = msgspec.field(default_factory=lambda: [])
+    above: Box | None = None
+    below: list[Box] = msgspec.field(default_factory=lambda: [])
 
     @property
     def left(self) -> float:
-        return _EDGE + self.level * (_WIDE + _ACROSS)
+        """How far from the left it begins, in points."""
+        return EDGE + self.level * (WIDE + _ACROSS)
 
 
 def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
@@ -51,9 +68,9 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
         tree: At most `MOST_LEAVES` leaves.
         rows: How rows go through it.
     """
-    boxes = _boxes(tree, rows)
-    high = _placed(boxes)
-    wide = max(box.left for box in boxes) + _WIDE + _EDGE
+    boxes = boxes_of(tree, rows)
+    high = placed(boxes)
+    wide = max(box.left for box in boxes) + WIDE + EDGE
     whole = sum(boxes[0].counts)
     drawn = [_branch(box, whole) for box in boxes if box.above is not None]
     drawn += [_drawn(box) for box in boxes]
@@ -75,11 +92,11 @@ def class_mark(code: int) -> str:
     return f"k{code % _PALETTE}"
 
 
-def _boxes(tree: FuzzyTree, rows: Passing | None) -> list[_Box]:
-    """Return all nodes and leaves, depth first."""
+def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
+    """Return all nodes and leaves, depth first; `placed` puts them in their places."""
     codes = {label: code for code, label in enumerate(tree.classes)}
-    found: list[_Box] = []
-    todo: list[tuple[int | None, int | None, str, _Box | None]]
+    found: list[Box] = []
+    todo: list[tuple[int | None, int | None, str, Box | None]]
     todo = [(1, None, "", None) if tree.nodes else (None, 1, "", None)]
     while todo:
         node, leaf, branch, above = todo.pop()
@@ -87,7 +104,7 @@ def _boxes(tree: FuzzyTree, rows: Passing | None) -> list[_Box]:
         if node is not None:
             asked = tree.nodes[node - 1]
             cuts = ", ".join(map(number, asked.cuts))
-            box = _Box(level, f"{asked.variable}?", f"cut at {cuts}", branch)
+            box = Box(level, f"{asked.variable}?", f"cut at {cuts}", branch)
             box.counts = rows.nodes[node - 1] if rows else ()
             todo += [
                 (one.node, one.leaf, _branch_words(asked, place), box)
@@ -96,7 +113,7 @@ def _boxes(tree: FuzzyTree, rows: Passing | None) -> list[_Box]:
         else:
             position = leaf or 1
             end = tree.leaves[position - 1]
-            box = _Box(level, end.pattern or end.label, "", branch, codes[end.label])
+            box = Box(level, end.pattern or end.label, "", branch, codes[end.label])
             if rows:
                 box.counts = rows.leaves[position - 1]
             elif end.support is not None:
@@ -113,7 +130,7 @@ def _boxes(tree: FuzzyTree, rows: Passing | None) -> list[_Box]:
     return found
 
 
-def _add_up(boxes: Sequence[_Box]) -> None:
+def _add_up(boxes: Sequence[Box]) -> None:
     """Give each node without counts those of the leaves behind it."""
     for box in reversed(boxes):
         if not box.counts and box.below and all(one.counts for one in box.below):
@@ -136,24 +153,24 @@ def _branch_words(node: Node, place: int) -> str:
     return f"{names}: {' or '.join(taken)}"
 
 
-def _placed(boxes: Sequence[_Box]) -> float:
+def placed(boxes: Sequence[Box]) -> float:
     """Put leaves below one another and nodes in their middle; return the height."""
-    down = _EDGE + 14.0
+    down = EDGE + 14.0
     for box in boxes:
         if not box.below:
-            box.middle = down + _HIGH / 2.0
-            down += _HIGH + _DOWN
+            box.middle = down + HIGH / 2.0
+            down += HIGH + _DOWN
     for box in reversed(boxes):
         if box.below:
             box.middle = (box.below[0].middle + box.below[-1].middle) / 2.0
-    return down - _DOWN + _EDGE
+    return down - _DOWN + EDGE
 
 
-def _branch(box: _Box, whole: int) -> Markup:
+def _branch(box: Box, whole: int) -> Markup:
     above = box.above
     assert above is not None  # the root has no branch
     share = sum(box.counts) / whole if whole else 0.0
-    start, end = above.left + _WIDE, box.left
+    start, end = above.left + WIDE, box.left
     bend = (start + end) / 2.0
     way = f"M{start:.1f} {above.middle:.1f}C{bend:.1f} {above.middle:.1f} "
     way += f"{bend:.1f} {box.middle:.1f} {end:.1f} {box.middle:.1f}"
@@ -161,11 +178,11 @@ def _branch(box: _Box, whole: int) -> Markup:
     return tag("path", d=way, class_="branch", stroke_width=thick)
 
 
-def _drawn(box: _Box) -> Markup:
-    left, top = box.left, box.middle - _HIGH / 2.0
+def _drawn(box: Box) -> Markup:
+    left, top = box.left, box.middle - HIGH / 2.0
     is_leaf = box.code is not None
     mark = class_mark(box.code or 0) if is_leaf else ""
-    room = (_WIDE - 20.0) / (LETTER * 13.0)
+    room = (WIDE - 20.0) / (LETTER * 13.0)
     said = [box.branch, box.title, box.note, _told(box.counts)]
     return tag(
         "g",
@@ -174,15 +191,15 @@ def _drawn(box: _Box) -> Markup:
             "rect",
             x=left,
             y=top,
-            width=_WIDE,
-            height=_HIGH,
+            width=WIDE,
+            height=HIGH,
             rx=14.0 if is_leaf else 4.0,
             class_=f"box {mark}".rstrip(),
         ),
-        words(left + 2, top - 6, cut(box.branch, _WIDE / 6.1), "small"),
+        words(left + 2, top - 6, cut(box.branch, WIDE / 6.1), "small"),
         words(left + 10, top + 18, cut(box.title, room), f"strong {mark}".rstrip()),
-        words(left + 10, top + 33, cut(box.note, _WIDE / 6.4), "small"),
-        *_bar(box.counts, left + 10, top + 40, _WIDE - 20),
+        words(left + 10, top + 33, cut(box.note, WIDE / 6.4), "small"),
+        *_bar(box.counts, left + 10, top + 40, WIDE - 20),
     )
 
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fuzzytree.report.plots.labels import SIZE
 from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.words import short
+from fuzzytree.report.plots.words import SIZE, short
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -18,10 +18,9 @@ import numpy as np
 import pytest
 
 from fuzzytree.benchmarking.records import Kind, Point, Question, Study
-from fuzzytree.checking.stability.results import OffsetCost
 from fuzzytree.errors import MissingExtraError, WriteError
 from fuzzytree.report import plots
-from fuzzytree.report.plots.panels import time_text
+from fuzzytree.report.plots.precision import time_text
 from fuzzytree.report.plots.saving import drawn
 from tests.benchmarking.studies import error, point, study, timing
 
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Annotation
+    from matplotlib.text import Annotation, Text
     from matplotlib.transforms import Bbox
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
@@ -110,18 +109,23 @@ def test_a_tree_lies_at_its_share_of_other_classes_in_a_panel_of_its_own() -> No
     assert axes.get_ylabel() == "rows with\nanother class"
 
 
-def test_no_error_lies_in_a_strip_that_says_so() -> None:
+def test_an_error_of_0_lies_on_a_line_that_says_so() -> None:
     found = markers(picture())
-    strip = found["native: tree"][2]
-    assert strip is found["onnxruntime: tree"][2]
-    assert strip is not found["scikit-learn: tree"][2]
-    assert strip.get_yscale() == "linear"
-    assert [tick.get_text() for tick in strip.get_yticklabels()] == ["none"]
+    _, height, axes = found["native: tree"]
+    assert found["onnxruntime: tree"][1:] == (height, axes)
+    assert height < found["scikit-learn: tree"][1]
+    words = {float(y): t.get_text() for y, t in ticks(axes)}
+    assert words[height] == "none"
 
 
 def test_rules_without_an_error_are_called_exact() -> None:
     figure = plots.work_precision(study(point("a", 1e5, error(0.0))), rows=1000)
-    assert [tick.get_text() for tick in figure.axes[0].get_yticklabels()] == ["exact"]
+    assert [text.get_text() for _, text in ticks(figure.axes[0])] == ["exact"]
+
+
+def ticks(axes: Axes) -> Iterator[tuple[float, Text]]:
+    """Yield the height and the words of each tick."""
+    return zip(axes.get_yticks(), axes.get_yticklabels(), strict=True)
 
 
 def test_a_legend_explains_what_there_is() -> None:
@@ -132,22 +136,11 @@ def test_a_legend_explains_what_there_is() -> None:
         "runtime",
         "peer",
         "unbeaten",
-        "observed",
         "floor",
     ]
     bare = plots.work_precision(study(point("a", 1e5, error(0.1))), rows=1000)
     words = [text.get_text() for text in bare.legends[0].get_texts()]
     assert words == ["rules", "runtime", "unbeaten"]
-
-
-def test_each_question_has_its_lane_of_the_strip() -> None:
-    exact = [
-        point("native", 5e4, error(0.0), question=question)
-        for question in ("raw rules", "relative rules")
-    ]
-    found = markers(plots.work_precision(study(*exact), rows=1000))
-    heights = [height for _, height, _ in found.values()]
-    assert sorted(heights) == [-1.0, 0.0]
 
 
 def test_a_bar_is_the_interval_of_the_median() -> None:
@@ -169,7 +162,7 @@ def test_the_front_is_labelled_and_filled() -> None:
         for bars in axes.containers
     }
     assert faces["native: raw rules"] == "#00795a"
-    assert faces["simpful: raw rules"] == (1.0, 1.0, 1.0, 1.0)
+    assert faces["simpful: raw rules"] == "white"
 
 
 def test_a_member_of_the_front_shows_what_was_observed_below_its_bound() -> None:
@@ -267,7 +260,7 @@ def test_an_error_that_is_none_lies_at_one(wrong: float) -> None:
     )
 
 
-def test_a_study_whose_errors_are_all_zero_has_strips_alone() -> None:
+def test_a_study_whose_errors_are_all_0_has_one_line() -> None:
     figure = plots.work_precision(study(point("a", 1e5, error(0.0))), rows=1000)
     assert len(figure.axes) == 1
 
@@ -305,7 +298,7 @@ def test_a_png_is_sixteen_hundred_dots_wide(tmp_path: Path) -> None:
     plots.save(figure, path)
     content = path.read_bytes()
     width, height = struct.unpack(">II", content[16:24])
-    assert (width, height) == (1600, int(figure.get_figheight() * 200))
+    assert (width, height) == (1600, round(figure.get_figheight() * 200))
     assert b"Software" not in content
 
 
@@ -356,72 +349,6 @@ def test_shares_are_percent() -> None:
     shown = [tick.get_text() for tick in axes.get_yticklabels(which="both")]
     assert {text for text in shown if text} >= {"1 %", "10 %"}
     assert not any("times" in text for text in shown)
-
-
-def costs() -> list[OffsetCost]:
-    """Return what a distance costs: float32 ever more, and then not held at all."""
-    found = [
-        OffsetCost("relative rules", 10.0**-k, 1e-7 * 10.0**k, 1e-7, 0.0, k, 150)
-        for k in (1, 3, 5)
-    ]
-    lost = OffsetCost("relative rules", 1e-7, None, 2e-7, 1e-16, 0, 150)
-    return [lost, *found, OffsetCost("raw rules", 1e-1, 1e-6, 3e-7, 2e-16, 0, 150)]
-
-
-def lines(figure: Figure) -> dict[tuple[str, int], list[list[float]]]:
-    """Return the points of each line, by its name and the number of its axes."""
-    return {
-        (str(line.get_label()), number): np.asarray(line.get_xydata()).tolist()
-        for number, axes in enumerate(figure.axes)
-        for line in axes.lines
-    }
-
-
-def test_errors_are_drawn_against_the_distance_from_zero() -> None:
-    found = lines(plots.error_against_offset("grip", costs()))
-    assert found["mixed: relative rules", 0] == [
-        [1e-1, 1e-7],
-        [1e-3, 1e-7],
-        [1e-5, 1e-7],
-        [1e-7, 2e-7],
-    ]
-    assert found["mixed: raw rules", 0] == [[1e-1, 3e-7]]
-
-
-def test_a_line_ends_where_a_number_type_cannot_hold_the_model() -> None:
-    found = lines(plots.error_against_offset("grip", costs()))
-    assert [ratio for ratio, _ in found["float32: relative rules", 0]] == [
-        1e-1,
-        1e-3,
-        1e-5,
-    ]
-
-
-def test_no_error_at_some_distance_lies_in_the_strip() -> None:
-    found = lines(plots.error_against_offset("grip", costs()))
-    assert found["float64: relative rules", 0] == [[1e-7, 1e-16]]
-    assert [error for _, error in found["float64: relative rules", 1]] == [0.0] * 3
-
-
-def test_without_an_exact_point_there_is_no_strip() -> None:
-    figure = plots.error_against_offset("grip", costs()[-1:])
-    assert len(figure.axes) == 1
-
-
-def test_number_types_are_named_at_the_ends_of_their_lines() -> None:
-    figure = plots.error_against_offset("grip", costs())
-    assert {words.get_text() for words in labels(figure)} == {
-        "float32",
-        "mixed",
-        "float64",
-    }
-    assert figure.texts[0].get_text() == "grip: error against the distance from zero"
-
-
-def test_no_distance_at_all_is_a_sentence() -> None:
-    with pytest.raises(ValueError, match="no error was measured") as caught:
-        plots.error_against_offset("grip", [])
-    assert str(caught.value) == "grip: no error was measured at any distance from zero"
 
 
 @pytest.mark.parametrize(

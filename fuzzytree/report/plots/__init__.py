@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fuzzytree.report.plots.confusion import draw_confusion
-from fuzzytree.report.plots.offsets import error_against_offset
 from fuzzytree.report.plots.precision import work_precision
 from fuzzytree.report.plots.saving import SUFFIXES, save
 from fuzzytree.report.plots.trees import draw_tree
@@ -12,7 +11,6 @@ __all__ = [
     "SUFFIXES",
     "draw_confusion",
     "draw_tree",
-    "error_against_offset",
     "save",
     "work_precision",
 ]

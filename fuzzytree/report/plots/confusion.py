@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzytree.report.plots.labels import SIZE
 from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.words import LINE, MARGIN, TITLE, WORD, Sheet, short
+from fuzzytree.report.plots.words import LINE, MARGIN, SIZE, TITLE, WORD, Sheet, short
 
 if TYPE_CHECKING:
     import numpy.typing as npt

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from fuzzytree.report.plots.labels import SIZE
-
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+SIZE = 8.0
+"""Of letters, in points."""
 
 LINE, FAINT, WORD = "#8c959f", "#57606a", "#24292f"
 """The colours of lines, of words beside others, and of words."""
