@@ -10,7 +10,6 @@ from fuzzytree.auditing.engine.states import Bracket, Span, Witness, point_of
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.views import View
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.report.decision_map import exact_axes
 from fuzzytree.report.drawing import Axis
 from fuzzytree.report.markup import Markup, tag
 from fuzzytree.report.svg_regions import bar_picture, map_picture, windows
@@ -91,6 +90,33 @@ def _values(point: Mapping[str, Fraction], scene: Scene) -> dict[str, Fraction]:
     if rules is None or not point:
         return dict(point)
     return exact_axes(rules, point) or dict(point)
+
+
+def exact_axes(
+    rules: RuleBase, point: Mapping[str, Fraction]
+) -> dict[str, Fraction] | None:
+    """Return the value of every variable at a point; None if an input has no value.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Part, Rule, Variable
+        >>> sums = Variable("sum", parts=(Part("a", 2.0, 1.0),))
+        >>> rules = RuleBase("r", ("k",), (Variable("a"), sums), (Rule((), "k"),))
+        >>> exact_axes(rules, {"a": Fraction(1, 3)})["sum"]
+        Fraction(-4, 3)
+    """
+    if any(name not in point for name in rules.inputs):
+        return None
+    axes = {name: point[name] for name in rules.inputs}
+    for variable in rules.variables:
+        if variable.parts:
+            axes[variable.name] = sum(
+                (
+                    Fraction(part.weight) * (point[part.input] - Fraction(part.centre))
+                    for part in variable.parts
+                ),
+                start=Fraction(0),
+            )
+    return axes
 
 
 def _near(values: Mapping[str, Fraction], axis: Axis) -> float | None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
 import numpy as np
 
 from fuzzytree.auditing.engine.states import Span
 from fuzzytree.model.rulebase import RuleBase
-from fuzzytree.report.decision_map import decisions
 from fuzzytree.report.drawing import (
     LETTER,
     Axis,
@@ -27,6 +27,7 @@ from fuzzytree.report.drawing import (
 from fuzzytree.report.markup import Markup, tag, trimmed
 from fuzzytree.report.svg_terms import DASHES, MOST_CURVES, outside, scale_of
 from fuzzytree.report.svg_tree import class_mark
+from fuzzytree.runtimes.native_rules import fire
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import IntArray
@@ -227,6 +228,55 @@ def map_picture(
     desc = "Each part has the name of its class; the hatched part is the region, the "
     desc += "diamond the witness; all other variables are those of the witness"
     return svg(_MAP_WIDE, _MAP_HIGH, title, desc, *parts, name=name)
+
+
+def decisions(
+    rules: RuleBase,
+    across: tuple[str, Sequence[float]],
+    down: tuple[str, Sequence[float]],
+    others: Mapping[str, Fraction],
+) -> IntArray:
+    """Return the number of the class decided for at each point of a grid, -1 for none.
+
+    The native runtime decides, in double; a combination is a variable like any other.
+
+    Args:
+        rules: The rule base.
+        across: A variable and its values.
+        down: Another variable and its values.
+        others: The value of every other variable that the rules test.
+
+    Returns:
+        Shape (values down, values across).
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Band, Clause, Rule, Term, Variable
+        >>> low = Term("low", Band(high=0.0))
+        >>> axes = Variable("a", (low,)), Variable("b", (low,))
+        >>> both = Rule((Clause("a", ("low",)), Clause("b", ("low",))), "k")
+        >>> rules = RuleBase("r", ("k",), axes, (both,))
+        >>> decisions(rules, ("a", [-1.0, 1.0]), ("b", [-1.0, 1.0]), {}).tolist()
+        [[0, -1], [-1, -1]]
+    """
+    tested = {clause.variable for rule in rules.rules for clause in rule.when}
+    variables = (one for one in rules.variables if one.name in tested)
+    free = tuple(msgspec.structs.replace(one, parts=()) for one in variables)
+    rules = msgspec.structs.replace(rules, variables=free, columns=())
+    columns = {name: float(value) for name, value in others.items()}
+    x, y = np.meshgrid(across[1], down[1])
+    values = np.stack(
+        [
+            x if name == across[0] else y if name == down[0] else x * 0 + columns[name]
+            for name in rules.inputs
+        ]
+    )
+    outcome = fire(rules)(values.reshape(len(rules.inputs), -1))
+    codes = {label: code for code, label in enumerate(rules.classes)}
+    uncovered = rules.semantics.uncovered
+    none = -1 if uncovered is None else codes[uncovered]
+    classes = np.array([none, *(codes[rule.then] for rule in rules.rules)])
+    found: IntArray = classes[outcome.rule].reshape(x.shape)
+    return found
 
 
 def _middles(ends: tuple[float, float]) -> list[float]:

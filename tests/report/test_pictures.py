@@ -24,8 +24,8 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.numerics.exact import exact_answer, exact_axis, exact_degree
+from fuzzytree.report.audit_pictures import exact_axes
 from fuzzytree.report.audit_rows import data_of, histogram, passing
-from fuzzytree.report.decision_map import decisions, exact_axes
 from fuzzytree.report.drawing import (
     Axis,
     Scale,
@@ -38,7 +38,7 @@ from fuzzytree.report.drawing import (
     tick_words,
     ticks,
 )
-from fuzzytree.report.svg_regions import bar_picture, map_picture, windows
+from fuzzytree.report.svg_regions import bar_picture, decisions, map_picture, windows
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import tree_picture
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -83,15 +83,6 @@ def test_a_map_shows_the_exact_decision(seed: int, kind: str, conjunction: str) 
         label = exact_answer(rules, {across: x, down: y, **still}).label
         code = -1 if label is None else rules.classes.index(label)
         assert found[i, j] == code
-
-
-def test_a_map_decides_what_products_of_doubles_cannot() -> None:
-    rules = rule_base()
-    rules = msgspec.structs.replace(rules, semantics=Semantics("product"))
-    tiny = 2.0 + 2.0**-51
-    found = decisions(rules, ("pressure", [tiny]), ("area", [60.0 - 2.0**-47]), {})
-    label = exact_answer(rules, {"pressure": tiny, "area": 60.0 - 2.0**-47}).label
-    assert rules.classes[found[0, 0]] == label
 
 
 def test_where_no_rule_fires_a_map_shows_the_answer_for_that() -> None:
