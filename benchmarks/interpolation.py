@@ -19,12 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-<<<<<<< /tmp/outw/cmp/c
 from fuzzytree.report.plots import save
-from fuzzytree.report.plots.labels import SIZE
-=======
-from fuzzytree.report.plots import draw_frames, save
->>>>>>> /tmp/outw/cmp/m
 from fuzzytree.report.plots.saving import style
 from fuzzytree.report.plots.words import SIZE
 from fuzzytree.tactile.given import given_frames

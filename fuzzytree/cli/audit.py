@@ -223,7 +223,7 @@ def _for_programs(found: Audit, form: Form, baseline: Mapping[str, str] | None) 
 
             return printable_json(sarif(found, baseline))
         case "github":
-            from fuzzytree.report.annotations import annotation_lines
+            from fuzzytree.report.sarif import annotation_lines
 
             return "\n".join(annotation_lines(found))
         case _:

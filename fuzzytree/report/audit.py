@@ -9,9 +9,11 @@ from typing import Final
 
 from fuzzytree.auditing.engine.states import Bracket, Coordinate, Declined, Witness
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, Audit, Measure, Place, Severity
+from fuzzytree.auditing.findings.records import Answer, Audit, Measure, Place
 from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import (
+    SEVERITIES,
+    STATES,
     as_in_file,
     result_text,
     state_text,
@@ -51,18 +53,10 @@ ORIGINS: Mapping[str, str] = {
 }
 """Where the ends of a variable's domain come from."""
 
-_GRAVE: Mapping[Severity, tuple[str, str]] = {
-    "error": ("error", "errors"),
-    "warning": ("warning", "warnings"),
-    "info": ("note", "notes"),
-}
-"""What people call each severity, the gravest first."""
-
-_STATE_WORDS = ("PROVED", "WITNESS", "BRACKET", "SAMPLED", "DECLINED")
 _Paint = Callable[[str, str], str]
 _SUMMARY = (
     *("code", "question", "asked", "found"),
-    *("proved", "witness", "bracket", "sampled", "declined"),
+    *map(str.lower, STATES),
 )
 
 
@@ -93,7 +87,7 @@ def audit_lines(
     paint = _painted if is_coloured else _plain
     yield from _wrapped(verdict_text(audit, gone), WIDTH, "  ")
     findings = sorted(
-        audit.open_findings, key=lambda one: [*_GRAVE].index(one.severity)
+        audit.open_findings, key=lambda one: [*SEVERITIES].index(one.severity)
     )
     if not (is_verbose or is_whole):
         yield from _short(audit, findings, paint)
@@ -139,7 +133,7 @@ def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[
     given = [o for o in audit.answers if (o.code, o.subject) == ("FT204", "row")]
     yield from _brief("the row of --row", given, paint)
     states = Counter(state_word(one.state) for one in audit.answers)
-    told = [f"{states[word]} {word}" for word in _STATE_WORDS if states[word]]
+    told = [f"{states[word]} {word}" for word in STATES if states[word]]
     yield f"{counted(len(audit.answers), 'question')}: {', '.join(told) or 'none'}"
     if audit.unasked:
         yield f"not examined, or not to the end: {counted(len(audit.unasked), 'item')}"
@@ -182,7 +176,7 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
         ids = counted(len(gone), "accepted finding")
         said += f"; {ids} no longer found, which --write-baseline forgets"
     if found:
-        gravest = min(found, key=lambda one: [*_GRAVE].index(one.severity))
+        gravest = min(found, key=lambda one: [*SEVERITIES].index(one.severity))
         said += f"; `fuzzytree explain {gravest.code}` tells what to do"
     elif audit.is_complete:
         said += f"; {_asked_text(audit)}"
@@ -339,14 +333,14 @@ def _counts(answers: Sequence[Answer]) -> Iterator[str]:
     words = [state_word(answer.state) for answer in answers]
     found = sum(answer.is_finding for answer in answers)
     counts = [len(answers), found]
-    counts += [words.count(word) for word in _STATE_WORDS]
+    counts += [words.count(word) for word in STATES]
     yield from (str(count) if count else "-" for count in counts)
 
 
 def _by_severity(found: Sequence[Answer]) -> str:
     counts = [
-        counted(sum(one.severity == severity for one in found), *_GRAVE[severity])
-        for severity in _GRAVE
+        counted(sum(one.severity == severity for one in found), SEVERITIES[severity])
+        for severity in SEVERITIES
         if any(one.severity == severity for one in found)
     ]
     return f"{counted(len(found), 'finding')}: {', '.join(counts)}"

@@ -10,7 +10,8 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
 from string import Template
 from typing import TYPE_CHECKING
@@ -20,13 +21,13 @@ from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import Answer, Audit
 from fuzzytree.auditing.findings.subject import Rows
 from fuzzytree.auditing.findings.views import view
-from fuzzytree.model.agreement import Agreement
+from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.audit import ORIGINS, gathered
-from fuzzytree.report.audit_checks import agreement_section, stability_section
 from fuzzytree.report.audit_findings import (
+    Scene,
     anchors,
     facts_section,
     findings_section,
@@ -38,18 +39,18 @@ from fuzzytree.report.audit_model import (
     terms_section,
     tree_section,
 )
-from fuzzytree.report.audit_pictures import Scene
 from fuzzytree.report.audit_rows import data_of, passing
 from fuzzytree.report.audit_states import (
+    SEVERITIES,
     STATES,
     as_in_file,
+    icon,
     known_as,
     result_text,
     state_badge,
     state_note,
     state_word,
 )
-from fuzzytree.report.audit_verdict import verdict
 from fuzzytree.report.drawing import axes_of
 from fuzzytree.report.markup import (
     Content,
@@ -61,7 +62,17 @@ from fuzzytree.report.markup import (
     tag,
     text,
 )
-from fuzzytree.report.text import counted, number
+from fuzzytree.report.stability import CRITERION, advice, criterion_row
+from fuzzytree.report.stability import verdict_text as stability_text
+from fuzzytree.report.text import (
+    CERTIFIED,
+    COMPARISON,
+    certified_row,
+    comparison_row,
+    counted,
+    number,
+)
+from fuzzytree.report.text import verdict_text as agreement_text
 
 if TYPE_CHECKING:
     from fuzzytree.checking.stability.results import Stability
@@ -330,3 +341,147 @@ def _command(answers: Sequence[Answer]) -> str:
     """
     found = {one.repeat.removesuffix(f" --select {one.code}") for one in answers}
     return found.pop() if len(found) == 1 else ""
+
+
+_MOST_URGENT = 12  # findings that are named
+_MOST_ALIKE = 3  # of one code and severity
+
+
+def verdict(audit: Audit) -> Markup:
+    """Return what was found, in words, and how it is known."""
+    findings = gravest_first(audit.open_findings)
+    states = known_as(audit.answers)
+    sign, said = _result(findings, states, is_complete=audit.is_complete)
+    accepted = len(audit.findings) - len(findings)
+    if accepted:
+        said += f"; {counted(accepted, 'other')} {'is' if accepted == 1 else 'are'} "
+        said += "accepted"
+    asked = counted(len(audit.answers), "question")
+    whole = f"The audit is complete: {asked} asked, all of them answered or declined"
+    if not audit.is_complete:
+        by = "by hand" if audit.was_interrupted else "by its budget"
+        whole = f"The audit was cut short {by}: {asked} asked, others were not"
+    shown = [
+        tag("li", state_badge(word), tag("b", str(states[word])), f" {meaning}")
+        for word, meaning in STATES.items()
+    ]
+    return joined(
+        [
+            tag("p", icon(sign), said, class_=f"said {sign}"),
+            tag("p", whole, class_="whole" if audit.is_complete else "whole cut"),
+            _urgent(findings, gravest_first(audit.findings)),
+            tag("ul", *shown, class_="known"),
+        ]
+    )
+
+
+def _result(
+    findings: Sequence[Answer], states: Mapping[str, int], *, is_complete: bool
+) -> tuple[str, str]:
+    """Return a sign and a sentence: what was found, and what that is worth."""
+    counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
+    told = [counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]]
+    if told:
+        worst = next(one for one in SEVERITIES if counts[one])
+        verb = "was" if len(findings) == 1 else "were"
+        others = ", ".join(told[:-1])
+        return worst, f"{others}{' and ' if others else ''}{told[-1]} {verb} found"
+    whole, declined = sum(states.values()), states["DECLINED"]
+    if declined and declined == whole:
+        return "declined", "Nothing was decided: every question was declined"
+    said = "Nothing was found" if is_complete else "Nothing was found so far"
+    if declined:
+        said += f"; {declined} of {whole} questions were declined"
+    return "calm" if is_complete and not declined else "info", said
+
+
+def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | None:
+    """Return links to the errors and warnings among findings.
+
+    Args:
+        findings: Those that are not accepted.
+        named: All, in the order of the page.
+    """
+    told = {id(one) for one in findings if one.severity != "info"}
+    urgent: dict[tuple[str, str], list[tuple[Answer, str]]] = {}
+    for one, name in zip(named, anchors(named), strict=True):
+        if id(one) in told:
+            urgent.setdefault((one.code, one.sentence), []).append((one, name))
+    if not urgent:
+        return None
+    items: list[Content] = []
+    kinds: Counter[tuple[str, str]] = Counter()
+    for alike in urgent.values():
+        one, name = alike[0]
+        kinds[one.code, one.severity] += 1
+        if kinds[one.code, one.severity] > _MOST_ALIKE or len(items) == _MOST_URGENT:
+            continue
+        times = f" {len(alike)} times" if len(alike) > 1 else ""
+        parts = [
+            tag("span", icon(one.severity), class_=one.severity),
+            tag("a", one.sentence, href=f"#{name}"),
+            text(times) if times else None,
+            " ",
+            tag("span", one.code, class_="code"),
+        ]
+        items.append(joined(parts))
+    more = len(urgent) - len(items)
+    if more > 0:
+        items.append(tag("a", f"and {more} more", href="#findings"))
+    return listed(items, class_="urgent")
+
+
+_MOST_CALM = 12  # comparisons that agree and are not folded
+_MOST_TOLD = 200  # sentences
+
+
+def agreement_section(found: Agreement) -> Markup:
+    """Return the result of a check as a table."""
+    calm = [one for one in found.comparisons if one.verdict == "agrees"]
+    if len(calm) <= _MOST_CALM:
+        calm = []
+    shown = [one for one in found.comparisons if one not in calm]
+    parts: list[Content] = [tag("p", agreement_text(found), class_="lead")]
+    if shown:
+        parts.append(_compared(shown, "Comparisons"))
+    if calm:
+        said = f"{counted(len(calm), 'comparison')} agree"
+        parts.append(folded(said, _compared(calm, "Comparisons that agree")))
+    if found.certificates:
+        bounds = map(certified_row, found.certificates)
+        parts.append(table(CERTIFIED, bounds, caption="What rounding can change"))
+    details = [line for one in found.comparisons for line in one.detail]
+    details += [line for one in found.certificates for line in one.detail]
+    parts += [_folded("Differences", details), _folded("Not examined", found.skipped)]
+    return joined(parts)
+
+
+def _compared(found: Sequence[Comparison], caption: str) -> Markup:
+    rows = map(comparison_row, found)
+    return table(COMPARISON, rows, caption=caption, right=(3, 4, 5), sorts=True)
+
+
+def stability_section(found: Stability) -> Markup:
+    """Return the result of a study as a table of its stability checks."""
+    rows = map(criterion_row, found.criteria)
+    details = [f"{one.code}: {line}" for one in found.criteria for line in one.detail]
+    missed = [f"{one.code}: {line}" for one in found.criteria for line in one.skipped]
+    probes, tried = counted(found.probes, "probe"), counted(found.tried, "row")
+    return joined(
+        [
+            tag("p", f"{stability_text(found)} ({probes}, {tried})", class_="lead"),
+            table(CRITERION, rows, caption="Stability checks", right=(2, 3)),
+            _folded("What to do", [*advice(found)]),
+            _folded("What was measured", details),
+            _folded("Not tried", missed),
+        ]
+    )
+
+
+def _folded(name: str, told: list[str] | tuple[str, ...]) -> Markup | None:
+    if not told:
+        return None
+    shown: list[Content] = [*told[:_MOST_TOLD]]
+    if len(told) > _MOST_TOLD:
+        shown.append(f"and {len(told) - _MOST_TOLD} more")
+    return folded(f"{name} ({len(told)})", listed(shown))

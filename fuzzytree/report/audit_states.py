@@ -74,52 +74,29 @@ def severity_badge(severity: Severity) -> Markup:
 
 def evidence(state: State) -> Markup:
     """Return how an answer is known: in a sentence, with the point if there is one."""
-    match state:
-        case Proved(how=how):
-            return tag("p", how, class_="how")
-        case Witness(point=point, claims=claims):
-            return joined([_claims(claims, "Here"), point_table(point)])
-        case Bracket(of=of, low=low, high=high, why=why, point=point, claims=claims):
-            said = f"{of} lies between {number(low)} and {number(high)}; {why}"
-            return joined(
-                [
-                    tag("p", said, class_="how"),
-                    _claims(claims, "Here"),
-                    point_table(point),
-                ]
-            )
-        case Sampled():
-            return tag("p", sampled_text(state), class_="how")
-        case Declined():
-            return tag("p", declined_text(state), class_="how")
-
-
-def declined_text(state: Declined) -> str:
-    """Return why something was not decided.
-
-    Example:
-        >>> declined_text(Declined("FTD06", "no table was given"))
-        'FTD06, needs rows: no table was given'
-    """
-    title = CODES[state.code].title if state.code in CODES else "declined"
-    return f"{state.code}, {title.removeprefix('declined: ')}: {state.reason}"
+    if isinstance(state, Witness | Bracket):
+        said = None if isinstance(state, Witness) else state_text(state)
+        return joined(
+            [
+                tag("p", said, class_="how") if said else None,
+                _claims(state.claims),
+                point_table(state.point),
+            ]
+        )
+    return tag("p", state_text(state, has_title=True), class_="how")
 
 
 def state_note(state: State) -> str:
     """Return how an answer is known in a line: what a table has room for."""
     match state:
-        case Proved(how=how):
-            return how
         case Witness(point=point):
-            told = ", ".join(f"{one.input} = {one.decimal}" for one in point[:_SOME])
+            shown = ", ".join(f"{one.input} = {one.decimal}" for one in point[:_SOME])
             more = len(point) - _SOME
-            return f"at {told}{f' and {more} more' if more > 0 else ''}"
+            return f"at {shown}{f' and {more} more' if more > 0 else ''}"
         case Bracket(of=of, low=low, high=high):
             return f"{of}: {number(low)} to {number(high)}"
-        case Sampled():
-            return sampled_text(state)
-        case Declined():
-            return declined_text(state)
+        case _:
+            return state_text(state, has_title=True)
 
 
 def sampled_text(state: Sampled) -> str:
@@ -169,11 +146,11 @@ def point_table(point: Sequence[Coordinate]) -> Markup:
     return joined([listing, line])
 
 
-def _claims(claims: Sequence[Claim], where: str) -> Markup | None:
+def _claims(claims: Sequence[Claim]) -> Markup | None:
     if not claims:
         return None
     said = "; ".join(map(claim_text, claims))
-    return tag("p", f"{where}, in fractions: {said}", class_="how")
+    return tag("p", f"Here, in fractions: {said}", class_="how")
 
 
 def claim_text(claim: Claim) -> str:
@@ -277,8 +254,12 @@ def _claim_in_file(claim: Claim, numbers: Sequence[int]) -> Claim:
     return msgspec.structs.replace(claim, rules=rules, rivals=rivals)
 
 
-def state_text(state: State) -> str:
+def state_text(state: State, *, has_title: bool = False) -> str:
     """Return how an answer is known, in words.
+
+    Args:
+        state: How it is known.
+        has_title: Whether the code of a declined question has its title, too.
 
     Example:
         >>> state_text(Bracket("the largest lead", 0.1, 0.2, "the budget is spent"))
@@ -294,7 +275,9 @@ def state_text(state: State) -> str:
         case Sampled():
             return sampled_text(state)
         case Declined(code=code, reason=reason):
-            return f"{code}: {reason}"
+            title = CODES[code].title if code in CODES else "declined"
+            after = f", {title.removeprefix('declined: ')}" if has_title else ""
+            return f"{code}{after}: {reason}"
 
 
 def result_text(result: Result) -> str:

@@ -10,8 +10,8 @@ from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.audit import audit_lines
-from fuzzytree.report.audit_checks import agreement_section
 from fuzzytree.report.audit_model import sentence_of
+from fuzzytree.report.audit_page import agreement_section
 from fuzzytree.report.markup import Markup, folded, joined, table, tag, text
 from fuzzytree.report.systems import system_lines
 from fuzzytree.report.text import head_lines, model_lines, term_lines

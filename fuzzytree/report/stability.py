@@ -17,7 +17,7 @@ _CURVES_SHOWN = 5  # curves with a fault, unless all are printed
 _INPUTS_SHOWN = 6  # inputs that float32 is not safe for, unless all are printed
 _SAFE = "float32 is safe"
 
-_CRITERION = ("code", "stability check", "cases", "worst", "verdict")
+CRITERION = ("code", "stability check", "cases", "worst", "verdict")
 _STIFF = ("input", "spread/size", "float32 costs", "observed", "flips", "advice")
 _OFFSET = ("form", "spread/distance", "float32", "mixed", "double", "flips in float32")
 _CURVE = ("curve", "form", "size", "leaves [0, 1]", "rises", "advice")
@@ -37,7 +37,7 @@ def stability_lines(found: Stability, *, is_verbose: bool = False) -> Iterator[s
     yield f"{found.model}: {verdict_text(found)} ({probes}{rows}; {runtimes})"
     if is_verbose:
         yield f"runtimes: {', '.join(found.runtimes) or 'none'}"
-    yield from aligned([_CRITERION, *map(_criterion_row, found.criteria)])
+    yield from aligned([CRITERION, *map(criterion_row, found.criteria)])
     for one in found.criteria:
         yield from _detail(one, is_verbose=is_verbose)
     yield from _inputs(found, is_verbose=is_verbose)
@@ -87,7 +87,8 @@ def advice(found: Stability) -> Iterator[str]:
             yield f"{stiff.input}: {stiff.advice}"
 
 
-def _criterion_row(one: Criterion) -> tuple[str, ...]:
+def criterion_row(one: Criterion) -> tuple[str, ...]:
+    """Return the cells of a stability check, below `CRITERION`."""
     cases = str(one.cases) if one.cases else "-"
     worst = "-" if one.worst is None else f"{one.worst:.2g}"
     verdict = one.verdict.replace("holds", "passes")

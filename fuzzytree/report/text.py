@@ -303,12 +303,12 @@ def agreement_lines(
     wrong = [c for c in found.comparisons if c.verdict in ("DISAGREES", "rows only")]
     if is_verbose or is_full:
         shown: Sequence[Comparison] = found.comparisons
-        yield from aligned([_COMPARISON, *map(_comparison_row, shown)])
+        yield from aligned([COMPARISON, *map(comparison_row, shown)])
     else:
         yield from aligned([_GROUP, *_groups(found.comparisons)])
         shown = wrong[:_MOST_WRONG]
         if shown:
-            yield from aligned([_COMPARISON, *map(_comparison_row, shown)])
+            yield from aligned([COMPARISON, *map(comparison_row, shown)])
         yield from _more(len(wrong) - len(shown), "comparison")
     for comparison in shown:
         if comparison.detail and (is_full or comparison in wrong):
@@ -348,7 +348,7 @@ def _bound_lines(bounds: Sequence[Certified], *, is_verbose: bool) -> Iterator[s
     wrong = [one for one in bounds if one.verdict == "DISAGREES"]
     if wrong or (is_verbose and bounds):
         shown = bounds if is_verbose else wrong[:_MOST_WRONG]
-        yield from aligned([_CERTIFIED, *map(_certified_row, shown)])
+        yield from aligned([CERTIFIED, *map(certified_row, shown)])
     elif bounds:
         largest = max((one.largest or 0.0 for one in bounds), default=0.0)
         yield (
@@ -369,7 +369,7 @@ def _more(count: int, noun: str, after: str = "not shown") -> Iterator[str]:
 _MOST_WRONG = 8  # comparisons that do not agree, unless all are printed
 _MOST_SKIPPED = 3
 _GROUP = ("compared with", "comparisons", "largest difference", "result")
-_COMPARISON = (
+COMPARISON = (
     "representation",
     "compared with",
     "on",
@@ -410,7 +410,8 @@ def _basis_text(found: Agreement) -> str:
     return text + (f", {counted(found.cells, 'cell')}" if found.cells else "")
 
 
-def _comparison_row(one: Comparison) -> tuple[str, ...]:
+def comparison_row(one: Comparison) -> tuple[str, ...]:
+    """Return the cells of a comparison, below `COMPARISON`."""
     verdict: str = one.verdict
     if verdict == "rows only":
         verdict += f", {counted(one.differing, 'difference')}"
@@ -437,7 +438,7 @@ def _comparison_row(one: Comparison) -> tuple[str, ...]:
     )
 
 
-_CERTIFIED = (
+CERTIFIED = (
     "compared with exact arithmetic",
     "largest error",
     "inside the band",
@@ -447,7 +448,8 @@ _CERTIFIED = (
 )
 
 
-def _certified_row(one: Certified) -> tuple[str, ...]:
+def certified_row(one: Certified) -> tuple[str, ...]:
+    """Return the cells of a rounding bound, below `CERTIFIED`."""
     flips = str(one.flips)
     if one.largest_flip_margin is not None:
         flips += f" (margin up to {one.largest_flip_margin:.2g})"

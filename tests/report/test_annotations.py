@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.report.annotations import annotation_lines
+from fuzzytree.report.sarif import annotation_lines
 from tests.report.audits import every_state
 
 

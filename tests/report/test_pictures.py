@@ -24,7 +24,7 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.numerics.exact import exact_answer, exact_axis, exact_degree
-from fuzzytree.report.audit_pictures import exact_axes
+from fuzzytree.report.audit_findings import exact_axes
 from fuzzytree.report.audit_rows import data_of, histogram, passing
 from fuzzytree.report.drawing import (
     Axis,
