@@ -31,11 +31,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # for tests.*
 
-from fuzzytree.auditing.engine import ground as grounds
+from fuzzytree.auditing.engine import arrangement as grounds
+from fuzzytree.auditing.engine.arrangement import ground, rule_strengths
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.ground import ground, rule_strengths
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import State
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import Settings
 from fuzzytree.model.rulebase import (

@@ -6,10 +6,10 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from fuzzytree.auditing.engine.wording import (  # for other reports too
+from fuzzytree.auditing.engine.states import (  # for other reports too
     counted as counted,
 )
-from fuzzytree.auditing.engine.wording import number_text
+from fuzzytree.auditing.engine.states import number_text
 from fuzzytree.model.agreement import Agreement, Certified, Comparison
 from fuzzytree.model.rulebase import (
     LR,

@@ -4,7 +4,7 @@ The same operations on the same numbers prove decisions equal on any input. Othe
 rows of data, probes of both models, points drawn from the domain and points beside
 decision boundaries are tried, each answered exactly; and where these show no
 difference, boxes prove that there is none on the domain, or find it, or leave a bracket
-(`fuzzytree.auditing.engine.alike`).
+(`fuzzytree.auditing.engine.equivalence`).
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 
 from fuzzytree.auditing.diff.drafting import Evidence
 from fuzzytree.auditing.diff.matching import have_same_classes
-from fuzzytree.auditing.engine.alike import OF, alike, region
-from fuzzytree.auditing.engine.answers import Answered, answer_at, difference_at
+from fuzzytree.auditing.engine.arrangement import Answered, answer_at, difference_at
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.equivalence import OF, alike, region
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,
@@ -30,10 +30,10 @@ from fuzzytree.auditing.engine.states import (
     Span,
     State,
     Witness,
+    answer_text,
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import simplified
-from fuzzytree.auditing.engine.wording import answer_text
 from fuzzytree.auditing.findings.domains import inputs_of
 from fuzzytree.auditing.findings.records import Answer, Settings
 from fuzzytree.auditing.findings.subject import Rows

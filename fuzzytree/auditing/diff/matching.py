@@ -12,8 +12,8 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from fuzzytree.auditing.engine.curves import Piece, pieces
-from fuzzytree.auditing.engine.stretches import Key
+from fuzzytree.auditing.engine.contenders import Key
+from fuzzytree.auditing.engine.pieces import Piece, pieces
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Shape, shapes_of
 
 How = Literal["same", "class", "curves", "clauses"]

@@ -17,7 +17,7 @@ from fuzzytree.auditing.diff.matching import (
 )
 from fuzzytree.auditing.diff.structure_terms import set_drafts, variable_drafts
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.wording import answer_text, listed
+from fuzzytree.auditing.engine.states import answer_text, listed
 from fuzzytree.model.rulebase import Path, Rule, RuleBase, clause_text, sentence
 from fuzzytree.model.tree import FuzzyTree
 

@@ -8,11 +8,10 @@ from fractions import Fraction
 
 from fuzzytree.auditing.diff.drafting import Draft
 from fuzzytree.auditing.diff.matching import Curves
-from fuzzytree.auditing.engine.distances import distance
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.stretches import Key
-from fuzzytree.auditing.engine.variables import span
-from fuzzytree.auditing.engine.wording import listed
+from fuzzytree.auditing.engine.contenders import Key
+from fuzzytree.auditing.engine.domain import Domain, span
+from fuzzytree.auditing.engine.measures import distance
+from fuzzytree.auditing.engine.states import listed
 from fuzzytree.auditing.findings.records import Measure
 from fuzzytree.model.rulebase import Path, RuleBase, Term, Variable
 from fuzzytree.model.tree import FuzzyTree

@@ -1,5 +1,9 @@
 """Which rules may win on a box: bounds of their strengths, and which beat which.
 
+Two models have common axes: an input's name, or the summands of a combination. On a
+stretch of an axis a clause has bounds of its degree, from Bernstein coefficients in
+fractions, and the number of a form: clauses of one form are the same function there.
+
 A rule is *beaten* on a box if another one is preferred to it wherever it fires there:
 certainly stronger, or as strong and before it. At a point this is an order of the
 rules, so the winner is never beaten.
@@ -7,21 +11,368 @@ rules, so the winner is never beaten.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.engine.stretches import (
-    ALWAYS,
-    NEVER,
-    Axis,
-    Numbered,
-    Seen,
-    Stretch,
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, Piece, piece_at, pieces
+from fuzzytree.auditing.engine.polynomials import (
+    Polynomial,
+    composed,
+    difference,
+    roots,
 )
 from fuzzytree.model.interrupts import checkpoint
-from fuzzytree.model.rulebase import Conjunction, RuleBase
+from fuzzytree.model.rulebase import Conjunction, Part, RuleBase, Shape, shapes_of
+from fuzzytree.numerics.exact import outwards
+
+Key = str | tuple[Part, ...]
+"""What an axis is known by in any model: an input, or the summands of a combination."""
+
+Asked = tuple[bool, tuple[Shape, ...]]
+"""A clause: whether it is negated, and the curves that it takes the largest of, each
+once and in an order that depends on nothing but them."""
+
+Numbered = tuple[int, int]
+"""A clause in a rule: the number of its axis, and its number there."""
+
+Bounds = tuple[Fraction, Fraction]
+
+NEVER, ALWAYS = 0, 1
+"""The numbers of the forms that are 0 and 1 throughout."""
+
+_MOST_CROSSED = 400  # pairs of pieces, of which crossings are looked for
+
+
+class Stretch(NamedTuple):
+    """A part of an axis: `low < x <= high`, and `low` itself where it is closed."""
+
+    low: Fraction
+    high: Fraction
+    is_closed: bool = False
+
+
+class Seen(NamedTuple):
+    """A clause on a stretch.
+
+    Attributes:
+        form: Clauses of one form are equal at every point of the stretch.
+        low: At most the degree.
+        high: At least the degree.
+        is_below: Whether the degree is below `high` at every point.
+    """
+
+    form: int
+    low: float
+    high: float
+    is_below: bool = False
+
+
+class Axis:
+    """An axis with the clauses that two models ask of it.
+
+    Args:
+        key: What it is known by.
+        whole: All of it that is asked about.
+    """
+
+    def __init__(self, key: Key, whole: Stretch) -> None:
+        self.key = key
+        self.whole = whole
+        self.clauses: dict[Asked, int] = {}
+        self._forms: dict[object, int] = {NEVER: NEVER, ALWAYS: ALWAYS}
+        self._seen: dict[Stretch, tuple[Seen, ...]] = {}
+        self._above: dict[tuple[Stretch, int, int], bool] = {}
+
+    def number(self, asked: Asked) -> int:
+        """Return the number of a clause, which is new or known."""
+        return self.clauses.setdefault(asked, len(self.clauses))
+
+    def seen(self, stretch: Stretch) -> tuple[Seen, ...]:
+        """Return every clause on a stretch."""
+        found = self._seen.get(stretch)
+        if found is None:
+            found = tuple(self._see(asked, stretch) for asked in self.clauses)
+            self._seen[stretch] = found
+        return found
+
+    def _see(self, asked: Asked, stretch: Stretch) -> Seen:
+        checkpoint()
+        is_negated, shapes = asked
+        parts = [_clipped(shape, stretch) for shape in shapes]
+        bounds = [_bounds(part) for part in parts]
+        low = max(one for one, _ in bounds)
+        high = max(one for _, one in bounds)
+        best = bounds.index(max(bounds))
+        met = frozenset(
+            part
+            for k, (part, (_, most)) in enumerate(zip(parts, bounds, strict=True))
+            if k == best or most > low
+        )
+        is_below = not is_negated and all(
+            most < high or _falls_short(part, stretch)
+            for part, (_, most) in zip(parts, bounds, strict=True)
+        )
+        if is_negated:
+            low, high = 1 - high, 1 - low
+        form: object = (is_negated, met)
+        if low == high == 1:
+            form = ALWAYS
+        elif high == 0:
+            form = NEVER
+        elif low == high:
+            form = low
+        number = self._forms.setdefault(form, len(self._forms))
+        return Seen(number, outwards(low)[0], outwards(high)[1], is_below)
+
+    def is_above(self, one: int, other: int, stretch: Stretch) -> bool:
+        """Return whether a clause is at least as true as another on all of a stretch.
+
+        False where it is not known.
+        """
+        key = (stretch, one, other)
+        if key not in self._above:
+            asked = list(self.clauses)
+            self._above[key] = _clause_is_above(asked[one], asked[other], stretch)
+        return self._above[key]
+
+    @functools.cached_property
+    def edges(self) -> tuple[tuple[Fraction, ...], ...]:
+        """Where the curves of each clause begin or cease to be constant."""
+        return tuple(
+            self._inside(end for shape in curves for end in _edges(shape))
+            for _, curves in self.clauses
+        )
+
+    @functools.cached_property
+    def marks(self) -> tuple[Fraction, ...]:
+        """Where a curve changes its formula or crosses another, within the whole."""
+        shapes = list(dict.fromkeys(s for _, curves in self.clauses for s in curves))
+        found = {end for s in shapes for p in pieces(s) if (end := p.high) is not None}
+        for one, other in itertools.combinations(shapes, 2):
+            if len(pieces(one)) * len(pieces(other)) <= _MOST_CROSSED:
+                found.update(_crossings(one, other, self.whole))
+        return self._inside(found)
+
+    def _inside(self, marks: Iterable[Fraction]) -> tuple[Fraction, ...]:
+        low, high = self.whole.low, self.whole.high
+        return tuple(sorted({mark for mark in marks if low <= mark < high}))
+
+
+def _edges(shape: Shape) -> Iterator[Fraction]:
+    for one, other in itertools.pairwise(pieces(shape)):
+        is_edge = min(len(one.polynomial), len(other.polynomial)) == 1
+        if is_edge and one.high is not None:
+            yield one.high
+
+
+def laid(
+    models: Iterable[RuleBase], ends: Iterable[tuple[Key, Stretch]]
+) -> tuple[tuple[Axis, ...], list[list[tuple[Numbered, ...]]]]:
+    """Lay models on common axes.
+
+    Args:
+        models: The rule bases.
+        ends: For each axis that one of them asks, the stretch that is asked about.
+
+    Returns:
+        The axes; and for each model the clauses of each of its rules.
+    """
+    axes = [Axis(key, whole) for key, whole in ends]
+    places = {axis.key: place for place, axis in enumerate(axes)}
+    rules: list[list[tuple[Numbered, ...]]] = []
+    for model in models:
+        keys = {v.name: v.parts or v.name for v in model.variables}
+        shapes = shapes_of(model.variables)
+        rules.append([])
+        for rule in model.rules:
+            when: list[Numbered] = []
+            for clause in rule.when:
+                place = places[keys[clause.variable]]
+                curves = {shapes[clause.variable, t] for t in clause.terms}
+                asked = (clause.negated, tuple(sorted(curves, key=repr)))
+                when.append((place, axes[place].number(asked)))
+            rules[-1].append(tuple(when))
+    return tuple(axes), rules
+
+
+class Laid(NamedTuple):
+    """A piece of a curve, ended by a stretch: on `low <= x <= high`."""
+
+    low: Fraction
+    high: Fraction
+    polynomial: Polynomial
+    cap: Fraction
+
+
+def _clipped(shape: Shape, stretch: Stretch) -> tuple[Laid, ...]:
+    """Return a curve's pieces on a stretch, those of equal formulas joined."""
+    found: list[Laid] = []
+    if stretch.is_closed:
+        piece = piece_at(pieces(shape), stretch.low)
+        if stretch.low == stretch.high or piece.high == stretch.low:
+            degree = piece.degree(stretch.low)
+            found.append(Laid(stretch.low, stretch.low, (degree,), ONE))
+    for part in _parts(pieces(shape), stretch):
+        last = found[-1] if found else None
+        if last and last[2:] == part[2:]:
+            found[-1] = last._replace(high=part.high)
+        else:
+            found.append(part)
+    return tuple(found)
+
+
+def _parts(laid_out: Iterable[Piece], stretch: Stretch) -> Iterator[Laid]:
+    for piece in laid_out:
+        low = stretch.low if piece.low is None else max(piece.low, stretch.low)
+        high = stretch.high if piece.high is None else min(piece.high, stretch.high)
+        if low >= high:
+            continue
+        least, most = spread(piece.polynomial, low, high)
+        if most <= 0:
+            yield Laid(low, high, (ZERO,), ONE)
+        elif least >= piece.cap:
+            yield Laid(low, high, (piece.cap,), ONE)
+        else:
+            # A cap that is not reached makes no difference.
+            cap = ONE if most <= piece.cap else piece.cap
+            yield Laid(low, high, difference(piece.polynomial, (ZERO,)), cap)
+
+
+def _falls_short(parts: tuple[Laid, ...], stretch: Stretch) -> bool:
+    """Return whether a curve reaches its upper bound nowhere but at an open low end."""
+    _, high = _bounds(parts)
+    first, *others = parts
+    if (
+        stretch.is_closed
+        or first.low == first.high
+        or _bounds(tuple(others))[1] == high
+    ):
+        return False
+    start, *rest = _bends(first.polynomial, first.low, first.high)
+    return start <= first.cap and bool(rest) and max(rest) < start
+
+
+def _bounds(parts: tuple[Laid, ...]) -> Bounds:
+    low, high = ONE, ZERO
+    for part in parts:
+        least, most = spread(part.polynomial, part.low, part.high)
+        low = min(low, max(least, ZERO), part.cap)
+        high = max(high, min(max(most, ZERO), part.cap))
+    return low, high
+
+
+def spread(polynomial: Polynomial, low: Fraction, high: Fraction) -> Bounds:
+    """Return two numbers between which a polynomial stays on a closed interval.
+
+    They are the least and the largest Bernstein coefficient: exact for lines, and
+    wherever the largest and least value lie at the ends.
+
+    Example:
+        >>> [str(one) for one in spread((ZERO, ZERO, ONE), -ONE, ONE)]
+        ['-1', '1']
+    """
+    bends = _bends(polynomial, low, high)
+    return min(bends), max(bends)
+
+
+@functools.lru_cache(maxsize=1 << 15)
+def _bends(
+    polynomial: Polynomial, low: Fraction, high: Fraction
+) -> tuple[Fraction, ...]:
+    """Return the Bernstein coefficients; the first is the value at the low end."""
+    if len(polynomial) == 1:
+        return polynomial
+    if len(polynomial) == 2:
+        constant, slope = polynomial
+        return constant + slope * low, constant + slope * high
+    unit = composed(polynomial, low, high - low)
+    last = len(unit) - 1
+    return tuple(
+        sum(
+            (
+                Fraction(math.comb(j, i), math.comb(last, i)) * unit[i]
+                for i in range(j + 1)
+            ),
+            start=ZERO,
+        )
+        for j in range(last + 1)
+    )
+
+
+def _clause_is_above(one: Asked, other: Asked, stretch: Stretch) -> bool:
+    if one[0] != other[0]:
+        return False
+    uppers, lowers = (other[1], one[1]) if one[0] else (one[1], other[1])
+    return all(
+        any(_curve_is_above(upper, lower, stretch) for upper in uppers)
+        for lower in lowers
+    )
+
+
+def _curve_is_above(upper: Shape, lower: Shape, stretch: Stretch) -> bool:
+    if stretch.is_closed and _degree(upper, stretch.low) < _degree(lower, stretch.low):
+        return False
+    return all(
+        _formula_is_above(above, below, low, high)
+        for above, below, low, high in _overlaps(upper, lower, stretch)
+    )
+
+
+def _formula_is_above(
+    above: Piece, below: Piece, low: Fraction, high: Fraction
+) -> bool:
+    _, most = spread(below.polynomial, low, high)
+    if most <= 0:
+        return True
+    least, _ = spread(above.polynomial, low, high)
+    if min(least, above.cap) >= min(most, below.cap):
+        return True
+    if above.cap < below.cap and most > above.cap:
+        return False
+    gap, _ = spread(difference(above.polynomial, below.polynomial), low, high)
+    return gap >= 0
+
+
+def _degree(shape: Shape, at: Fraction) -> Fraction:
+    return piece_at(pieces(shape), at).degree(at)
+
+
+def _overlaps(
+    one: Shape, other: Shape, stretch: Stretch
+) -> Iterator[tuple[Piece, Piece, Fraction, Fraction]]:
+    """Yield the pieces of two curves that meet on a stretch, with where they do."""
+    others = pieces(other)
+    for piece in pieces(one):
+        low = stretch.low if piece.low is None else max(piece.low, stretch.low)
+        high = stretch.high if piece.high is None else min(piece.high, stretch.high)
+        if low >= high:
+            continue
+        for match in others:
+            start = low if match.low is None else max(match.low, low)
+            end = high if match.high is None else min(match.high, high)
+            if start < end:
+                yield piece, match, start, end
+
+
+def _crossings(one: Shape, other: Shape, stretch: Stretch) -> Iterator[Fraction]:
+    """Yield a point at, or beside, each crossing of two curves within a stretch."""
+    for first, second, low, high in _overlaps(one, other, stretch):
+        gap = difference(first.polynomial, second.polynomial)
+        if len(gap) > 1:
+            for root in roots(gap, low, high):
+                yield root.low if root.low == root.high else _near(root.low)
+
+
+def _near(value: Fraction) -> Fraction:
+    return Fraction(float(value))
+
+
+# --- rules on a box
+
 
 Box = tuple[Stretch, ...]
 """A stretch of each axis."""
@@ -80,7 +431,7 @@ def left_on(
     Args:
         rules: The rules.
         asked: The clauses of each of them; see
-            `fuzzytree.auditing.engine.stretches.laid`.
+            `fuzzytree.auditing.engine.contenders.laid`.
         axes: The axes.
         box: A stretch of each.
         among: The places of the rules that may win on a box around this one, in order;

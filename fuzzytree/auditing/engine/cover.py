@@ -8,15 +8,20 @@ from fractions import Fraction
 
 import numpy as np
 
-from fuzzytree.auditing.engine.boxes import cell_of, zone_of
-from fuzzytree.auditing.engine.choices import Part, at_most, choices, union
+from fuzzytree.auditing.engine.arrangement import Ground, Laid, strengths_at
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.contests import Contest
-from fuzzytree.auditing.engine.covering import cover, maximal
-from fuzzytree.auditing.engine.ground import Ground, Laid, strengths_at
-from fuzzytree.auditing.engine.parts import Stretch
-from fuzzytree.auditing.engine.questions import Question, searched
-from fuzzytree.auditing.engine.seeking import leader
+from fuzzytree.auditing.engine.domain import Point, variable_value
+from fuzzytree.auditing.engine.duels import Question, searched
+from fuzzytree.auditing.engine.options import (
+    Contest,
+    Part,
+    at_most,
+    choices,
+    cover,
+    maximal,
+    union,
+)
+from fuzzytree.auditing.engine.probes import leader
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -26,8 +31,14 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.auditing.engine.variables import Point, variable_value
-from fuzzytree.auditing.engine.witnesses import coupled, is_within, point_with
+from fuzzytree.auditing.engine.witnesses import (
+    Stretch,
+    cell_of,
+    coupled,
+    is_within,
+    point_with,
+    zone_of,
+)
 from fuzzytree.numerics.exact import outwards
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs
@@ -48,7 +59,7 @@ def below(given: Ground, epsilon: Fraction, clock: Clock | None = None) -> State
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.auditing.engine.domain import Domain, Side
-        >>> from fuzzytree.auditing.engine.ground import ground
+        >>> from fuzzytree.auditing.engine.arrangement import ground
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1))
         >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))

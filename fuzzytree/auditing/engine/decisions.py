@@ -1,12 +1,11 @@
-"""Is a box decided alike everywhere?
+"""Does one class decide everywhere on a box?
 
 A class decides where the first of the strongest rules is one of its rules. So another
-decision than a class's is made where some rule of another class is stronger than all of
-its rules (`fuzzytree.auditing.engine.wins`); where such a rule is as strong as some
-that stand behind it, and stronger than the others (`fuzzytree.auditing.engine.ties`);
-or where no rule fires and that is answered otherwise
-(`fuzzytree.auditing.engine.cover`). Rules that do not come up to the class anywhere on
-the box, by bounds of doubles, are not asked about.
+decision is made where some rule of another class is stronger than all of its rules
+(`fuzzytree.auditing.engine.duels`); where such a rule is as strong as some later ones,
+and stronger than the others (`fuzzytree.auditing.engine.ties`); or where no rule fires
+and the prediction for that differs (`fuzzytree.auditing.engine.cover`). Bounds of all
+rules on many boxes at once, in doubles rounded outwards, exclude most rules first.
 """
 
 from __future__ import annotations
@@ -18,13 +17,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.answers import answer_at
-from fuzzytree.auditing.engine.around import Around
-from fuzzytree.auditing.engine.branching import simplified
+from fuzzytree.auditing.engine.arrangement import Ground, answer_at, ground
+from fuzzytree.auditing.engine.bounding import simplified
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import uncovered
-from fuzzytree.auditing.engine.ground import Ground, ground
-from fuzzytree.auditing.engine.seeking import drawn_in, ends_of, near_strengths
+from fuzzytree.auditing.engine.domain import Domain, Point
+from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.probes import drawn_in, ends_of, near_strengths
+from fuzzytree.auditing.engine.ranges import clause_ranges
 from fuzzytree.auditing.engine.states import (
     Carrier,
     Claim,
@@ -35,12 +35,275 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.ties import decides_by_order
-from fuzzytree.auditing.engine.variables import Point
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import Clause, RuleBase, Variable, shapes_of
+from fuzzytree.numerics.enclosures import Enclosure, U, axis_value, strength_enclosure
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from fuzzytree.model.contracts import FloatArray
+
+    BoolArray = npt.NDArray[np.bool_]
+
+
+_STEPS: Final = 8  # towards the place where another class gets ahead
+_BESIDE: Final = 1e-6  # of a range, to see which way degrees change
+_BEYOND: Final = 1e-5  # of a radius, so that the other class is ahead for sure
+_RANDOM_POINTS: Final = 512  # points around a centre where no step met another class
+_OCTAVES: Final = 9.0  # over which their distances are spread
+_NOTHING: Final = 2.0**-1000
+_CHUNK: Final = 1 << 15  # points that are evaluated at once
+
+
+class Around:
+    """Rules, on boxes of a domain.
+
+    Args:
+        rules: The rules.
+        domain: A side for each input.
+    """
+
+    def __init__(self, rules: RuleBase, domain: Domain) -> None:
+        self.rules, self.inputs = rules, rules.inputs
+        self.low, self.high = ends_of(rules, domain)
+        self.width = self.high - self.low
+        self.variables = {variable.name: variable for variable in rules.variables}
+        self.shapes = shapes_of(rules.variables)
+        self.is_product = rules.semantics.conjunction == "product"
+
+    def ball(self, centres: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+        """Return the ends of boxes that hold all of the domain within a radius.
+
+        Args:
+            centres: Shape (inputs, points).
+            radius: In widths of the inputs' ranges.
+        """
+        reach = radius * self.width
+        reach = reach * (1.0 + 4 * U) + 4 * U * np.abs(centres) + 2.0**-1000
+        low = np.maximum(np.nextafter(centres - reach, -np.inf), self.low)
+        high = np.minimum(np.nextafter(centres + reach, np.inf), self.high)
+        return low, high
+
+    def reached(self, low: FloatArray, high: FloatArray) -> Enclosure:
+        """Return what each rule's strength lies between on boxes.
+
+        Args:
+            low: Shape (inputs, boxes): the lower ends.
+            high: The upper ends, the same.
+
+        Returns:
+            Both of shape (rules, boxes).
+
+        Example:
+            >>> from fuzzytree.semantics.lowering import rules_from_tree
+            >>> from fuzzytree.auditing.engine.domain import Side
+            >>> from fuzzytree.testing import random_tree
+            >>> rules = rules_from_tree(random_tree(1))
+            >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
+            >>> origin = np.zeros((len(rules.inputs), 1))
+            >>> found = Around(rules, box).reached(origin, origin)
+            >>> found.low.max().tolist(), found.high.max().tolist()
+            (1.0, 1.0)
+        """
+        rules, count = self.rules.rules, low.shape[1]
+        edges: dict[str, FloatArray] = {}
+        known: dict[Clause, Enclosure] = {}
+        least, most = np.ones((len(rules), count)), np.ones((len(rules), count))
+        for number, rule in enumerate(rules):
+            checkpoint()
+            whole = Enclosure(least[number], most[number])
+            for clause in rule.when:
+                if clause not in known:
+                    name = clause.variable
+                    if name not in edges:
+                        edges[name] = self._edges(self.variables[name], low, high)
+                    cells = clause_ranges(clause, self.shapes, edges[name])[1]
+                    known[clause] = Enclosure(cells.low[:, 0], cells.high[:, 0])
+                whole = strength_enclosure(
+                    whole, known[clause], is_product=self.is_product
+                )
+            least[number], most[number] = whole
+        return Enclosure(least, most)
+
+    def _edges(
+        self, variable: Variable, low: FloatArray, high: FloatArray
+    ) -> FloatArray:
+        """Return a variable's ends on boxes, shape (boxes, 2); a cell is open below."""
+        if variable.parts:
+            first, last = self._combined(variable, low, high)
+        else:
+            place = self.inputs.index(variable.name)
+            first, last = low[place], high[place]
+        most = np.finfo(np.float64).max
+        first = np.maximum(np.nextafter(first, -np.inf), -most)
+        return np.stack([first, np.minimum(last, most)], axis=1)
+
+    def _combined(
+        self, variable: Variable, low: FloatArray, high: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of a combination: at the ends that make it least and largest.
+
+        The ends are doubles, so that its value there is known as well as at a row.
+        """
+        weight = dict.fromkeys(self.inputs, 0.0)
+        for part in variable.parts:
+            weight[part.input] += part.weight
+        names = self.inputs
+        rising = np.array([[weight[name] > 0.0] for name in names])
+        down = axis_value(
+            variable, dict(zip(names, np.where(rising, low, high), strict=True))
+        )
+        up = axis_value(
+            variable, dict(zip(names, np.where(rising, high, low), strict=True))
+        )
+        assert down.slack is not None  # of a combination
+        assert up.slack is not None
+        most = np.finfo(np.float64).max
+        with np.errstate(over="ignore", invalid="ignore"):
+            first = np.nextafter(down.x - down.slack, -np.inf)
+            last = np.nextafter(up.x + up.slack, np.inf)
+        first = np.where(np.isfinite(first), first, -most)
+        return first, np.where(np.isfinite(last), last, most)
+
+    def is_clear(
+        self, low: FloatArray, high: FloatArray, labels: Sequence[str | None]
+    ) -> BoolArray:
+        """Return which boxes are for certain decided as their class everywhere.
+
+        Args:
+            low: Shape (inputs, boxes): the lower ends.
+            high: The upper ends, the same.
+            labels: The class of each box; None is no class.
+        """
+        reached = self.reached(low, high)
+        found = np.zeros(len(labels), dtype=bool)
+        for label in dict.fromkeys(labels):
+            at = np.array([one == label for one in labels])
+            own = self._own(label)
+            others = reached.high[~own][:, at].max(axis=0, initial=0.0)
+            least = reached.low[own][:, at].max(axis=0, initial=0.0)
+            clear = least > others
+            if self.rules.semantics.uncovered == label:
+                clear |= others == 0.0
+            found[at] = clear
+        return found
+
+    def _own(self, label: str | None) -> BoolArray:
+        return np.array([rule.then == label for rule in self.rules.rules])
+
+    # --- towards another class
+
+    def margins(self, points: FloatArray, label: str | None) -> FloatArray:
+        """Return about how far a class is ahead of others at points; below 0 it is not.
+
+        Where no rule fires, no class is ahead of no class.
+        """
+        own = self._own(label)
+        parts: list[FloatArray] = [np.zeros(0)]
+        for start in range(0, points.shape[1], _CHUNK):
+            found = near_strengths(self.rules, points[:, start : start + _CHUNK])
+            mine = found[own].max(axis=0, initial=0.0)
+            ahead = mine - found[~own].max(axis=0, initial=0.0)
+            if self.rules.semantics.uncovered != label:
+                ahead = np.where(mine == 0.0, ahead - _NOTHING, ahead)
+            parts.append(ahead)
+        return np.concatenate(parts)
+
+    def approached(
+        self, centres: FloatArray, labels: Sequence[str | None]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return points near some others where another class seems to be ahead.
+
+        Each step goes where the margin would be 0 if it went on as it does: all inputs
+        by the same share of their ranges, each to the side on which the margin falls.
+        Where that leads nowhere, points are drawn. Nothing is claimed.
+
+        Args:
+            centres: Shape (inputs, points).
+            labels: The class of each point.
+
+        Returns:
+            Points, and how far they are; infinity where none was met.
+        """
+        best, away = centres.copy(), np.full(centres.shape[1], np.inf)
+        for label in dict.fromkeys(labels):
+            at = np.flatnonzero([one == label for one in labels])
+            best[:, at], away[at] = self._approached(centres[:, at], label)
+        return best, away
+
+    def _approached(
+        self, centres: FloatArray, label: str | None
+    ) -> tuple[FloatArray, FloatArray]:
+        size, count = centres.shape
+        points, best = centres.copy(), centres.copy()
+        away = np.full(count, np.inf)
+        beside = np.where(self.width > 0.0, self.width * _BESIDE, 0.0)
+        for _ in range(_STEPS):
+            step = np.where(points + beside <= self.high, beside, -beside)
+            moved = np.repeat(points[:, np.newaxis], size + 1, axis=1)
+            moved[np.arange(size), np.arange(size)] += step
+            margins = self.margins(moved.reshape(size, -1), label)
+            margins = margins.reshape(size + 1, count)
+            here = margins[size]
+            radius = self._away(points, centres)
+            is_met = (here < 0.0) & (radius < away)
+            best[:, is_met], away[is_met] = points[:, is_met], radius[is_met]
+            with np.errstate(all="ignore"):
+                slope = np.where(step != 0.0, (margins[:size] - here) / step, 0.0)
+                goal = here + (slope * (centres - points)).sum(axis=0)
+                reach = goal / (np.abs(slope) * self.width).sum(axis=0)
+            reach = np.nan_to_num(reach, nan=0.0, posinf=1.0, neginf=0.0)
+            reach = np.clip(reach * (1.0 + _BEYOND) + 2.0**-40, 0.0, 1.0)
+            points = centres - np.sign(slope) * reach * self.width
+            points = np.clip(points, self.low, self.high)
+        for place in np.flatnonzero(np.isinf(away)).tolist():
+            best[:, place], away[place] = self._drawn(centres[:, [place]], label)
+        return best, away
+
+    def _drawn(self, centre: FloatArray, label: str | None) -> tuple[FloatArray, float]:
+        """Return the nearest of some points that are drawn, at all distances."""
+        chance = np.random.default_rng(0)
+        shape = len(centre), _RANDOM_POINTS
+        reach = 2.0 ** (-_OCTAVES * chance.random(_RANDOM_POINTS)) * self.width
+        points = centre + reach * chance.uniform(-1.0, 1.0, shape)
+        points = np.where(
+            chance.random(shape) < chance.random(_RANDOM_POINTS), centre, points
+        )
+        points = np.clip(points, self.low, self.high)
+        away = self._away(points, centre)
+        away[self.margins(points, label) >= 0.0] = np.inf
+        nearest = int(away.argmin())
+        return points[:, nearest], float(away[nearest])
+
+    def pairs(self, points: FloatArray, others: FloatArray) -> list[tuple[int, float]]:
+        """Return for each point the nearest of some others, and how far it is."""
+        if not others.shape[1]:
+            return [(0, np.inf)] * points.shape[1]
+        found: list[tuple[int, float]] = []
+        for column in points.T:
+            away = self._away(others, column[:, np.newaxis])
+            place = int(away.argmin())
+            found.append((place, float(away[place])))
+        return found
+
+    def _away(self, points: FloatArray, centres: FloatArray) -> FloatArray:
+        width = np.where(self.width > 0.0, self.width, np.inf)
+        found: FloatArray = np.max(np.abs(points - centres) / width, axis=0)
+        return found
+
+
+def columns(
+    points: Sequence[Mapping[str, Fraction]], inputs: Sequence[str]
+) -> FloatArray:
+    """Return points as an array of shape (inputs, points)."""
+    made = [[float(point[name]) for point in points] for name in inputs]
+    return np.array(made, dtype=np.float64).reshape(len(inputs), len(points))
+
+
+# --- decisions
+
 
 _DRAWN: Final = 256  # points in which another decision is looked for first
 
@@ -51,7 +314,7 @@ def decision_at(given: Ground, point: Mapping[str, Fraction]) -> str | None:
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.auditing.engine.domain import Domain, Side
-        >>> from fuzzytree.auditing.engine.ground import ground
+        >>> from fuzzytree.auditing.engine.arrangement import ground
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(3))
         >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))

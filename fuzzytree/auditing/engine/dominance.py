@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import msgspec
 import numpy as np
 
+from fuzzytree.auditing.engine.arrangement import Ground, Laid
 from fuzzytree.auditing.engine.factors import (
     Factored,
     is_single,
@@ -28,7 +29,6 @@ from fuzzytree.auditing.engine.factors import (
     least_ratios,
     meets,
 )
-from fuzzytree.auditing.engine.ground import Ground, Laid
 from fuzzytree.model.interrupts import checkpoint
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ class Compared(msgspec.Struct, frozen=True, eq=False, dict=True):
         Example:
             >>> from fuzzytree.semantics.lowering import rules_from_tree
             >>> from fuzzytree.auditing.engine.domain import Domain, Side
-            >>> from fuzzytree.auditing.engine.ground import ground
+            >>> from fuzzytree.auditing.engine.arrangement import ground
             >>> from fuzzytree.testing import random_tree
             >>> rules = rules_from_tree(random_tree(1))
             >>> box = Domain(tuple(Side(name, -1.0, 1.0) for name in rules.inputs))

@@ -15,22 +15,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.curves import ONE, ZERO
-from fuzzytree.auditing.engine.elements import Element
-from fuzzytree.auditing.engine.ground import Ground, Laid
-from fuzzytree.auditing.engine.measures import (
-    Bounds,
-    local,
-    multiplied,
-    sizes,
-    values_near,
-)
+from fuzzytree.auditing.engine.arrangement import Ground, Laid
+from fuzzytree.auditing.engine.measures import Bounds, local, sizes, values_near
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, Element
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     derivative,
     difference,
     divided,
     monic,
+    multiplied,
     roots,
     value_at,
 )
@@ -38,7 +32,7 @@ from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Clause, Shape, shapes_of
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.ground import BoolArray
+    from fuzzytree.auditing.engine.arrangement import BoolArray
     from fuzzytree.model.contracts import FloatArray
 
 UNKNOWN: Final = Fraction(1 << 4096)

@@ -15,9 +15,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from fuzzytree.auditing.engine.curves import ONE, ZERO, piece_at, pieces
-from fuzzytree.auditing.engine.elements import Element, Place
-from fuzzytree.auditing.engine.measures import multiplied
+from fuzzytree.auditing.engine.pieces import ONE, ZERO, Element, Place, piece_at, pieces
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     Root,
@@ -26,6 +24,7 @@ from fuzzytree.auditing.engine.polynomials import (
     division,
     integers,
     magnitude,
+    multiplied,
     refined,
     roots,
     squarefree,

@@ -1,19 +1,28 @@
-"""Heights, areas and distances of curves on an axis, between exact bounds.
+"""Heights, areas, overlaps, dips and distances of curves, between exact bounds.
 
 An axis is cut (`fuzzytree.auditing.engine.axes`) so that within a cell every curve is
-one polynomial. What is asked of a curve is then asked of polynomials, in fractions.
-Only where a cell ends at an irrational place is the answer a narrow interval.
+one polynomial, and each question becomes one about polynomials, in fractions. Only
+where a cell ends at an irrational place is the result a narrow interval.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from fuzzytree.auditing.engine.axes import Cells, cut
-from fuzzytree.auditing.engine.curves import ONE, ZERO, piece_at, pieces
-from fuzzytree.auditing.engine.elements import Element, places
+from fuzzytree.auditing.engine.pieces import (
+    ONE,
+    ZERO,
+    Element,
+    piece_at,
+    pieces,
+    places,
+)
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     composed,
@@ -24,11 +33,12 @@ from fuzzytree.auditing.engine.polynomials import (
     roots,
     value_at,
 )
+from fuzzytree.auditing.engine.ranges import shape_ranges
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Shape
 
 if TYPE_CHECKING:
-    pass
+    from fuzzytree.model.contracts import FloatArray
 
 
 class Bounds(NamedTuple):
@@ -117,20 +127,6 @@ def local(element: Element, at: Fraction) -> Polynomial:
     clipped = degree in (ZERO, piece.cap)
     polynomial = (degree,) if clipped else piece.polynomial
     return difference((ONE,), polynomial) if element.is_complement else polynomial
-
-
-def multiplied(one: Polynomial, other: Polynomial) -> Polynomial:
-    """Return the product of two polynomials.
-
-    Example:
-        >>> multiplied((Fraction(1), Fraction(1)), (Fraction(0), Fraction(2)))
-        (Fraction(0, 1), Fraction(2, 1), Fraction(2, 1))
-    """
-    found = [ZERO] * (len(one) + len(other) - 1)
-    for i, a in enumerate(one):
-        for j, b in enumerate(other):
-            found[i + j] += a * b
-    return tuple(found)
 
 
 def values_near(polynomial: Polynomial, low: Fraction, high: Fraction) -> Bounds:
@@ -245,3 +241,293 @@ def seen(of: Line, one: int, zone: int, *, is_after: bool = False) -> Bounds:
         return Bounds(value, value)
     values = (of.cells.right if is_after else of.cells.left)[:, one, zone]
     return Bounds(Fraction(values[0]), Fraction(values[1]))
+
+
+# --- overlap of two curves
+
+
+_CELLS = 256  # on which degrees are enclosed before areas are asked exactly
+
+
+class Overlap(NamedTuple):
+    """How much two curves share on a line.
+
+    Attributes:
+        shared: The area under both, the integral of their minimum.
+        joined: The area under either, the integral of their maximum.
+        possibility: The supremum of their minimum.
+        at: A point near where it is reached.
+        crossings: Points at which they cross, each with the degree there.
+        is_within: Whether the first is nowhere above the second.
+        is_around: Whether the first is nowhere below the second.
+    """
+
+    shared: Bounds
+    joined: Bounds
+    possibility: Bounds
+    at: Fraction
+    crossings: tuple[tuple[Fraction, Bounds], ...]
+    is_within: bool
+    is_around: bool
+
+    @property
+    def jaccard(self) -> Bounds | None:
+        """The shared area over the joined area; None if that may be 0."""
+        if self.joined.low <= 0:
+            return None
+        high = self.shared.high / self.joined.low
+        return Bounds(self.shared.low / self.joined.high, min(high, ONE))
+
+
+def overlap(of: Line) -> Overlap:
+    """Return how much the two curves of a line share, exactly but for slivers.
+
+    Raises:
+        ValueError: If the line has not two curves.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Points
+        >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
+        >>> from fuzzytree.auditing.engine.measures import line
+        >>> found = overlap(line([down, up], Fraction(0), Fraction(1)))
+        >>> found.jaccard.exact, found.possibility.exact
+        ('1/3', '1/2')
+    """
+    if len(of.elements) != 2:
+        raise ValueError(f"two curves overlap, not {len(of.elements)}")
+    rank = of.cells.rank
+    lower = [int(a > b) for a, b in rank]
+    shared = area(of, lambda cell, at: local(of.elements[lower[cell]], at))
+    joined = area(of, lambda cell, at: local(of.elements[1 - lower[cell]], at))
+    met = [
+        (
+            Bounds(min(a.low, b.low), min(a.high, b.high)),
+            at,
+        )
+        for (a, at), (b, _) in _both(of)
+    ]
+    low = max(bounds.low for bounds, _ in met)
+    high = max(bounds.high for bounds, _ in met)
+    start = of.cells.start_rank
+    orders = [] if of.is_open and len(rank) else [int(start[0]) - int(start[1])]
+    orders += [int(a) - int(b) for a, b in rank]
+    return Overlap(
+        shared,
+        joined,
+        Bounds(low, high),
+        next(at for bounds, at in met if bounds.low == low),
+        tuple(_crossings(of)),
+        all(order <= 0 for order in orders),
+        all(order >= 0 for order in orders),
+    )
+
+
+def most_shared(shapes: Sequence[Shape], low: float, high: float) -> FloatArray:
+    """Return bounds from above of the shared by the joined area of each two curves.
+
+    Degrees are enclosed on each of some cells, so nothing is left to chance; only what
+    comes near to an answer is worth the exact areas.
+
+    Returns:
+        Shape (shapes, shapes); 1 where nothing is known.
+    """
+    width = (high - low) / _CELLS
+    if not width > 1e-6 * max(abs(low), abs(high)):
+        return np.ones((len(shapes), len(shapes)))
+    edges = np.linspace(low, high, _CELLS + 1, dtype=np.float64)
+    cells = [shape_ranges(shape, edges)[1] for shape in shapes]
+    least = np.array([one.low for one in cells])
+    most = np.array([one.high for one in cells])
+    found = np.ones((len(shapes), len(shapes)))
+    for place in range(len(shapes)):
+        shared = np.minimum(most, most[place]).sum(axis=1)
+        joined = np.maximum(least, least[place]).sum(axis=1)
+        # Edges and sums are off by roundings, which are far below this.
+        found[place] = (shared + 1e-6) / np.maximum(joined - 1e-6, 1e-12)
+    return np.minimum(found, 1.0)
+
+
+def _both(
+    of: Line,
+) -> Iterator[tuple[tuple[Bounds, Fraction], tuple[Bounds, Fraction]]]:
+    """Yield the values of two curves at the same places, seen from both sides."""
+    zones = of.cells.zones
+    for number, (a, b) in enumerate(zones):
+        at = (a + b) / 2
+        for is_after, is_asked in (
+            (False, number > 0 or not of.is_open or len(zones) == 1),
+            (True, number + 1 < len(zones)),
+        ):
+            if is_asked:
+                one, other = (
+                    seen(of, which, number, is_after=is_after) for which in (0, 1)
+                )
+                yield (one, at), (other, at)
+
+
+def _crossings(of: Line) -> Iterator[tuple[Fraction, Bounds]]:
+    before = 0
+    since = 0
+    for cell, (a, b) in enumerate(of.cells.rank):
+        order = int(a > b) - int(a < b)
+        if order and before and order != before:
+            low, high = of.cells.zones[since]
+            yield (low + high) / 2, seen(of, 0, since)
+        if order:
+            before, since = order, cell + 1
+
+
+# --- dips and clipping
+
+
+def dips(values: Sequence[Seen], least: Fraction) -> Iterator[tuple[Seen, Seen, Seen]]:
+    """Yield where a walk falls and rises again by at least some amount.
+
+    Args:
+        values: A walk.
+        least: The least depth that counts, above 0.
+
+    Yields:
+        The peak before, the valley, and the peak behind it.
+
+    Example:
+        >>> from fuzzytree.auditing.engine.measures import Bounds
+        >>> walked = [(Bounds(Fraction(v), Fraction(v)), Fraction(k))
+        ...           for k, v in enumerate((0, 3, 1, 2, 0))]
+        >>> [[int(at) for _, at in dip] for dip in dips(walked, Fraction(1, 2))]
+        [[1, 2, 3]]
+    """
+    before: Seen | None = None
+    peak = valley = bottom = values[0]
+    is_rising = True
+    for value in values:
+        height = value[0].low
+        if is_rising:
+            if height > peak[0].low:
+                peak = value
+            elif peak[0].low - height >= least:
+                if before is not None:
+                    yield before, bottom, peak
+                before, valley, is_rising = peak, value, False
+        elif height < valley[0].low:
+            valley = value
+        elif height - valley[0].low >= least:
+            bottom, peak, is_rising = valley, value, True
+    if is_rising and before is not None:
+        yield before, bottom, peak
+
+
+def outside(shape: Shape, low: Fraction, high: Fraction) -> Iterator[Excess]:
+    """Yield where a shape's polynomials leave [0, 1] before they are clipped.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Band, Flank
+        >>> bulge = Band(0.0, 1.0, right=Flank(1.0, 2.0, (4.0, -3.0)))
+        >>> [(round(float(e.depth), 3), e.is_above)
+        ...  for e in outside(bulge, Fraction(0), Fraction(3))]
+        [(0.333, True)]
+    """
+    for piece in pieces(shape):
+        if piece.low is None or piece.high is None or len(piece.polynomial) < 2:
+            continue
+        a, b = max(piece.low, low), min(piece.high, high)
+        if a >= b or _is_inside(piece.polynomial, a, b):
+            continue
+        for goal, sign in ((ONE, 1), (ZERO, -1)):
+            over = difference(piece.polynomial, (goal,))
+            ends = [a, *((r.low + r.high) / 2 for r in roots(over, a, b)), b]
+            for start, end in itertools.pairwise(ends):
+                if sign * value_at(over, (start + end) / 2) <= 0:
+                    continue
+                found = [*extremes(over, start, end)]
+                at, depth = max(
+                    ((at, sign * (v.low + v.high) / 2) for at, v in found),
+                    key=lambda one: one[1],
+                )
+                yield Excess(start, end, at, depth, sign > 0)
+
+
+def _is_inside(polynomial: Polynomial, low: Fraction, high: Fraction) -> bool:
+    """Return whether a polynomial is a line within [0, 1]."""
+    ends = value_at(polynomial, low), value_at(polynomial, high)
+    return len(polynomial) == 2 and all(ZERO <= end <= ONE for end in ends)
+
+
+class Excess(NamedTuple):
+    """A stretch on which a polynomial leaves [0, 1].
+
+    Attributes:
+        low: From where.
+        high: To where.
+        at: Where it is farthest outside.
+        depth: How far.
+        is_above: Whether it is above 1, otherwise below 0.
+    """
+
+    low: Fraction
+    high: Fraction
+    at: Fraction
+    depth: Fraction
+    is_above: bool
+
+
+# --- distance of two curves
+
+
+class Distance(NamedTuple):
+    """The largest difference of two curves on an interval.
+
+    Attributes:
+        low: It is at least this; reached, or approached from above, at `at`.
+        high: It is at most this.
+        at: Where.
+    """
+
+    low: Fraction
+    high: Fraction
+    at: Fraction
+
+
+def distance(one: Shape, other: Shape, low: Fraction, high: Fraction) -> Distance:
+    """Return how far two curves are apart at most on a closed interval.
+
+    The interval is cut where a curve changes; in each cell both are polynomials, whose
+    difference is largest at an end or where it turns.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Points
+        >>> steep = Points((0.0, 1.0), (0.0, 1.0))
+        >>> slow = Points((0.0, 2.0), (0.0, 1.0))
+        >>> found = distance(steep, slow, Fraction(0), Fraction(4))
+        >>> str(found.low), str(found.high), str(found.at)
+        ('1/2', '1/2', '1')
+    """
+    found = [*_gaps(one, other, low, high)]
+    least, at = max(((gap.low, at) for at, gap in found), key=lambda best: best[0])
+    return Distance(least, max(gap.high for _, gap in found), at)
+
+
+def _gaps(
+    one: Shape, other: Shape, low: Fraction, high: Fraction
+) -> Iterator[tuple[Fraction, Bounds]]:
+    """Yield places with how far two curves are apart there; the largest is among them.
+
+    What is reached only from above is told of the place that it is approached at.
+    """
+    laid = apart([one, other], low, high)
+    first, second = laid.elements
+    start = abs(first.degree(low) - second.degree(low))
+    yield low, Bounds(start, start)
+    for a, b in laid.cells.between:
+        middle = (a + b) / 2
+        gap = difference(local(first, middle), local(second, middle))
+        yield from sizes(gap, a, b)
+    # Where a curve changes at an irrational place, that is known as a narrow interval.
+    lows, highs = laid.cells.left
+    for number, (a, b) in enumerate(laid.cells.zones):
+        if a < b:
+            sides = (0, 1), (1, 0)
+            most = max(
+                Fraction(highs[p, number]) - Fraction(lows[q, number]) for p, q in sides
+            )
+            yield (a + b) / 2, Bounds(ZERO, max(most, ZERO))

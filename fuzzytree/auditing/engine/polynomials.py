@@ -95,6 +95,20 @@ def difference(one: Polynomial, other: Polynomial) -> Polynomial:
     return tuple(found)
 
 
+def multiplied(one: Polynomial, other: Polynomial) -> Polynomial:
+    """Return the product of two polynomials.
+
+    Example:
+        >>> multiplied((Fraction(1), Fraction(1)), (Fraction(0), Fraction(2)))
+        (Fraction(0, 1), Fraction(2, 1), Fraction(2, 1))
+    """
+    found = [Fraction(0)] * (len(one) + len(other) - 1)
+    for i, a in enumerate(one):
+        for j, b in enumerate(other):
+            found[i + j] += a * b
+    return tuple(found)
+
+
 def divided(polynomial: Polynomial, at: Fraction) -> Polynomial:
     """Return p / (x - at), where p is 0 at `at` (Horner's scheme).
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.curves import Piece, pieces
+from fuzzytree.auditing.engine.pieces import Piece, pieces
 from fuzzytree.auditing.engine.polynomials import composed, derivative, roots
 from fuzzytree.model.rulebase import Clause, Shape
 from fuzzytree.numerics.enclosures import (

@@ -13,9 +13,14 @@ import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import (
+    Domain,
+    Side,
+    linear_form,
+    span,
+    variable_value,
+)
 from fuzzytree.auditing.engine.linear import Row, feasible
-from fuzzytree.auditing.engine.variables import linear_form, span, variable_value
 from fuzzytree.model.rulebase import Value, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, intervals
 from fuzzytree.numerics.exact import outwards

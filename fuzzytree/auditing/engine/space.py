@@ -1,31 +1,375 @@
 """Boxes of inputs, many at a time: what rules can reach on each, by doubles.
 
-A box is a row of numbers: for each input the part of its line. A combination of inputs
-takes, on a box, values between the sums of its summands' ends, rounded outwards.
+A segment is an input's interval, halved again and again; a box is a row with the number
+of a part of each segment. What the clauses of a rule reach on a part is computed once
+and looked up by all boxes that use it. Two rules are compared cell by cell on a part:
+where one degree falls as the other does, their ratio says more than both ranges. A
+combination of inputs lies, on a box, between the sums of its summands' ends, rounded
+outwards.
 """
 
 from __future__ import annotations
 
+import functools
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import Ground, Laid
+from fuzzytree.auditing.engine.arrangement import Ground, Laid
+from fuzzytree.auditing.engine.domain import Domain, Side, linear_form
 from fuzzytree.auditing.engine.linear import Row, feasible
-from fuzzytree.auditing.engine.lines import Asked, Line, Pair, Spans, Table, product_of
-from fuzzytree.auditing.engine.variables import linear_form
-from fuzzytree.model.rulebase import Variable
-from fuzzytree.numerics.enclosures import U
+from fuzzytree.auditing.engine.ranges import bends, clause_ranges
+from fuzzytree.model.interrupts import checkpoint
+from fuzzytree.model.rulebase import Clause, RuleBase, Shape, Variable, shapes_of
+from fuzzytree.numerics.enclosures import LEAST, Enclosure, U
 from fuzzytree.numerics.exact import outwards
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.model.contracts import FloatArray, IntArray
+
+
+_CELLS = 16  # of a part, in which degrees are enclosed
+_FINEST = 2.0**-52  # the share of a line that is not parted any more
+_WIDEST = 20.0  # a logarithm: what can be 0 is not infinitely worth parting
+
+
+class Pair(NamedTuple):
+    """Two rules that are compared, by position: is `one` above `other`?"""
+
+    one: int
+    other: int
+
+
+class Table(NamedTuple):
+    """What is known on each of some intervals.
+
+    Attributes:
+        low: Shape (intervals, rules): at least this is the degree of a rule's clauses.
+        high: At most this.
+        at: About this at the interval's middle.
+        most: Shape (intervals, pairs). Under the product, at most this many times is
+            `one` as large as `other`, clauses of both left out. Under the minimum, at
+            least this is `other` where it is below `one`; infinite if it never is.
+        least: At least this many times under the product; 0 under the minimum.
+        spread: How far apart both are, for choosing which line to part.
+        width: Shape (intervals, rules): the same for a rule alone.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    at: FloatArray
+    most: FloatArray
+    least: FloatArray
+    spread: FloatArray
+    width: FloatArray
+
+
+class Spans(NamedTuple):
+    """Intervals `low < x <= high`, in order and apart from each other."""
+
+    low: FloatArray
+    high: FloatArray
+
+    def hold(self, a: FloatArray, b: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which cells `a < x <= b` lie within one of the intervals."""
+        if not len(self.low):
+            return np.zeros(a.shape, dtype=bool)
+        place = np.searchsorted(self.high, b).clip(max=len(self.low) - 1)
+        starts: npt.NDArray[np.bool_] = self.low[place] <= a
+        ends: npt.NDArray[np.bool_] = b <= self.high[place]
+        return starts & ends & (a < b)
+
+
+class Asked:
+    """What some rules ask of one variable.
+
+    Attributes:
+        clauses: The clauses that differ, by what they say.
+        rules: For each rule the positions of its clauses.
+        pairs: For each pair the clauses that only one of both has.
+        ordered: For each pair where `other` is at least as large, exactly known.
+        steps: Where a curve jumps.
+        marks: Where a curve turns or one of its pieces ends.
+    """
+
+    def __init__(
+        self,
+        rules: RuleBase,
+        variable: Variable,
+        chosen: Sequence[int],
+        pairs: Sequence[Pair],
+        ordered: Sequence[Spans] = (),
+    ) -> None:
+        self.is_product = rules.semantics.conjunction == "product"
+        self.shapes = shapes_of([variable])
+        known: dict[tuple[frozenset[Shape], bool], int] = {}
+        self.clauses: list[Clause] = []
+        self.rules: list[tuple[int, ...]] = []
+        for position in chosen:
+            asked: list[int] = []
+            for clause in rules.rules[position].when:
+                if clause.variable == variable.name:
+                    said = frozenset(
+                        self.shapes[variable.name, t] for t in clause.terms
+                    )
+                    key = (said, clause.negated)
+                    if key not in known:
+                        known[key] = len(known)
+                        self.clauses.append(clause)
+                    asked.append(known[key])
+            self.rules.append(tuple(sorted(asked)))
+        place = {position: n for n, position in enumerate(chosen)}
+        self.pairs = [
+            _apart(self.rules[place[one]], self.rules[place[other]])
+            for one, other in pairs
+        ]
+        self.ordered = ordered or [Spans(np.empty(0), np.empty(0))] * len(pairs)
+        self.ones = [place[pair.one] for pair in pairs]
+        self.others = [place[pair.other] for pair in pairs]
+        turns = [bends(shape) for shape in dict.fromkeys(self.shapes.values())]
+        nothing = np.empty(0)
+        self.steps = np.unique(np.concatenate([nothing, *(t.steps for t in turns)]))
+        self.marks = np.unique(np.concatenate([nothing, *(t.low for t in turns)]))
+
+    def table(self, edges: FloatArray, middle: FloatArray) -> Table:
+        """Return what is known on intervals.
+
+        Args:
+            edges: Shape (intervals, cells + 1): the ends of each interval's cells.
+            middle: Shape (intervals,): a value in each.
+        """
+        lows: list[FloatArray] = []
+        highs: list[FloatArray] = []
+        ats: list[FloatArray] = []
+        for clause in self.clauses:
+            _, cells = clause_ranges(clause, self.shapes, edges)
+            here, _ = clause_ranges(clause, self.shapes, middle[:, np.newaxis])
+            lows.append(cells.low)
+            highs.append(cells.high)
+            ats.append((here.low + here.high)[:, 0] / 2)
+        size = edges.shape[0], edges.shape[1] - 1
+        low = [self._joined(lows, asked, size, -1) for asked in self.rules]
+        high = [self._joined(highs, asked, size, 1) for asked in self.rules]
+        at = [self._joined(ats, asked, size[:1], 0) for asked in self.rules]
+        compare = _ratios if self.is_product else _losses
+        apart: list[tuple[FloatArray, FloatArray]] = []
+        for (mine, theirs), one, spans in zip(
+            self.pairs, self.ones, self.ordered, strict=True
+        ):
+            ours, others = (
+                Enclosure(
+                    self._joined(lows, asked, size, -1),
+                    self._joined(highs, asked, size, 1),
+                )
+                for asked in (mine, theirs)
+            )
+            is_below = spans.hold(edges[:, :-1], edges[:, 1:])
+            apart.append(compare(ours, others, high[one], is_below))
+        least_low = _columns([one.min(axis=1) for one in low], size[0])
+        most_high = _columns([one.max(axis=1) for one in high], size[0])
+        most = _columns([one for one, _ in apart], size[0])
+        least = _columns([one for _, one in apart], size[0])
+        width = self._width(least_low, most_high)
+        spread = self._width(least, most) if self.is_product else width[:, self.ones]
+        if not self.is_product:
+            spread = np.maximum(spread, width[:, self.others])
+        return Table(
+            least_low,
+            most_high,
+            _columns(at, size[0]),
+            most,
+            least,
+            spread,
+            width,
+        )
+
+    def _width(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        if not self.is_product:
+            return high - low
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            wide = np.log(high / low)
+        return np.where(high > low, np.clip(wide, 0.0, _WIDEST), 0.0)
+
+    def _joined(
+        self,
+        degrees: Sequence[FloatArray],
+        asked: Sequence[int],
+        size: tuple[int, ...],
+        side: int,
+    ) -> FloatArray:
+        """Return the degree of some clauses together, rounded down, up or not."""
+        checkpoint()
+        chosen = [degrees[place] for place in asked]
+        if not self.is_product:
+            return functools.reduce(np.minimum, chosen, np.ones(size))
+        return product_of(chosen, side) if chosen else np.ones(size)
+
+
+def product_of(factors: Sequence[FloatArray], side: int) -> FloatArray:
+    """Return a product of factors, at least 0, as a bound from below (-1) or above (1).
+
+    Each multiplication is off by one rounding, relative to the product; what could
+    underflow becomes 0 or `LEAST`. A factor of 0 makes exactly 0, and factors of 1 do
+    not round.
+    """
+    found = factors[0]
+    for factor in factors[1:]:
+        before = found
+        with np.errstate(invalid="ignore", over="ignore", under="ignore"):
+            found = before * factor
+            off = found * (1.0 + side * 2 * U)
+        if not side:
+            continue
+        off = np.where((before == 1.0) | (factor == 1.0), found, off)
+        if side < 0:
+            found = np.where(off >= LEAST, off, 0.0)  # infinity times 0 is not known
+        else:
+            off = np.maximum(off, LEAST)
+            found = np.where((before == 0.0) | (factor == 0.0), 0.0, off)
+    return found
+
+
+def _apart(
+    one: Sequence[int], other: Sequence[int]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    mine, theirs = Counter(one), Counter(other)
+    return tuple((mine - theirs).elements()), tuple((theirs - mine).elements())
+
+
+def _columns(columns: Sequence[FloatArray], rows: int) -> FloatArray:
+    return np.stack(columns, axis=1) if columns else np.empty((rows, 0))
+
+
+def _ratios(
+    one: Enclosure,
+    other: Enclosure,
+    whole: FloatArray,
+    is_below: npt.NDArray[np.bool_],
+) -> tuple[FloatArray, FloatArray]:
+    """Return how many times one is as large as the other, at most and at least.
+
+    Cells where one's rule cannot fire do not count for the most; where the other is
+    known to be as large (`is_below`), it is at most 1.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        most = one.high / other.low * (1.0 + 4 * U)
+        least = one.low / other.high * (1.0 - 4 * U)
+    most = np.where(other.low == 0.0, np.inf, np.maximum(most, LEAST))
+    is_below = is_below | (one.high <= other.low)
+    most = np.where(is_below, np.minimum(most, 1.0), most)
+    most = np.where(whole == 0.0, 0.0, most)
+    least = np.where(other.high == 0.0, np.inf, least)
+    least = np.where((one.low == 0.0) | (least < LEAST), 0.0, least)
+    return most.max(axis=1), least.min(axis=1)
+
+
+def _losses(
+    one: Enclosure,
+    other: Enclosure,
+    whole: FloatArray,
+    is_below: npt.NDArray[np.bool_],
+) -> tuple[FloatArray, FloatArray]:
+    """Return how small the other is, at least, where it is below one's rule."""
+    del one
+    is_below = is_below | (other.low >= whole)
+    most = np.where(is_below, np.inf, other.low).min(axis=1)
+    return most, np.zeros(most.shape)
+
+
+class Line:
+    """An input's interval and its parts, each `start < x <= end`, or a point.
+
+    Attributes:
+        start: Shape (parts,): where each part begins.
+        end: Where it ends.
+        middle: Where it is parted: a double in it; a step or mark of a curve if
+            there is a good one.
+        child: The number of the lower half; the upper one follows. -1 before it is
+            parted.
+        table: What is known on each part.
+        roots: The parts that make up the whole.
+    """
+
+    def __init__(self, asked: Asked, low: float, high: float, *, is_open: bool) -> None:
+        self.asked = asked
+        self.finest = float(high - low) * _FINEST
+        first = [(low, high)] if low < high else []
+        # A curve may jump just behind the lower end, which is then a part of its own.
+        if not is_open and (low == high or low in asked.steps):
+            first.append((low, low))
+        ends = np.array(first).reshape(-1, 2)
+        self.start, self.end = ends[:, 0], ends[:, 1]
+        self.middle = self._middles(self.start, self.end)
+        self.child = np.full(len(first), -1)
+        self.table = asked.table(_edges(self.start, self.end), self.middle)
+        self.roots = range(len(first))
+
+    @property
+    def can_part(self) -> npt.NDArray[np.bool_]:
+        """Shape (parts,): whether each is wide enough, and a double lies within."""
+        is_within = (self.start < self.middle) & (self.middle < self.end)
+        is_wide: npt.NDArray[np.bool_] = self.end - self.start > self.finest
+        return is_within & is_wide
+
+    def halves(self, parts: IntArray) -> IntArray:
+        """Return the lower half of each part; the number after is the upper one."""
+        new = np.unique(parts[self.child[parts] < 0])
+        if len(new):
+            count = len(self.child)
+            self.child[new] = count + 2 * np.arange(len(new))
+            start = np.stack([self.start[new], self.middle[new]], axis=1).ravel()
+            end = np.stack([self.middle[new], self.end[new]], axis=1).ravel()
+            middle = self._middles(start, end)
+            table = self.asked.table(_edges(start, end), middle)
+            self.start = np.concatenate([self.start, start])
+            self.end = np.concatenate([self.end, end])
+            self.middle = np.concatenate([self.middle, middle])
+            self.child = np.concatenate([self.child, np.full(len(start), -1)])
+            self.table = Table(*map(_stacked, self.table, table))
+        return self.child[parts]
+
+    def _middles(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        middle = start * 0.5 + end * 0.5
+        middle = np.where((start < middle) & (middle < end), middle, end)
+        quarter = (end - start) * 0.25
+        for mark in _neighbours(self.asked.marks, middle):
+            is_central = (start + quarter < mark) & (mark < end - quarter)
+            middle = np.where(is_central, mark, middle)
+        for step in _neighbours(self.asked.steps, middle):
+            middle = np.where((start < step) & (step < end), step, middle)
+        return middle
+
+
+def _neighbours(marks: FloatArray, x: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the marks about each value, the nearer one last."""
+    if not len(marks):
+        return ()
+    after = np.searchsorted(marks, x)
+    below = marks[np.maximum(after - 1, 0)]
+    above = marks[np.minimum(after, len(marks) - 1)]
+    is_below = x - below < above - x
+    return np.where(is_below, above, below), np.where(is_below, below, above)
+
+
+def _stacked(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.concatenate([one, other])
+
+
+def _edges(start: FloatArray, end: FloatArray) -> FloatArray:
+    share = np.arange(_CELLS + 1) / _CELLS
+    edges = start[:, np.newaxis] * (1.0 - share) + end[:, np.newaxis] * share
+    edges = np.clip(edges, start[:, np.newaxis], end[:, np.newaxis])
+    return np.maximum.accumulate(edges, axis=1)
+
+
+# --- boxes
+
 
 _MIX_CELLS = 4  # of a combination's values on one box
 

@@ -1,15 +1,176 @@
-"""From values of the axes to a point of the inputs, checked in fractions."""
+"""From cells of the axes to points of the inputs, and the boxes around these.
+
+A stretch is the part of a cell on which chosen curves reach a level and others stay
+below it. Linear inequalities in fractions find the inputs that have such values.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
 
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.ground import Ground
+from fuzzytree.auditing.engine.arrangement import Ground, Laid
+from fuzzytree.auditing.engine.domain import (
+    Domain,
+    Point,
+    contains,
+    linear_form,
+    variable_value,
+)
 from fuzzytree.auditing.engine.linear import Row, feasible, simple
-from fuzzytree.auditing.engine.parts import Stretch
-from fuzzytree.auditing.engine.variables import Point, contains, linear_form
+from fuzzytree.auditing.engine.pieces import ONE, Element, piece_at, pieces
+from fuzzytree.auditing.engine.polynomials import (
+    difference,
+    magnitude,
+    refined,
+    roots,
+    value_at,
+)
+from fuzzytree.auditing.engine.states import Span
+from fuzzytree.numerics.exact import outwards
+
+if TYPE_CHECKING:
+    from fuzzytree.auditing.engine.axes import Values
+
+
+START = -1  # the number of the option at an axis's lower end itself
+
+
+class Stretch(NamedTuple):
+    """Values of an axis on which an option holds at a level: all between low and high.
+
+    Attributes:
+        low: The lower end.
+        high: The upper end.
+        is_open: Whether the ends themselves are left out.
+    """
+
+    low: Fraction
+    high: Fraction
+    is_open: bool = True
+
+
+def stretch(
+    laid: Laid,
+    cell: int,
+    level: Fraction,
+    high_ones: Iterable[int],
+    low_ones: Iterable[int],
+) -> Stretch | None:
+    """Return where in a cell some elements are at a level or above, others below it.
+
+    Args:
+        laid: The axis.
+        cell: The cell, or `START`.
+        level: A level that is in no band.
+        high_ones: The elements that must reach it.
+        low_ones: The elements that must stay below it.
+
+    Returns:
+        A part of the cell, shorter than the true one by next to nothing; None if there
+        is none.
+    """
+    sides = [*((one, True) for one in high_ones), *((one, False) for one in low_ones)]
+    elements = laid.axis.elements
+    if cell == START:
+        at = laid.cells.zones[0][0]
+        fits = all((elements[e].degree(at) >= level) is up for e, up in sides)
+        return Stretch(at, at, is_open=False) if fits else None
+    ends = laid.cells.between[cell]
+    for bits in (64, 256, 1024):
+        low, high = ends
+        for one, is_high in sides:
+            found = part_of(elements[one], ends, level, is_high=is_high, bits=bits)
+            low, high = max(low, found.low), min(high, found.high)
+        if low < high:
+            return Stretch(low, high)
+    return None
+
+
+def part_of(
+    element: Element,
+    ends: tuple[Fraction, Fraction],
+    level: Fraction,
+    *,
+    is_high: bool,
+    bits: int,
+) -> Stretch:
+    """Return the part of a cell where a monotone element is on a side of a level.
+
+    A cell is within one piece, which is clipped on all of it or nowhere.
+    """
+    low, high = ends
+    middle = (low + high) / 2
+    piece = piece_at(pieces(element.shape), middle)
+    goal = 1 - level if element.is_complement else level
+    crossed = difference(piece.polynomial, (goal,))
+    found = () if piece.degree(middle) in (0, piece.cap) else roots(crossed, low, high)
+    if not found:
+        is_met = (element.degree(middle) >= level) is is_high
+        return Stretch(low, high) if is_met else Stretch(high, low)
+    size = max(0, -magnitude(high - low))
+    place = refined(crossed, found[0], size + bits)
+    starts_above = value_at(crossed, low) > 0
+    if starts_above is (is_high is not element.is_complement):
+        return Stretch(low, place.low)
+    return Stretch(place.high, high)
+
+
+def widest(
+    laid: Laid,
+    cell: int,
+    levels: tuple[Fraction, Fraction],
+    high_ones: Iterable[int],
+    low_ones: Iterable[int],
+) -> Stretch | None:
+    """Return closed bounds of where a cell's option holds at any level of some.
+
+    Nothing is left out: the elements of `high_ones` must reach the lower level and
+    those of `low_ones` be below the upper one, and the zones at the cell's ends count.
+    """
+    elements = laid.axis.elements
+    zones = laid.cells.zones
+    if cell == START:
+        at = zones[0][0]
+        fits = all(elements[one].degree(at) >= levels[0] for one in high_ones) and all(
+            elements[one].degree(at) < levels[1] for one in low_ones
+        )
+        return Stretch(at, at, is_open=False) if fits else None
+    low, high = laid.cells.between[cell]
+    ends = low, high
+    first, last = zones[cell][0], zones[cell + 1][1]
+    for one in high_ones:
+        part = _outer(
+            part_of(elements[one], ends, levels[0], is_high=True, bits=64), ends
+        )
+        low, high = max(low, part.low), min(high, part.high)
+    for one in low_ones:
+        part = _outer(
+            part_of(elements[one], ends, levels[1], is_high=False, bits=64), ends
+        )
+        low, high = max(low, part.low), min(high, part.high)
+    if low > high:
+        return None
+    return Stretch(
+        first if low <= ends[0] else low,
+        last if high >= ends[1] else high,
+        is_open=False,
+    )
+
+
+def _outer(part: Stretch, ends: tuple[Fraction, Fraction]) -> Stretch:
+    """Return bounds of a part that its own ends, inner ones, fall short of."""
+    if part.low > part.high:
+        return part
+    margin = (ends[1] - ends[0]) / 2**60
+    return Stretch(part.low - margin, part.high + margin)
+
+
+# --- points of the inputs
+
 
 _DIGITS = (2, 3, 5, 8, 12)  # tried for each value of a witness
 
@@ -42,6 +203,26 @@ def coupled(given: Ground) -> tuple[tuple[int, ...], ...]:
                 apart.append(other)
         groups = [*apart, (members, joined)]
     return tuple(tuple(sorted(members)) for members, _ in groups if len(members) > 1)
+
+
+def direction_of(given: Ground, axis: int) -> tuple[tuple[int, Fraction], ...]:
+    """Return the weights of an axis's inputs that vary, as multiples of the first."""
+    number = {name: place for place, name in enumerate(given.rules.inputs)}
+    weights, _ = linear_form(given.axes[axis].variable, number)
+    sides = [given.domain.side(name) for name in given.rules.inputs]
+    kept = [
+        (place, weight)
+        for place, weight in sorted(weights.items())
+        if (side := sides[place]) is not None and side.low < side.high
+    ]
+    return tuple((place, weight / kept[0][1]) for place, weight in kept)
+
+
+def have_one_direction(given: Ground) -> bool:
+    """Return whether curves of two axes can be one function of the inputs."""
+    known = [direction_of(given, axis) for axis in range(len(given.axes))]
+    found = [one for one in known if one]
+    return len(set(found)) < len(found)
 
 
 def point_with(given: Ground, wanted: Mapping[int, Stretch]) -> Point | None:
@@ -154,3 +335,199 @@ def simplified(
                 best = tried
                 break
     return best
+
+
+# --- the box around a point
+
+
+class Held(NamedTuple):
+    """What must hold along an axis.
+
+    Attributes:
+        level: A level.
+        bound: What values must reach to reach it: the level, or the least double that
+            does, where values are doubles.
+        above: The positions of the rules that must reach it.
+        below: The positions of the rules that must stay below it.
+    """
+
+    level: Fraction
+    bound: Fraction | float
+    above: Sequence[int]
+    below: Sequence[int]
+
+
+def region_around(
+    given: Ground,
+    point: Mapping[str, Fraction],
+    above: Sequence[int],
+    below: Sequence[int],
+    *,
+    between: tuple[Fraction, Fraction],
+) -> tuple[Span, ...]:
+    """Return a box around a point on which rules keep to two sides of a level.
+
+    On all of it each of `above` is at least as strong as some level, and each of
+    `below` is weaker than it, under the minimum. Only variables that matter have a
+    span; the ends of spans are doubles. It is empty where no doubles are around.
+
+    Args:
+        given: The rules and the box.
+        point: A point of it.
+        above: Numbers of rules, from 1.
+        below: Numbers of others.
+        between: The strengths at the point between which the level is chosen: the
+            largest of `below` and the least of `above`.
+    """
+    level = simple(*between)
+    left = {number - 1 for number in below}
+    at = [variable_value(axis.variable, point) for axis in given.axes]
+    low_at: list[set[int]] = []
+    for axis, value in zip(given.axes, at, strict=True):
+        of = [element.degree(value) for element in axis.elements]
+        degrees = [
+            min((max(of[one] for one in group) for group in groups), default=ONE)
+            for groups in axis.asked
+        ]
+        low_at.append({rule for rule in left if degrees[rule] < level})
+    wanted: dict[int, set[int]] = {}
+    while left:
+        best = _widest(low_at, left)
+        if not low_at[best] & left:
+            return ()
+        wanted[best] = low_at[best] & left
+        left -= low_at[best]
+    spans: list[Span] = []
+    mine = [number - 1 for number in above]
+    bound = level if given.is_fine else outwards(level)[1]
+    for number, laid in enumerate(given.laid[0]):
+        held = Held(level, bound, mine, sorted(wanted.get(number, ())))
+        span = _span(laid, at[number], held)
+        if span is None:
+            continue
+        if not (span.low or 0.0) <= at[number] <= (span.high or 0.0):
+            return ()  # narrower than doubles tell
+        spans.append(span)
+    return tuple(spans)
+
+
+def _widest(sets: Sequence[set[int]], left: set[int]) -> int:
+    """Return the position of the set that holds most of what is left."""
+    return max(range(len(sets)), key=lambda place: len(sets[place] & left))
+
+
+def _span(laid: Laid, x: Fraction, held: Held) -> Span | None:
+    """Return from where to where it holds along an axis; None if all along it."""
+    zones = laid.cells.zones
+    low, high = _walked(laid, x, held, -1), _walked(laid, x, held, 1)
+    # It may not hold at the ends themselves, be they the axis's own.
+    is_from = low <= zones[0][0] and _holds_at(laid, 0, held)
+    is_to = high >= zones[-1][1] and _holds_at(laid, len(zones) - 1, held)
+    if is_from and is_to:
+        return None
+    first, last = outwards(low)[1], outwards(high)[0]
+    if first == low and low != x and not is_from:
+        first = math.nextafter(first, math.inf)
+    if last == high and high != x and not is_to:
+        last = math.nextafter(last, -math.inf)
+    return Span(laid.axis.variable.name, first, last)
+
+
+def zone_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int | None:
+    """Return the number of the zone that a value is in, None if it is in a cell."""
+    place = bisect_left(zones, x, key=lambda zone: zone[1])
+    return place if place < len(zones) and zones[place][0] <= x else None
+
+
+def cell_of(zones: Sequence[tuple[Fraction, Fraction]], x: Fraction) -> int:
+    """Return the number of the cell that a value outside all zones is in."""
+    return bisect_left(zones, (x, x)) - 1
+
+
+def _walked(laid: Laid, x: Fraction, held: Held, step: int) -> Fraction:
+    """Return how far it holds from a value, in one direction."""
+    zones, cells = laid.cells.zones, laid.cells.between
+    far = x
+    place = zone_of(zones, x)
+    if place is None:
+        cell = cell_of(zones, x)
+    else:
+        if step > 0 and not _holds_after(laid, place, held):
+            return far
+        cell = place if step > 0 else place - 1
+    while 0 <= cell < len(cells):
+        low, high = cells[cell]
+        start = max(low, x) if step > 0 else min(high, x)
+        end = _end(laid, cell, start, held, step)
+        if end is not None:
+            return end
+        place = cell + 1 if step > 0 else cell
+        far = zones[place][0] if step > 0 else zones[place][1]
+        if not _holds_at(laid, place, held):
+            return far
+        far = zones[place][1] if step > 0 else zones[place][0]
+        if step > 0 and not _holds_after(laid, place, held):
+            return far
+        cell += step
+    return far
+
+
+def _end(
+    laid: Laid, cell: int, start: Fraction, held: Held, step: int
+) -> Fraction | None:
+    """Return where in a cell it ends to hold; None if it holds to the cell's end."""
+    elements = laid.axis.elements
+    sides = [(int(laid.of[rule, cell]), True) for rule in held.above]
+    sides += [(int(laid.of[rule, cell]), False) for rule in held.below]
+    ends = laid.cells.between[cell]
+    found: list[Fraction] = []
+    for one, is_high in dict.fromkeys(sides):
+        if _is_sure(laid, cell, one, held.bound, is_high=is_high):
+            continue
+        part = part_of(elements[one], ends, held.level, is_high=is_high, bits=64)
+        if step > 0:
+            if part.low > start or part.high < start:
+                return start
+            if part.high < ends[1]:
+                found.append(part.high)
+        else:
+            if part.high < start or part.low > start:
+                return start
+            if part.low > ends[0]:
+                found.append(part.low)
+    if not found:
+        return None
+    return min(found) if step > 0 else max(found)
+
+
+def _is_sure(
+    laid: Laid, cell: int, one: int, bound: Fraction | float, *, is_high: bool
+) -> bool:
+    """Return whether an element keeps to its side in all of a cell, by its bounds."""
+    first, last = laid.cells.right[:, one, cell], laid.cells.left[:, one, cell + 1]
+    if is_high:
+        return bool(min(first[0], last[0]) >= bound)
+    return bool(max(first[1], last[1]) < bound)
+
+
+def _holds_at(laid: Laid, place: int, held: Held) -> bool:
+    return _holds(laid, place, held, laid.cells.left)
+
+
+def _holds_after(laid: Laid, place: int, held: Held) -> bool:
+    return _holds(laid, place, held, laid.cells.right)
+
+
+def _holds(laid: Laid, place: int, held: Held, values: Values) -> bool:
+    """Return whether it holds at a zone for sure, by the bounds of values there."""
+    low, high = values[0][:, place].tolist(), values[1][:, place].tolist()
+
+    def degree(rule: int, of: Sequence[float]) -> float:
+        groups = laid.axis.asked[rule]
+        return min(
+            (max(of[one] for one in group) for group in groups), default=math.inf
+        )
+
+    return all(degree(rule, low) >= held.bound for rule in held.above) and all(
+        degree(rule, high) < held.bound for rule in held.below
+    )

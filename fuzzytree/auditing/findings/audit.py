@@ -14,8 +14,7 @@ import msgspec
 
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.engine.wording import counted
+from fuzzytree.auditing.engine.states import Declined, counted
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.limits import LIMITS, digest_of

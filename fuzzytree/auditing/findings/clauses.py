@@ -10,10 +10,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.alike import alike
-from fuzzytree.auditing.engine.answers import answer_at
+from fuzzytree.auditing.engine.arrangement import (
+    Ground,
+    answer_at,
+    ground,
+    rule_strengths,
+)
 from fuzzytree.auditing.engine.dominance import Compared
-from fuzzytree.auditing.engine.ground import Ground, ground, rule_strengths
+from fuzzytree.auditing.engine.equivalence import alike
 from fuzzytree.auditing.engine.states import (
     Claim,
     Proved,

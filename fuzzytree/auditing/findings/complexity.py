@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.curves import ONE, ZERO
 from fuzzytree.auditing.engine.measures import Bounds, Line, apart, local
+from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.polynomials import (
     Polynomial,
     difference,
@@ -15,8 +15,7 @@ from fuzzytree.auditing.engine.polynomials import (
     roots,
     value_at,
 )
-from fuzzytree.auditing.engine.states import Proved
-from fuzzytree.auditing.engine.wording import counted, short
+from fuzzytree.auditing.engine.states import Proved, counted, short
 from fuzzytree.auditing.findings.ranges import Range, measure, ranges
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject

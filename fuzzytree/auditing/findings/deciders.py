@@ -8,13 +8,24 @@ from typing import Protocol
 
 import numpy as np
 
-from fuzzytree.auditing.engine.around import Around, columns
+from fuzzytree.auditing.engine.arrangement import Ground, ground, narrowed, strengths_at
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.decisions import decision_at, other_decision
+from fuzzytree.auditing.engine.decisions import (
+    Around,
+    columns,
+    decision_at,
+    other_decision,
+)
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.ground import Ground, ground, narrowed, strengths_at
-from fuzzytree.auditing.engine.nearest import NARROW, Nearest, nearest, nearest_box
-from fuzzytree.auditing.engine.polytopes import Polytope, Polytopes, polytope_of
+from fuzzytree.auditing.engine.nearest import (
+    NARROW,
+    Nearest,
+    Polytope,
+    Polytopes,
+    nearest,
+    nearest_box,
+    polytope_of,
+)
 from fuzzytree.auditing.engine.regions import Region, boxes, leaf_at, regions
 from fuzzytree.auditing.engine.states import Carrier, Claim, Proved, State, Witness
 from fuzzytree.auditing.engine.witnesses import is_within

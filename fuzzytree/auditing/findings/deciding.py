@@ -8,22 +8,27 @@ from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from fuzzytree.auditing.engine.arrangement import Ground
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.glimpses import Glimpses
-from fuzzytree.auditing.engine.ground import Ground
-from fuzzytree.auditing.engine.leads import largest_lead
-from fuzzytree.auditing.engine.shared import may_tie
-from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State, Witness
+from fuzzytree.auditing.engine.duels import largest_lead, wins
+from fuzzytree.auditing.engine.pivots import may_tie
+from fuzzytree.auditing.engine.probes import Glimpses
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Declined,
+    Proved,
+    State,
+    Witness,
+    counted,
+)
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
-from fuzzytree.auditing.engine.wins import wins
-from fuzzytree.auditing.engine.wording import counted
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.sides import Sides, sides_of
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.turns import Turns
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.ground import BoolArray
+    from fuzzytree.auditing.engine.arrangement import BoolArray
 
 MOST_SHOWN: Final = 20
 """The most ties that are told one by one."""

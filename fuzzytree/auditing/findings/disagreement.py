@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.auditing.engine.ground import Ground, ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import Ground, ground, strengths_at
 from fuzzytree.auditing.engine.regions import Region, boxes, regions
-from fuzzytree.auditing.engine.states import Proved, State, Witness, point_of
-from fuzzytree.auditing.engine.wording import answer_text
+from fuzzytree.auditing.engine.states import (
+    Proved,
+    State,
+    Witness,
+    answer_text,
+    point_of,
+)
 from fuzzytree.auditing.findings.deciders import Both, other_in
 from fuzzytree.auditing.findings.nearby import nearest_difference
 from fuzzytree.auditing.findings.records import Answer

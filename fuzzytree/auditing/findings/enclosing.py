@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Final, Literal, NamedTuple
 
-from fuzzytree.auditing.engine.elements import Element
+from fuzzytree.auditing.engine.pieces import Element
 from fuzzytree.errors import LossError
 from fuzzytree.model.rulebase import Points, Shape
 from fuzzytree.model.system import (

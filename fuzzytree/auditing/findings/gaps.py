@@ -10,12 +10,11 @@ from typing import Final
 
 from msgspec.structs import replace
 
+from fuzzytree.auditing.engine.arrangement import Ground, narrowed
 from fuzzytree.auditing.engine.clock import OutOfTimeError
 from fuzzytree.auditing.engine.cover import uncovered
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import Ground, narrowed
+from fuzzytree.auditing.engine.domain import Domain, Side, span
 from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
-from fuzzytree.auditing.engine.variables import span
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.rows import ranked
 from fuzzytree.auditing.findings.sides import Sides, sides_of

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.around import columns
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.decisions import columns
 from fuzzytree.auditing.engine.nearest import NARROW, Nearest, nearest
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -20,8 +20,8 @@ from fuzzytree.auditing.engine.states import (
     State,
     Witness,
     coordinates,
+    percent,
 )
-from fuzzytree.auditing.engine.wording import percent
 from fuzzytree.auditing.findings.deciders import Both
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.rows import OF_RANGES, Points, distance_measure

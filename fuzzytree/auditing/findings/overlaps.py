@@ -7,11 +7,16 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.auditing.engine.curves import pieces
-from fuzzytree.auditing.engine.measures import Bounds
-from fuzzytree.auditing.engine.overlap import Overlap, most_shared, overlap
-from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State
-from fuzzytree.auditing.engine.wording import counted, short
+from fuzzytree.auditing.engine.measures import Bounds, Overlap, most_shared, overlap
+from fuzzytree.auditing.engine.pieces import pieces
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Declined,
+    Proved,
+    State,
+    counted,
+    short,
+)
 from fuzzytree.auditing.findings.ranges import Range, labels_of, measure, ranges
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject

@@ -8,10 +8,16 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
 from fuzzytree.auditing.engine.factors import Distance
-from fuzzytree.auditing.engine.meeting import Meeting
-from fuzzytree.auditing.engine.states import Declined, Proved, State, Witness
+from fuzzytree.auditing.engine.joint_maximum import Meeting
+from fuzzytree.auditing.engine.states import (
+    Declined,
+    Proved,
+    State,
+    Witness,
+    counted,
+    short,
+)
 from fuzzytree.auditing.engine.witnesses import coupled
-from fuzzytree.auditing.engine.wording import counted, short
 from fuzzytree.auditing.findings.clauses import clause_answers
 from fuzzytree.auditing.findings.ranges import measure
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from fuzzytree.auditing.engine.domain import span
 from fuzzytree.auditing.engine.measures import Bounds, Line, line
-from fuzzytree.auditing.engine.variables import span
 from fuzzytree.auditing.findings.records import Label, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import Term, Variable

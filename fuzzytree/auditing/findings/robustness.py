@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
+from fuzzytree.auditing.engine.domain import contains, variable_value
 from fuzzytree.auditing.engine.nearest import Nearest
 from fuzzytree.auditing.engine.regions import regions
 from fuzzytree.auditing.engine.states import (
@@ -16,10 +17,11 @@ from fuzzytree.auditing.engine.states import (
     Proved,
     State,
     Witness,
+    answer_text,
     coordinates,
+    number_text,
+    percent,
 )
-from fuzzytree.auditing.engine.variables import contains, variable_value
-from fuzzytree.auditing.engine.wording import answer_text, number_text, percent
 from fuzzytree.auditing.findings.deciders import Decider, decider_of
 from fuzzytree.auditing.findings.nearby import narrowed_state, not_asked
 from fuzzytree.auditing.findings.records import Answer, Measure

@@ -9,11 +9,10 @@ from fractions import Fraction
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.polytopes import Polytope, Polytopes, polytope_of
+from fuzzytree.auditing.engine.domain import Domain, Side, contains
+from fuzzytree.auditing.engine.domain import span as ends_on
+from fuzzytree.auditing.engine.nearest import Polytope, Polytopes, polytope_of
 from fuzzytree.auditing.engine.states import Span, Witness, point_of
-from fuzzytree.auditing.engine.variables import contains
-from fuzzytree.auditing.engine.variables import span as ends_on
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Rows, Subject
 from fuzzytree.model.rulebase import Variable

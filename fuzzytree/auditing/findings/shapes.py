@@ -6,12 +6,18 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final
 
-from fuzzytree.auditing.engine.curves import pieces
-from fuzzytree.auditing.engine.defects import Excess, dips, outside
-from fuzzytree.auditing.engine.elements import Element
-from fuzzytree.auditing.engine.measures import Bounds, area, line, local, walk
-from fuzzytree.auditing.engine.states import Proved, Span
-from fuzzytree.auditing.engine.wording import short
+from fuzzytree.auditing.engine.measures import (
+    Bounds,
+    Excess,
+    area,
+    dips,
+    line,
+    local,
+    outside,
+    walk,
+)
+from fuzzytree.auditing.engine.pieces import Element, pieces
+from fuzzytree.auditing.engine.states import Proved, Span, short
 from fuzzytree.auditing.findings.ranges import (
     Range,
     labels_of,

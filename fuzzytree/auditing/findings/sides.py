@@ -22,17 +22,16 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
+from fuzzytree.auditing.engine.arrangement import Ground, ground
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
-from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.dominance import Compared, Verdict
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.factors import Distance, distance
-from fuzzytree.auditing.engine.ground import Ground, ground
+from fuzzytree.auditing.engine.joint_maximum import Meeting, highest, meet
 from fuzzytree.auditing.engine.measures import Bounds
-from fuzzytree.auditing.engine.meeting import Meeting, highest, meet
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
-from fuzzytree.auditing.engine.variables import span
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.auditing.findings.held import Held
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import (
@@ -54,7 +53,7 @@ from fuzzytree.numerics.enclosures import (
 from fuzzytree.numerics.exact import outwards
 
 if TYPE_CHECKING:
-    from fuzzytree.auditing.engine.ground import BoolArray
+    from fuzzytree.auditing.engine.arrangement import BoolArray
     from fuzzytree.model.contracts import FloatArray
 
 _BELOW: Final = "from below: "

@@ -6,9 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.engine.variables import span
 from fuzzytree.auditing.findings.enclosing import (
     Enclosed,
     Name,

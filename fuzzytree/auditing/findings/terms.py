@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.curves import pieces
-from fuzzytree.auditing.engine.elements import Element
 from fuzzytree.auditing.engine.measures import Bounds, heights
-from fuzzytree.auditing.engine.states import Bracket, Proved
-from fuzzytree.auditing.engine.wording import counted, short
+from fuzzytree.auditing.engine.pieces import Element, pieces
+from fuzzytree.auditing.engine.states import Bracket, Proved, counted, short
 from fuzzytree.auditing.findings.ranges import (
     Range,
     labels_of,

@@ -24,8 +24,8 @@ from fuzzytree.auditing.engine.states import (
     Span,
     Witness,
     coordinates,
+    number_text,
 )
-from fuzzytree.auditing.engine.wording import number_text
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.tree import FuzzyTree

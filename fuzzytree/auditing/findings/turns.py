@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Final, TypeVar
 
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
-from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.engine.wording import counted
+from fuzzytree.auditing.engine.states import Declined, counted
 from fuzzytree.auditing.findings.records import Answer
 
 _MOST: Final = 0.25  # of the time that is left, for one question

@@ -16,7 +16,7 @@ import fuzzytree as ft
 from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.distances import distance
+from fuzzytree.auditing.engine.measures import distance
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Declined,

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.alike import alike, region
-from fuzzytree.auditing.engine.answers import answer_at
+from fuzzytree.auditing.engine.arrangement import answer_at
 from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.contenders import Stretch, laid, spread
 from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.equivalence import alike, region
 from fuzzytree.auditing.engine.states import Bracket, Proved, State, Witness, point_of
-from fuzzytree.auditing.engine.stretches import Stretch, laid, spread
 from fuzzytree.model.rulebase import (
     Band,
     Clause,

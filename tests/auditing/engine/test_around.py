@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import pytest
 
-from fuzzytree.auditing.engine.around import Around, columns
-from fuzzytree.auditing.engine.decisions import decision_at
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import ground, strengths_at
+from fuzzytree.auditing.engine.decisions import Around, columns, decision_at
+from fuzzytree.auditing.engine.domain import Domain, Side, contains
 from fuzzytree.auditing.engine.nearest import distance
-from fuzzytree.auditing.engine.seeking import drawn_in
-from fuzzytree.auditing.engine.variables import contains
+from fuzzytree.auditing.engine.probes import drawn_in
 from fuzzytree.model.rulebase import Conjunction, RuleBase
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_tree

@@ -8,6 +8,7 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing.engine.arrangement import ground
 from fuzzytree.auditing.engine.bounding import (
     below_by_boxes,
     highest_by_boxes,
@@ -17,7 +18,7 @@ from fuzzytree.auditing.engine.bounding import (
 )
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import ground
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Coordinate,
@@ -25,7 +26,6 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     point_of,
 )
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.model.rulebase import (
     Band,
     Clause,

@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.auditing.diff import decisions
 from fuzzytree.auditing.engine.clock import GRACE_S, Clock, OutOfTimeError, enforced
-from fuzzytree.auditing.engine.elements import Element
+from fuzzytree.auditing.engine.pieces import Element
 from fuzzytree.auditing.engine.states import Bracket
 from fuzzytree.auditing.findings.records import Settings
 from fuzzytree.model.interrupts import checkpoint

@@ -8,9 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from fuzzytree.auditing.engine.arrangement import ground, strengths_at
 from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import ground, strengths_at
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.model.rulebase import (
     LR,

@@ -8,14 +8,14 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine import ground as module
+from fuzzytree.auditing.engine import arrangement as module
+from fuzzytree.auditing.engine.arrangement import TooManyCellsError, ground
+from fuzzytree.auditing.engine.axes import crossings
 from fuzzytree.auditing.engine.cover import below, least_cover, uncovered
-from fuzzytree.auditing.engine.crowds import crossings
-from fuzzytree.auditing.engine.elements import Element, places
-from fuzzytree.auditing.engine.ground import TooManyCellsError, ground
+from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.pieces import Element, places
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness
 from fuzzytree.auditing.engine.ties import tie
-from fuzzytree.auditing.engine.wins import wins
 from tests.auditing.engine.bases import random_base, random_shape, unit_domain
 
 

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.curves import degree_after, piece_at, pieces
+from fuzzytree.auditing.engine.pieces import degree_after, piece_at, pieces
 from fuzzytree.model.rulebase import Band, Flank, Points, RuleBase
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.lowering import rules_from_tree

@@ -9,10 +9,11 @@ from typing import get_args
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing.engine.arrangement import Ground, ground, narrowed, strengths_at
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.decisions import decision_at, other_decision
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import Ground, ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -22,7 +23,6 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.model.rulebase import (
     Band,
     Clause,

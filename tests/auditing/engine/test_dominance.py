@@ -8,14 +8,14 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.curves import ONE, ZERO
+from fuzzytree.auditing.engine.arrangement import ground, strengths_at
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.dominance import Compared
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.factors import distance, largest_ratio, quotient
-from fuzzytree.auditing.engine.ground import ground, strengths_at
-from fuzzytree.auditing.engine.meeting import highest, meet
+from fuzzytree.auditing.engine.joint_maximum import highest, meet
+from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.model.rulebase import (
     LR,
     Band,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from fractions import Fraction
 
-from fuzzytree.auditing.engine.elements import Element, places
+from fuzzytree.auditing.engine.pieces import Element, places
 from fuzzytree.model.rulebase import LR, Band, Flank
 from fuzzytree.model.rulebase import Side as Half
 

@@ -6,10 +6,10 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.glimpses import Glimpses, strength_above
-from fuzzytree.auditing.engine.ground import ground, strengths_at
+from fuzzytree.auditing.engine.arrangement import ground, strengths_at
+from fuzzytree.auditing.engine.duels import wins
+from fuzzytree.auditing.engine.probes import Glimpses, strength_above
 from fuzzytree.auditing.engine.states import Witness, point_of
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.model.rulebase import Conjunction
 from tests.auditing.engine.bases import random_base, unit_domain, with_hidden_rule
 

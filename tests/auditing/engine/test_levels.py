@@ -6,14 +6,14 @@ from fractions import Fraction
 
 import pytest
 
+from fuzzytree.auditing.engine.arrangement import ground
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.curves import ONE, ZERO
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.dominance import Compared
-from fuzzytree.auditing.engine.ground import ground
+from fuzzytree.auditing.engine.duels import Question, searched
 from fuzzytree.auditing.engine.levels import Level, parted, relation
+from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.polynomials import roots, value_at
-from fuzzytree.auditing.engine.questions import Question, searched
 from fuzzytree.auditing.engine.states import Proved, Witness
 from fuzzytree.model.rulebase import (
     Band,

@@ -8,17 +8,19 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.defects import dips, outside
 from fuzzytree.auditing.engine.measures import (
     Bounds,
     Line,
     area,
+    dips,
     heights,
     line,
     local,
+    most_shared,
+    outside,
+    overlap,
     walk,
 )
-from fuzzytree.auditing.engine.overlap import most_shared, overlap
 from fuzzytree.model.rulebase import LR, Points, Shape
 from fuzzytree.model.rulebase import Side as Half
 from fuzzytree.numerics.exact import exact_degree

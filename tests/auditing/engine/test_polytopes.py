@@ -8,11 +8,9 @@ from fractions import Fraction
 import pytest
 
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, Side, variable_value
 from fuzzytree.auditing.engine.linear import Row, holds, solved
-from fuzzytree.auditing.engine.nearest import Nearest, distance
-from fuzzytree.auditing.engine.polytopes import Polytopes, polytope_of
-from fuzzytree.auditing.engine.variables import variable_value
+from fuzzytree.auditing.engine.nearest import Nearest, Polytopes, distance, polytope_of
 from fuzzytree.model.rulebase import Part, Variable
 
 NONE, ONE = Fraction(0), Fraction(1)

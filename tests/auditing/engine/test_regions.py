@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.engine.domain import Domain, Side
+from fuzzytree.auditing.engine.domain import Domain, Side, contains
 from fuzzytree.auditing.engine.regions import (
     boxes,
     common,
@@ -14,7 +14,6 @@ from fuzzytree.auditing.engine.regions import (
     point_in,
     regions,
 )
-from fuzzytree.auditing.engine.variables import contains
 from fuzzytree.model.tree import FuzzyTree, Node
 from fuzzytree.testing import random_tree
 

@@ -6,8 +6,8 @@ import itertools
 
 import pytest
 
-from fuzzytree.auditing.engine.ground import ground
-from fuzzytree.auditing.engine.shared import may_tie
+from fuzzytree.auditing.engine.arrangement import ground
+from fuzzytree.auditing.engine.pivots import may_tie
 from fuzzytree.auditing.engine.states import Witness
 from fuzzytree.auditing.engine.ties import tie
 from tests.auditing.engine.bases import Kind, random_base, unit_domain

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing.engine.arrangement import ground, strengths_at
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import ground, strengths_at
-from fuzzytree.auditing.engine.shared import may_tie
+from fuzzytree.auditing.engine.pivots import may_tie
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness, point_of
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.model.rulebase import (

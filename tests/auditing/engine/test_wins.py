@@ -8,13 +8,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from fuzzytree.auditing.engine.arrangement import Ground, ground, narrowed, strengths_at
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.cover import least_cover, uncovered
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import Ground, ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.auditing.engine.ties import tie
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.model.rulebase import (
     LR,
     Band,

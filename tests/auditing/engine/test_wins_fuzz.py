@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fuzzytree.auditing.engine.arrangement import ground, strengths_at
 from fuzzytree.auditing.engine.bounding import wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.ground import ground, strengths_at
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.numerics.oracle import DECIDED, decide
 from tests.auditing.engine.bases import random_base, unit_domain
 

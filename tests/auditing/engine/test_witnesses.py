@@ -6,12 +6,11 @@ from fractions import Fraction
 
 import pytest
 
+from fuzzytree.auditing.engine.arrangement import ground, strengths_at
 from fuzzytree.auditing.engine.cover import least_cover, uncovered
-from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import ground, strengths_at
+from fuzzytree.auditing.engine.domain import Domain, Side, linear_form, span
+from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import Proved, Witness, point_of
-from fuzzytree.auditing.engine.variables import linear_form, span
-from fuzzytree.auditing.engine.wins import wins
 from fuzzytree.model.rulebase import (
     Clause,
     Part,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 
+from fuzzytree.auditing.engine.arrangement import ground
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.ground import ground
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import _won as won
 from fuzzytree.auditing.findings.deciding import answers

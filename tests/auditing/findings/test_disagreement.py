@@ -15,9 +15,9 @@ from fuzzytree.auditing.engine.states import (
     Declined,
     Proved,
     Witness,
+    percent,
     point_of,
 )
-from fuzzytree.auditing.engine.wording import percent
 from fuzzytree.auditing.findings.deciders import Both
 from fuzzytree.auditing.findings.disagreement import answers
 from fuzzytree.auditing.findings.nearby import nearest_difference

@@ -11,8 +11,8 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
+from fuzzytree.auditing.engine.arrangement import ground
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.ground import ground
 from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.domains import domain_of

@@ -7,9 +7,9 @@ from fractions import Fraction
 import pytest
 from msgspec.structs import replace
 
-from fuzzytree.auditing.engine.answers import answer_at
+from fuzzytree.auditing.engine.arrangement import answer_at
+from fuzzytree.auditing.engine.joint_maximum import Meeting
 from fuzzytree.auditing.engine.measures import Bounds
-from fuzzytree.auditing.engine.meeting import Meeting
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,

@@ -8,8 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.engine.states import Bracket, Declined, Proved
-from fuzzytree.auditing.engine.wording import short
+from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, short
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.records import Answer, Settings
 from fuzzytree.model.rulebase import (

@@ -84,9 +84,9 @@ def test_a_rule_that_wins_at_a_random_point_is_never_called_dead() -> None:
 
 @pytest.mark.heavy
 def test_its_proofs_agree_with_the_engine() -> None:
+    from fuzzytree.auditing.engine.arrangement import ground
     from fuzzytree.auditing.engine.domain import Side
-    from fuzzytree.auditing.engine.ground import ground
-    from fuzzytree.auditing.engine.wins import wins
+    from fuzzytree.auditing.engine.duels import wins
 
     for seed in range(16):
         base = random_base(seed, 5, 2, kind="mixed", odd=0.3, shared=0.5)

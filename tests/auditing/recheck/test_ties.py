@@ -72,8 +72,8 @@ def test_rules_that_a_third_one_hides_do_not_tie() -> None:
 
 @pytest.mark.heavy
 def test_ties_agree_with_the_engine() -> None:
+    from fuzzytree.auditing.engine.arrangement import ground
     from fuzzytree.auditing.engine.domain import Domain, Side
-    from fuzzytree.auditing.engine.ground import ground
     from fuzzytree.auditing.engine.states import Proved, Witness
     from fuzzytree.auditing.engine.ties import tie
 

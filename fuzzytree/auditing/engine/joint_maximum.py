@@ -16,15 +16,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fuzzytree.auditing.engine.arrangement import Ground, Laid, strengths_at
 from fuzzytree.auditing.engine.bounding import highest_by_boxes
-from fuzzytree.auditing.engine.boxes import region_around
-from fuzzytree.auditing.engine.choices import Part, at_most, choices
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.curves import ONE, ZERO
 from fuzzytree.auditing.engine.dominance import FAR, Compared
-from fuzzytree.auditing.engine.ground import Ground, Laid, strengths_at
 from fuzzytree.auditing.engine.measures import Bounds
-from fuzzytree.auditing.engine.parts import START, Stretch, stretch, widest
+from fuzzytree.auditing.engine.options import Part, at_most, choices
+from fuzzytree.auditing.engine.pieces import ONE, ZERO
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -35,12 +33,22 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
     point_of,
 )
-from fuzzytree.auditing.engine.witnesses import coupled, is_within, point_with
+from fuzzytree.auditing.engine.witnesses import (
+    START,
+    Stretch,
+    coupled,
+    is_within,
+    point_with,
+    region_around,
+    stretch,
+    widest,
+)
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.numerics.exact import outwards
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray, IntArray
+
 
 _MOST_CHOICES = 1000  # of parts of axes that share inputs
 _HALVINGS = 12  # of what a level may be raised by

@@ -1,34 +1,43 @@
-"""Search a box for a point at which some rules reach a level and others do not.
+"""Is a rule stronger than some rivals at any input, and by how much at most?
 
-At each level between two critical ones (`fuzzytree.auditing.engine.contests`) the
-options of the axes are sets of rivals left below, and the question is whether a choice
-on every axis leaves all of them below: `fuzzytree.auditing.engine.covering`. What is
-strict spans an open interval of levels, so it is seen at a level between two bands; or
-it lies within one band, where the bounds of critical levels do not tell their order.
-There every option that may be open is taken for open: if even that does not suffice,
-nothing is missed; if it does, the question is asked again with critical levels known as
+At each level between two critical ones the options of the axes are sets of rivals left
+below (`fuzzytree.auditing.engine.options`); a choice on every axis must leave all of
+them below. A strict lead spans an open interval of levels, so it shows at a level
+between two bands, or it lies within one band, where the bounds of critical levels leave
+their order open. There every option that may be open counts as open: if even these do
+not suffice, nothing is missed; otherwise the search runs again with critical levels as
 fractions.
 
-Axes that share inputs are first taken as free. If nothing is found then, there is
-nothing; if something is, values of the inputs are sought by linear inequalities in
-fractions.
+Axes that share inputs are first treated as free. If that finds nothing, there is
+nothing; otherwise linear inequalities in fractions look for values of the inputs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Collection, Iterator, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from functools import partial
+from typing import Final, NamedTuple
 
+from fuzzytree.auditing.engine.arrangement import (
+    Ground,
+    TooManyCellsError,
+    strengths_at,
+)
 from fuzzytree.auditing.engine.axes import between
-from fuzzytree.auditing.engine.boxes import region_around
-from fuzzytree.auditing.engine.choices import choices, parts_of, union
+from fuzzytree.auditing.engine.bounding import wins_by_boxes
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
-from fuzzytree.auditing.engine.contests import Contest, weakest
-from fuzzytree.auditing.engine.covering import cover
-from fuzzytree.auditing.engine.ground import Ground, TooManyCellsError, strengths_at
-from fuzzytree.auditing.engine.parts import START, Stretch, stretch
-from fuzzytree.auditing.engine.seeking import leader, plainer
+from fuzzytree.auditing.engine.domain import Point
+from fuzzytree.auditing.engine.options import (
+    Contest,
+    choices,
+    cover,
+    parts_of,
+    union,
+    weakest,
+)
+from fuzzytree.auditing.engine.probes import leader, plainer
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
@@ -36,10 +45,18 @@ from fuzzytree.auditing.engine.states import (
     State,
     Witness,
     coordinates,
+    counted,
+    point_of,
 )
-from fuzzytree.auditing.engine.variables import Point
-from fuzzytree.auditing.engine.witnesses import coupled, is_within, point_with
-from fuzzytree.auditing.engine.wording import counted
+from fuzzytree.auditing.engine.witnesses import (
+    START,
+    Stretch,
+    coupled,
+    is_within,
+    point_with,
+    region_around,
+    stretch,
+)
 from fuzzytree.numerics.exact import outwards
 
 _MOST_CHOICES = 2_000  # of values for axes that share inputs, in one question
@@ -372,3 +389,171 @@ class _Search:
             whole = {axis: part for axis, part in found.items() if part is not None}
             if len(whole) == len(found):
                 yield wanted | whole
+
+
+# --- does a rule win
+
+
+_TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
+
+
+def wins(
+    given: Ground, rule: int, rivals: Collection[int], clock: Clock | None = None
+) -> State:
+    """Return whether a rule is somewhere stronger than each of some others.
+
+    Args:
+        given: The rules and the box.
+        rule: The number of the rule, from 1.
+        rivals: The numbers of the others; without any it is asked whether the rule
+            fires at all.
+        clock: How much time there is; no limit unless given.
+
+    Returns:
+        `Proved`: it never is. `Witness`: it is, at a point that was evaluated in
+        fractions. `Bracket`: the largest lead, where time or inputs that depend on each
+        other leave it open.
+
+    Example:
+        >>> from fuzzytree.semantics.lowering import rules_from_tree
+        >>> from fuzzytree.auditing.engine.domain import Domain, Side
+        >>> from fuzzytree.auditing.engine.arrangement import ground
+        >>> from fuzzytree.testing import random_tree
+        >>> rules = rules_from_tree(random_tree(1))
+        >>> box = Domain(tuple(Side(name, -9.0, 9.0) for name in rules.inputs))
+        >>> found = wins(ground(rules, box), 1, {2, 3})
+        >>> [(one.kind, one.rules, one.rivals, one.level) for one in found.claims]
+        [('beats', (1,), (2, 3), None), ('strength', (1,), (), '1')]
+    """
+    clock = clock or Clock()
+    others = tuple(sorted(rivals))
+    if given.is_empty:
+        return Proved("the domain has no point")
+    by_boxes = partial(
+        wins_by_boxes, given.rules, given.domain, rule, others, tolerance=_TOLERANCE
+    )
+    if given.rules.semantics.conjunction == "product" or not given.is_kept:
+        return by_boxes(clock)
+    question = Question((rule,), others, None, f"the largest lead of rule {rule}")
+    # Half of the time for cells, the rest for boxes: they see that clauses cancel, and
+    # know inputs that depend on each other.
+    found = searched(given, question, clock.share(0.5))
+    if not isinstance(found, Bracket):
+        return found
+    other = by_boxes(clock.share(0.9))
+    if not isinstance(other, Bracket):
+        return other
+    return min(found, other, key=lambda one: one.high)
+
+
+# --- by how much a rule leads
+
+
+_STEPS = 10  # halvings of the upper end
+
+
+def largest_lead(
+    given: Ground,
+    rule: int,
+    rivals: Collection[int],
+    won: Witness,
+    enough: Fraction,
+    clock: Clock | None = None,
+) -> Bracket:
+    """Return bounds of a rule's largest lead over the strongest of some others.
+
+    Under the minimum a lead of d somewhere means that a choice of cells has the rule
+    reach a level d above one below which every rival has values. The places within the
+    cells are not asked for, so this bounds the lead from above. From below it is the
+    best point that floats led to, evaluated in fractions.
+
+    Args:
+        given: The rules and the box.
+        rule: The number of the rule, from 1.
+        rivals: The numbers of the others.
+        won: A point at which the rule wins.
+        enough: Once a lead of this much is found, the upper end is not worked out.
+        clock: How much time there is; no limit unless given.
+    """
+    clock = clock or Clock()
+    others = tuple(sorted(rivals))
+    best = point_of(won.point)
+    low = _lead(given, best, rule, others)
+    if low < enough:
+        found = leader(given, (rule,), others)
+        if is_within(given, found) and _lead(given, found, rule, others) > low:
+            best = plainer(given, found, (rule,), others)
+            low = _lead(given, best, rule, others)
+    name = f"the largest lead of rule {rule}"
+    claims = (
+        Claim("beats", rules=(rule,), rivals=others),
+        *_strengths(given, best, (rule, *others)),
+    )
+    high, why = Fraction(1), "a lead that large is enough"
+    if low < enough:
+        if given.rules.semantics.conjunction == "product" or not given.is_kept:
+            from fuzzytree.auditing.engine.bounding import largest_lead_by_boxes
+
+            wide = largest_lead_by_boxes(given.rules, given.domain, rule, others, clock)
+            high, why = Fraction(wide.high), wide.why
+        else:
+            high, why = _bound(given, rule, others, low, clock)
+    return Bracket(
+        name, outwards(low)[0], outwards(high)[1], why, coordinates(best), claims
+    )
+
+
+def _lead(given: Ground, point: Point, rule: int, rivals: Collection[int]) -> Fraction:
+    strengths = strengths_at(given, point)
+    return strengths[rule - 1] - max(
+        (strengths[number - 1] for number in rivals), default=Fraction(0)
+    )
+
+
+def _strengths(
+    given: Ground, point: Point, rules: Collection[int]
+) -> tuple[Claim, ...]:
+    """Return claims of the strengths of a rule and of the strongest of others."""
+    strengths = strengths_at(given, point)
+    first, *others = rules
+    told = [first]
+    if others:
+        told.append(max(others, key=lambda number: strengths[number - 1]))
+    return tuple(
+        Claim("strength", rules=(number,), level=str(strengths[number - 1]))
+        for number in told
+    )
+
+
+def _bound(
+    given: Ground, rule: int, rivals: tuple[int, ...], low: Fraction, clock: Clock
+) -> tuple[Fraction, str]:
+    """Return what the lead does not exceed, and how that is known."""
+    contest = Contest(given, (rule - 1,), tuple(number - 1 for number in rivals))
+    high = Fraction(1)
+    try:
+        for step in range(_STEPS):
+            # The true lead tends to be small: begin near the lower end.
+            middle = low + (high - low) / (64 if step == 0 else 2)
+            if middle <= low:
+                break
+            if _may_reach(contest, middle, clock):
+                low = middle
+            else:
+                high = middle
+    except OutOfTimeError:
+        return high, "the budget was spent"
+    return high, "the places within the cells are not asked for"
+
+
+def _may_reach(contest: Contest, lead: Fraction, clock: Clock) -> bool:
+    """Return whether a lead cannot be excluded."""
+    bands = contest.bands
+    for band in contest.events:
+        top = bisect_left(bands.high, bands.low[band] + lead)
+        families = [
+            options.masks(options.top >= top, band) for options in contest.options
+        ]
+        if cover(families, contest.full, clock) is not None:
+            return True
+    return False

@@ -1,32 +1,113 @@
-"""What a rule can reach and which rivals it can leave below, axis by axis.
+"""What each axis can contribute to a duel, and a choice on every axis that suffices.
 
 Under the minimum, a rule is stronger than its rivals at a point exactly if some level t
 lies above all of their strengths and not above its own. At such a level every axis must
 keep the rule at t or above, and every rival must be below t on some axis. In a cell the
-elements are in strict order, so what a value of the axis leaves below t is nested: as
-far as it is below the rule's element, an element is left below at exactly the levels
-above its least value in the cell and up to the rule's largest. So a cell is one option,
-told by bands: `top` of the rule, and `floor` of each rival.
+elements are in strict order, so the sets of rivals below t are nested: an element below
+the rule's is below t at exactly the levels above its least value in the cell, up to the
+rule's largest. So a cell is one option, given by bands: `top` of the rule, and `floor`
+of each rival.
+
+One option on each axis must together leave all rivals below. That is set cover with
+bit masks, solved by a dynamic program over the covered set, one axis after another,
+which keeps only sets that no other contains. Where axes share inputs, linear
+inequalities in fractions decide whether any inputs have the chosen values.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.covering import maximal
-from fuzzytree.auditing.engine.ground import Bands, Ground, Laid
-from fuzzytree.auditing.engine.parts import START
+from fuzzytree.auditing.engine.arrangement import Bands, Ground, Laid
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.witnesses import (
+    START,
+    Stretch,
+    point_with,
+    stretch,
+    widest,
+)
 from fuzzytree.model.interrupts import checkpoint
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
     from fuzzytree.model.contracts import IntArray
+
+
+def maximal(masks: Iterable[int]) -> tuple[int, ...]:
+    """Return the sets that no other one contains, in a fixed order.
+
+    Example:
+        >>> maximal([0b011, 0b001, 0b100])
+        (3, 4)
+    """
+    kept: list[int] = []
+    for mask in sorted(set(masks), key=lambda one: (-one.bit_count(), one)):
+        checkpoint()
+        if all(mask | other != other for other in kept):
+            kept.append(mask)
+    return tuple(kept)
+
+
+def cover(
+    families: Sequence[Sequence[int]], full: int, clock: Clock
+) -> tuple[int, ...] | None:
+    """Return an option of each family that together cover `full`, or None.
+
+    Args:
+        families: The options on each axis, as sets of bits.
+        full: What must be covered.
+        clock: Asked between two axes.
+
+    Raises:
+        OutOfTimeError: If the clock is over.
+
+    Example:
+        >>> cover([[0b01, 0b10], [0b01]], 0b11, Clock())
+        (2, 1)
+    """
+    if not all(families):
+        return None
+    order = sorted(range(len(families)), key=lambda axis: len(families[axis]))
+    rest = [0] * (len(order) + 1)
+    for place in range(len(order) - 1, -1, -1):
+        union = rest[place + 1]
+        for mask in families[order[place]]:
+            union |= mask
+        rest[place] = union & full
+    if rest[0] != full:
+        return None
+    steps: list[dict[int, tuple[int, int]]] = []
+    live: Iterable[int] = (0,)
+    for place, axis in enumerate(order):
+        clock.check()
+        reached: dict[int, tuple[int, int]] = {}
+        for before in live:
+            checkpoint()
+            for mask in families[axis]:
+                after = (before | mask) & full
+                if after | rest[place + 1] == full:
+                    reached.setdefault(after, (before, mask))
+        if not reached:
+            return None
+        steps.append(reached)
+        live = maximal(reached)
+    chosen = [0] * len(order)
+    at = full
+    for place in range(len(order) - 1, -1, -1):
+        at, chosen[order[place]] = steps[place][at]
+    return tuple(chosen)
+
+
+# --- options of the axes
+
 
 NEVER = np.iinfo(np.int64).max
 _MOST_BITS = 63
@@ -237,3 +318,143 @@ def _undominated(options: Options) -> Options:
         is_better &= floor[:, np.newaxis, rival] <= floor[:, rival]
     chosen = order[~np.triu(is_better, 1).any(axis=0)]
     return Options(options.where[chosen], options.top[chosen], options.floor[chosen])
+
+
+# --- axes that share inputs
+
+
+Part = tuple[Stretch, int]
+"""A stretch of an axis, and the rivals that it leaves below, as bits."""
+
+
+def union(masks: Iterable[int]) -> int:
+    """Return all bits of some masks.
+
+    Example:
+        >>> union([0b001, 0b100])
+        5
+    """
+    found = 0
+    for mask in masks:
+        found |= mask
+    return found
+
+
+def at_most(calls: int, clock: Clock | None = None) -> Callable[[], None]:
+    """Return what raises OutOfTimeError when called too often, or too late."""
+    left = iter(range(calls))
+
+    def tell() -> None:
+        if clock is not None:
+            clock.check()
+        if next(left, None) is None:
+            raise OutOfTimeError
+
+    return tell
+
+
+def choices(
+    given: Ground,
+    parts: Mapping[int, Sequence[Part]],
+    goal: int,
+    rest: int,
+    held: Mapping[int, Stretch],
+    tell: Callable[[], None],
+) -> Iterator[tuple[dict[int, Stretch], int]]:
+    """Yield choices that some point has, each with what it leaves below.
+
+    Args:
+        given: The rules and the box.
+        parts: What each axis can be.
+        goal: What must be left below, by the other axes too.
+        rest: What the other axes can leave below.
+        held: What axes must be besides.
+        tell: Called before inequalities are solved; it may raise.
+    """
+    axes = list(parts)
+    reach = [rest]
+    for axis in reversed(axes):
+        reach.append(reach[-1] | union(mask for _, mask in parts[axis]))
+    reach.reverse()
+    todo: list[tuple[int, dict[int, Stretch], int]] = [(0, dict(held), 0)]
+    while todo:
+        place, wanted, covered = todo.pop()
+        if (covered | reach[place]) & goal != goal:
+            continue
+        if wanted:
+            tell()
+            if point_with(given, wanted) is None:
+                continue
+        if place == len(axes):
+            yield wanted, covered
+            continue
+        axis = axes[place]
+        todo += [
+            (place + 1, {**wanted, axis: part}, covered | mask)
+            for part, mask in parts[axis]
+        ]
+
+
+def parts_of(
+    contest: Contest,
+    options: Options,
+    axis: int,
+    band: int,
+    levels: tuple[Fraction, Fraction],
+    *,
+    is_outer: bool,
+) -> Iterator[Part]:
+    """Yield the stretches of an axis, each with the rivals left below there.
+
+    Args:
+        contest: The question.
+        options: Those of the axis that count.
+        axis: The axis.
+        band: The band below the levels.
+        levels: The rule must reach the lower one, the rivals stay below the upper.
+        is_outer: Whether what may suffice at some level between counts.
+    """
+    laid = contest.ground.laid[0][axis]
+    for number in ((options.top > band) & (options.where >= START)).nonzero()[0]:
+        cell = int(options.where[number])
+        mine = weakest(laid, contest.ours, cell)
+        floors = options.floor[number]
+        theirs = {
+            n: weakest(laid, [contest.rivals[n]], cell)
+            for n in range(len(floors))
+            if floors[n] <= band
+        }
+        yield from nested(laid, cell, levels, mine, theirs, is_outer=is_outer)
+
+
+def nested(
+    laid: Laid,
+    cell: int,
+    levels: tuple[Fraction, Fraction],
+    mine: int,
+    theirs: Mapping[int, int],
+    *,
+    is_outer: bool,
+) -> Iterator[Part]:
+    """Yield stretches of a cell, each with the rivals left below there.
+
+    What is left below is nested: everything up to some element of the order.
+
+    Args:
+        laid: The axis.
+        cell: The cell.
+        levels: As for `parts_of`.
+        mine: The element that is the rule's degree.
+        theirs: That of each rival that may be left below.
+        is_outer: As for `parts_of`.
+    """
+    rank = laid.cells.start_rank if cell == START else laid.cells.rank[cell]
+    for limit in sorted({-1, *(int(rank[e]) for e in theirs.values())}):
+        kept = {n: e for n, e in theirs.items() if int(rank[e]) <= limit}
+        below = set(kept.values())
+        if is_outer:
+            part = widest(laid, cell, levels, [mine], below)
+        else:
+            part = stretch(laid, cell, levels[0], [mine], below)
+        if part is not None:
+            yield part, union(1 << n for n in kept)

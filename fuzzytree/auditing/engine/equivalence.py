@@ -1,17 +1,16 @@
-"""Do two rule bases decide alike everywhere on a box? Branch and bound in fractions.
+"""Do two rule bases predict the same class everywhere on a box?
 
-A box is a product of stretches of the axes that either model asks; combinations count
-as axes of their own, which only makes more boxes. On a box the strength of each rule
-has bounds, and a rule is *beaten* if another one is preferred to it at every point:
-certainly stronger, or as strong and before it. What is left of a model are the rules
-that may win there. The box is settled
+Branch and bound in fractions. A box is a product of stretches of the axes that either
+model uses; combinations count as axes of their own, which only makes more boxes. On a
+box the strength of each rule has bounds; the contenders of a model are the rules that
+may win there (`fuzzytree.auditing.engine.contenders`). The box is settled
 
-- if both models answer one and the same class on it, or
-- if the same rules are left of both in the same order, for which their forms count and
-  not their names: then whichever wins in one wins in the other.
+- if both models predict one and the same class on it, or
+- if the same rules remain of both in the same order, compared by form and not by name:
+  then the same rule wins in both.
 
-If what the two may answer has nothing in common, any point of the box is a witness. All
-other boxes are halved, best where a curve changes its formula or crosses another.
+If the possible predictions of the two are disjoint, any point of the box is a witness.
+All other boxes are halved, best where a curve changes its formula or crosses another.
 """
 
 from __future__ import annotations
@@ -19,19 +18,129 @@ from __future__ import annotations
 import heapq
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Final, Literal, NamedTuple
 
-from fuzzytree.auditing.engine.answers import difference_at
+from fuzzytree.auditing.engine.arrangement import difference_at
 from fuzzytree.auditing.engine.clock import Clock
-from fuzzytree.auditing.engine.contenders import Box, Contender, Left, left_on, same
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.points import Places, Point, middle
+from fuzzytree.auditing.engine.contenders import (
+    Axis,
+    Box,
+    Contender,
+    Key,
+    Left,
+    Numbered,
+    Stretch,
+    laid,
+    left_on,
+    same,
+)
+from fuzzytree.auditing.engine.domain import Domain, linear_form, span
+from fuzzytree.auditing.engine.linear import ZERO, Row, feasible
 from fuzzytree.auditing.engine.states import Bracket, Proved, Span, State, Witness
-from fuzzytree.auditing.engine.stretches import Axis, Key, Numbered, Stretch, laid
-from fuzzytree.auditing.engine.variables import span
 from fuzzytree.model.rulebase import RuleBase, Variable
+
+Point = Mapping[str, Fraction]
+
+
+class Places:
+    """The inputs of some rule bases on a domain, and where axes take them.
+
+    Args:
+        models: The rule bases.
+        keys: The axes; see `fuzzytree.auditing.engine.contenders`.
+        domain: A side for each input.
+
+    Raises:
+        ValueError: If an input has no side.
+    """
+
+    def __init__(
+        self, models: Sequence[RuleBase], keys: Sequence[Key], domain: Domain
+    ) -> None:
+        self.inputs = tuple(dict.fromkeys(n for model in models for n in model.inputs))
+        self.keys = keys
+        self.has_sums = not all(isinstance(key, str) for key in keys)
+        sides = {side.variable: side for side in domain.sides}
+        missing = [name for name in self.inputs if name not in sides]
+        if missing:
+            raise ValueError(f"the domain has no side for {missing[0]!r}")
+        self._place = {name: number for number, name in enumerate(self.inputs)}
+        self._ranges = [
+            (Fraction(sides[name].low), Fraction(sides[name].high))
+            for name in self.inputs
+        ]
+        self._limits = [
+            _row(v.parts, self._place, Stretch(Fraction(one.low), Fraction(one.high)))
+            for model in models
+            for v in model.variables
+            if v.parts and (one := sides.get(v.name)) is not None
+        ]
+
+    def some(self, box: Sequence[Stretch]) -> list[Point]:
+        """Return points of a box, where axes are inputs: its middle and its far end."""
+        given = dict(zip(map(str, self.keys), box, strict=True))
+        whole = {
+            name: given.get(name, Stretch(low, high))
+            for name, (low, high) in zip(self.inputs, self._ranges, strict=True)
+        }
+        return [
+            {name: middle(one) for name, one in whole.items()},
+            {name: one.high for name, one in whole.items()},
+        ]
+
+    def solved(self, box: Sequence[Stretch]) -> Point | None:
+        """Return a point whose axes lie in a box, None if there is none."""
+        rows = [
+            _row(key, self._place, one, is_open=not one.is_closed)
+            for key, one in zip(self.keys, box, strict=True)
+        ]
+        found = feasible(self._ranges, [*rows, *self._limits])
+        return None if found is None else dict(zip(self.inputs, found, strict=True))
+
+    def in_doubles(self, point: Point) -> Point | None:
+        """Return the doubles nearest to a point, if they are on the domain."""
+        near = {name: Fraction(float(point[name])) for name in self.inputs}
+        values = list(near.values())
+        pairs = zip(values, self._ranges, strict=True)
+        is_within = all(low <= value <= high for value, (low, high) in pairs)
+        is_within = is_within and all(_holds(row, values) for row in self._limits)
+        return near if is_within else None
+
+
+def middle(stretch: Stretch) -> Fraction:
+    """Return the double nearest to the middle, or the middle if no double is inside.
+
+    Example:
+        >>> middle(Stretch(Fraction(0), Fraction(1)))
+        Fraction(1, 2)
+    """
+    exact = (stretch.low + stretch.high) / 2
+    near = Fraction(float(exact))
+    return near if stretch.low < near < stretch.high else exact
+
+
+def _row(
+    key: Key, place: Mapping[str, int], stretch: Stretch, *, is_open: bool = False
+) -> Row:
+    """Return that an axis lies on a stretch, as an inequality of the inputs."""
+    if isinstance(key, str):
+        weights = {place[key]: Fraction(1)}
+        return Row(weights, stretch.low, stretch.high, is_open)
+    weights, constant = linear_form(Variable("", parts=key), place)
+    return Row(weights, stretch.low - constant, stretch.high - constant, is_open)
+
+
+def _holds(row: Row, values: Sequence[Fraction]) -> bool:
+    total = sum((w * values[k] for k, w in row.weights.items()), ZERO)
+    return (row.low is None or row.low <= total) and (
+        row.high is None or total <= row.high
+    )
+
+
+# --- branch and bound
+
 
 MOST_BOXES = 4_000
 """Boxes that are looked at, unless the clock ends before."""

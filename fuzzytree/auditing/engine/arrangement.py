@@ -1,10 +1,9 @@
-"""A rule base on a box, made ready for exact questions under the minimum.
+"""A rule base on a box, as an arrangement of cells on its axes.
 
-Every axis is cut into cells (`fuzzytree.auditing.engine.axes`). The values that
-elements have at the cells' ends are the *critical levels*; known as intervals, they are
-joined where they touch into *bands*, in order. Between two neighbouring bands the
-picture is the same at every level, and inside a cell all that matters of an element is
-the band of its least and of its largest value.
+Every axis is cut into cells (`fuzzytree.auditing.engine.axes`). The values of the
+elements at the ends of cells are the *critical levels*; as intervals, they are joined
+into *bands* where they touch. Under the minimum, nothing changes between two bands, and
+within a cell an element counts by the bands of its least and largest value.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.engine.axes import Cells, cut
-from fuzzytree.auditing.engine.crowds import crossings
-from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.engine.elements import ALWAYS, Element, Place, places
+from fuzzytree.auditing.engine.axes import Cells, crossings, cut
+from fuzzytree.auditing.engine.domain import Domain, span, variable_value
 from fuzzytree.auditing.engine.levels import Level, level_at, told_apart
-from fuzzytree.auditing.engine.variables import span, variable_value
+from fuzzytree.auditing.engine.linear import ZERO
+from fuzzytree.auditing.engine.pieces import ALWAYS, Element, Place, places
+from fuzzytree.auditing.engine.states import Claim, Witness, coordinates
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, Variable, shapes_of
 from fuzzytree.numerics.exact import exact_degree
@@ -437,3 +436,60 @@ def rule_strengths(
     if is_product:
         return [math.prod(of_rule, start=one) for of_rule in each]
     return [min(of_rule, default=one) for of_rule in each]
+
+
+# --- predictions at a point
+
+
+class Answered(NamedTuple):
+    """What a rule base says at a point, exactly.
+
+    Attributes:
+        label: The class, or None for no class.
+        rule: The number of the winning rule, 0 if none fires.
+        is_tie: Whether another rule is as strong.
+        margin: How far the strongest class is ahead of the next; not firing counts as
+            a class of strength 0.
+    """
+
+    label: str | None
+    rule: int
+    is_tie: bool
+    margin: Fraction
+
+
+def answer_at(rules: RuleBase, point: Mapping[str, Fraction]) -> Answered:
+    """Return what a rule base says at a point that need not be of doubles.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Rule
+        >>> answer_at(RuleBase("a", ("x",), (), (Rule((), "x"),)), {}).label
+        'x'
+    """
+    strengths = rule_strengths(rules, point)
+    best = max(strengths)
+    if best == 0:
+        return Answered(rules.semantics.uncovered, 0, False, ZERO)
+    winner = strengths.index(best)
+    label = rules.rules[winner].then
+    others = [
+        s for s, rule in zip(strengths, rules.rules, strict=True) if rule.then != label
+    ]
+    margin = best - max(others, default=ZERO)
+    return Answered(label, winner + 1, strengths.count(best) > 1, margin)
+
+
+def difference_at(
+    old: RuleBase, new: RuleBase, point: Mapping[str, Fraction]
+) -> Witness | None:
+    """Return a point as a witness that two rule bases answer otherwise there, if so."""
+    one, other = answer_at(old, point), answer_at(new, point)
+    if one.label == other.label:
+        return None
+    return Witness(
+        coordinates(point),
+        (
+            Claim("decides", of="old", label=one.label),
+            Claim("decides", of="new", label=other.label),
+        ),
+    )

@@ -1,0 +1,413 @@
+"""Ties under the product: where are rules one function, and the strongest there?
+
+In a box of cells a rule's strength is a product of polynomials, one on each axis. Two
+such products agree on a set with an interior exactly if on every axis one polynomial is
+a constant times the other, and the constants multiply to 1: polynomials that agree on
+an open set are equal, and on free axes the factorization is unique. On axes that share
+inputs this is true as well while no two of them have the same direction, for then no
+factor of the one is a multiple of a factor of the other. Branch and bound decides
+whether the rules are the strongest somewhere in such a box.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
+from typing import Final, NamedTuple
+
+import msgspec
+from msgspec.structs import replace
+
+from fuzzytree.auditing.engine.arrangement import Ground, Laid
+from fuzzytree.auditing.engine.bounding import wins_by_boxes
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.domain import (
+    Domain,
+    Point,
+    Side,
+    variable_value,
+)
+from fuzzytree.auditing.engine.factors import Factored
+from fuzzytree.auditing.engine.pieces import ONE, ZERO
+from fuzzytree.auditing.engine.pivots import Asked, checked
+from fuzzytree.auditing.engine.polynomials import Polynomial, difference, monic
+from fuzzytree.auditing.engine.states import (
+    Declined,
+    Proved,
+    State,
+    Witness,
+    counted,
+    point_of,
+)
+from fuzzytree.auditing.engine.witnesses import (
+    START,
+    Stretch,
+    coupled,
+    direction_of,
+    point_with,
+)
+from fuzzytree.numerics.exact import outwards
+
+
+class Run(NamedTuple):
+    """Neighbouring cells of an axis, by number; `START` twice is its only value."""
+
+    first: int
+    last: int
+
+
+Box = tuple[Run, ...]
+"""A run on each axis."""
+
+_Form = tuple[Fraction, Polynomial]
+
+
+class Proportions(msgspec.Struct, frozen=True, eq=False, dict=True):
+    """The rules of a ground, to be compared as functions on boxes of cells.
+
+    Attributes:
+        ground: The rules, joined by the product, and the box, which is not empty.
+    """
+
+    ground: Ground
+
+    @functools.cached_property
+    def factored(self) -> Factored:
+        """The rules as polynomials."""
+        return Factored(self.ground)
+
+    @property
+    def laid(self) -> tuple[Laid, ...]:
+        """The axes."""
+        return self.ground.laid[0]
+
+    @functools.cached_property
+    def whole(self) -> Box:
+        """All of the domain."""
+        count = [len(laid.cells.between) for laid in self.laid]
+        return tuple(Run(0, n - 1) if n else Run(START, START) for n in count)
+
+    def boxes(self, one: int, other: int, within: Box) -> Iterator[Box]:
+        """Yield all boxes on which two rules are one function that is not 0.
+
+        Args:
+            one: The position of a rule.
+            other: The position of another one.
+            within: Where they are looked for.
+        """
+        runs: list[list[tuple[Run, Fraction]]] = []
+        for axis, run in enumerate(within):
+            found = [*self._runs(axis, one, other, run)]
+            if not found:
+                return
+            runs.append(found)
+        reach = [{ONE}]  # what the ratios of the last axes can multiply to
+        for of in reversed(runs):
+            reach.append({a * b for a in {ratio for _, ratio in of} for b in reach[-1]})
+        reach.reverse()
+        todo: list[tuple[Box, Fraction]] = [((), ONE)]
+        while todo:
+            box, ratio = todo.pop()
+            if 1 / ratio not in reach[len(box)]:
+                continue
+            if len(box) == len(within):
+                yield box
+            else:
+                todo += [((*box, run), ratio * by) for run, by in runs[len(box)]]
+
+    def are_one(self, one: int, other: int, box: Box) -> bool:
+        """Return whether two rules are one function on all of a box."""
+        whole = ONE
+        for axis, run in enumerate(box):
+            if self.is_shared(axis, one, other):
+                continue
+            if any(self.vague(axis, run)):
+                return False
+            ratios = {
+                self._ratio(axis, one, other, cell)
+                for cell in _cells(run)
+                if not self._is_zero(axis, one, cell)
+                or not self._is_zero(axis, other, cell)
+            }
+            if not ratios:
+                return True  # both are 0
+            ratio = ratios.pop()
+            if ratios or ratio is None:
+                return False
+            whole *= ratio
+        return whole == 1
+
+    def is_told(self, one: int, other: int) -> bool:
+        """Return whether cells tell all about two rules: none is hidden in a zone."""
+        return not any(
+            any(self.vague(axis, run)) and not self.is_shared(axis, one, other)
+            for axis, run in enumerate(self.whole)
+        )
+
+    def vague(self, axis: int, run: Run) -> Sequence[bool]:
+        """Return of each place within a run, its ends too, if it may hide a cell."""
+        found: list[bool] = self.laid[axis].cells.is_vague.tolist()
+        return found[max(run.first, 0) : run.last + 2]
+
+    @functools.cached_property
+    def _shared(self) -> dict[tuple[int, int, int], bool]:
+        return {}
+
+    def is_shared(self, axis: int, one: int, other: int) -> bool:
+        """Return whether two rules ask the same of an axis, in whatever order."""
+        key = axis, one, other
+        if key not in self._shared:
+            asked = self.factored.asked[axis]
+            self._shared[key] = sorted(asked[one]) == sorted(asked[other])
+        return self._shared[key]
+
+    def are_free(self, one: int, other: int) -> bool:
+        """Return whether no two axes on which rules differ have one direction."""
+        found: list[tuple[tuple[int, Fraction], ...]] = []
+        for axis, laid in enumerate(self.laid):
+            if self.is_shared(axis, one, other):
+                continue
+            direction = direction_of(self.ground, axis)
+            if direction and not laid.cells.between:
+                return False  # one value of a combination makes inputs depend
+            if direction in found:
+                return False
+            if direction:
+                found.append(direction)
+        return True
+
+    @functools.cached_property
+    def _forms(self) -> dict[tuple[int, int, int], _Form]:
+        return {}
+
+    def _form(self, axis: int, rule: int, cell: int) -> _Form:
+        """Return a rule's polynomial in a cell: the last number, and the rest by it."""
+        key = axis, rule, cell
+        if key not in self._forms:
+            if cell == START:
+                polynomial: Polynomial = (self.factored.at_start(axis, rule),)
+            else:
+                polynomial = self.factored.polynomial(axis, rule, cell)
+            polynomial = difference(polynomial, (ZERO,))
+            self._forms[key] = polynomial[-1], monic(polynomial)
+        return self._forms[key]
+
+    def _is_zero(self, axis: int, rule: int, cell: int) -> bool:
+        return not self._form(axis, rule, cell)[0]
+
+    def _ratio(self, axis: int, one: int, other: int, cell: int) -> Fraction | None:
+        """Return one rule by another one in a cell; None if it varies, or is 0."""
+        (a, p), (b, q) = (self._form(axis, rule, cell) for rule in (one, other))
+        return a / b if a and b and p == q else None
+
+    def _runs(
+        self, axis: int, one: int, other: int, within: Run
+    ) -> Iterator[tuple[Run, Fraction]]:
+        """Yield runs on which two rules are in one ratio, as long as they can be."""
+        if self.is_shared(axis, one, other):
+            yield within, ONE
+            return
+        is_vague = self.laid[axis].cells.is_vague
+        first, known = within.first, None
+        for cell in _cells(within):
+            ratio = self._ratio(axis, one, other, cell)
+            if ratio == known and not (cell > first and is_vague[cell]):
+                continue
+            if known is not None:
+                yield Run(first, cell - 1), known
+            first, known = cell, ratio
+        if known is not None:
+            yield Run(first, within.last), known
+
+    def ends(self, axis: int, run: Run) -> tuple[Fraction, Fraction]:
+        """Return the ends of a run; those of the axis where it reaches them."""
+        cells = self.laid[axis].cells
+        if run == self.whole[axis]:
+            return cells.zones[0][0], cells.zones[-1][1]
+        low = cells.between[run.first][0] if run.first else cells.zones[0][0]
+        is_last = run.last == len(cells.between) - 1
+        high = cells.zones[-1][1] if is_last else cells.between[run.last][1]
+        return low, high
+
+
+def _cells(run: Run) -> range:
+    return range(run.first, run.last + 1)
+
+
+# --- ties
+
+
+_MOST_BOXES: Final = 500  # of cells, in one question
+_SHARE: Final = 0.25  # of the time that is left, for one box
+_NEAR: Final = (3, 6, 12, 24, 48)  # halvings of the way from a point to the middle
+_TOLERANCE: Final = 1e-6  # of a lead, at which boxes end
+
+
+def tie_of_products(given: Ground, asked: Asked, clock: Clock) -> State:
+    """Return whether rules are the strongest on a set with an interior.
+
+    Args:
+        given: The rules, joined by the product, and the box, which is not empty.
+        asked: Which of them.
+        clock: How much time there is.
+
+    Returns:
+        `Proved`: they nowhere are. `Witness`: here they are. `Bracket`: time, or a
+        lead that is too small to tell, leaves it open. `Declined`: axes of one
+        direction do, or places too near to each other.
+
+    Raises:
+        OutOfTimeError: If the clock is over.
+        TooManyCellsError: If the axes are too large.
+    """
+    search = _Search(Proportions(given), asked, clock)
+    mine, *others = (rule - 1 for rule in (*asked.ours, *asked.weak))
+    if not all(search.of.is_told(mine, other) for other in others):
+        search.of = Proportions(given.fine)
+    found = search.found()
+    if found is not None:
+        return found
+    if search.why:
+        return asked.open(search.why)
+    if not all(search.of.are_free(mine, other) for other in others):
+        reason = "the inputs of its variables depend on each other"
+        return Declined("FTD04", reason)
+    if not all(search.of.is_told(mine, other) for other in others):
+        return Declined("FTD04", "two places of an axis are too near to tell")
+    boxes = counted(len(search.seen), "box", "boxes")
+    return Proved(f"{boxes} of cells visited in which they are one function")
+
+
+class _Search:
+    """One question.
+
+    Attributes:
+        of: The rules.
+        asked: Which of them.
+        clock: How much time there is.
+        seen: The boxes that were asked about.
+        why: What left a box open, if any was.
+    """
+
+    def __init__(self, of: Proportions, asked: Asked, clock: Clock) -> None:
+        self.of, self.asked, self.clock = of, asked, clock
+        self.seen: set[Box] = set()
+        self.why = ""
+        given = of.ground
+        self.joined = {axis for group in coupled(given) for axis in group}
+
+    def found(self) -> Witness | None:
+        """Return a point, or None if there is none, or none was found."""
+        mine, *others = (rule - 1 for rule in self.asked.ours)
+        todo: list[Iterable[Box]] = [
+            self.of.boxes(mine, others[0], self.of.whole) if others else [self.of.whole]
+        ]
+        while todo:
+            for box in todo.pop():
+                self.clock.check()
+                if box in self.seen:
+                    continue
+                if len(self.seen) == _MOST_BOXES:
+                    raise OutOfTimeError
+                self.seen.add(box)
+                same = {
+                    rule
+                    for rule in self.asked.rivals
+                    if self.of.are_one(mine, rule - 1, box)
+                }
+                if same & {*self.asked.strict}:
+                    continue
+                found = self._leads(box, same)
+                if found is not None:
+                    return found
+                todo.append(self._parts(box, same))
+        return None
+
+    def _parts(self, box: Box, same: set[int]) -> Iterator[Box]:
+        """Yield the parts of a box in which more rivals are the same function."""
+        mine = self.asked.ours[0] - 1
+        for rule in self.asked.weak:
+            if rule not in same:
+                yield from self.of.boxes(mine, rule - 1, box)
+
+    def _leads(self, box: Box, same: set[int]) -> Witness | None:
+        """Return a point of a box at which all but some rivals are weaker."""
+        rivals = [rule for rule in self.asked.rivals if rule not in same]
+        rules, rule = self.of.ground.rules, self.asked.ours[0]
+        for is_outer in (True, False):
+            domain = self._domain(box, is_outer=is_outer)
+            if domain is None:
+                break
+            clock = self.clock.share(_SHARE)
+            state = wins_by_boxes(
+                rules, domain, rule, rivals, clock, tolerance=_TOLERANCE
+            )
+            if isinstance(state, Proved) and is_outer:
+                return None
+            if isinstance(state, Witness):
+                found = self._near(box, point_of(state.point))
+                if found is not None:
+                    return found
+        found = self._near(box, None)  # there may be no double in it
+        if found is None:
+            self.why = "no point is known where they lead, and none is excluded"
+        return found
+
+    def _near(self, box: Box, point: Point | None) -> Witness | None:
+        """Return a point of a box at which they tie, if one near another does."""
+        given = self.of.ground
+        ends = enumerate(self.of.ends(axis, run) for axis, run in enumerate(box))
+        wanted = {n: Stretch(*of, is_open=of[0] < of[1]) for n, of in ends}
+        middle = point_with(given, wanted)
+        tried = [] if point is None else [point]
+        if middle is not None:
+            start = point or middle
+            tried += [
+                {name: x + (middle[name] - x) / 2**bits for name, x in start.items()}
+                for bits in (_NEAR if point else (0,))
+            ]
+        for one in tried:
+            if self._is_inside(box, one):
+                found = checked(given, self.asked, one)
+                if found is not None:
+                    return found
+        return None
+
+    def _domain(self, box: Box, *, is_outer: bool) -> Domain | None:
+        """Return a box with doubles for its ends, around it or within it."""
+        domain = self.of.ground.domain
+        sides = {side.variable: side for side in domain.sides}
+        for axis, run in enumerate(box):
+            variable = self.of.laid[axis].axis.variable
+            known = sides.get(variable.name)
+            if run == self.of.whole[axis]:
+                if known is not None and known.low < known.high:
+                    # What holds at an end alone has no interior.
+                    sides[variable.name] = replace(known, is_open=True)
+                continue
+            low, high = self.of.ends(axis, run)
+            (below, first), (last, above) = outwards(low), outwards(high)
+            if is_outer:
+                first, last = below, above
+            # The value at a lower end belongs to the cell before.
+            is_open = first == low
+            if first > last or (first == last and is_open):
+                return None
+            sides[variable.name] = Side(variable.name, first, last, is_open=is_open)
+        return Domain(tuple(sides.values()))
+
+    def _is_inside(self, box: Box, point: Point) -> bool:
+        """Return whether points with an interior about one, or below, are in a box."""
+        for axis, run in enumerate(box):
+            laid = self.of.laid[axis]
+            value = variable_value(laid.axis.variable, point)
+            if axis in self.joined and laid.cells.between:
+                cells = laid.cells.between[run.first : run.last + 1]
+                if not any(low < value < high for low, high in cells):
+                    return False
+                continue
+            low, high = self.of.ends(axis, run)
+            if not (low < value <= high or low == value == high):
+                return False
+        return True
