@@ -30,8 +30,8 @@ from fuzzytree.exporters.fcl_terms import (
     unspeakable,
 )
 from fuzzytree.exporters.fll_rules import speakable
-from fuzzytree.formats.fcl.fcl import FACTS, places, read
 from fuzzytree.formats.fcl.fcl_dialects import MARK
+from fuzzytree.formats.fcl.fcl_reader import FACTS, places, read
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
 from fuzzytree.model.naming import Names, changes_text

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fcl_rules import rule_losses, uses
-from fuzzytree.formats.engines import fuzzylite_losses
 from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, PAIRS
+from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.system import And, FuzzySystem, Or, SNorm, SystemOutput, questions
 from fuzzytree.semantics.conversion import number_losses

@@ -16,8 +16,7 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
 from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
-from fuzzytree.formats.engines import fuzzylite_losses
-from fuzzytree.formats.fis.fis import (
+from fuzzytree.formats.fis.fis_reader import (
     DEFAULTS,
     DIALECT,
     always_concluded,
@@ -34,6 +33,7 @@ from fuzzytree.formats.fis.fis_words import (
     TNORMS,
     Dialect,
 )
+from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
 from fuzzytree.model.naming import Names, changes_text

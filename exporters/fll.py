@@ -22,11 +22,11 @@ from fuzzytree.exporters.fll_terms import (
     number_text,
     weighted_type,
 )
-from fuzzytree.formats.fll.fll import places, read
-from fuzzytree.formats.fll.fll_meaning import differences
+from fuzzytree.formats.fll.fll_differences import differences
+from fuzzytree.formats.fll.fll_reader import places, read
 from fuzzytree.formats.fll.fll_rules import RULE_WORDS
 from fuzzytree.formats.fll.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NORMS
-from fuzzytree.formats.lines import LONGEST_WORD
+from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
 from fuzzytree.model.naming import Names, changes_text
@@ -164,7 +164,7 @@ def _accepted(names: Sequence[str]) -> Names:
     # Words are reserved in small letters only: a variable may be called X.
     taken = {name.lower() for name in names if name != name.lower()} - {*names}
     reserved = [word for word in _RESERVED if word not in taken]
-    return Names.of(names, reserved=reserved, longest=LONGEST_WORD)
+    return Names.of(names, reserved=reserved, longest=LONGEST_NAME)
 
 
 def _with_pointed_numbers(

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
-from fuzzytree.formats.fml.fml import places, reading
+from fuzzytree.formats.fml.fml_reader import places, reading
 from fuzzytree.formats.fml.fml_words import (
     FAR,
     METHODS,

@@ -14,10 +14,11 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.yaml_parts import named_shape, numbers, range_ends, summand
 from fuzzytree.exporters.yaml_system import entries_of, losses_of
 from fuzzytree.exporters.yaml_text import Entry, Noted, Short, joined
+from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml import layout
-from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
-from fuzzytree.formats.yaml.sentences import Vocabulary, readings, vocabulary_of
-from fuzzytree.formats.yaml.yaml import places, reading
+from fuzzytree.formats.yaml.clauses import Vocabulary, readings, vocabulary_of
+from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_SENTENCE
+from fuzzytree.formats.yaml.yaml_reader import places, reading
 from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.model.rulebase import (
     Clause,

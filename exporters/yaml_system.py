@@ -9,10 +9,10 @@ from typing import assert_never
 from fuzzytree.exporters.yaml_parts import named_shape, numbers, range_ends, summand
 from fuzzytree.exporters.yaml_text import Entry, Noted, Short
 from fuzzytree.formats.formulas import FormulaError, parse, text_of
+from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.conditions import conclusions_text, condition_text
-from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_NAME, LONGEST_SENTENCE
-from fuzzytree.formats.yaml.system_layout import LONGEST_NOTE
+from fuzzytree.formats.yaml.layout import LARGEST_COUNT, LONGEST_NOTE, LONGEST_SENTENCE
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import LR, Band, Points
 from fuzzytree.model.system import (

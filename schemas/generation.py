@@ -25,7 +25,7 @@ FILES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "rulebase.schema.json": "fuzzytree.formats.yaml.layout:RuleBaseFile",
         "tree.schema.json": "fuzzytree.formats.yaml.layout:TreeFile",
-        "system.schema.json": "fuzzytree.formats.yaml.system_layout:SystemFile",
+        "system.schema.json": "fuzzytree.formats.yaml.layout:SystemFile",
         "board.schema.json": "fuzzytree.tactile.board_files.layout:BoardFile",
     }
 )

@@ -232,7 +232,7 @@ def _for_programs(found: Audit, form: Form, baseline: Mapping[str, str] | None) 
 
 def _lines_of(material: Material) -> list[str]:
     """Return the lines of a model's file, for people."""
-    from fuzzytree.formats.lines import split_lines
+    from fuzzytree.formats.text_files import split_lines
 
     content = material.file.content if material.file else b""
     is_wide = content[:2] in (b"\xff\xfe", b"\xfe\xff")

@@ -111,7 +111,7 @@ def self_test(has_onnx: bool) -> list[str]:
     import numpy as np
 
     from fuzzytree.api import verbs
-    from fuzzytree.formats.yaml.yaml import read
+    from fuzzytree.formats.yaml.yaml_reader import read
     from fuzzytree.runtimes.answers import Answers
 
     table = np.array([[k, k % 3] for k in range(12)], np.float64)

@@ -18,7 +18,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.yaml.layout import LONGEST_NAME
+from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
     FUNCTIONS,

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 
 from fuzzytree.errors import LossError
 from fuzzytree.formats.formulas import parse
-from fuzzytree.formats.yaml.rules import blocks_of, joined
+from fuzzytree.formats.yaml.clauses import blocks_of, joined
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     And,

@@ -15,7 +15,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from fuzzytree.errors import LossError
-from fuzzytree.formats.yaml.rules import blocks_of, joined
+from fuzzytree.formats.yaml.clauses import blocks_of, joined
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     And,

@@ -14,7 +14,7 @@ import fuzzytree as ft
 from fuzzytree.cli import main
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import TABLE, all_formats, yaml
-from fuzzytree.formats.yaml.yaml import reading
+from fuzzytree.formats.yaml.yaml_reader import reading
 from fuzzytree.model.contracts import Document, Loss, Reading, Written
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import check_list, write
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect
-from fuzzytree.formats.fcl.fcl import read
+from fuzzytree.formats.fcl.fcl_reader import read
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.model.system import (
     And,

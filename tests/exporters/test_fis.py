@@ -15,7 +15,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fis import write
 from fuzzytree.exporters.fis_terms import term_of
-from fuzzytree.formats.fis.fis import DEFAULTS, always_concluded, reading
+from fuzzytree.formats.fis.fis_reader import DEFAULTS, always_concluded, reading
 from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, DIALECTS, HEDGES, Dialect
 from fuzzytree.model.contracts import Written
 from fuzzytree.model.rulebase import Points, RuleBase

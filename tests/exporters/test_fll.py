@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from fuzzytree.checking.anonymous import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fll import write
-from fuzzytree.formats.fll.fll import read
+from fuzzytree.formats.fll.fll_reader import read
 from fuzzytree.model.rulebase import LR, Band, Flank, Part, Points, RuleBase, Side
 from fuzzytree.model.system import (
     Activation,

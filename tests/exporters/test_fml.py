@@ -12,7 +12,7 @@ from fuzzytree.checking.anonymous import anonymous
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.fml import write
-from fuzzytree.formats.fml.fml import reading
+from fuzzytree.formats.fml.fml_reader import reading
 from fuzzytree.formats.fml.fml_words import FAR, MODIFIERS, USUAL
 from fuzzytree.model.rulebase import Clause, Kind, Points, Rule
 from fuzzytree.model.system import (

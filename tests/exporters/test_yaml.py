@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.yaml import FORMAT, write
-from fuzzytree.formats.yaml import layout, nodes
+from fuzzytree.formats import text_files
+from fuzzytree.formats.yaml import nodes
 from fuzzytree.formats.yaml.nodes import Scalar, compose
-from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.formats.yaml.yaml_reader import read
 from fuzzytree.model.contracts import Model, Reading
 from fuzzytree.model.rulebase import (
     LR,
@@ -284,7 +285,7 @@ def test_what_no_file_can_hold_is_refused() -> None:
             "are more than the 1000 of a name\n"
             "rule 2: the support is above 9007199254740992"
         )
-    assert layout.LONGEST_NAME == 1000
+    assert text_files.LONGEST_NAME == 1000
 
 
 def test_a_file_that_would_not_be_read_again_is_refused(

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fcl.fcl import read
+from fuzzytree.formats.fcl.fcl_reader import read
 from fuzzytree.model.contracts import Reading
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (

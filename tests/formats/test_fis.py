@@ -8,7 +8,7 @@ import time
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fis.fis import reading
+from fuzzytree.formats.fis.fis_reader import reading
 from fuzzytree.formats.fis.fis_words import FAR, KINDS, Dialect, curve_of
 from fuzzytree.model.system import (
     And,

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fll.fll import read
+from fuzzytree.formats.fll.fll_reader import read
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     Activation,

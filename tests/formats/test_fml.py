@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters.fml import write
-from fuzzytree.formats.fml.fml import reading
+from fuzzytree.formats.fml.fml_reader import reading
 from fuzzytree.formats.fml.fml_words import FAR, USUAL
 from fuzzytree.model.system import (
     And,

@@ -5,10 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import msgspec
+
+from fuzzytree.formats import text_files
 from fuzzytree.formats.yaml import layout, nodes
 from fuzzytree.formats.yaml.binding import bind
 from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
-from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.formats.yaml.yaml_reader import read
 from fuzzytree.model.rulebase import RuleBase
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "yaml-format.md"
@@ -43,7 +46,7 @@ def test_every_other_example_fits_the_layout() -> None:
         *((item, layout.End) for item in items(nodes_and_leaves, "leaves")),
         *((item, layout.FittedSets) for item in items(sets, "sets")),
     ]
-    found: list[nodes.Found] = []
+    found: list[text_files.Found] = []
     for item, kind in bound:
         assert bind(item, kind, found) is not None
     assert found == []
@@ -53,14 +56,14 @@ def test_the_page_states_the_limits_of_the_code() -> None:
     text = " ".join(TEXT.split())
     assert f"more than {nodes.MOST_BYTES // 2**20} MiB" in text
     assert f"{nodes.MOST_NODES:,} entries or {nodes.MOST_LEVELS} levels" in text
-    assert f"names of more than {layout.LONGEST_NAME:,} and" in text
+    assert f"names of more than {text_files.LONGEST_NAME:,} and" in text
     assert f"sentences of more than {layout.LONGEST_SENTENCE:,} characters" in text
 
 
 def test_the_page_names_every_key() -> None:
-    kinds = [kind for kind in vars(layout).values() if isinstance(kind, type)]
-    records = [kind for kind in kinds if issubclass(kind, layout.Record)]
+    files = [layout.RuleBaseFile, layout.TreeFile]
+    records = msgspec.json.schema_components(files)[1].values()
     assert len(records) > 15
     for record in records:
-        for name in record.__struct_encode_fields__:
+        for name in record["properties"]:
             assert re.search(rf"\b{re.escape(name)}\b", TEXT), name

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzytree.formats.yaml.sentences import guess, readings, words
+from fuzzytree.formats.yaml.clauses import guess, readings, words
 from fuzzytree.model.rulebase import Clause, clause_text
 
 PLAIN = {"size": words(["low", "high"]), "wet or dry": words(["wet", "dry"])}

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.yaml import write
-from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.formats.yaml.yaml_reader import read
 from fuzzytree.model.system import (
     MOST_LEVELS,
     Call,

@@ -6,12 +6,11 @@ import re
 from pathlib import Path
 from typing import get_args
 
-from msgspec import inspect
+import msgspec
 
 from fuzzytree.exporters.yaml import write
-from fuzzytree.formats.yaml import system_layout
-from fuzzytree.formats.yaml.layout import TermOfVariable
-from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.formats.yaml import layout
+from fuzzytree.formats.yaml.yaml_reader import read
 from fuzzytree.model.system import (
     FUNCTIONS,
     ActivationMethod,
@@ -55,18 +54,10 @@ def test_the_page_names_every_choice() -> None:
 
 
 def test_the_page_names_every_key_of_its_own() -> None:
-    kinds = [
-        one
-        for one in vars(system_layout).values()
-        if isinstance(one, type) and one.__module__ == system_layout.__name__
-    ]
-    assert len(kinds) > 10
-    for kind in kinds:
-        for key in _keys(kind) - _keys(TermOfVariable):
-            assert re.search(rf"\b{re.escape(key)}\b", TEXT), (kind, key)
-
-
-def _keys(kind: type) -> set[str]:
-    info = inspect.type_info(kind)
-    assert isinstance(info, inspect.StructType)
-    return {field.encode_name for field in info.fields}
+    records = msgspec.json.schema_components([layout.SystemFile])[1].values()
+    pages = msgspec.json.schema_components([layout.RuleBaseFile])[1].values()
+    others = {key for record in pages for key in record["properties"]}
+    assert len(records) > 10
+    for record in records:
+        for key in {*record["properties"]} - others:
+            assert re.search(rf"\b{re.escape(key)}\b", TEXT), key

@@ -10,7 +10,7 @@ import pytest
 
 from fuzzytree.errors import ReadError
 from fuzzytree.exporters.yaml import write
-from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.formats.yaml.yaml_reader import read
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Clause, RuleBase
 from fuzzytree.semantics.lowering import rules_from_tree

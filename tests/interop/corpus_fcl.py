@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fuzzytree.formats.fcl.fcl import read
+from fuzzytree.formats.fcl.fcl_reader import read
 from tests.interop.corpus_rows import DEBIAN, Case, Corpus, Tools
 from tests.interop.fuzzylite_engine import Answers, run_program
 

@@ -6,7 +6,7 @@ import importlib.util
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from fuzzytree.formats.fll.fll import read
+from fuzzytree.formats.fll.fll_reader import read
 from tests.interop.corpus_rows import DEBIAN, Case, Corpus, Tools
 from tests.interop.fuzzylite_engine import Answers, run_library, run_program
 

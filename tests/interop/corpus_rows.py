@@ -16,7 +16,7 @@ from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_session import open_session
-from fuzzytree.formats.fll.fll import read as read_fll
+from fuzzytree.formats.fll.fll_reader import read as read_fll
 from fuzzytree.formats.fll.fll_words import SAMPLES as SAMPLED
 from fuzzytree.model.contracts import Reading, Written
 from fuzzytree.model.options import options_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.exporters.fll import write
-from fuzzytree.formats.fll.fll import read
+from fuzzytree.formats.fll.fll_reader import read
 from fuzzytree.model.system import FuzzySystem
 from tests.interop import corpus
 from tests.interop.corpus_fll import FLL

@@ -16,7 +16,7 @@ from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl import write
 from fuzzytree.exporters.fcl_dialects import Dialect
 from fuzzytree.exporters.fll import write as write_fll
-from fuzzytree.formats.fcl.fcl import read
+from fuzzytree.formats.fcl.fcl_reader import read
 from fuzzytree.model.rulebase import Kind, Points
 from fuzzytree.model.system import And, Condition, Defuzzifier, FuzzySystem, Or
 from fuzzytree.semantics.conversion import as_system, pointed, winner

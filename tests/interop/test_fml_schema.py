@@ -17,7 +17,7 @@ import pytest
 
 from fuzzytree import learn
 from fuzzytree.exporters.fml import write
-from fuzzytree.formats.fml.fml import reading
+from fuzzytree.formats.fml.fml_reader import reading
 from fuzzytree.formats.fml.fml_words import NAMESPACE
 from fuzzytree.model.rulebase import Kind
 from fuzzytree.semantics.conversion import pointed

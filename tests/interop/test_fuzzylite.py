@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from fuzzytree import learn
 from fuzzytree.exporters.fll import write
-from fuzzytree.formats.fll.fll import read
+from fuzzytree.formats.fll.fll_reader import read
 from fuzzytree.model.rulebase import (
     Clause,
     Kind,

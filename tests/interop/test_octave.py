@@ -13,7 +13,7 @@ from sklearn import datasets
 from fuzzytree import learn
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis import write
-from fuzzytree.formats.fis.fis import reading
+from fuzzytree.formats.fis.fis_reader import reading
 from fuzzytree.learning import learn_arrays
 from fuzzytree.model.rulebase import Kind, RuleBase
 from fuzzytree.model.system import FuzzySystem

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.fll.fll import read
+from fuzzytree.formats.fll.fll_reader import read
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     FUNCTIONS,

@@ -17,7 +17,7 @@ from fuzzytree.errors import LossError, ReadError
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_lines import MOST_CHAINED
 from fuzzytree.exporters.yaml import write
-from fuzzytree.formats.yaml.yaml import read
+from fuzzytree.formats.yaml.yaml_reader import read
 from fuzzytree.model.contracts import Dtype, Runtime
 from fuzzytree.model.rulebase import (
     MOST_POINTS,

@@ -24,10 +24,10 @@ from msgspec import Meta, field
 from fuzzytree.auditing.findings.records import Settings
 from fuzzytree.auditing.findings.selecting import check_settings, chosen_codes
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.formats.yaml.binding import bind
+from fuzzytree.formats.text_files import Found, report
+from fuzzytree.formats.yaml.binding import bind, find
 from fuzzytree.formats.yaml.layout import Name, Record
-from fuzzytree.formats.yaml.nodes import Found, MappingNode, compose, report
-from fuzzytree.formats.yaml.places import find
+from fuzzytree.formats.yaml.nodes import MappingNode, compose
 
 FILE: Final = "fuzzytree-audit.yaml"
 """Read from the current folder if it is there and no other is named."""

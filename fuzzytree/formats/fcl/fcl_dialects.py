@@ -9,11 +9,12 @@ from typing import Final, Literal, NamedTuple, TypeVar
 
 from lark import Token
 
-from fuzzytree.formats.fcl.fcl_blocks import Block
-from fuzzytree.formats.fcl.fcl_statements import (
+from fuzzytree.formats.fcl.fcl_syntax import (
     Asked,
+    Block,
     Condition,
     Declaration,
+    FclText,
     Header,
     Joined,
     Negated,
@@ -22,7 +23,6 @@ from fuzzytree.formats.fcl.fcl_statements import (
     TermText,
     place,
 )
-from fuzzytree.formats.fcl.fcl_text import FclText
 from fuzzytree.formats.fll.fll_terms import CLASSES
 from fuzzytree.formats.fll.fll_words import METHODS, S_NORMS, T_NORMS, Method, Notes
 from fuzzytree.model.rulebase import name_choice

@@ -10,7 +10,6 @@ import msgspec
 from lark import Token
 from msgspec.structs import replace
 
-from fuzzytree.formats.fcl.fcl_blocks import Block, raw
 from fuzzytree.formats.fcl.fcl_dialects import (
     JFUZZYLOGIC_PAIRS,
     PAIRS,
@@ -18,16 +17,18 @@ from fuzzytree.formats.fcl.fcl_dialects import (
     norm_of,
     t_norm_of,
 )
-from fuzzytree.formats.fcl.fcl_statements import (
+from fuzzytree.formats.fcl.fcl_syntax import (
     Asked,
+    Block,
     Condition,
     Joined,
     Negated,
     RuleText,
     place,
+    raw,
 )
 from fuzzytree.formats.fll.fll_words import Notes
-from fuzzytree.formats.lines import number_of
+from fuzzytree.formats.text_files import number_of
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import Points, name_choice
 from fuzzytree.model.system import (

@@ -11,9 +11,9 @@ import msgspec
 from lark import Token
 
 from fuzzytree.formats.fcl.fcl_dialects import Dialect
-from fuzzytree.formats.fcl.fcl_statements import TermText, place
+from fuzzytree.formats.fcl.fcl_syntax import TermText, place
 from fuzzytree.formats.fll.fll_terms import CLASSES, Place, Term, TermError, read_term
-from fuzzytree.formats.lines import Word, number_of
+from fuzzytree.formats.text_files import Word, number_of
 from fuzzytree.model.rulebase import LR, Band, Points, name_choice
 from fuzzytree.model.system import (
     Bell,

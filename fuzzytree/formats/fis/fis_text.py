@@ -9,8 +9,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.yaml.layout import LONGEST_NAME
-from fuzzytree.formats.yaml.nodes import Found
+from fuzzytree.formats.text_files import LONGEST_NAME, Found
 from fuzzytree.formats.yaml.spots import Group, Spots
 from fuzzytree.model.contracts import Loss
 

@@ -9,8 +9,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.lines import Word, number_of
-from fuzzytree.formats.yaml.nodes import MOST_SHOWN, Found
+from fuzzytree.formats.text_files import MOST_SHOWN, Found, Word, number_of
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import (
     MOST_LEVELS,

@@ -11,8 +11,7 @@ import msgspec
 
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.formulas import FormulaError, parse
-from fuzzytree.formats.lines import Word, number_of
-from fuzzytree.formats.yaml.nodes import Found
+from fuzzytree.formats.text_files import Found, Word, number_of
 from fuzzytree.model.rulebase import Points, name_choice
 from fuzzytree.model.system import (
     Arc,

@@ -9,8 +9,15 @@ from typing import Final, Literal, TypeVar
 
 import msgspec
 
-from fuzzytree.formats.lines import LONGEST_WORD, Word, number_of, split_lines, words
-from fuzzytree.formats.yaml.nodes import MOST_SHOWN, Found
+from fuzzytree.formats.text_files import (
+    LONGEST_NAME,
+    MOST_SHOWN,
+    Found,
+    Word,
+    number_of,
+    split_lines,
+    words,
+)
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import Activation, Defuzzifier, SNorm, TNorm
@@ -250,7 +257,7 @@ def _belongs(
 
 def _short(text: str) -> str:
     text = text.strip()
-    return text if len(text) <= LONGEST_WORD else text[:LONGEST_WORD] + "..."
+    return text if len(text) <= LONGEST_NAME else text[:LONGEST_NAME] + "..."
 
 
 def truth(entry: Entry | None, default: bool, notes: Notes) -> bool:

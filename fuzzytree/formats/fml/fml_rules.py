@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, TypeVar
 import msgspec
 
 from fuzzytree.formats.fml import fml_words as words
-from fuzzytree.formats.fml.fml_terms import Notes, number
+from fuzzytree.formats.fml.fml_words import Notes, number
 from fuzzytree.formats.fml.xml import Element
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import name_choice

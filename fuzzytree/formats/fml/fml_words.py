@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, Literal
 
-from fuzzytree.model.system import Defuzzifier, Hedge, SNorm, TNorm
+import msgspec
+
+from fuzzytree.formats.fml.xml import Element
+from fuzzytree.formats.text_files import Found, number_of
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.rulebase import Points, name_choice
+from fuzzytree.model.system import (
+    Curve,
+    Defuzzifier,
+    Gaussian,
+    Hedge,
+    PiCurve,
+    SCurve,
+    Singleton,
+    SNorm,
+    TNorm,
+    Trapezoid,
+    TwoGaussians,
+    curve_mistakes,
+)
 
 NAMESPACE: Final = "http://www.ieee1855.org"
 FAR: Final = 1e300
@@ -75,3 +95,98 @@ MODIFIERS: Final[Mapping[str, Hedge]] = MappingProxyType(
 """The modifiers with a meaning here; above, below, norm and slightly have none."""
 
 OTHER_MODIFIERS: Final = ("above", "below", "norm", "slightly")
+
+
+_Make = Callable[[Sequence[float]], Curve]
+
+SHAPES: Final[Mapping[str, tuple[int, _Make]]] = MappingProxyType(
+    {
+        "rightLinearShape": (2, lambda n: Points((n[0], n[1]), (0.0, 1.0))),
+        "leftLinearShape": (2, lambda n: Points((n[0], n[1]), (1.0, 0.0))),
+        "piShape": (2, lambda n: PiCurve(n[0], n[1], n[1], n[1] + abs(n[1] - n[0]))),
+        "triangularShape": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
+        "trapezoidShape": (4, lambda n: Trapezoid(n[0], n[1], n[2], n[3])),
+        "gaussianShape": (2, lambda n: Gaussian(n[0], abs(n[1]))),
+        "rightGaussianShape": (2, lambda n: TwoGaussians(n[0], abs(n[1]), FAR, 1.0)),
+        "leftGaussianShape": (2, lambda n: TwoGaussians(-FAR, 1.0, n[0], abs(n[1]))),
+        "singletonShape": (1, lambda n: Singleton(n[0])),
+        "rectangularShape": (2, lambda n: Trapezoid(n[0], n[0], n[1], n[1])),
+        "sShape": (2, lambda n: SCurve(n[0], n[1])),
+        "zShape": (2, lambda n: SCurve(n[1], n[0])),
+    }
+)
+POINTS: Final = ("pointSetShape", "pointSetMonotonicShape")
+CIRCULAR: Final = "circularDefinition"
+
+
+class Notes(msgspec.Struct, frozen=True):
+    """What is found on the way: mistakes, losses and remarks are added to the lists."""
+
+    found: list[Found]
+    losses: list[Loss]
+    remarks: list[str]
+
+    def wrong(self, element: Element, sentence: str) -> None:
+        """Note a mistake of an element."""
+        self.found.append((element.line, element.column, sentence))
+
+
+def number(
+    element: Element, key: str, notes: Notes, default: float | None = None
+) -> float:
+    """Return an attribute as a number; NaN, and a mistake, if it is none."""
+    text = element.attributes.get(key)
+    if text is None:
+        if default is None:
+            notes.wrong(element, f"<{element.name}> needs the attribute {key}")
+            return math.nan
+        return default
+    value = number_of(text.strip())
+    if value is None:
+        what = f"{key} of <{element.name}> must be a number, not {text[:40]!r}"
+        notes.wrong(element, what)
+        return math.nan
+    return value
+
+
+def curve_of(term: Element, where: str, notes: Notes) -> Curve | None:
+    """Return the curve of a term; None, and a mistake, if there is none."""
+    shapes = [child for child in term.children if child.name != CIRCULAR]
+    if len(shapes) != 1:
+        notes.wrong(term, f"{where} needs one shape, and has {len(shapes)}")
+        return None
+    shape = shapes[0]
+    before = len(notes.found)
+    if shape.name in POINTS:
+        curve: Curve = _points(shape, where, notes)
+    elif shape.name in SHAPES:
+        count, make = SHAPES[shape.name]
+        numbers = [number(shape, f"param{k + 1}", notes) for k in range(count)]
+        if len(notes.found) > before:
+            return None
+        curve = make(numbers)
+        if shape.name == "piShape":
+            what = "a piShape falls behind its second number as it rose before it"
+            notes.remarks.append(f"{where}: {what}, as in the reference implementation")
+    else:
+        known = [*SHAPES, *POINTS, CIRCULAR]
+        choice = name_choice(shape.name[:40], known)
+        notes.wrong(shape, f"{where}: no shape <{shape.name[:40]}>; {choice}")
+        return None
+    if len(notes.found) > before:
+        return None
+    for text in curve_mistakes(curve):
+        notes.wrong(shape, f"{where}: {text}")
+    if isinstance(curve, Trapezoid) and curve.a == curve.d:
+        return Singleton(curve.b)  # JFML samples the corners of each shape
+    return curve
+
+
+def _points(shape: Element, where: str, notes: Notes) -> Points:
+    method = shape.attributes.get("interpolationMethod", "linear")
+    if method.lower() != "linear":
+        what = f"points joined by {method} are joined by lines here"
+        notes.losses.append(Loss(where, what))
+    points = shape.all("point")
+    values = tuple(number(point, "x", notes) for point in points)
+    return Points(values, tuple(number(point, "y", notes) for point in points))

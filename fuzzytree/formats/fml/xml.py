@@ -12,7 +12,7 @@ from xml.parsers import expat
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.yaml.nodes import report
+from fuzzytree.formats.text_files import report
 
 MOST_BYTES: Final = 16 * 2**20
 MOST_ELEMENTS: Final = 200_000

@@ -8,7 +8,7 @@ Tags, anchors, aliases and several documents are refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final, Literal
 
 import msgspec
@@ -25,15 +25,11 @@ from yaml.events import (
 )
 
 from fuzzytree.errors import ReadError
+from fuzzytree.formats.text_files import Found, report
 
 MOST_BYTES: Final = 64 * 2**20
 MOST_NODES: Final = 1_000_000
 MOST_LEVELS: Final = 32
-MOST_SHOWN: Final = 100
-LONGEST_SENTENCE: Final = 1_500
-
-Found = tuple[int, int, str]
-"""A mistake: line and column, both from 1, and a sentence."""
 
 
 class Scalar(msgspec.Struct, frozen=True, gc=False):
@@ -104,33 +100,6 @@ def meaning(scalar: Scalar) -> Meaning:
     if _INTEGER.fullmatch(text):
         return "an integer"
     return "a number" if _NUMBER.fullmatch(text) else "text"
-
-
-def report(name: str, found: Sequence[Found]) -> ReadError:
-    """Return the error that lists mistakes by line, a hundred at most.
-
-    A sentence that quotes more than it should loses its middle.
-
-    Example:
-        >>> len(str(report("x.yaml", [(1, 1, "no term " + "n" * 1_000_000)])))
-        1517
-    """
-    found = sorted(set(found))
-    lines = [
-        f"{name}:{line}:{column}: {_shortened(text)}" for line, column, text in found
-    ]
-    if len(lines) > MOST_SHOWN:
-        rest = len(lines) - MOST_SHOWN
-        more = "1 more mistake" if rest == 1 else f"{rest} more mistakes"
-        lines[MOST_SHOWN:] = [f"{name}: and {more}"]
-    return ReadError("\n".join(lines))
-
-
-def _shortened(sentence: str) -> str:
-    if len(sentence) <= LONGEST_SENTENCE:
-        return sentence
-    half = LONGEST_SENTENCE // 2
-    return f"{sentence[:half]} ... {sentence[-half:]}"
 
 
 def compose(content: bytes, name: str) -> tuple[Node, list[Found]]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from fuzzytree.formats.yaml.nodes import Found
+from fuzzytree.formats.text_files import Found
 from fuzzytree.model.rulebase import Mistake, Path
 from fuzzytree.semantics.conversion.facts import numbers_of, places_of
 

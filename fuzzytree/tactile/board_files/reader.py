@@ -9,9 +9,9 @@ from typing import Final
 
 from fuzzytree.errors import InvalidModelError, ReadError
 from fuzzytree.files import PathLike, read_bounded
-from fuzzytree.formats.yaml.binding import entries, record
-from fuzzytree.formats.yaml.nodes import Found, MappingNode, Scalar, compose, report
-from fuzzytree.formats.yaml.places import located, value_of
+from fuzzytree.formats.text_files import Found, report
+from fuzzytree.formats.yaml.binding import entries, located, record, value_of
+from fuzzytree.formats.yaml.nodes import MappingNode, Scalar, compose
 from fuzzytree.model.rulebase import Mistake
 from fuzzytree.tactile.board_files.layout import (
     BOARD_FORMAT,

@@ -1,8 +1,8 @@
 """FML files (IEEE 1855-2016) as systems.
 
-`docs/reference/fml.md` describes what is read. All names of a document are XML IDs;
-terms that are called `variable.term` throughout, as our writer does to keep them
-unlike, get their own name back.
+`docs/fml.md` describes what is read. All names of a document are XML IDs; terms that
+are all called `variable.term`, as our writer does to keep them distinct, get their own
+name back.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fml import fml_words as words
 from fuzzytree.formats.fml import xml
 from fuzzytree.formats.fml.fml_rules import Variables, blocks_of
-from fuzzytree.formats.fml.fml_terms import CIRCULAR, Notes, curve_of, number
+from fuzzytree.formats.fml.fml_words import CIRCULAR, Notes, curve_of, number
 from fuzzytree.formats.fml.xml import Element
-from fuzzytree.formats.yaml.nodes import report
+from fuzzytree.formats.text_files import report
 from fuzzytree.formats.yaml.spots import Group, Spots
 from fuzzytree.model.contracts import Locate, Reading
 from fuzzytree.model.naming import numbered

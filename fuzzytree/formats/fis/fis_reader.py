@@ -1,8 +1,8 @@
 """FIS files of MATLAB, Octave and fuzzylite as systems.
 
-`docs/reference/fis.md` describes the file and says where the three mean other things by
-it. What a file does not say itself (its dialect) is found out from words that only one
-of them has; MATLAB's meaning is the default.
+`docs/fis.md` describes the file and the differences between the three. A file does not
+name its dialect: the reader detects it from words that only one dialect has, and takes
+MATLAB's meaning by default.
 """
 
 from __future__ import annotations
@@ -15,14 +15,13 @@ from typing import Final, NamedTuple
 import msgspec
 
 from fuzzytree.errors import InvalidModelError
-from fuzzytree.formats.engines import fuzzylite_losses
 from fuzzytree.formats.fis import fis_text as text
 from fuzzytree.formats.fis import fis_words as words
-from fuzzytree.formats.fis.fis_rules import rules_of
-from fuzzytree.formats.fis.fis_terms import labels_of
+from fuzzytree.formats.fis.fis_parts import labels_of, rules_of
 from fuzzytree.formats.fis.fis_text import Entry, Notes, Section
 from fuzzytree.formats.fis.fis_words import Dialect
-from fuzzytree.formats.yaml.nodes import report
+from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
+from fuzzytree.formats.text_files import report
 from fuzzytree.formats.yaml.spots import Spots
 from fuzzytree.model.contracts import Locate, Loss, Reading
 from fuzzytree.model.naming import numbered, printable

@@ -9,31 +9,27 @@ from typing import Any, Final
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.formulas import FormulaError, parse
-from fuzzytree.formats.yaml import system_layout as layout
-from fuzzytree.formats.yaml import values
+from fuzzytree.formats.text_files import MOST_SHOWN, Found
+from fuzzytree.formats.yaml import layout, values
 from fuzzytree.formats.yaml.binding import (
     Entries,
     bind,
     entries,
+    located,
     not_a_list,
     record,
+    record_at,
+    records_at,
     shortened,
+    value_of,
 )
+from fuzzytree.formats.yaml.clauses import is_flood
 from fuzzytree.formats.yaml.conditions import (
     SentenceError,
     parse_conclusions,
     parse_condition,
 )
-from fuzzytree.formats.yaml.nodes import (
-    MOST_SHOWN,
-    Found,
-    ListNode,
-    MappingNode,
-    Node,
-    Scalar,
-)
-from fuzzytree.formats.yaml.places import located, record_at, records_at, value_of
-from fuzzytree.formats.yaml.references import is_flood
+from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar
 from fuzzytree.model.rulebase import Band, Mistake, Part, Path
 from fuzzytree.model.system import (
     Activation,

@@ -1,128 +1,31 @@
-"""What an FLL file means where it is not the plain sum of its lines.
-
-What is disabled is taken out, monotone terms are told from others in weighted outputs,
-and remarks say where fuzzylite 6 and pyfuzzylite 8 mean other things by one file.
-"""
+"""Where fuzzylite 6 and pyfuzzylite 8 give one file different meanings."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-from msgspec.structs import replace
-
-from fuzzytree.formats.engines import constant_degrees
-from fuzzytree.formats.fll.fll_terms import as_degree
-from fuzzytree.formats.fll.fll_variables import Known, ReadBlock
-from fuzzytree.formats.fll.fll_words import Entry, Notes
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
-    And,
     Arc,
     Call,
     Concave,
-    Condition,
     Curve,
     Expression,
     Formula,
     FuzzySystem,
-    Is,
     Label,
     Linear,
-    Not,
-    Or,
+    Number,
+    SCurve,
     SemiEllipse,
     Singleton,
     SystemOutput,
-    SystemRule,
     names_in,
 )
 from fuzzytree.semantics.inference import value_at
-
-
-def without_disabled(
-    variables: Sequence[Known], blocks: Sequence[ReadBlock], notes: Notes
-) -> tuple[list[Known], list[ReadBlock]]:
-    """Return variables and blocks without what is disabled; remarks tell it.
-
-    What is asked of a disabled variable has degree 0, whatever the hedges. A disabled
-    input stays a column, for formulas may name it.
-    """
-    for block in blocks:
-        if not block.is_enabled:
-            line = block.section.head.line
-            notes.remarks.append(f"line {line}: a disabled block is left out")
-    kept_blocks = [one for one in blocks if one.is_enabled]
-    off = [one.name for one in variables if not one.is_enabled]
-    kept = [one for one in variables if one.is_enabled or not one.is_output]
-    for name in off:
-        text = f"{name!r} is disabled: nothing concludes it, and it is nothing"
-        notes.remarks.append(text)
-    outputs = [one.name for one in kept if one.is_output]
-    if not off or not outputs:
-        return kept, kept_blocks
-    never = Is(outputs[0], None, ("not", "any"))
-    return kept, [_without(one, off, never, notes) for one in kept_blocks]
-
-
-def _without(
-    read: ReadBlock, off: Collection[str], never: Condition, notes: Notes
-) -> ReadBlock:
-    """Return a block whose rules do not know the disabled variables."""
-    rules: list[SystemRule] = []
-    lines: list[Entry] = []
-    for rule, line in zip(read.block.rules, read.lines, strict=True):
-        then = tuple(one for one in rule.then if one.output not in off)
-        when = None if rule.when is None else _asked(rule.when, off, never)
-        if then:
-            rules.append(replace(rule, when=when, then=then))
-            lines.append(line)
-        elif read.block.activation.method not in ("general", "threshold"):
-            what = "it concludes only what is disabled, and is not counted any more"
-            notes.losses.append(Loss(f"the rule in line {line.line}", what))
-    block = replace(read.block, rules=tuple(rules))
-    return replace(read, block=block, lines=tuple(lines))
-
-
-def _asked(condition: Condition, off: Collection[str], never: Condition) -> Condition:
-    match condition:
-        case Is(variable=variable):
-            return never if variable in off else condition
-        case And(parts=parts):
-            return And(tuple(_asked(part, off, never) for part in parts))
-        case Or(parts=parts):
-            return Or(tuple(_asked(part, off, never) for part in parts))
-        case Not(part=part):
-            return Not(_asked(part, off, never))
-
-
-def as_meant(output: Known, notes: Notes) -> SystemOutput:
-    """Return an output whose weighted terms are numbers where the file says so.
-
-    Fuzzylite calls it the type: `TakagiSugeno` takes the degree of every term at the
-    activation, `Tsukamoto` asks a monotone term where it has that degree, `Automatic`
-    goes by the terms.
-    """
-    variable = output.variable
-    assert isinstance(variable, SystemOutput)  # who calls it sees to that
-    if not variable.defuzzifier.is_weighted:
-        return variable
-    has_numbers = any(term.is_number for term in output.terms)
-    has_monotone = any(term.is_monotone for term in output.terms)
-    if output.kind == "Automatic" and has_numbers and has_monotone:
-        what = (
-            "numbers and monotone terms are mixed, which fuzzylite 6 takes by the "
-            "first that is activated and pyfuzzylite refuses; each is taken by its kind"
-        )
-        notes.losses.append(Loss(f"output {output.name!r}", what))
-    is_sugeno = output.kind == "TakagiSugeno"
-    labels = tuple(
-        as_degree(term.label) if is_sugeno or not term.is_monotone else term.label
-        for term in output.terms
-    )
-    return replace(variable, labels=labels)
 
 
 def differences(system: FuzzySystem) -> Iterator[str]:
@@ -328,3 +231,60 @@ def _is_truth(expression: Expression) -> bool:
     if expression.function == "*":
         return all(map(_is_truth, expression.arguments))
     return expression.function in _TRUTHS
+
+
+def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
+    """Yield where fuzzylite 6 finds other numbers for an output of its own dialects.
+
+    Args:
+        output: As it is read; `docs/witnesses.md` tells how the two were compared.
+
+    Example:
+        >>> from fuzzytree.model.system import Defuzzifier, Label
+        >>> how = Defuzzifier("weighted average")
+        >>> falling = Label("little", Concave(0.5, 0.4))
+        >>> output = SystemOutput("tip", (falling,), 0.0, 1.0, how)
+        >>> [loss.where for loss in fuzzylite_losses(output)]
+        ["output 'tip'"]
+    """
+    where = f"output {output.name!r}"
+    if output.defuzzifier.method == "mean of maximum":
+        yield Loss(
+            where,
+            "the mean of all values of the largest degree answers; fuzzylite 6 takes "
+            "the first stretch of such values, and degrees within 1e-6 as equal",
+        )
+    curves = {type(label.curve) for label in output.labels}
+    if output.defuzzifier.is_weighted and curves & {SCurve, Concave, Arc}:
+        yield Loss(
+            where,
+            "where a term has a degree is computed exactly; fuzzylite 6 finds other "
+            "values for SShape, ZShape and Concave",
+        )
+
+
+def constant_degrees(output: SystemOutput) -> Iterator[str]:
+    """Yield a remark on each number that is a degree because a curve is sampled.
+
+    Args:
+        output: As it is read from FLL, or from FCL in fuzzylite's dialect.
+
+    Example:
+        >>> from fuzzytree.model.system import Defuzzifier, Label
+        >>> low = Label("low", Formula(Number(0.3)))
+        >>> how = Defuzzifier("centroid")
+        >>> len([*constant_degrees(SystemOutput("tip", (low,), 0.0, 1.0, how))])
+        1
+    """
+    if output.defuzzifier.is_weighted:
+        return
+    for label in output.labels:
+        match label.curve:
+            case Formula(Number(value)):
+                yield (
+                    f"term {label.name!r} of {output.name!r} has the degree {value!r} "
+                    "everywhere, as in fuzzylite; to answer numbers, choose a weighted "
+                    "defuzzifier"
+                )
+            case _:
+                pass

@@ -1,30 +1,177 @@
-"""Variables and blocks of FLL files, as they stand there."""
+"""FLL files of fuzzylite and pyfuzzylite as systems.
+
+`docs/fll.md` describes the file and the differences between the two engines.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
-from typing import Final
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import PurePath
+from typing import Final, NamedTuple
 
 import msgspec
+from msgspec.structs import replace
 
+from fuzzytree.errors import InvalidModelError
 from fuzzytree.formats.fll import fll_words as fll
+from fuzzytree.formats.fll.fll_differences import differences
 from fuzzytree.formats.fll.fll_rules import RuleError, Variable, Vocabulary, read_rule
-from fuzzytree.formats.fll.fll_terms import Place, Term, TermError, read_term
-from fuzzytree.formats.fll.fll_words import Entry, Notes, Section
-from fuzzytree.formats.lines import LONGEST_WORD, Word, number_of
-from fuzzytree.model.contracts import Loss
+from fuzzytree.formats.fll.fll_terms import Place, Term, TermError, as_degree, read_term
+from fuzzytree.formats.fll.fll_words import MOST_BYTES, Entry, Notes, Section, read_page
+from fuzzytree.formats.text_files import (
+    LONGEST_NAME,
+    MOST_SHOWN,
+    Word,
+    decoded,
+    number_of,
+    report,
+)
+from fuzzytree.formats.yaml.spots import Group, Spots
+from fuzzytree.model.contracts import Locate, Loss, Reading
+from fuzzytree.model.naming import printable
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
+    And,
+    Condition,
     Defuzzifier,
+    FuzzySystem,
+    Is,
     Label,
+    Not,
+    Or,
     RuleBlock,
     Singleton,
     SystemInput,
     SystemOutput,
     SystemRule,
 )
+from fuzzytree.semantics.conversion import as_written
+
+
+def read(content: bytes, name: str) -> Reading:
+    r"""Return what an FLL file says.
+
+    Args:
+        content: The file.
+        name: What messages call it.
+
+    Raises:
+        ReadError: With every mistake of the file.
+
+    Example:
+        >>> lines = ["Engine: tip", "InputVariable: food", "  term: good Ramp 0 10",
+        ...          "OutputVariable: tip", "  defuzzifier: WeightedAverage",
+        ...          "  term: much Constant 25", "RuleBlock:",
+        ...          "  rule: if food is good then tip is much"]
+        >>> read("\n".join(lines).encode(), "tip.fll").model.columns
+        ('food',)
+    """
+    return _read(content, name)[0]
+
+
+def places(content: bytes, name: str) -> Locate:
+    """Return where the parts of the model of an FLL file stand: their values.
+
+    Raises:
+        ReadError: With every mistake of the file.
+    """
+    _, parts, facts = _read(content, name)
+    return parts.spots().of_facts(facts).find
+
+
+class _Parts(NamedTuple):
+    """A system, and what its parts were made of."""
+
+    system: FuzzySystem
+    inputs: Sequence[Known]
+    outputs: Sequence[Known]
+    blocks: Sequence[ReadBlock]
+
+    def spots(self) -> Spots:
+        return _spots(self.inputs, self.outputs, self.blocks)
+
+
+def _read(content: bytes, name: str) -> tuple[Reading, _Parts, str | None]:
+    """Return what a file says, what of, and the facts of a rule base if it is one."""
+    notes = Notes([], [], [])
+    text, remarks = decoded(content, name, MOST_BYTES)
+    notes.remarks.extend(remarks)
+    page = read_page(text, notes)
+    parts = None
+    if not notes.is_full:
+        parts = _system(page.sections, printable(PurePath(name).stem), notes)
+    if notes.found or parts is None:
+        raise report(name, notes.found)
+    model, facts = as_written(parts.system, page.comments)
+    reading = Reading(model, tuple(notes.losses), tuple(notes.remarks))
+    return reading, parts, facts
+
+
+def _system(sections: Sequence[Section], stem: str, notes: Notes) -> _Parts | None:
+    """Return the system; None where it has mistakes, which are noted."""
+    variables = read_variables(sections, notes)
+    vocabulary = vocabulary_of(variables)
+    blocks = [
+        read_block(section, vocabulary, notes)
+        for section in sections
+        if section.kind == "RuleBlock" and not notes.is_full
+    ]
+    if not any(one.is_output and one.is_enabled for one in variables):
+        notes.found.append((1, 1, "there is no OutputVariable that is enabled"))
+    if notes.found:
+        return None
+    variables, blocks = _without_disabled(variables, blocks, notes)
+    _tell_descriptions(sections, notes)
+    outputs = [one for one in variables if one.is_output]
+    inputs = [one for one in variables if not one.is_output]
+    engine = next((one for one in sections if one.kind == "Engine"), None)
+    described = None if engine is None else engine.one_of("description")
+    try:
+        system = FuzzySystem(
+            (engine.head.value if engine else "") or stem or "system",
+            tuple(
+                one.variable for one in inputs if isinstance(one.variable, SystemInput)
+            ),
+            tuple(_as_meant(one, notes) for one in outputs),
+            tuple(one.block for one in blocks),
+            described.value if described else "",
+        )
+    except InvalidModelError as error:
+        mistakes = error.mistakes[: MOST_SHOWN + 1]
+        notes.found.extend(_spots(inputs, outputs, blocks).placed(mistakes))
+        return None
+    notes.remarks.extend(differences(system))
+    return _Parts(system, inputs, outputs, blocks)
+
+
+def _tell_descriptions(sections: Sequence[Section], notes: Notes) -> None:
+    told = [
+        one.head.value or one.kind
+        for one in sections
+        if one.kind != "Engine" and one.one_of("description")
+    ]
+    if told:
+        names = ", ".join(map(repr, told[:5])) + (", ..." if len(told) > 5 else "")
+        notes.remarks.append(f"descriptions have no place here: of {names}")
+
+
+def _spots(
+    inputs: Sequence[Known], outputs: Sequence[Known], blocks: Sequence[ReadBlock]
+) -> Spots:
+    """Return where the parts of the system stand."""
+    return Spots(
+        tuple(_group(one.section, one.lines) for one in inputs),
+        tuple(_group(one.section, one.lines) for one in outputs),
+        tuple(_group(one.section, one.lines) for one in blocks),
+    )
+
+
+def _group(section: Section, lines: Sequence[Entry]) -> Group:
+    spots = tuple((one.line, one.start) for one in lines)
+    return Group((section.head.line, section.head.start), spots)
+
 
 MOST_VARIABLES: Final = 2000
 
@@ -108,8 +255,8 @@ def vocabulary_of(variables: Sequence[Known]) -> Vocabulary:
 
 def _variable_name(section: Section, notes: Notes) -> str:
     given = section.head.value
-    if not given or len(given) > LONGEST_WORD:
-        what = "a name" if not given else f"a name of at most {LONGEST_WORD} characters"
+    if not given or len(given) > LONGEST_NAME:
+        what = "a name" if not given else f"a name of at most {LONGEST_NAME} characters"
         notes.found.append(section.head.mistake(f"{section.kind} needs {what}"))
     return _cleaned(given, notes)
 
@@ -223,8 +370,8 @@ def _term(entry: Entry, place: Place, notes: Notes) -> Term | None:
         notes.found.append(entry.mistake(sentence))
         return None
     given, kind, *rest = found
-    if len(given.text) > LONGEST_WORD:
-        sentence = f"a term needs a name of at most {LONGEST_WORD} characters"
+    if len(given.text) > LONGEST_NAME:
+        sentence = f"a term needs a name of at most {LONGEST_NAME} characters"
         notes.found.append(given.mistake(sentence))
         return None
     name = _cleaned(given.text, notes)
@@ -328,3 +475,86 @@ def read_block(section: Section, vocabulary: Vocabulary, notes: Notes) -> ReadBl
         section.head.value,
     )
     return ReadBlock(section, block, tuple(lines), is_enabled)
+
+
+def _without_disabled(
+    variables: Sequence[Known], blocks: Sequence[ReadBlock], notes: Notes
+) -> tuple[list[Known], list[ReadBlock]]:
+    """Return variables and blocks without what is disabled; remarks tell it.
+
+    What is asked of a disabled variable has degree 0, whatever the hedges. A disabled
+    input stays a column, for formulas may name it.
+    """
+    for block in blocks:
+        if not block.is_enabled:
+            line = block.section.head.line
+            notes.remarks.append(f"line {line}: a disabled block is left out")
+    kept_blocks = [one for one in blocks if one.is_enabled]
+    off = [one.name for one in variables if not one.is_enabled]
+    kept = [one for one in variables if one.is_enabled or not one.is_output]
+    for name in off:
+        text = f"{name!r} is disabled: nothing concludes it, and it is nothing"
+        notes.remarks.append(text)
+    outputs = [one.name for one in kept if one.is_output]
+    if not off or not outputs:
+        return kept, kept_blocks
+    never = Is(outputs[0], None, ("not", "any"))
+    return kept, [_without(one, off, never, notes) for one in kept_blocks]
+
+
+def _without(
+    read: ReadBlock, off: Collection[str], never: Condition, notes: Notes
+) -> ReadBlock:
+    """Return a block whose rules do not know the disabled variables."""
+    rules: list[SystemRule] = []
+    lines: list[Entry] = []
+    for rule, line in zip(read.block.rules, read.lines, strict=True):
+        then = tuple(one for one in rule.then if one.output not in off)
+        when = None if rule.when is None else _asked(rule.when, off, never)
+        if then:
+            rules.append(replace(rule, when=when, then=then))
+            lines.append(line)
+        elif read.block.activation.method not in ("general", "threshold"):
+            what = "it concludes only what is disabled, and is not counted any more"
+            notes.losses.append(Loss(f"the rule in line {line.line}", what))
+    block = replace(read.block, rules=tuple(rules))
+    return replace(read, block=block, lines=tuple(lines))
+
+
+def _asked(condition: Condition, off: Collection[str], never: Condition) -> Condition:
+    match condition:
+        case Is(variable=variable):
+            return never if variable in off else condition
+        case And(parts=parts):
+            return And(tuple(_asked(part, off, never) for part in parts))
+        case Or(parts=parts):
+            return Or(tuple(_asked(part, off, never) for part in parts))
+        case Not(part=part):
+            return Not(_asked(part, off, never))
+
+
+def _as_meant(output: Known, notes: Notes) -> SystemOutput:
+    """Return an output whose weighted terms are numbers where the file says so.
+
+    Fuzzylite calls it the type: `TakagiSugeno` takes the degree of every term at the
+    activation, `Tsukamoto` asks a monotone term where it has that degree, `Automatic`
+    goes by the terms.
+    """
+    variable = output.variable
+    assert isinstance(variable, SystemOutput)  # who calls it sees to that
+    if not variable.defuzzifier.is_weighted:
+        return variable
+    has_numbers = any(term.is_number for term in output.terms)
+    has_monotone = any(term.is_monotone for term in output.terms)
+    if output.kind == "Automatic" and has_numbers and has_monotone:
+        what = (
+            "numbers and monotone terms are mixed, which fuzzylite 6 takes by the "
+            "first that is activated and pyfuzzylite refuses; each is taken by its kind"
+        )
+        notes.losses.append(Loss(f"output {output.name!r}", what))
+    is_sugeno = output.kind == "TakagiSugeno"
+    labels = tuple(
+        as_degree(term.label) if is_sugeno or not term.is_monotone else term.label
+        for term in output.terms
+    )
+    return replace(variable, labels=labels)

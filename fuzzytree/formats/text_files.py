@@ -7,17 +7,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import msgspec
 
 from fuzzytree.errors import ReadError
-from fuzzytree.formats.yaml.layout import LONGEST_NAME
-from fuzzytree.formats.yaml.nodes import Found, report
 
 MOST_BYTES: Final = 4 * 2**20
-LONGEST_WORD: Final = LONGEST_NAME
+MOST_SHOWN: Final = 100
+LONGEST_MISTAKE: Final = 1_500
+LONGEST_NAME: Final = 1000
+
+Found = tuple[int, int, str]
+"""A mistake: line and column, both from 1, and a sentence."""
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
@@ -29,6 +32,33 @@ _UNLIMITED = {
     for sign in ("", "+", "-")
     for word in ("inf", "infinity", "nan")
 }
+
+
+def report(name: str, found: Sequence[Found]) -> ReadError:
+    """Return the error that lists mistakes by line, a hundred at most.
+
+    A sentence that quotes more than it should loses its middle.
+
+    Example:
+        >>> len(str(report("x.yaml", [(1, 1, "no term " + "n" * 1_000_000)])))
+        1517
+    """
+    found = sorted(set(found))
+    lines = [
+        f"{name}:{line}:{column}: {_shortened(text)}" for line, column, text in found
+    ]
+    if len(lines) > MOST_SHOWN:
+        rest = len(lines) - MOST_SHOWN
+        more = "1 more mistake" if rest == 1 else f"{rest} more mistakes"
+        lines[MOST_SHOWN:] = [f"{name}: and {more}"]
+    return ReadError("\n".join(lines))
+
+
+def _shortened(sentence: str) -> str:
+    if len(sentence) <= LONGEST_MISTAKE:
+        return sentence
+    half = LONGEST_MISTAKE // 2
+    return f"{sentence[:half]} ... {sentence[-half:]}"
 
 
 class Word(msgspec.Struct, frozen=True, gc=False):
@@ -112,8 +142,8 @@ def words(text: str, line: int, column: int, signs: str = "") -> Iterator[Word]:
     pattern = rf"[{marked}]|[^\s{marked}]+" if signs else r"\S+"
     for found in re.finditer(pattern, text):
         word = found.group()
-        if len(word) > LONGEST_WORD:
-            word = f"{word[:LONGEST_WORD]}..."
+        if len(word) > LONGEST_NAME:
+            word = f"{word[:LONGEST_NAME]}..."
         yield Word(word, line, column + found.start())
 
 

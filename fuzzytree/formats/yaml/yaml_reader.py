@@ -7,31 +7,34 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Final, TypeVar
 
 from fuzzytree.errors import InvalidModelError
+from fuzzytree.formats.text_files import Found, report
 from fuzzytree.formats.yaml import layout, values
-from fuzzytree.formats.yaml.binding import Entries, entries, record
-from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
-from fuzzytree.formats.yaml.nodes import (
-    Found,
-    ListNode,
-    MappingNode,
-    Node,
-    Scalar,
-    compose,
-    report,
+from fuzzytree.formats.yaml.binding import (
+    Entries,
+    entries,
+    find,
+    located,
+    record,
+    record_at,
+    records_at,
+    value_of,
 )
-from fuzzytree.formats.yaml.places import find, located, record_at, records_at, value_of
-from fuzzytree.formats.yaml.references import (
+from fuzzytree.formats.yaml.clauses import (
+    Vocabulary,
     clauses_of_nodes,
     clauses_of_rules,
     is_flood,
+    read_rules,
     sets_of_nodes,
     unknown_classes,
     unknown_inputs,
     unknown_terms,
+    vocabulary_of,
+    words,
 )
-from fuzzytree.formats.yaml.rules import read_rules
-from fuzzytree.formats.yaml.sentences import Vocabulary, vocabulary_of, words
-from fuzzytree.formats.yaml.systems import read_system
+from fuzzytree.formats.yaml.layout import RuleBaseFile, TreeFile
+from fuzzytree.formats.yaml.nodes import ListNode, MappingNode, Node, Scalar, compose
+from fuzzytree.formats.yaml.system_reader import read_system
 from fuzzytree.model.contracts import Document, Locate, Reading
 from fuzzytree.model.rulebase import (
     Band,

@@ -1,0 +1,308 @@
+"""Rules of a file: clauses as sentences, and names that nothing declares."""
+
+from __future__ import annotations
+
+import itertools
+import operator
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
+
+import msgspec
+
+from fuzzytree.formats.text_files import LONGEST_NAME
+from fuzzytree.formats.yaml import layout
+from fuzzytree.formats.yaml.binding import shortened
+from fuzzytree.model.rulebase import Clause, Mistake, Path, Rule, Variable, clause_text
+from fuzzytree.model.system import (
+    And,
+    Condition,
+    Or,
+    RuleBlock,
+    SNorm,
+    SystemRule,
+    TNorm,
+)
+from fuzzytree.model.tree import Branch, Node
+
+_IS: Final = " is "
+_OR: Final = " or "
+_NOT: Final = "not "
+_MOST_ORS: Final = 8  # keeps the search linear; names with more are written out
+
+
+class Words(msgspec.Struct, frozen=True):
+    """The terms of a variable: their names, and the most ` or ` within one name."""
+
+    terms: frozenset[str]
+    most_ors: int
+
+
+Vocabulary = Mapping[str, Words]
+
+
+def words(terms: Iterable[str]) -> Words:
+    """Return what `readings` needs to know about a variable's terms."""
+    names = frozenset(terms)
+    return Words(names, max((len(_places(name)) for name in names), default=0))
+
+
+def vocabulary_of(variables: Iterable[Variable]) -> Vocabulary:
+    """Return the words of each variable."""
+    return {v.name: words(term.name for term in v.terms) for v in variables}
+
+
+def readings(text: str, vocabulary: Vocabulary) -> tuple[Clause, ...]:
+    """Return the clauses that a sentence can mean: none, one, or two of several.
+
+    Args:
+        text: `VARIABLE is TERM or TERM`, or `VARIABLE is not TERM or TERM`.
+        vocabulary: The words of each variable.
+
+    Example:
+        >>> readings("grip is not firm", {"grip": words(["soft", "firm"])})
+        (Clause(variable='grip', terms=('firm',), negated=True),)
+    """
+    found: list[Clause] = []
+    end = text.find(_IS)
+    while 0 <= end <= LONGEST_NAME and len(found) < 2:
+        variable = text[:end]
+        known = vocabulary.get(variable)
+        if known is not None and known.most_ors <= _MOST_ORS:
+            rest = text[end + len(_IS) :]
+            found += [Clause(variable, terms) for terms in _lists(rest, known)]
+            if rest.startswith(_NOT):
+                lists = _lists(rest[len(_NOT) :], known)
+                found += [Clause(variable, terms, negated=True) for terms in lists]
+        end = text.find(_IS, end + 1)
+    return tuple(found[:2])
+
+
+def guess(text: str, vocabulary: Vocabulary) -> Clause | None:
+    """Return what a sentence without a reading comes closest to, None if it is none."""
+    end = text.find(_IS)
+    best = end
+    while 0 <= end <= LONGEST_NAME:
+        if text[:end] in vocabulary:
+            best = end
+        end = text.find(_IS, end + 1)
+    if best < 0:
+        return None
+    rest = text[best + len(_IS) :]
+    negated = rest.startswith(_NOT)
+    terms = rest[len(_NOT) :] if negated else rest
+    return Clause(text[:best], tuple(terms.split(_OR)), negated)
+
+
+def _lists(text: str, known: Words) -> list[tuple[str, ...]]:
+    """Return the lists of terms, joined by OR, that a text can mean: two at most."""
+    if not known.most_ors and " or or " not in text:
+        terms = tuple(text.split(_OR))
+        return [terms] if known.terms.issuperset(terms) else []
+    ors = _places(text)
+    starts, ends = [0, *(place + len(_OR) for place in ors)], [*ors, len(text)]
+    # steps[i]: the pairs (term, next i) with which the rest from starts[i] can be read.
+    steps: list[list[tuple[str, int]]] = [[] for _ in starts]
+    for start in range(len(starts) - 1, -1, -1):
+        # A term can share a blank with the ` or ` before it and with the one behind.
+        furthest = min(start + known.most_ors + 2, len(ends) - 1)
+        for end in range(start, furthest + 1):
+            term = text[starts[start] : ends[end]]
+            is_last = end == len(ends) - 1
+            if term in known.terms and (is_last or steps[end + 1]):
+                steps[start].append((term, end + 1))
+    return [*_two_walks(steps)] if steps[0] else []
+
+
+def _places(text: str) -> list[int]:
+    """Return where ` or ` stands, also where one begins with the end of another."""
+    return [match.start() for match in re.finditer("(?= or )", text)]
+
+
+def _two_walks(steps: list[list[tuple[str, int]]]) -> Iterator[tuple[str, ...]]:
+    """Yield the first list of terms, and one that turns off where that is possible."""
+    first: list[str] = []
+    turn: list[str] | None = None
+    position = 0
+    while position < len(steps):
+        if turn is None and len(steps[position]) > 1:
+            turn = [*first, *_walk(steps, *steps[position][1])]
+        term, position = steps[position][0]
+        first.append(term)
+    yield tuple(first)
+    if turn is not None:
+        yield tuple(turn)
+
+
+def _walk(steps: list[list[tuple[str, int]]], term: str, position: int) -> list[str]:
+    terms = [term]
+    while position < len(steps):
+        term, position = steps[position][0]
+        terms.append(term)
+    return terms
+
+
+_MOST_COMPARED: Final = 200_000
+
+Asked = tuple[Path, str, Clause]
+"""Where a clause stands, in the model and in words, and the clause."""
+
+
+def clauses_of_rules(rules: Sequence[Rule]) -> Iterator[Asked]:
+    """Yield the clauses of rules."""
+    for number, rule in enumerate(rules, 1):
+        for index, clause in enumerate(rule.when):
+            yield ("rules", number - 1, "when", index), f"rule {number}", clause
+
+
+def clauses_of_nodes(nodes: Sequence[Node]) -> Iterator[Asked]:
+    """Yield the branches of nodes as clauses."""
+    for path, where, node, branch in _branches(nodes):
+        yield path, where, Clause(node.variable, branch.terms)
+
+
+def sets_of_nodes(nodes: Sequence[Node]) -> Iterator[Asked]:
+    """Yield the fitted sets of branches as clauses."""
+    for path, where, node, branch in _branches(nodes):
+        if branch.sets:
+            yield path, where, Clause(node.variable, branch.sets)
+
+
+def _branches(nodes: Sequence[Node]) -> Iterator[tuple[Path, str, Node, Branch]]:
+    for number, node in enumerate(nodes, 1):
+        for index, branch in enumerate(node.branches):
+            path: Path = ("nodes", number - 1, "branches", index)
+            yield path, f"node {number}", node, branch
+
+
+def unknown_terms(asked: Iterable[Asked], vocabulary: Vocabulary) -> Iterator[Mistake]:
+    """Yield the clauses that name an unknown variable or term."""
+    known: dict[int, Clause] = {}  # rules share clauses
+    for path, where, clause in asked:
+        declared = vocabulary.get(clause.variable)
+        if id(clause) in known:
+            continue
+        if declared is not None and declared.terms.issuperset(clause.terms):
+            known[id(clause)] = clause
+        else:
+            text = shortened(clause_text(clause))
+            yield path, f"{where}: {text} names what is not declared"
+
+
+def unknown_classes(
+    rules: Sequence[Rule], classes: tuple[str, ...]
+) -> Iterator[Mistake]:
+    """Yield the rules that conclude an unknown class."""
+    known = frozenset(classes)
+    for number, rule in enumerate(rules, 1):
+        if rule.then not in known:
+            text = f"rule {number}: no class {shortened(rule.then)}"
+            yield ("rules", number - 1, "then"), text
+
+
+def unknown_inputs(
+    variables: Sequence[Variable], columns: Sequence[str]
+) -> Iterator[Mistake]:
+    """Yield the summands of unknown inputs, and inputs that are no columns."""
+    known = {variable.name for variable in variables if not variable.parts}
+    of_table = frozenset(columns) if columns else known
+    for position, variable in enumerate(variables):
+        if not variable.parts and variable.name not in of_table:
+            path: Path = ("variables", position, "name")
+            yield path, f"input {shortened(variable.name)} is not among the columns"
+        for index, part in enumerate(variable.parts):
+            if part.input not in known:
+                path = ("variables", position, "parts", index, "input")
+                yield path, f"no input {shortened(part.input)}"
+
+
+def is_flood(unknown: Sequence[Mistake], known: int) -> bool:
+    """Return whether so much is unknown that looking for similar names takes long."""
+    return len(unknown) * known > _MOST_COMPARED
+
+
+def read_rules(
+    bound: list[layout.RuleOfModel | None],
+    any_class: str,
+    vocabulary: Vocabulary,
+    mistakes: list[Mistake],
+) -> tuple[Rule, ...]:
+    """Return the rules, with one that is always right in the place of a broken one."""
+    cache: dict[str | layout.WrittenOut, Clause | None] = {}
+    rules: list[Rule] = []
+    for position, one in enumerate(bound):
+        if one is None:
+            rules.append(Rule((), any_class))
+            continue
+        clauses: list[Clause] = []
+        for index, clause in enumerate(one.if_):
+            path: Path = ("rules", position, "when", index)
+            if clause not in cache:
+                meant = _clause(clause, vocabulary)
+                cache[clause] = meant if isinstance(meant, Clause) else None
+                if isinstance(meant, str):
+                    mistakes.append((path, f"rule {position + 1}: {meant}"))
+            read_clause = cache[clause]
+            if read_clause is not None:
+                clauses.append(read_clause)
+        rules.append(Rule(tuple(clauses), one.then, one.support))
+    return tuple(rules)
+
+
+def _clause(given: str | layout.WrittenOut, vocabulary: Vocabulary) -> Clause | str:
+    """Return a clause, or why the sentence cannot be one."""
+    if isinstance(given, layout.WrittenOut):
+        terms = given.is_ if given.is_ is not None else given.is_not or ()
+        return Clause(given.variable, terms, negated=given.is_ is None)
+    found = readings(given, vocabulary)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        either = " or ".join(map(_written_out, found))
+        return f"{shortened(given)} can be read in two ways; write {either}"
+    meant = guess(given, vocabulary)
+    if meant is None or not [*unknown_terms([((), "", meant)], vocabulary)]:
+        return (
+            f"{shortened(given)} is no clause; a clause is 'VARIABLE is TERM or TERM', "
+            "or the same with 'is not'"
+        )
+    return meant
+
+
+def _written_out(clause: Clause) -> str:
+    verb = "is not" if clause.negated else "is"
+    terms = ", ".join(map(repr, clause.terms))
+    return f"{{variable: {clause.variable!r}, {verb}: [{terms}]}}"
+
+
+def joined(join: type[And] | type[Or], left: Condition, right: Condition) -> Condition:
+    """Return two conditions joined, without parentheses that change only rounding.
+
+    Example:
+        >>> from fuzzytree.model.system import Is
+        >>> a, b, c = (Is("force", term) for term in "abc")
+        >>> joined(Or, a, joined(Or, b, c)) == Or((a, b, c))
+        True
+    """
+    first, last = (
+        one.parts if isinstance(one, join) else (one,) for one in (left, right)
+    )
+    return join((*first, *last))
+
+
+def blocks_of(
+    rules: Iterable[tuple[SystemRule, TNorm, SNorm]], implication: TNorm | None
+) -> tuple[RuleBlock, ...]:
+    """Return blocks of rules in their order, a new one where the operators change.
+
+    Args:
+        rules: Each rule with its AND and its OR.
+        implication: That of all blocks.
+    """
+    groups = itertools.groupby(rules, key=operator.itemgetter(1, 2))
+    return tuple(
+        RuleBlock(
+            tuple(rule for rule, *_ in some), conjunction, disjunction, implication
+        )
+        for (conjunction, disjunction), some in groups
+    )
