@@ -3,7 +3,7 @@
 Keywords may be in upper or lower case; names must be spelled alike everywhere. The
 reader detects the dialect of a file and reports it in a remark with the reasons.
 Engines give the same words other meanings, so each file is read as its own engine
-reads it. `docs/fcl.md` lists the differences.
+reads it. `docs/reference/fcl.md` lists the differences.
 """
 
 from __future__ import annotations

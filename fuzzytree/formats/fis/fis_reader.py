@@ -1,8 +1,8 @@
 """FIS files of MATLAB, Octave and fuzzylite as systems.
 
-`docs/fis.md` describes the file and the differences between the three. A file does not
-name its dialect: the reader detects it from words that only one dialect has, and takes
-MATLAB's meaning by default.
+`docs/reference/fis.md` describes the file and the differences between the three. A file
+does not name its dialect: the reader detects it from words that only one dialect has,
+and takes MATLAB's meaning by default.
 """
 
 from __future__ import annotations

@@ -237,7 +237,8 @@ def fuzzylite_losses(output: SystemOutput) -> Iterator[Loss]:
     """Yield where fuzzylite 6 finds other numbers for an output of its own dialects.
 
     Args:
-        output: As it is read; `docs/witnesses.md` tells how the two were compared.
+        output: As it is read; `docs/reference/interop.md` describes how the two were
+            compared.
 
     Example:
         >>> from fuzzytree.model.system import Defuzzifier, Label

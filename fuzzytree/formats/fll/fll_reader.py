@@ -1,6 +1,6 @@
 """FLL files of fuzzylite and pyfuzzylite as systems.
 
-`docs/fll.md` describes the file and the differences between the two engines.
+`docs/reference/fll.md` describes the file and the differences between the two engines.
 """
 
 from __future__ import annotations

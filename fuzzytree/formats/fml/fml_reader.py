@@ -1,8 +1,8 @@
 """FML files (IEEE 1855-2016) as systems.
 
-`docs/fml.md` describes what is read. All names of a document are XML IDs; terms that
-are all called `variable.term`, as our writer does to keep them distinct, get their own
-name back.
+`docs/reference/fml.md` describes what is read. All names of a document are XML IDs;
+terms that are all called `variable.term`, as our writer does to keep them distinct, get
+their own name back.
 """
 
 from __future__ import annotations

@@ -420,8 +420,8 @@ class LabelOfVariable(TermOfVariable, frozen=True, kw_only=True):
     as a and `.inf` as d leave that side open. A triangle `[a, b, d]` has its peak at b.
     `at least: v` is 1 from v on, `at most: v` up to v, both with v itself. A
     `singleton` is 1 at one value and, as a conclusion, the number itself. The other
-    curves are those of a rule base and those of `docs/systems.md`. The degree is
-    multiplied by the height.
+    curves are those of a rule base and those of `docs/reference/systems.md`. The degree
+    is multiplied by the height.
     """
 
     forms: ClassVar[tuple[Form, ...]] = (
