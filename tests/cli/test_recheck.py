@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzzytree.auditing.recheck.fixed import LIMITS
+from fuzzytree.auditing.recheck.head import LIMITS
 
 pytestmark = pytest.mark.usefixtures("folder")
 

@@ -12,7 +12,7 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.places import model_file
 from fuzzytree.auditing.findings.records import Settings
 from fuzzytree.auditing.recheck import recheck
-from fuzzytree.auditing.recheck.fingerprints import digest_of
+from fuzzytree.auditing.recheck.head import digest_of
 from fuzzytree.checking.converting import load_content
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import yaml

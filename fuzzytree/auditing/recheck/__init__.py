@@ -23,8 +23,8 @@ from pathlib import Path
 
 from fuzzytree.auditing.recheck.answers import check_answer
 from fuzzytree.auditing.recheck.audit_records import Audit
-from fuzzytree.auditing.recheck.building import built, read_json
 from fuzzytree.auditing.recheck.cases import Case
+from fuzzytree.auditing.recheck.facts import built, read_json
 from fuzzytree.auditing.recheck.head import check_files, check_head
 from fuzzytree.auditing.recheck.model_records import System
 from fuzzytree.auditing.recheck.models import read_file
@@ -32,8 +32,8 @@ from fuzzytree.auditing.recheck.outcomes import (
     MOST_BYTES,
     CannotRunError,
     DoesNotHoldError,
+    Report,
 )
-from fuzzytree.auditing.recheck.report import Report
 
 __all__ = ["CannotRunError", "Report", "recheck", "recheck_files"]
 

@@ -17,18 +17,16 @@ from fuzzytree.auditing.recheck.audit_records import (
 )
 from fuzzytree.auditing.recheck.cases import NEAR, Case
 from fuzzytree.auditing.recheck.claims import check_point, check_spans, corners, holds
-from fuzzytree.auditing.recheck.deciding import decide, shows
-from fuzzytree.auditing.recheck.deciding_pairs import highest
-from fuzzytree.auditing.recheck.deciding_wins import lead
-from fuzzytree.auditing.recheck.fixed import SEVERITIES
+from fuzzytree.auditing.recheck.deciding import decide, highest, lead, shows
 from fuzzytree.auditing.recheck.forms import is_as_told
+from fuzzytree.auditing.recheck.head import SEVERITIES
 from fuzzytree.auditing.recheck.meaning import value_of
 from fuzzytree.auditing.recheck.outcomes import (
     DoesNotHoldError,
+    Report,
     UndecidedError,
     require,
 )
-from fuzzytree.auditing.recheck.report import Report
 
 
 def check_answer(case: Case, report: Report, answer: Answer, where: str) -> None:

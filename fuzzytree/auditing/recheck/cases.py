@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 
-from fuzzytree.auditing.recheck.areas import height, shared
 from fuzzytree.auditing.recheck.audit_records import (
     Answer,
     Audit,
@@ -15,10 +14,10 @@ from fuzzytree.auditing.recheck.audit_records import (
     Measure,
     fraction,
 )
-from fuzzytree.auditing.recheck.cells import Line
+from fuzzytree.auditing.recheck.cells import Line, height, shared
 from fuzzytree.auditing.recheck.enclosing import Between
-from fuzzytree.auditing.recheck.grid import Asked, Grid
-from fuzzytree.auditing.recheck.meaning import Point, strengths
+from fuzzytree.auditing.recheck.grid import Asked, Grid, Ties
+from fuzzytree.auditing.recheck.meaning import Point, Steps, paths, rules_of, strengths
 from fuzzytree.auditing.recheck.model_records import (
     Model,
     Rules,
@@ -26,15 +25,13 @@ from fuzzytree.auditing.recheck.model_records import (
     Tree,
     Variable,
 )
+from fuzzytree.auditing.recheck.models import Place, Places
 from fuzzytree.auditing.recheck.outcomes import (
     DoesNotHoldError,
     UndecidedError,
     require,
 )
-from fuzzytree.auditing.recheck.places import Place, Places
 from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
-from fuzzytree.auditing.recheck.ties import Ties
-from fuzzytree.auditing.recheck.trees import Steps, paths, rules_of
 from fuzzytree.auditing.recheck.views import View
 
 NEAR = Fraction(1, 10**6)

@@ -3,9 +3,9 @@
 A rule is stronger than some rivals at a point exactly if, at some level t, all of its
 clauses are at t or above and each rival has a clause below t. An axis is cut where a
 piece ends, where two degrees cross, and where one turns: in a cell between two cuts
-all are monotone and in one order. Their values at cuts are the critical levels;
-between two of these the picture stays the same, so one level there decides for all.
-Which clauses can be at t or above together is told per axis, and combined in `grid`.
+all are monotone and in one order. Their values at cuts are the critical levels; nothing
+changes between two of these, so one level there decides for all. Which clauses can be
+at t or above together is computed per axis, and combined in `grid`.
 """
 
 from __future__ import annotations
@@ -15,19 +15,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from fuzzytree.auditing.recheck.curves import Piece, piece_at, pieces
 from fuzzytree.auditing.recheck.model_records import Shape
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
 from fuzzytree.auditing.recheck.polynomials import (
     ONE,
     ZERO,
+    Piece,
     Poly,
+    Root,
     at,
     derivative,
+    is_same,
+    piece_at,
+    pieces,
     plus,
+    roots,
     times,
 )
-from fuzzytree.auditing.recheck.roots import Root, is_same, roots
 
 MOST_ROOTS, MOST_CRITICAL = 4_000, 4_000
 FINE = Fraction(1, 2**50)
@@ -181,3 +185,39 @@ def crossings(curves: Sequence[Poly], a: Fraction, b: Fraction) -> list[Root]:
             if not any(is_same(root, other) for other in met):
                 met.append(root)
     return sorted(met, key=lambda root: root.low)
+
+
+# --- heights and areas of terms
+
+
+def height(shape: Shape, line: Line, level: Fraction) -> Fraction:
+    """Return the largest degree on a line, from below; exactly at or below a level."""
+    levels = Levels()
+    mark = levels.add((level,), ZERO)
+    found = cells([((shape,), False, ONE)], line, levels)
+    levels.sort()
+    most = max(levels.band[end] for cell in found for end in (*cell.left, *cell.right))
+    bounds = levels.bands[most]
+    if most == levels.band[mark] and bounds[0] < bounds[1]:
+        raise UndecidedError("a height is too near to the level to tell")
+    return bounds[0] if most <= levels.band[mark] else max(bounds[0], level)
+
+
+def shared(one: Shape, other: Shape, line: Line) -> tuple[Fraction, Fraction] | None:
+    """Return between which numbers the integral of min by that of max lies."""
+    least = most = slack = ZERO
+    if line.low == line.high:
+        return None
+    both = [((one,), False, ONE), ((other,), False, ONE)]
+    for left, right, curves in stretches(both, line):
+        inside = between(left, right)
+        for root in (end for end in (left, right) if isinstance(end, Root)):
+            root.narrow(FINE * (line.high - line.low))
+            slack += root.high - root.low
+        a = left.high if isinstance(left, Root) else left
+        b = right.low if isinstance(right, Root) else right
+        order = sorted(curves, key=lambda poly: at(poly, inside))
+        wholes = [(ZERO, *(c / n for n, c in enumerate(p, 1))) for p in order]
+        areas = [at(whole, b) - at(whole, a) for whole in wholes]
+        least, most = least + areas[0], most + areas[1]
+    return (least / (most + slack), (least + slack) / most) if most else None

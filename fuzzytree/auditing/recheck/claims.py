@@ -13,11 +13,11 @@ from fuzzytree.auditing.recheck.meaning import Point, answer_of, value_of
 from fuzzytree.auditing.recheck.model_records import Model, Rules
 from fuzzytree.auditing.recheck.outcomes import (
     DoesNotHoldError,
+    Report,
     UndecidedError,
     require,
 )
 from fuzzytree.auditing.recheck.polynomials import ZERO
-from fuzzytree.auditing.recheck.report import Report
 
 FIELDS = {
     "strength": "rules level",

@@ -1,37 +1,549 @@
-"""Which check an answer of a code needs: of a proof, or of what a witness shows."""
+"""The check of each code: of a proof, and of the claims of a witness."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from fractions import Fraction
 
-from fuzzytree.auditing.recheck.audit_records import Answer, Witness
-from fuzzytree.auditing.recheck.cases import Case
-from fuzzytree.auditing.recheck.deciding_leaves import shows_difference, shows_region
-from fuzzytree.auditing.recheck.deciding_pairs import (
-    apart,
-    copied,
-    hidden,
-    needless,
-    shows_conflict,
-    shows_need,
+from fuzzytree.auditing.recheck.audit_records import (
+    Answer,
+    Declined,
+    Label,
+    Witness,
+    fraction,
 )
-from fuzzytree.auditing.recheck.deciding_terms import (
-    complexity,
-    heights,
-    overlaps,
-    unused,
+from fuzzytree.auditing.recheck.cases import (
+    LEVELS,
+    NEAR,
+    Case,
+    counted,
+    end_of,
+    level_of,
 )
-from fuzzytree.auditing.recheck.deciding_wins import (
-    covered,
-    dead,
-    shows_gap,
-    shows_lead,
-    shows_tie,
-    shows_win,
-    superfluous,
-    tied,
+from fuzzytree.auditing.recheck.cells import FINE
+from fuzzytree.auditing.recheck.claims import point_of
+from fuzzytree.auditing.recheck.grid import Asked
+from fuzzytree.auditing.recheck.meaning import Point, answer_of, leaf_of, strengths
+from fuzzytree.auditing.recheck.model_records import Clause, Rules, Tree, Variable
+from fuzzytree.auditing.recheck.outcomes import (
+    DoesNotHoldError,
+    UndecidedError,
+    require,
 )
-from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.auditing.recheck.polynomials import ZERO
+from fuzzytree.auditing.recheck.views import View
+
+Interval = tuple[Fraction, Fraction, bool]  # True opens the low end
+
+
+def dead_leaf(case: Case, tree: Tree, answer: Answer) -> None:
+    """Ask of a leaf whether it is reached, or of all whether those told are all."""
+    reached = {n for n in case.numbers if _is_reached(case, tree, n)}
+    if answer.is_finding:
+        case.never(not reached.isdisjoint(answer.rules), "the leaf is reached")
+    elif not answer.rules:
+        told = {one.rules for one in case.coded("FT101") if one.is_finding}
+        hidden = [n for n in case.numbers if n not in reached]
+        missing = [n for n in hidden if (n,) not in told]
+        require(not missing, f"leaves that are not reached are not told: {missing}")
+
+
+def shows_region(case: Case, answer: Answer, state: Witness) -> None:
+    """Compare the region of a leaf with the intervals on the path to it."""
+    tree = case.model
+    if not isinstance(tree, Tree) or len(answer.rules) != 1:
+        raise DoesNotHoldError("it is of no leaf")
+    number = answer.rules[0]
+    is_there = leaf_of(tree, point_of(state.point)) == number
+    require(is_there, "the witness reaches another leaf")
+    label = tree.leaves[number - 1].label
+    require([c.label for c in state.claims] == [label], "it is not the leaf's class")
+    asked = {node.variable for node, _ in case.paths[number]}
+    require({s.variable for s in state.region} == asked, "not what its path asks")
+    for span in state.region:
+        is_one = any(
+            math.isclose(span.low or 0.0, low, rel_tol=2.0**-50)
+            and math.isclose(span.high or 0.0, high, rel_tol=2.0**-50)
+            for low, high, _ in _ways(case, number, case.variables[span.variable])
+        )
+        require(is_one, f"the path leads elsewhere in {span.variable!r}")
+
+
+def shows_difference(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that the tree and its raw rules are claimed to answer differently."""
+    said = {claim.of: claim.label for claim in state.claims if claim.kind == "decides"}
+    require(said.keys() == {"tree", "raw rules"}, "it is not claimed what both answer")
+    is_near = not answer.rules  # the nearest to a row is no finding
+    require(answer.is_finding or is_near, "two answers that differ are a finding")
+    require(said["tree"] != said["raw rules"], "the two answers are the same")
+
+
+def _is_reached(case: Case, tree: Tree, number: int) -> bool:
+    """Return whether the intervals on the path to a leaf meet the domain."""
+    return all(_ways(case, number, variable) for variable in tree.variables)
+
+
+def _ways(case: Case, number: int, variable: Variable) -> list[Interval]:
+    """Return the values of a variable that lead to a leaf."""
+    line = case.line(variable)
+    met: list[Interval] = [(line.low, line.high, False)]
+    for node, way in case.paths[number]:
+        if node.variable == variable.name:
+            ends = zip((None, *node.cuts), (*node.cuts, None), node.owners, strict=True)
+            place = node.branches.index(way)
+            mine = [(low, high) for low, high, owner in ends if owner == place]
+            met = [_met(one, low, high) for one in met for low, high in mine]
+    return [one for one in met if one[0] < one[1] or (one[0] == one[1] and not one[2])]
+
+
+def _met(one: Interval, low: float | None, high: float | None) -> Interval:
+    """Return what an interval has in common with `low < x <= high`."""
+    start, end, is_open = one
+    if low is not None and low >= start:
+        start, is_open = Fraction(low), True
+    return start, end if high is None else min(end, Fraction(high)), is_open
+
+
+# --- pairs of rules, and clauses: FT104 to FT107, FT201
+
+
+def hidden(case: Case, answer: Answer) -> None:
+    """Ask each rule that is told to hide another; or all pairs that are not told."""
+    if answer.rules:
+        _told_to_hide(case, answer)
+    else:
+        _not_told_to_hide(case, answer)
+
+
+def _told_to_hide(case: Case, answer: Answer) -> None:
+    weak, *strong = answer.rules
+    for number in strong:
+        is_one = case.then(number) == case.then(weak)
+        require(is_one == (answer.code == "FT104"), "the classes are not so")
+        beats = case.beats(case.asked(weak), [case.asked(number)])
+        case.never(beats, f"rule {weak} is somewhere stronger than rule {number}")
+        if answer.code == "FT105" and number > weak:
+            raise UndecidedError("that it is always strictly weaker is not asked here")
+    counted(answer, {"rules that subsume it": len(strong)}, answer.code == "FT104")
+    counted(answer, {"rules that mask it": len(strong)}, answer.code == "FT105")
+
+
+def _not_told_to_hide(case: Case, answer: Answer) -> None:
+    is_alike = answer.code == "FT104"
+    pairs = [pair for pair in case.pairs(alike=is_alike) if case.fire(*pair)]
+    silent = sum(not case.fire(number) for number in case.numbers)
+    counts = {"pairs": len(pairs), "pairs too near to tell": 0}
+    counts["rules that never fire"] = silent
+    counted(answer, counts, 3)
+    told = {(a.rules[0], n) for a in case.coded(answer.code) for n in a.rules[1:]}
+    for first, second in pairs:
+        if (first, second) in told or (second, first) in told:
+            continue
+        one, other = case.asked(first), case.asked(second)
+        require(case.beats(other, [one]), f"rule {second} hides behind {first}")
+        if is_alike:
+            require(case.beats(one, [other]), f"rule {first} hides behind {second}")
+
+
+def _is_copy(answer: Answer) -> bool:
+    """Return whether two rules are told to be at no distance of each other."""
+    return any(measure.exact == "0" for measure in answer.measures)
+
+
+def copied(case: Case, answer: Answer) -> None:
+    """Ask whether one of two rules that are told to be alike is ever stronger."""
+    if not answer.rules:
+        pairs = case.pairs(alike=True) + case.pairs(alike=False)
+        counted(answer, {"pairs": len(pairs)}, 1)
+        text = "that no other two rules are nearly alike is not asked here"
+        raise UndecidedError(text)
+    first, second = answer.rules
+    is_one = case.then(first) == case.then(second)
+    graver = "error" if case.view is None else "info"
+    severity = "warning" if is_one else graver
+    require(answer.severity == severity, "the classes are not so")
+    if not _is_copy(answer):
+        raise UndecidedError("the distance of curves that differ is not measured here")
+    one, other = case.asked(first), case.asked(second)
+    if one != other:
+        is_more = case.beats(one, [other]) or case.beats(other, [one])
+        require(not is_more, "the two rules are not alike")
+
+
+def apart(case: Case, answer: Answer) -> None:
+    """Ask of each pair that is not told whether both rules can reach the level."""
+    if case.rules.semantics.conjunction != "min":
+        raise UndecidedError("conflicts under product are not decided again here")
+    told = {one.rules for one in case.coded("FT201")}
+    level, grid = Fraction(case.audit.settings.level), case.grid
+    rest = [pair for pair in case.pairs(alike=False) if pair not in told]
+    if case.view is not None:
+        rest = [pair for pair in rest if case.view.may_conflict(*pair)]
+    untold = next((m.value for m in answer.measures if "not told" in m.name), 0)
+    require(answer.is_finding == (untold > 0), "a finding that is none")
+    counted(answer, {"pairs that never do": len(rest) - untold}, 1)
+    if untold:
+        raise UndecidedError("which pairs are not told is not known")
+    for one, other in rest:
+        both = _union(case.asked(one), case.asked(other))
+        if not grid.leaves(both, (), grid.gap(level, is_above=False)):
+            continue
+        is_met = level < 1 and grid.leaves(both, (), grid.gap(level, is_above=True))
+        case.never(is_met, f"rules {one} and {other} reach the level together")
+        raise UndecidedError(f"rules {one} and {other} touch the level")
+
+
+def highest(case: Case, answer: Answer) -> None:
+    """Ask whether two rules reach a level together above the one that is told.
+
+    Raises:
+        UndecidedError: If that cannot be told here.
+    """
+    if case.rules.semantics.conjunction != "min":
+        raise UndecidedError("conflicts under product are not decided again here")
+    tops = [one for one in answer.measures if one.name in LEVELS]
+    require(len(tops) == 1 and len(answer.rules) == 2, "it tells no highest level")
+    top, grid = end_of(tops[0]), case.grid
+    both = _union(*map(case.asked, answer.rules))
+    require(0 <= top <= 1 + NEAR, "a level outside 0 to 1")
+    if 0 < top <= 1 and case.is_free and tops[0].exact is not None:
+        is_near = grid.leaves(both, (), grid.gap(top, is_above=False))
+        require(is_near, "both do not reach so high a level together")
+    if top >= 1:
+        return
+    band = grid.gap(top, is_above=True)
+    case.never(grid.leaves(both, (), band), "both reach a higher level together")
+    low, high = grid.levels.bands[band]
+    if low < high and grid.leaves(both, (), band, is_gap=False):
+        raise UndecidedError("two critical levels are too near to tell apart")
+
+
+def needless(case: Case, answer: Answer) -> None:
+    """Ask whether a rule without a clause is anywhere stronger than with it."""
+    if not answer.rules:
+        raise UndecidedError("which other clauses matter is not known")
+    require(len(answer.rules) == 1, "it is of no rule")
+    if not answer.terms:
+        require(not answer.is_finding, "it is of no clause of the rule")
+        require(not case.fire(*answer.rules), "the rule fires somewhere")
+        return
+    rest, number = case.grid.asked(_without(case, answer)), answer.rules[0]
+    if case.beats(rest, [case.asked(number)]):
+        _decides_alike(case, number, rest)
+
+
+def _decides_alike(case: Case, number: int, rest: Asked) -> None:
+    """Ask whether a rule that becomes stronger decides what was decided otherwise.
+
+    It does if it wins where a rule of another class was above all of its own class; or
+    where no rule fired; or it may if it ties with a later rule of another class.
+    """
+    grid, then = case.grid, case.then(number)
+    own = [case.asked(n) for n in case.numbers if case.then(n) == then]
+    others = [n for n in case.numbers if case.then(n) != then]
+    is_more = any(
+        case.beats(_union(rest, case.asked(n)), own)
+        or (n > number and case.ties.tie(rest, case.asked(n), own))
+        for n in others
+    )
+    if case.rules.semantics.uncovered != then:
+        is_more |= grid.leaves(rest, grid.of, grid.gap(ZERO, is_above=True))
+    if is_more:
+        raise UndecidedError("the rule is stronger without it, if not in its answers")
+
+
+def _union(one: Asked, other: Asked) -> Asked:
+    """Return what two rules ask together."""
+    return tuple(a | b for a, b in zip(one, other, strict=True))
+
+
+def _without(case: Case, answer: Answer) -> tuple[Clause, ...]:
+    """Return a rule's clauses without the one that an answer is about."""
+    when = case.rules.rules[answer.rules[0] - 1].when
+    asked = {c: tuple(Label(c.variable, term) for term in c.terms) for c in when}
+    found = {clause for clause, labels in asked.items() if labels == answer.terms}
+    if len(found) > 1:  # one of them is negated: only the subject says which
+        found = {c for c in found if answer.subject.endswith(repr(_text(c)))}
+    require(len(found) == 1, "it is of no clause of the rule")
+    place = when.index(found.pop())
+    return (*when[:place], *when[place + 1 :])
+
+
+def _text(clause: Clause) -> str:
+    verb = "is not" if clause.negated else "is"
+    return f"{clause.variable} {verb} {' or '.join(clause.terms)}"
+
+
+def shows_need(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that the answer at the witness is another one without the clause."""
+    rest, point = _without(case, answer), point_of(state.point)
+    every, place = list(case.rules.rules), answer.rules[0] - 1
+    every[place] = every[place]._replace(when=rest)
+    other = answer_of(case.rules._replace(rules=tuple(every)), point)
+    is_other = other != answer_of(case.rules, point) and not answer.is_finding
+    require(is_other, "the clause does not matter there")
+
+
+def shows_conflict(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that two rules of two classes are claimed to reach the level together."""
+    level = Fraction(case.audit.settings.level)
+    met = [c for c in state.claims if c.kind == "reaches" and c.rules == answer.rules]
+    is_high = any(fraction(claim.level or "0") >= level for claim in met)
+    is_found = is_high and answer.is_finding
+    require(is_found, "it is not claimed that both reach the level")
+    case.differ(answer.rules)
+    if case.rules.semantics.conjunction == "min":
+        highest(case, answer)
+
+
+# --- terms, and their use: FT401, FT403, FT404, FT501
+
+
+def heights(case: Case, answer: Answer) -> None:
+    """Compare the terms that do not reach the level with what is told."""
+    level = case.audit.settings.level
+    low = {label: height for label, height in case.heights.items() if height < level}
+    told = [one.terms[0] for one in case.coded("FT401") if one.terms]
+    told = [label for label in told if label in case.heights]
+    require(told == list(low), "other terms are too low")
+    if any(label not in case.heights for label in answer.terms):
+        raise UndecidedError("the height of a curve that is no polynomial")
+    for label in answer.terms:
+        is_empty = answer.severity == "error"
+        require(is_empty == (not low[label]), f"{label.term!r} is empty, or is not")
+        value = next((m.value for m in answer.measures if m.name == "height"), -1.0)
+        require(abs(value - low[label]) <= 2.0**-30, f"the height of {label.term!r}")
+
+
+def overlaps(case: Case, answer: Answer) -> None:
+    """Compare the shared areas of pairs of terms with what is told of them."""
+    limit = Fraction(case.audit.settings.overlap)
+    known = {labels: share for labels, share in case.shares.items() if share}
+    near = {labels: share for labels, share in known.items() if share[1] >= limit}
+    if any(low < limit for low, _ in near.values()):
+        raise UndecidedError("a shared area is too near to the limit to tell")
+    told = [one for one in case.coded("FT403") if one.terms]
+    told = [one for one in told if not isinstance(one.state, Declined)]
+    require({a.terms for a in told} <= near.keys(), "two terms are easy to tell apart")
+    if not answer.terms:
+        require(answer.is_finding == (len(near) > len(told)), "a finding that is none")
+        counts = {
+            "pairs not told one by one": len(near) - len(told),
+            "pairs apart": len(known) - len(near),
+            "pairs without area": len(case.shares) - len(known),
+        }
+        counted(answer, counts, len(counts))
+        return
+    low, high = near[answer.terms]
+    value = Fraction(next(m.value for m in answer.measures if "shared" in m.name))
+    require(low - FINE <= value <= high + FINE, "the share is another one")
+
+
+def unused(case: Case, answer: Answer) -> None:
+    """Compare the terms and variables that no rule asks with what is told."""
+    every, asked = case.terms, _asked(case.rules)
+    if case.view is not None:  # the system itself is read, rules left out or not
+        every = [
+            Label(v.name, label.name)
+            for v in case.view.system.inputs
+            for label in v.labels
+        ]
+        asked = case.view.questions()
+    needed = {variable for variable, _ in asked}
+    names = [v.name for v in case.rules.variables]
+    for variable in case.rules.variables:
+        if variable.name in needed:
+            needed |= {part.input for part in variable.parts}
+    idle = [f"variable {name!r}" for name in names if name not in needed]
+    idle += [
+        f"term {term!r} of {name!r}"
+        for name, term in every
+        if name in needed and (name, term) not in asked
+    ]
+    needed, asked = needed.intersection(names), asked.intersection(every)
+    told = [one.subject for one in case.coded("FT404") if one.is_finding]
+    require(told == idle, "other terms or variables are unused")
+    counts = {"variables in use": len(needed), "terms in use": len(asked)}
+    counted(answer, counts, 0 if answer.is_finding else 2)
+
+
+def complexity(case: Case, answer: Answer) -> None:
+    """Count rules, clauses, terms and variables."""
+    lengths, asked = [len(r.when) for r in case.rules.rules], _asked(case.rules)
+    counts: dict[str, float] = {
+        "rules": len(lengths),
+        "clauses": sum(lengths),
+        "most clauses of a rule": max(lengths),
+        "clauses per rule": sum(lengths) / len(lengths),
+        "distinct terms in use": len(asked),
+        "variables in use": len({variable for variable, _ in asked}),
+    }
+    if isinstance(case.model, Tree):
+        counts["depth of the tree"] = max(map(len, case.paths.values()))
+    counted(answer, counts, len(counts))
+    text = "its counts are right; the index of Nauck is not worked out here"
+    raise UndecidedError(text)
+
+
+def _asked(rules: Rules) -> set[tuple[str, str]]:
+    """Return the variable and term of everything that a rule asks."""
+    clauses = [clause for rule in rules.rules for clause in rule.when]
+    return {(clause.variable, term) for clause in clauses for term in clause.terms}
+
+
+# --- rules that win, tie or fire nowhere: FT101 to FT103, FT202, FT301
+
+
+def dead(case: Case, answer: Answer) -> None:
+    """Ask whether a rule is anywhere stronger than those of other classes."""
+    if isinstance(case.model, Tree):
+        dead_leaf(case, case.model, answer)
+        return
+    if case.view is not None:
+        silent(case, case.view, answer)
+        return
+    require(len(answer.rules) > 0, "no rule is named")
+    number = answer.rules[0]
+    rivals = [case.asked(n) for n in case.numbers if case.then(n) != case.then(number)]
+    wins = case.beats(case.asked(number), rivals)
+    case.never(wins, "the rule wins somewhere")
+
+
+def silent(case: Case, view: View, answer: Answer) -> None:
+    """Ask whether a rule of a system fires, in any of its ways."""
+    require(answer.is_finding, "a finding that is none")
+    if not answer.rules:
+        require(answer.subject in view.silent, "its text lets it fire")
+        return
+    case.never(case.fire(*answer.rules), "the rule fires somewhere")
+
+
+def superfluous(case: Case, answer: Answer) -> None:
+    """Ask whether a rule is anywhere stronger than all, or first of the strongest."""
+    require(len(answer.rules) == 1 and answer.is_finding, "it is of no rule")
+    number = answer.rules[0]
+    mine, then = case.asked(number), case.then(number)
+    others = [n for n in case.numbers if n != number]
+    wins = case.beats(mine, [case.asked(n) for n in others])
+    case.never(wins, "it is stronger than all somewhere")
+    later = [n for n in others if n > number and case.then(n) != then]
+    for other in (n for n in others if case.then(n) == then):
+        # one that hides it, with no other class between the two
+        is_between = any(n < other for n in later)
+        if not is_between and not case.beats(mine, [case.asked(other)]):
+            return
+    if any(case.tie(number, other) for other in later):
+        raise UndecidedError("it ties with a later rule, and its place may decide")
+
+
+def tied(case: Case, answer: Answer) -> None:
+    """Count the pairs of rules of two classes, and those that are told."""
+    pairs = len(case.pairs(alike=False))
+    told = sum(bool(one.rules) for one in case.coded("FT202"))
+    counted(answer, {"pairs": pairs, "pairs told one by one": told}, 2)
+    require(not answer.is_finding, "that others do not tie is no finding")
+    known = {one.rules for one in case.coded("FT202") if one.rules}
+    total = next((m.value for m in answer.measures if m.name == "pairs that tie"), told)
+    if total != told:
+        raise UndecidedError("which pairs are not told is not known")
+    for pair in case.pairs(alike=False):
+        if pair not in known:
+            text = f"rules {pair[0]} and {pair[1]} tie as the strongest"
+            case.never(case.tie(*pair), text)
+
+
+def covered(case: Case, answer: Answer) -> None:
+    """Ask whether some rule fires everywhere, or reaches epsilon everywhere."""
+    grid = case.grid
+    if answer.subject == "cover":
+        is_gap = grid.is_bare(grid.of)
+        if is_gap is None:
+            raise UndecidedError("a curve may touch 0 where it is not known exactly")
+        case.never(is_gap, "there are points at which no rule fires")
+        return
+    if case.rules.semantics.conjunction != "min":
+        raise UndecidedError("gaps under product are not decided again here")
+    below = grid.gap(Fraction(case.audit.settings.epsilon), is_above=False)
+    is_gap = grid.leaves(None, grid.of, below)
+    case.never(is_gap, "there are points at which every rule is below epsilon")
+    least_cover(case, answer)
+
+
+def least_cover(case: Case, answer: Answer) -> None:
+    """Ask whether the strength where it is least lies between those that are told."""
+    grid, told = case.grid, [level_of(m) for m in answer.measures if m.name in LEVELS]
+    require(len(told) == 2 and 0 <= told[0] <= told[1] <= 1, "no least strength")
+    if told[0] > 0:
+        is_less = grid.leaves(None, grid.of, grid.gap(told[0], is_above=False))
+        case.never(is_less, "somewhere every rule is weaker than is told")
+    if told[1] < 1 and case.is_free:
+        is_seen = grid.leaves(None, grid.of, grid.gap(told[1], is_above=True))
+        require(is_seen, "everywhere some rule is stronger than is told")
+
+
+def shows_win(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that a claim compares the rule with every rule that it is about."""
+    require(len(answer.rules) == 1, "it is of no rule")
+    number = answer.rules[0]
+    if case.view is not None:
+        fired = [claim.rules for claim in state.claims if claim.kind == "beats"]
+        is_found = (number,) in fired and not answer.is_finding
+        require(is_found, "it is not claimed that the rule fires")
+        return
+    rivals = {n for n in case.numbers if n != number}
+    if answer.code != "FT103":
+        rivals = {n for n in rivals if case.then(n) != case.then(number)}
+    ties = [c for c in state.claims if c.kind == "ties" and number in c.rules]
+    if answer.is_finding or (answer.code == "FT103" and ties):  # it ties, and is first
+        require(bool(ties), "it is not claimed that the rule ties")
+        return
+    beats = [c for c in state.claims if (c.kind, c.rules) == ("beats", (number,))]
+    is_all = any(rivals <= {*claim.rivals} for claim in beats)
+    require(is_all, "it is not claimed that the rule beats all these others")
+
+
+def lead(case: Case, number: int, point: Point) -> Fraction:
+    """Return by how much a rule is above those of other classes at a point."""
+    every = strengths(case.rules, point)
+    then = case.then(number)
+    others = (every[n - 1] for n in case.numbers if case.then(n) != then)
+    return every[number - 1] - max(others, default=ZERO)
+
+
+def shows_lead(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that the rule leads at the witness by as much as is told."""
+    require(len(answer.rules) == 1 and not answer.is_finding, "it is of no rule")
+    found = lead(case, answer.rules[0], point_of(state.point))
+    told = [m.value for m in answer.measures if m.name == "largest lead, at least"]
+    is_so = len(told) == 1 and found >= Fraction(told[0]) >= case.audit.settings.lead
+    require(is_so, "the rule does not lead by so much there")
+    shows_win(case, answer, state)
+
+
+def shows_tie(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that a claim compares two rules of two classes with every other rule."""
+    ties = [c for c in state.claims if c.kind == "ties"]
+    met = [c for c in ties if {*answer.rules} <= {*c.rules}]
+    is_all = any({*c.rules, *c.rivals} == {*case.numbers} for c in met)
+    require(is_all and answer.is_finding, "it is not claimed that the two tie")
+    case.differ(answer.rules)
+
+
+def shows_gap(case: Case, answer: Answer, state: Witness) -> None:
+    """Ask that every rule is claimed to be low enough."""
+    is_gap = answer.subject.startswith("gap ")
+    level = ZERO if is_gap else Fraction(case.audit.settings.epsilon)
+    below = [c for c in state.claims if c.kind == "below"]
+    met = [c for c in below if {*c.rules} == {*case.numbers}]
+    is_low = any(fraction(claim.level or "1") <= level for claim in met)
+    require(is_low and answer.is_finding, "it is not claimed that all rules are below")
+    if not is_gap and case.rules.semantics.conjunction == "min":
+        least_cover(case, answer)
+
+
+# --- the check of each code
+
 
 AGAIN: dict[str, Callable[[Case, Answer], None]] = {
     "FT101": dead,

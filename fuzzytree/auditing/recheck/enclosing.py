@@ -10,10 +10,9 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from fuzzytree.auditing.recheck.curves import degree, is_exact
 from fuzzytree.auditing.recheck.model_records import Curve, Scaled, Shape
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
-from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
+from fuzzytree.auditing.recheck.polynomials import ONE, ZERO, degree, is_exact
 
 BITS, TERMS = 160, 48
 UNIT = 1 << BITS

@@ -3,23 +3,136 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Literal
 
 from fuzzytree.auditing.recheck.audit_records import Answer, Policy
 from fuzzytree.auditing.recheck.cases import Case
-from fuzzytree.auditing.recheck.fingerprints import (
-    compact,
-    digest_of,
-    fingerprint,
-    said,
+from fuzzytree.auditing.recheck.model_records import (
+    LR,
+    And,
+    Band,
+    Curve,
+    Is,
+    Model,
+    Not,
+    Or,
+    Points,
+    Rule,
+    Rules,
+    Shape,
+    System,
+    Tree,
 )
-from fuzzytree.auditing.recheck.fixed import LIMITS, SEVERITIES
-from fuzzytree.auditing.recheck.model_records import Rules, Shape, System, Tree
-from fuzzytree.auditing.recheck.outcomes import UndecidedError
-from fuzzytree.auditing.recheck.report import Report
+from fuzzytree.auditing.recheck.outcomes import Report, UndecidedError
 from fuzzytree.auditing.recheck.systems import has_formula
+
+LIMITS = (
+    "that the rules are right: an audit finds what a rule base says, not whether it is "
+    "true of the world",
+    "anything outside the domain: every answer holds on the stated ranges and nowhere "
+    "else",
+    "that all of the domain can happen: inputs are asked in every combination, also in "
+    "those that no row will ever have",
+    "more about a sampled share than its interval says, and that only with the stated "
+    "confidence",
+    "what a bracket leaves open: the number lies between the two ends, and nothing "
+    "more is known",
+    "anything about what was declined or not asked; both are listed",
+    "that strengths which only touch are told: ties and gaps without an interior are "
+    "left out",
+    "what rounding changes: answers are about real numbers at the doubles of the "
+    "model, and a runtime may differ where strengths nearly tie",
+    "that other files, runtimes or devices answer alike: only what was compared is "
+    "compared",
+    "that the given rows are right, or stand for those to come",
+    "who made this audit: the digest shows an edit, and is no signature",
+)
+"""What every audit says that it does not establish, word for word."""
+
+SEVERITIES = {
+    **dict.fromkeys(("FT105", "FT601", "FT602"), "error"),
+    **dict.fromkeys(("FT102", "FT104", "FT202", "FT203", "FT402"), "warning"),
+    **dict.fromkeys(("FT103", "FT107", "FT201", "FT204", "FT205", "FT403"), "info"),
+    **dict.fromkeys(("FT404", "FT501", "FT701"), "info"),
+    **dict.fromkeys([f"FTD0{n}" for n in range(1, 9)], "info"),
+    "FT101": "error warning",  # it decides by its place alone
+    "FT301": "warning info",  # the model answers a class where no rule fires
+    "FT106": "warning error info",  # of another class: a contradiction, or a note
+    "FT401": "warning error",  # never reached at all
+}
+"""Every code, and the severities that a finding of it can have."""
+
+
+# --- fingerprints
+
+
+_TAGS: dict[type, str] = {
+    kind: kind.__name__.lower() for kind in (Band, LR, Points, Is, And, Or, Not)
+}
+
+
+def fingerprint(model: Model | System) -> str:
+    """Return the SHA-256 of a model's content, written as compact JSON."""
+    return hashlib.sha256(compact(model).encode()).hexdigest()
+
+
+def digest_of(facts: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of an audit's canonical JSON, with an empty digest."""
+    whole = dict(facts) | {"digest": ""}
+    text = json.dumps(whole, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def compact(value: Any) -> str:
+    """Return records, tuples and scalars as JSON without blanks."""
+    if isinstance(value, float):
+        return _digits(value)
+    if not isinstance(value, tuple | list):
+        return json.dumps(value, ensure_ascii=False)
+    names: tuple[str, ...] = getattr(value, "_fields", ())
+    if not names:
+        return f"[{','.join(map(compact, value))}]"
+    given: list[tuple[str, Any]] = [*zip(names, value, strict=True)]
+    given = [pair for pair in given if pair != ("label_type", None)]
+    tag = _TAGS.get(type(value))
+    if isinstance(value, Curve):
+        tag, given = value.kind, [*value.facts]
+    pairs = [f'"type":"{tag}"'] if tag else []
+    pairs += [f'"{n.rstrip("_")}":{compact(v)}' for n, v in given]
+    return f"{{{','.join(pairs)}}}"
+
+
+def _digits(value: float) -> str:
+    """Return the shortest digits: in full from 1e-5 up to 1e16, else with exponent."""
+    sign = "-" if math.copysign(1.0, value) < 0 else ""
+    mantissa, _, power = f"{abs(value)!r}".partition("e")
+    if not power:
+        return f"{sign}{mantissa}"
+    mantissa = mantissa.removesuffix(".0")
+    if int(power) == -5:
+        return f"{sign}0.0000{mantissa.replace('.', '')}"
+    return f"{sign}{mantissa}e{int(power)}"
+
+
+def said(rule: Rule, shapes: Mapping[tuple[str, str], Shape]) -> list[Any]:
+    """Return what a rule says and with which curves, in an order of its own."""
+    clauses = sorted(rule.when, key=str)
+    texts = [
+        f"{c.variable} is {'not ' * c.negated}{' or '.join(c.terms)}" for c in clauses
+    ]
+    curves = [
+        [c.variable, c.negated, sorted(compact(shapes[c.variable, t]) for t in c.terms)]
+        for c in clauses
+    ]
+    said = f"IF {' AND '.join(texts)} THEN" if texts else "ALWAYS"
+    return [f"{said} {rule.then}", sorted(curves, key=str)]
+
+
+# --- the checks
 
 
 def check_files(

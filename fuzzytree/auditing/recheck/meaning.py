@@ -1,21 +1,23 @@
-"""What a model means, in fractions: strengths and answers at a point."""
+"""What a model means, in fractions: paths, rules, strengths, predictions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
+from typing import Literal
 
-from fuzzytree.auditing.recheck.curves import degree
 from fuzzytree.auditing.recheck.model_records import (
     Branch,
     Clause,
     Model,
+    Node,
+    Rule,
     Rules,
     Tree,
     Variable,
 )
-from fuzzytree.auditing.recheck.polynomials import ONE, ZERO
+from fuzzytree.auditing.recheck.polynomials import ONE, ZERO, degree
 
 Point = Mapping[str, Fraction]
 
@@ -65,3 +67,45 @@ def leaf_of(tree: Tree, point: Point) -> int:
         x = value_of(variables[node.variable], point)
         branch = node.branches[node.owners[sum(x > cut for cut in node.cuts)]]
     return branch.leaf or 0
+
+
+# --- trees
+
+
+Steps = tuple[tuple[Node, Branch], ...]
+
+
+def paths(tree: Tree) -> Iterator[tuple[int, Steps]]:
+    """Yield each leaf's number and the path to it, in the order of the leaves."""
+    todo: list[tuple[int | None, int | None, Steps]]
+    todo = [(1, None, ()) if tree.nodes else (None, 1, ())]
+    while todo:
+        node, leaf, path = todo.pop()
+        if node is None:
+            yield leaf or 0, path
+            continue
+        asked = tree.nodes[node - 1]
+        todo += [
+            (b.node, b.leaf, (*path, (asked, b))) for b in reversed(asked.branches)
+        ]
+
+
+def rules_of(tree: Tree, kind: Literal["relative", "raw"]) -> Rules:
+    """Return the rules of a tree: rule k is the path to leaf k, a clause a node."""
+    groups = {v.name: v.terms for v in tree.variables}
+    if kind == "raw":
+        groups = {group.variable: group.terms for group in tree.sets}
+    variables = tuple(v._replace(terms=groups.get(v.name, ())) for v in tree.variables)
+    rules = [
+        Rule(
+            tuple(
+                Clause(node.variable, way.terms if kind == "relative" else way.sets)
+                for node, way in path
+            ),
+            tree.leaves[number - 1].label,
+            tree.leaves[number - 1].support,
+        )
+        for number, path in paths(tree)
+    ]
+    head = (tree.name, tree.classes, variables, tuple(rules), tree.semantics)
+    return Rules(*head, kind, tree.columns)

@@ -16,8 +16,7 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.findings.subject import Rows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
-from fuzzytree.auditing.recheck.fingerprints import digest_of
-from fuzzytree.auditing.recheck.fixed import LIMITS
+from fuzzytree.auditing.recheck.head import LIMITS, digest_of
 from fuzzytree.model.rulebase import (
     Clause,
     Conjunction,

@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.findings.records import Source
 from fuzzytree.auditing.findings.subject import Rows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
-from fuzzytree.auditing.recheck.fingerprints import digest_of
+from fuzzytree.auditing.recheck.head import digest_of
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from tests.auditing.findings.test_mutations import PLANTED, ROWS, Planted

@@ -16,14 +16,13 @@ from fuzzytree.auditing.findings.records import Answer, Audit
 from fuzzytree.auditing.recheck import (
     CannotRunError,
     audit_records,
-    fingerprints,
-    fixed,
+    head,
     model_records,
 )
-from fuzzytree.auditing.recheck.building import built, read_json
-from fuzzytree.auditing.recheck.fingerprints import compact
+from fuzzytree.auditing.recheck.facts import built, read_json
+from fuzzytree.auditing.recheck.head import compact
+from fuzzytree.auditing.recheck.meaning import rules_of
 from fuzzytree.auditing.recheck.models import read_file
-from fuzzytree.auditing.recheck.trees import rules_of
 from fuzzytree.auditing.recheck.yaml import read_yaml
 from fuzzytree.exporters import yaml
 from fuzzytree.model.rulebase import RuleBase, fingerprint
@@ -39,7 +38,7 @@ def test_its_reading_of_a_file_is_ours() -> None:
     for model in [*models(0), random_tree(5, leaves=40), numbers]:
         found = read(model)
         assert compact(found) == msgspec.json.encode(model).decode()
-        assert fingerprints.fingerprint(found) == fingerprint(model)
+        assert head.fingerprint(found) == fingerprint(model)
 
 
 @pytest.mark.heavy
@@ -61,11 +60,11 @@ def test_its_rules_of_a_tree_are_ours() -> None:
 
 
 def test_the_panel_and_the_codes_are_ours() -> None:
-    assert fixed.LIMITS == LIMITS
+    assert head.LIMITS == LIMITS
     asked = {code for code in CODES if not code.startswith("FT8")}
-    assert fixed.SEVERITIES.keys() == asked
+    assert head.SEVERITIES.keys() == asked
     for code in asked:
-        assert CODES[code].severity in fixed.SEVERITIES[code].split(" ")
+        assert CODES[code].severity in head.SEVERITIES[code].split(" ")
 
 
 def test_the_records_of_an_audit_are_ours() -> None:

@@ -14,13 +14,13 @@ from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.places import model_file
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.audit_records import Audit
-from fuzzytree.auditing.recheck.building import built
-from fuzzytree.auditing.recheck.conditions import HEDGES, read_condition
 from fuzzytree.auditing.recheck.enclosing import NORMS, bounds, hedged
-from fuzzytree.auditing.recheck.fingerprints import digest_of, fingerprint
+from fuzzytree.auditing.recheck.facts import built
+from fuzzytree.auditing.recheck.head import digest_of, fingerprint
 from fuzzytree.auditing.recheck.model_records import System
 from fuzzytree.auditing.recheck.models import read_file
 from fuzzytree.auditing.recheck.outcomes import UndecidedError
+from fuzzytree.auditing.recheck.systems import HEDGES, read_condition
 from fuzzytree.auditing.recheck.views import View
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import yaml

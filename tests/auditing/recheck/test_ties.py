@@ -8,8 +8,7 @@ import pytest
 
 from fuzzytree.auditing.recheck import model_records
 from fuzzytree.auditing.recheck.cells import Line
-from fuzzytree.auditing.recheck.grid import Grid
-from fuzzytree.auditing.recheck.ties import Ties
+from fuzzytree.auditing.recheck.grid import Grid, Ties
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from tests.auditing.engine.bases import random_base
 from tests.auditing.recheck.reading import read
