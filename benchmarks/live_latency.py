@@ -35,10 +35,10 @@ from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.recognition.sources import PAPER_BOARD, FromLine, simulated
 from fuzzytree.tactile.runtimes.frames import features_of
+from fuzzytree.tactile.simulation.device import Wire
 from fuzzytree.tactile.simulation.encoding import encoded
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import press
-from fuzzytree.tactile.simulation.wire import Wire
 
 FEATURES = (
     *("S1", "S2", "S7", "S8", "S9", "S11"),

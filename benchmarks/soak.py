@@ -27,6 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from serial_faults import ConnectionFaults, damaged, noise, with_marker
 from soak_verdicts import explained
 
 from fuzzytree.tactile.boards import (
@@ -42,9 +43,8 @@ from fuzzytree.tactile.link.decoding import Decoder, decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.tactile.simulation.device import bounds
 from fuzzytree.tactile.simulation.encoding import banner, encoded
-from fuzzytree.tactile.simulation.faults import Faults, damaged, noise, with_marker
 
-FAULTS = Faults(flip=1e-4, lose=5e-5, double=5e-5, noise=0.01, marker=0.1)
+FAULTS = ConnectionFaults(flip=1e-4, lose=5e-5, double=5e-5, noise=0.01, marker=0.1)
 CUT_EVERY = 5000  # frames after which the plug is pulled in the middle of one
 _POOL = 512  # different frames
 _RECENT = 2**15  # bytes among which a frame that came out must lie
@@ -143,7 +143,9 @@ class Pool(NamedTuple):
     found: dict[bytes, int]
 
 
-def pool_of(board: Board, faults: Faults, random: np.random.Generator) -> Pool:
+def pool_of(
+    board: Board, faults: ConnectionFaults, random: np.random.Generator
+) -> Pool:
     """Return frames of which no two are equal; some hold the marker on purpose."""
     sensor, (low, high) = board.sensor, bounds(board)
     shape = (sensor.rows, sensor.columns)
@@ -225,7 +227,9 @@ class Watch:
         return number if number < self.count.frames else None
 
 
-def soak(board: Board, frames: int, seed: int = 0, faults: Faults = FAULTS) -> Count:
+def soak(
+    board: Board, frames: int, seed: int = 0, faults: ConnectionFaults = FAULTS
+) -> Count:
     """Send frames with faults through the decoder of a board; count what comes out."""
     random = np.random.default_rng(seed)
     pool = pool_of(board, faults, random)
@@ -284,7 +288,7 @@ def _stream(
     decoder: Decoder,
     numbers: range,
     start: bytes,
-    faults: Faults,
+    faults: ConnectionFaults,
     random: np.random.Generator,
 ) -> None:
     """Send frames one after the other, as boards do that speak by themselves."""
@@ -363,7 +367,7 @@ def _answers(
     decoder: Decoder,
     numbers: range,
     start: bytes,
-    faults: Faults,
+    faults: ConnectionFaults,
     random: np.random.Generator,
 ) -> None:
     """Ask for every frame; what does not come whole has timed out."""

@@ -17,14 +17,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from msgspec.structs import replace
+from serial_faults import ConnectionFaults, FaultyDevice
 from soak import CASES, FAULTS, Pool, frame_key, pool_of
 
 from fuzzytree.tactile.boards import Board, Request
 from fuzzytree.tactile.frames import Counters
 from fuzzytree.tactile.link import Line, open_line
 from fuzzytree.tactile.sensor import Cells
-from fuzzytree.tactile.simulation.device import Device, Truth
-from fuzzytree.tactile.simulation.faults import Faults, Pause
+from fuzzytree.tactile.simulation.device import BoardCounts, Pause
 
 # The cells of some frames hold the marker anyway.
 LINE_FAULTS = replace(FAULTS, marker=0.0, unplug=Pause(0.2, every=20_000))
@@ -55,11 +55,15 @@ class Heard:
     right: int = 0
     wrong: int = 0
     counters: Counters = field(default_factory=Counters)
-    truth: Truth = field(default_factory=Truth)
+    truth: BoardCounts = field(default_factory=BoardCounts)
 
 
 def soak_line(
-    board: Board, seconds: float, *, faults: Faults = LINE_FAULTS, seed: int = 0
+    board: Board,
+    seconds: float,
+    *,
+    faults: ConnectionFaults = LINE_FAULTS,
+    seed: int = 0,
 ) -> Heard:
     """Let a line read a board with faults for some seconds; hold it to the laws."""
     if isinstance(board.protocol, Request):
@@ -68,11 +72,11 @@ def soak_line(
     pool = pool_of(board, FAULTS, np.random.default_rng(seed))
     heard, begin = Heard(), time.monotonic()
     frames = _frames(pool, begin + seconds)
-    with Device(board, frames, faults, None, seed=seed) as device:
+    with FaultyDevice(board, frames, faults, None, seed=seed) as device:
         with open_line(board, device.port, most_waiting=10_000) as line:
             _listen(line, device, pool, heard)
             heard.counters = line.counters
-        heard.truth = device.truth
+        heard.truth = device.counts
     heard.seconds = time.monotonic() - begin - _QUIET_S
     _check(heard)
     return heard
@@ -85,7 +89,7 @@ def _frames(pool: Pool, until: float) -> Iterator[Cells]:
         yield cells
 
 
-def _listen(line: Line, device: Device, pool: Pool, heard: Heard) -> None:
+def _listen(line: Line, device: FaultyDevice, pool: Pool, heard: Heard) -> None:
     while True:
         frame = line.take(_QUIET_S)
         if frame is None and device.over.is_set():

@@ -19,9 +19,9 @@ from fuzzytree.schemas.generation import of_result
 from fuzzytree.tactile.board_files.reader import load_board
 from fuzzytree.tactile.presses import Presses, read_presses, write_presses
 from fuzzytree.tactile.recognition.recogniser import Recogniser
-from tests.cli.conftest import folder
+from tests.cli.conftest import folder, originals
 
-__all__ = ["folder"]
+__all__ = ["folder", "originals"]
 Call = Callable[..., tuple[int, str, str]]
 
 SCHEMA = Path(__file__).resolve().parents[2] / "benchmarks" / "experiment.schema.json"

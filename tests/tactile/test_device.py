@@ -9,12 +9,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 import serial
+from serial_faults import ConnectionFaults, FaultyCounts, FaultyDevice, Receiver
 
-from fuzzytree.errors import TableError, WriteError
+from fuzzytree.errors import InvalidModelError, TableError, WriteError
 from fuzzytree.tactile.boards import (
     Board,
     Marker,
@@ -25,10 +25,16 @@ from fuzzytree.tactile.boards import (
     Text,
 )
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.device import Device, Truth, blob, bounds
+from fuzzytree.tactile.simulation.device import (
+    BoardCounts,
+    Device,
+    Faults,
+    Pause,
+    blob,
+    bounds,
+    faults_of,
+)
 from fuzzytree.tactile.simulation.encoding import banner, encoded
-from fuzzytree.tactile.simulation.faults import Faults, Pause
-from fuzzytree.tactile.simulation.uart import Receiver
 
 MAT = Board("mat", Sensor(8, 8), Marker("AA 55"), banner=1)
 
@@ -71,7 +77,7 @@ def test_a_board_sends_its_banner_and_its_frames(protocol: Protocol) -> None:
     with Device(board, frames, rate=None) as device, _host(device) as host:
         assert host.read(len(expected)) == expected
         assert device.over.wait(5.0)
-        assert device.truth == Truth(frames=20, bytes=len(expected), opens=1)
+        assert device.counts == BoardCounts(frames=20, bytes=len(expected), opens=1)
     assert not Path(device.port).exists()
 
 
@@ -85,7 +91,7 @@ def test_a_request_board_answers_as_often_as_it_is_asked() -> None:
             host.write(question)
             got += host.read(17 * answers)
         assert got == _sent(board, frames[:4])
-    assert (device.truth.asks, device.truth.frames) == (4, 4)
+    assert (device.counts.asks, device.counts.frames) == (4, 4)
 
 
 def test_a_line_takes_its_time() -> None:
@@ -98,13 +104,13 @@ def test_a_line_takes_its_time() -> None:
 
 
 def test_the_bytes_of_a_seed_are_the_same_again() -> None:
-    faults = Faults(flip=0.01, lose=0.01, double=0.01, noise=0.5, marker=0.5)
-    found: list[tuple[bytes, Truth]] = []
+    faults = ConnectionFaults(flip=0.01, lose=0.01, double=0.01, noise=0.5, marker=0.5)
+    found: list[tuple[bytes, FaultyCounts]] = []
     for seed in (1, 1, 2):
         frames = _frames(MAT, 100)
-        device = Device(MAT, frames, faults, None, seed=seed)
+        device = FaultyDevice(MAT, frames, faults, None, seed=seed)
         with device, _host(device) as host:
-            found.append((_all(device, host), device.truth))
+            found.append((_all(device, host), device.counts))
     assert found[0] == found[1] != found[2]
     data, truth = found[0]
     assert 30 < truth.markers < 70
@@ -122,10 +128,10 @@ def test_a_pulled_plug_cuts_a_frame_and_the_port_comes_back_under_its_name() -> 
         for _ in range(2):
             with _host(device) as host:
                 sizes.append(_until_gone(host))
-        assert device.truth.opens == 2
+        assert device.counts.opens == 2
     # The kernel throws what was not yet read away with the port.
     assert max(sizes) <= len(banner(MAT)) + 2 * 66 + 33
-    assert (device.truth.unplugs, device.truth.touched) == (2, 2)
+    assert (device.counts.unplugs, device.counts.touched) == (2, 2)
 
 
 def _until_gone(host: serial.Serial) -> int:
@@ -139,17 +145,18 @@ def _until_gone(host: serial.Serial) -> int:
 @pytest.mark.parametrize("baud", [57600, 250000, 123456])
 def test_a_host_of_another_speed_hears_what_a_receiver_would(baud: int) -> None:
     frames = _frames(MAT, 5)
-    with Device(MAT, frames, rate=None) as device, _host(device, baud) as host:
+    device = FaultyDevice(MAT, frames, rate=None)
+    with device, _host(device, baud) as host:
         got = _all(device, host)
     receiver = Receiver(Port(), baud)
     assert got == receiver.heard(_sent(MAT, frames))
-    assert device.truth.garbled == device.truth.bytes > 0
-    assert device.truth.framing_errors == receiver.framing_errors > 0
+    assert device.counts.garbled == device.counts.bytes > 0
+    assert device.counts.framing_errors == receiver.framing_errors > 0
 
 
 def test_a_board_of_another_speed_than_it_should_have_is_garbled() -> None:
     frames = _frames(MAT, 5)
-    device = Device(MAT, frames, Faults(baud=9600), None)
+    device = FaultyDevice(MAT, frames, ConnectionFaults(baud=9600), None)
     with device, _host(device) as host:
         assert _all(device, host) == Receiver(Port(baud=9600), 115200).heard(
             _sent(MAT, frames)
@@ -160,7 +167,7 @@ def test_what_a_host_does_not_read_in_time_is_lost_and_counted() -> None:
     with Device(MAT, _frames(MAT, 1000), rate=1000.0) as device, _host(device) as host:
         assert device.over.wait(10.0)
         got = _all(device, host)
-    truth = device.truth
+    truth = device.counts
     assert truth.overrun > 0
     assert len(got) + truth.overrun == truth.bytes == len(banner(MAT)) + 1000 * 66
 
@@ -170,7 +177,7 @@ def test_a_stall_is_counted_and_loses_nothing() -> None:
     faults = Faults(stall=Pause(0.02, every=2))
     with Device(MAT, frames, faults, None) as device, _host(device) as host:
         assert _all(device, host) == _sent(MAT, frames)
-    assert device.truth.stalls == 3
+    assert device.counts.stalls == 3
 
 
 def test_a_second_host_finds_the_board_as_after_its_start() -> None:
@@ -178,9 +185,9 @@ def test_a_second_host_finds_the_board_as_after_its_start() -> None:
         for opens in (1, 2):
             with _host(device) as host:
                 assert host.read(len(banner(MAT))) == banner(MAT)
-            while device.truth.closes < opens:
+            while device.counts.closes < opens:
                 time.sleep(0.001)
-        assert device.truth.opens == 2
+        assert device.counts.opens == 2
 
 
 def test_a_frame_that_cannot_be_sent_is_told_when_the_device_closes() -> None:
@@ -233,7 +240,7 @@ def test_what_took_the_place_of_the_link_is_left_alone(tmp_path: Path) -> None:
 def test_a_fault_that_the_board_cannot_have_is_refused() -> None:
     board = Board("mat", Sensor(4, 4), Text())
     with pytest.raises(ValueError, match="has no marker that cells could hold"):
-        Device(board, [], Faults(marker=0.1))
+        FaultyDevice(board, [], ConnectionFaults(marker=0.1))
 
 
 @pytest.mark.parametrize(
@@ -262,8 +269,39 @@ def test_the_page_names_every_fault_and_its_example_runs(
     page = (Path(__file__).parents[2] / "docs" / "how-to" / "device.md").read_text(
         "utf-8"
     )
-    for fault in msgspec.structs.fields(Faults):
-        assert f"| `{fault.name}=" in page
+    for name in Faults.__struct_fields__:
+        assert f"| `{name}=" in page
     (script,) = re.findall("```python\n(.*?)```", page, re.DOTALL)
     exec(script, {})
     assert capsys.readouterr().out == "200 True\n"
+
+
+def test_faults_are_written_as_names_and_durations() -> None:
+    assert faults_of(["stall=2", "unplug=3s/500"]) == Faults(
+        stall=Pause(2.0), unplug=Pause(3.0, 500)
+    )
+    assert faults_of([]) == Faults()
+
+
+@pytest.mark.parametrize(
+    ("texts", "sentence"),
+    [
+        (["flop=1"], "no fault 'flop'; there is stall, unplug"),
+        (["stall"], "stall: must be seconds, such as 2s or 2s/500"),
+        (["stall=soon"], "stall=soon: must be seconds, such as 2s or 2s/500"),
+        (["stall=1e"], "stall=1e: must be seconds, such as 2s or 2s/500"),
+        (["stall=1", "stall=2"], "the fault 'stall' is stated twice"),
+        (["stall=0s"], "stall takes 0 to 86400 seconds, not 0.0"),
+        (["unplug=1s/0"], "unplug comes every 1 or more frames, not 0"),
+    ],
+)
+def test_a_wrong_fault_is_refused(texts: list[str], sentence: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(sentence)) as caught:
+        faults_of(texts)
+    assert str(caught.value) == sentence
+
+
+def test_all_mistakes_of_faults_are_listed() -> None:
+    with pytest.raises(InvalidModelError) as caught:
+        Faults(stall=Pause(-1.0), unplug=Pause(1.0, 0))
+    assert len(caught.value.mistakes) == 2

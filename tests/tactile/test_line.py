@@ -15,6 +15,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from serial_faults import ConnectionFaults, FaultyDevice
 
 from fuzzytree.errors import MissingExtraError, PortError
 from fuzzytree.tactile.boards import (
@@ -30,9 +31,8 @@ from fuzzytree.tactile.boards import (
 from fuzzytree.tactile.frames import Frame
 from fuzzytree.tactile.link import Line, open_line, opened, ports, start
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.device import Device, blob
+from fuzzytree.tactile.simulation.device import Device, Faults, Pause, blob
 from fuzzytree.tactile.simulation.encoding import encoded
-from fuzzytree.tactile.simulation.faults import Faults, Pause
 
 BOARD = Board("mat", Sensor(8, 6), Marker("AA 55", checksum="crc16"))
 
@@ -101,7 +101,7 @@ def test_the_frames_of_every_family_come_as_they_were_sent(protocol: Protocol) -
     ):
         found = _taken(line, 30)
         assert line.counters.frames == 30
-        _until(lambda: line.counters.bytes == device.truth.bytes)
+        _until(lambda: line.counters.bytes == device.counts.bytes)
         assert line.state == "open"
     assert [frame.number for frame in found] == list(range(30))
     assert (np.array([frame.cells for frame in found]) == np.array(sent)).all()
@@ -397,7 +397,7 @@ def test_what_fails_within_the_line_is_raised_where_frames_are_taken(
 )
 def test_no_frame_is_made_up_and_none_is_lost_uncounted(protocol: Protocol) -> None:
     board = Board("mat", Sensor(8, 6), protocol)
-    faults = Faults(
+    faults = ConnectionFaults(
         flip=2e-5,
         lose=2e-5,
         noise=0.01,
@@ -408,17 +408,17 @@ def test_no_frame_is_made_up_and_none_is_lost_uncounted(protocol: Protocol) -> N
     known = {str(cells.tolist()) for cells in sent}
     found: list[Frame] = []
     with (
-        Device(board, sent, faults, rate=20.0, seed=3) as device,
+        FaultyDevice(board, sent, faults, rate=20.0, seed=3) as device,
         open_line(board, device.port, most_waiting=50) as line,
     ):
         while not device.over.is_set() and line.state != "ended":
             found += _taken(line, 10, 0.1)
         counters = line.counters
-        _until(lambda: line.counters.reconnects == device.truth.unplugs)
+        _until(lambda: line.counters.reconnects == device.counts.unplugs)
     found += list(line)
     assert all(str(frame.cells.tolist()) in known for frame in found)
     numbers = [frame.number for frame in found]
     assert numbers == sorted(set(numbers))
     assert len(found) + line.counters.dropped == line.counters.frames
-    assert counters.stalls >= device.truth.stalls
-    assert device.truth.unplugs >= 4
+    assert counters.stalls >= device.counts.stalls
+    assert device.counts.unplugs >= 4

@@ -24,7 +24,7 @@ def test_a_published_board_is_read_at_its_own_rate(path: Path) -> None:
     known = [frame.tolist() for frame in sent]
     with Device(board, sent, rate=1.0) as device, open_line(board, device.port) as line:
         frames = [line.take(5.0) for _ in range(10)]
-        if lost := device.truth.overrun:
+        if lost := device.counts.overrun:
             pytest.skip(f"the computer is too busy to listen: {lost} bytes are lost")
         assert line.counters.damaged == 0
     found = [frame.cells.tolist() for frame in frames if frame is not None]

@@ -12,14 +12,14 @@ import soak
 import soak_line
 import soak_verdicts
 from msgspec.structs import replace
+from serial_faults import ConnectionFaults
 
 from fuzzytree.tactile.board_files.reader import load_board
 from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
 from fuzzytree.tactile.link.decoding import decoder_of
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.device import blob
+from fuzzytree.tactile.simulation.device import Pause, blob
 from fuzzytree.tactile.simulation.encoding import banner, encoded
-from fuzzytree.tactile.simulation.faults import Faults, Pause
 
 ROOT = Path(__file__).parents[2]
 BOARDS = sorted((ROOT / "examples" / "tactile" / "boards").glob("*.yaml"))
@@ -29,7 +29,7 @@ PROVEN = "marker, sizes, crc16"
 
 @pytest.mark.parametrize("name", soak.CASES)
 def test_without_faults_every_frame_comes(name: str) -> None:
-    count = soak.soak(soak.CASES[name], 100, faults=Faults())
+    count = soak.soak(soak.CASES[name], 100, faults=ConnectionFaults())
     assert count.right == count.given == count.frames == 100
     assert count.touched == count.damaged == 0
 
@@ -63,7 +63,7 @@ def test_a_long_soak_keeps_the_laws(name: str) -> None:
 @pytest.mark.heavy
 @pytest.mark.parametrize("name", soak.CASES)
 def test_many_faults_keep_the_laws(name: str) -> None:
-    faults = Faults(flip=2e-3, lose=1e-3, double=1e-3, noise=0.3, marker=0.5)
+    faults = ConnectionFaults(flip=2e-3, lose=1e-3, double=1e-3, noise=0.3, marker=0.5)
     count = soak.soak(soak.CASES[name], 3000, seed=2, faults=faults)
     assert count.unexplained == 0
     assert count.touched > 1000

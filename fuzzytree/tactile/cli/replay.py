@@ -186,4 +186,4 @@ def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
         while not (device.over.wait(_LOOK_S) or told.is_set()):
             pass
         told.wait(_LAST_S)
-    say_rows(("sent", counted(device.truth.frames, "frame"), ""), quiet=quiet)
+    say_rows(("sent", counted(device.counts.frames, "frame"), ""), quiet=quiet)

@@ -69,8 +69,7 @@ def command(
         raise click.UsageError("--object and --recording exclude each other")
     from fuzzytree.tactile.board_files.reader import load_board
     from fuzzytree.tactile.recognition.sources import FRAMES_A_SECOND
-    from fuzzytree.tactile.simulation.device import Device
-    from fuzzytree.tactile.simulation.faults import faults_of
+    from fuzzytree.tactile.simulation.device import Device, faults_of
 
     known = load_board(board)
     rest, coming = _frames(known, name, recording, seed, quiet=quiet)
@@ -82,7 +81,6 @@ def command(
                 faults_of(faults),
                 None if fast else 1.0,
                 link=link,
-                seed=seed,
                 first=[rest] * known.start.frames,
                 frames_a_second=0.0 if fast else FRAMES_A_SECOND,
             )
@@ -93,7 +91,7 @@ def command(
             speed = "as fast as it is read" if fast else speed
             say_rows(("opened", device.port, f"{known.name}, {speed}"), quiet=quiet)
             _wait(device, told)
-    facts = device.truth.facts()
+    facts = device.counts.facts()
     counts = ", ".join(f"{what} {count}" for what, count in facts.items() if count)
     say_rows(("counted", counts or "nothing", ""), quiet=quiet)
     if as_json:

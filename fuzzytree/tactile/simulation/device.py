@@ -1,87 +1,306 @@
-"""A board of our own behind a pseudo-terminal, with faults on request."""
+"""A simulated board behind a pseudo-terminal, for trying hosts without hardware.
+
+The port takes the time of a serial connection. On request the board pauses (`stall`) or
+goes away and comes back (`unplug`).
+"""
 
 from __future__ import annotations
 
+import contextlib
+import os
+import re
+import select
 import shutil
+import sys
 import tempfile
 import threading
 import time
 from collections import deque
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from msgspec.structs import replace
 
+from fuzzytree.errors import InvalidModelError, WriteError
+from fuzzytree.files import reason
+from fuzzytree.model.rulebase import Mistake, Value
 from fuzzytree.tactile.boards import Board, Port, Request, Sentinel
 from fuzzytree.tactile.sensor import Cells
 from fuzzytree.tactile.simulation.encoding import banner, encoded
-from fuzzytree.tactile.simulation.faults import Faults, damaged, noise, with_marker
-from fuzzytree.tactile.simulation.wire import Wire
+
+if sys.platform != "win32":
+    import termios
+    import tty
 
 BOOT_S = 0.05
-"""How long the device waits after a host has opened it, as boards do that reset."""
+"""Pause after a host has opened the port, as of boards that reset then."""
 
-_LOOK_S = 0.01
-_HEARD = 64  # bytes of the host's that are kept, as many as an Arduino keeps
+EVERY = 100
+"""Frames between two pauses, unless stated."""
+
+UNSET = 50
+"""Speed of a terminal whose own baud rate has no name."""
+
+_POLL_S = 0.01
+_WIRE_POLL_S = 0.02
+_PIECE_S = 0.002  # duration of the bytes that are written at once
+_SLACK_S = 0.02  # by how much a late piece may hurry the next ones
+_INPUT_BYTES = 64  # size of the input buffer, as on an Arduino
+_PAUSE = re.compile(r"([0-9.e+-]+)s?(?:/([0-9]{1,9}))?", re.ASCII)
+
+
+class Pause(Value, frozen=True):
+    """A pause in the stream of frames.
+
+    Attributes:
+        seconds: Its duration.
+        every: Number of frames between two pauses.
+    """
+
+    seconds: float
+    every: int = EVERY
+
+
+class Faults(Value, frozen=True):
+    """What goes wrong with a simulated board.
+
+    Attributes:
+        stall: The board is silent for a while.
+        unplug: The port goes away, and comes back.
+
+    Raises:
+        InvalidModelError: If a duration or count is out of range; it lists all.
+    """
+
+    stall: Pause | None = None
+    unplug: Pause | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse durations and counts out of range."""
+        mistakes: list[Mistake] = []
+        for name, pause in (("stall", self.stall), ("unplug", self.unplug)):
+            if pause and not 0.0 < pause.seconds <= 86400.0:
+                text = f"{name} takes 0 to 86400 seconds, not {pause.seconds!r}"
+                mistakes.append(((name,), text))
+            if pause and pause.every < 1:
+                text = f"{name} comes every 1 or more frames, not {pause.every}"
+                mistakes.append(((name,), text))
+        if mistakes:
+            raise InvalidModelError(mistakes)
+
+
+def faults_of(texts: Sequence[str]) -> Faults:
+    """Return the faults that are written as `NAME=SECONDS` or `NAME=SECONDS/FRAMES`.
+
+    Args:
+        texts: Such as `stall=2s` (every 100 frames) or `unplug=3s/500`.
+
+    Raises:
+        ValueError: If one is not of this form, or stated twice.
+        InvalidModelError: If a number is out of range.
+
+    Example:
+        >>> faults_of(["unplug=3s/500"]).unplug
+        Pause(seconds=3.0, every=500)
+    """
+    known: dict[str, Pause] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in Faults.__struct_fields__:
+            names = ", ".join(Faults.__struct_fields__)
+            raise ValueError(f"no fault {name!r}; there is {names}")
+        if name in known:
+            raise ValueError(f"the fault {name!r} is stated twice")
+        parts = _PAUSE.fullmatch(value)
+        try:
+            seconds = float(parts[1]) if parts else None
+        except ValueError:
+            seconds = None
+        if parts is None or seconds is None:
+            raise ValueError(f"{text}: must be seconds, such as 2s or 2s/500")
+        known[name] = Pause(seconds, int(parts[2] or EVERY))
+    return replace(Faults(), **known)
 
 
 @dataclass(slots=True)
-class Truth:
-    """What the device did, to compare with what a host counts.
+class BoardCounts:
+    """What a simulated board did, to compare with the counters of a host.
 
     Attributes:
         frames: Frames that were begun.
-        touched: Frames of which a byte was turned, lost or doubled, or that were cut.
-        bytes: Bytes on the line: of frames, banners and noise.
-        flipped: Bytes of which a bit was turned.
-        lost: Bytes that were left out.
-        doubled: Bytes that went out twice.
-        noise: Bytes between frames that belong to none.
-        markers: Frames whose cells held the marker on purpose.
-        stalls: Silences.
+        touched: Frames that were cut off.
+        bytes: Bytes that were sent, banners included.
+        stalls: Pauses.
         unplugs: How often the port went away.
         opens: How often a host opened the port.
-        closes: How often it closed it again.
-        asks: How often a host asked.
-        overrun: Bytes for which there was no room, since the host did not read.
-        garbled: Bytes that went out at a speed that the host had not set.
-        framing_errors: Bytes that the host took of those whose stop bit was wrong.
+        closes: How often a host closed the port.
+        asks: Requests of the host.
+        overrun: Bytes that were lost because the host did not read in time.
     """
 
     frames: int = 0
     touched: int = 0
     bytes: int = 0
-    flipped: int = 0
-    lost: int = 0
-    doubled: int = 0
-    noise: int = 0
-    markers: int = 0
     stalls: int = 0
     unplugs: int = 0
     opens: int = 0
     closes: int = 0
     asks: int = 0
     overrun: int = 0
-    garbled: int = 0
-    framing_errors: int = 0
 
     def facts(self) -> dict[str, int]:
         """Return the counts by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
+class Wire:
+    """The board's end of a connection; the host's end is a pseudo-terminal.
+
+    Attributes:
+        bytes: Number of bytes sent.
+        overrun: Bytes that were lost because the host did not read in time.
+    """
+
+    def __init__(
+        self, port: Port, link: Path, stop: threading.Event, *, rate: float | None
+    ) -> None:
+        """Prepare a connection; it exists from `plug_in` on.
+
+        Args:
+            port: The settings of the board's port.
+            link: Path of the host's end.
+            stop: Ends every wait when it is set.
+            rate: Factor on the speed of the connection; None for as fast as the host
+                reads.
+        """
+        self.bytes = self.overrun = 0
+        self._port, self._link, self._stop = port, link, stop
+        self._byte_s = port.bits_of_a_byte / port.baud / rate if rate else 0.0
+        self._master: int | None = None
+        self._due = 0.0
+        self._terminal = ""
+
+    def _check_link(self) -> None:
+        if not hasattr(os, "openpty"):
+            raise WriteError("this system has no pseudo-terminals")
+        if self._link.exists():
+            what = f"it leads to {self._link.resolve()}, which is there"
+            if not self._link.is_symlink():
+                what = "something else is there"
+            raise WriteError(f"{self._link}: cannot be made a port: {what}")
+
+    def plug_in(self) -> None:
+        """Make the pseudo-terminal and its link.
+
+        Raises:
+            WriteError: If it cannot be made.
+        """
+        self._check_link()
+        try:
+            self._master, slave = os.openpty()
+            os.set_blocking(self._master, False)
+            tty.setraw(slave)
+            self._set_speed(slave)
+            self._terminal = os.ttyname(slave)
+            new = self._link.with_name(f".{self._link.name}.{os.getpid()}")
+            new.symlink_to(self._terminal)
+            new.replace(self._link)
+            os.close(slave)  # `is_open` then depends on the host alone
+        except OSError as error:
+            text = f"{self._link}: cannot be made a port: {reason(error)}"
+            raise WriteError(text) from error
+
+    def plug_out(self) -> None:
+        """Remove the pseudo-terminal and its link, as pulling the plug does."""
+        if self._master is not None:
+            if self._link.is_symlink() and str(self._link.readlink()) == self._terminal:
+                self._link.unlink()  # unless it was replaced
+            os.close(self._master)
+            self._master = None
+
+    def _set_speed(self, terminal: int) -> None:
+        speed = bauds().get(self._port.baud, bauds()[UNSET])
+        settings = termios.tcgetattr(terminal)
+        settings[4] = settings[5] = speed
+        termios.tcsetattr(terminal, termios.TCSANOW, settings)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a host has the port open."""
+        if self._master is None:
+            return False
+        poll = select.poll()
+        poll.register(self._master, select.POLLIN)
+        return not any(event & select.POLLHUP for _, event in poll.poll(0))
+
+    def rest(self) -> None:
+        """Note that the connection was idle until now."""
+        self._due = time.monotonic()
+
+    def send(self, data: bytes) -> bool:
+        """Send bytes in the time that they take; return False if no host reads."""
+        size = max(int(_PIECE_S / self._byte_s), 1) if self._byte_s else len(data)
+        for start in range(0, len(data), max(size, 1)):
+            piece = data[start : start + size]
+            self._due += len(piece) * self._byte_s
+            now = time.monotonic()
+            if self._due > now:
+                self._stop.wait(self._due - now)
+            self._due = max(self._due, now - _SLACK_S)
+            self.bytes += len(piece)  # before a host can count them
+            if self._stop.is_set() or not self._write(piece):
+                self.bytes -= len(piece)
+                return False
+        return True
+
+    def _write(self, data: bytes) -> bool:
+        """Write bytes; without room they are lost, or wait if no time is kept."""
+        assert self._master is not None
+        poll = select.poll()
+        poll.register(self._master, select.POLLOUT)
+        while data:
+            events = poll.poll(0 if self._byte_s else 1000 * _WIRE_POLL_S)
+            if self._stop.is_set() or any(e & select.POLLHUP for _, e in events):
+                return False
+            try:
+                data = data[os.write(self._master, data) :]
+            except BlockingIOError:
+                if self._byte_s:
+                    self.overrun += len(data)
+                    return True
+        return True
+
+    def received(self, patience_s: float = _WIRE_POLL_S) -> bytes:
+        """Return the bytes from the host, after waiting for some time at most."""
+        assert self._master is not None
+        poll = select.poll()
+        poll.register(self._master, select.POLLIN)
+        if any(event & select.POLLIN for _, event in poll.poll(1000 * patience_s)):
+            with contextlib.suppress(OSError):  # closed by the host meanwhile
+                return os.read(self._master, 4096)
+        return b""
+
+
+@cache
+def bauds() -> dict[int, int]:
+    """Return the constant of `termios` for each speed that has a name."""
+    names = [name for name in dir(termios) if re.fullmatch(r"B[1-9][0-9]*", name)]
+    return {int(name[1:]): getattr(termios, name) for name in names}
+
+
 class Device:
     """A board that sends frames through a port of its own, in a thread.
 
     It begins when a host opens the port, as boards do that reset then, and time stands
-    still while none has it open. A request board answers when it is asked.
+    still while no host has it open. A request board sends a frame for each request.
 
     Attributes:
-        port: The name of the port, for the host; it stays when the plug is pulled.
-        truth: What the device did.
-        over: Set when the last frame has gone out.
+        port: Path of the port for the host; it stays the same after `unplug`.
+        over: Set after the last frame.
     """
 
     def __init__(
@@ -92,64 +311,56 @@ class Device:
         rate: float | None = 1.0,
         *,
         link: str | Path | None = None,
-        seed: int = 0,
         first: Sequence[Cells] = (),
         frames_a_second: float = 0.0,
     ) -> None:
         """Open the port.
 
         Args:
-            board: What it speaks.
+            board: Its protocol, sensor and port settings.
             frames: Each of shape (rows, columns); taken as they are sent.
             faults: What goes wrong; nothing if None.
-            rate: How many times as fast as the line of the board would be; None for
-                as fast as the host reads.
-            link: The name of the port; if None, one in a folder of its own.
-            seed: Of all that is random.
-            first: Frames that come first, each time that a host opens the port: with
-                nothing on the sensor, so that it can measure its baseline.
-            frames_a_second: At most, as fast as the board reads its cells; 0 for as
-                many as the line carries.
+            rate: Factor on the speed of the board's connection; None for as fast as
+                the host reads.
+            link: Path of the port; if None, one in a folder of its own.
+            first: Frames that are sent first, each time that a host opens the port:
+                with nothing on the sensor, so that the host can measure its baseline.
+            frames_a_second: The most frames per second; 0 for no limit.
 
         Raises:
-            ValueError: If a fault is asked for that the board cannot have.
-            WriteError: If the port cannot be made.
+            WriteError: If the port cannot be created.
         """
         self._board, self._frames = board, iter(frames)
         self._faults = faults or Faults()
-        self._random = np.random.default_rng(seed)
         self._first, self._coming = first, deque(first)
         self._ahead: Cells | None = None  # the next frame, so that the last is known
         self._frame_s = 1.0 / frames_a_second if frames_a_second else 0.0
         self._due = 0.0
-        if self._faults.marker:
-            with_marker(board, empty(board), np.random.default_rng(0))
         self._stop = threading.Event()
         self._folder = None if link else Path(tempfile.mkdtemp(prefix="fuzzytree-"))
         path = Path(link) if link else Path(self._folder or "") / "board"
-        self._wire = Wire(_port(board, self._faults), path, self._stop, rate=rate)
+        self._wire = self._wire_of(path, rate)
         self._wire.plug_in()
         self._error: BaseException | None = None
-        self._asked = b""
-        self._truth = Truth()
+        self._input = b""
+        self._counts = self._no_counts()
         self.port = str(path)
         self.over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="device", daemon=True)
         self._thread.start()
 
     @property
-    def truth(self) -> Truth:
-        """What the device did until now."""
-        for name in ("bytes", "overrun", "garbled", "framing_errors"):
-            setattr(self._truth, name, getattr(self._wire, name))
-        return self._truth
+    def counts(self) -> BoardCounts:
+        """What the device has done so far."""
+        self._counts.bytes, self._counts.overrun = self._wire.bytes, self._wire.overrun
+        return self._counts
 
     @property
     def is_open(self) -> bool:
         """Whether a host has the port open."""
         return self._wire.is_open
 
-    def __enter__(self) -> Device:
+    def __enter__(self) -> Self:
         """Return itself."""
         return self
 
@@ -158,10 +369,10 @@ class Device:
         self.close()
 
     def close(self) -> None:
-        """Take the port away.
+        """Remove the port.
 
         Raises:
-            TableError: If the device ended, since a frame could not be sent.
+            TableError: If the device ended because a frame could not be sent.
         """
         self._stop.set()
         self._thread.join()
@@ -180,32 +391,32 @@ class Device:
                 self._wire.plug_out()
                 if not self._stop.wait(gone_s):
                     self._wire.plug_in()
-        except BaseException as error:  # told by close, in the thread that asks
+        except BaseException as error:  # raised by `close`
             self._error = error
             self.over.set()
 
     def _served(self) -> float:
-        """Serve every host until the plug is pulled; return for how many seconds."""
-        while not self._stop.wait(_LOOK_S):
+        """Serve every host until an `unplug`; return its duration in seconds."""
+        while not self._stop.wait(_POLL_S):
             if not self._wire.is_open:
                 continue
             self._stop.wait(BOOT_S)
-            self._truth.opens += 1
-            self._asked, self._coming = b"", deque(self._first)
+            self._counts.opens += 1
+            self._input, self._coming = b"", deque(self._first)
             self._wire.rest()
             self._wire.send(banner(self._board))
             while self._wire.is_open and not self._stop.is_set():
-                if not self._is_asked():
+                if not self._is_due():
                     continue
                 if not self._coming and self._ahead is None:
                     self.over.set()
-                    self._stop.wait(_LOOK_S)
+                    self._stop.wait(_POLL_S)
                     continue
                 if gone_s := self._sent(self._next()):
                     return gone_s
                 if not self._coming and self._ahead is None:
                     self.over.set()
-            self._truth.closes += not self._wire.is_open
+            self._counts.closes += not self._wire.is_open
         return 0.0
 
     def _next(self) -> Cells:
@@ -215,64 +426,60 @@ class Device:
         cells, self._ahead = self._ahead, next(self._frames, None)
         return cells
 
-    def _is_asked(self) -> bool:
-        """Whether to send a frame now; a board that speaks by itself always does."""
+    def _is_due(self) -> bool:
+        """Return whether to send a frame now; without requests always True."""
         protocol = self._board.protocol
         if not isinstance(protocol, Request):
-            self._wire.heard(0.0)  # and nobody listens
+            self._wire.received(0.0)  # and ignores it
             return True
         ask = bytes.fromhex(protocol.ask)
-        if ask not in self._asked:
-            self._asked = (self._asked + self._wire.heard())[-_HEARD:]
+        if ask not in self._input:
+            self._input = (self._input + self._wire.received())[-_INPUT_BYTES:]
             self._wire.rest()
-        _, found, rest = self._asked.partition(ask)
+        _, found, rest = self._input.partition(ask)
         if found:
-            self._asked = rest
-            self._truth.asks += 1
+            self._input = rest
+            self._counts.asks += 1
         return bool(found)
 
+    def _wire_of(self, path: Path, rate: float | None) -> Wire:
+        return Wire(self._board.port, path, self._stop, rate=rate)
+
+    def _no_counts(self) -> BoardCounts:
+        return BoardCounts()
+
+    def _encoded(self, cells: Cells) -> tuple[bytes, bool]:
+        """Return the bytes of a frame, and whether any of them is damaged."""
+        return encoded(self._board, cells, self._counts.frames), False
+
     def _sent(self, cells: Cells) -> float:
-        """Send a frame; return for how long the plug is then pulled, in seconds."""
-        truth, faults, random = self._truth, self._faults, self._random
+        """Send a frame; return the duration of the `unplug` that follows, or 0."""
+        counts, faults = self._counts, self._faults
         if self._frame_s:
             now = time.monotonic()
             self._due = max(self._due + self._frame_s, now)
             if self._stop.wait(self._due - now):
                 return 0.0
             self._wire.rest()
-        if faults.marker and random.random() < faults.marker:
-            cells = with_marker(self._board, cells, random)
-            truth.markers += 1
-        before = noise(faults, random)
-        after = damaged(encoded(self._board, cells, truth.frames), faults, random)
-        truth.frames += 1
-        truth.noise += len(before)
-        truth.flipped += after.flipped
-        truth.lost += after.lost
-        truth.doubled += after.doubled
-        data = before + after.data
+        data, is_damaged = self._encoded(cells)
+        counts.frames += 1
         unplug, stall = faults.unplug, faults.stall
-        if unplug and truth.frames % unplug.every == 0:
+        if unplug and counts.frames % unplug.every == 0:
             self._wire.send(data[: len(data) // 2])
-            truth.touched += 1
-            truth.unplugs += 1
+            counts.touched += 1
+            counts.unplugs += 1
             return unplug.seconds
         is_whole = self._wire.send(data)
-        truth.touched += len(after.touched) > 0 or not is_whole
-        if stall and truth.frames % stall.every == 0:
-            truth.stalls += 1
+        counts.touched += is_damaged or not is_whole
+        if stall and counts.frames % stall.every == 0:
+            counts.stalls += 1
             self._stop.wait(stall.seconds)
             self._wire.rest()
         return 0.0
 
 
-def _port(board: Board, faults: Faults) -> Port:
-    """Return how the device sets its port."""
-    return replace(board.port, baud=faults.baud or board.port.baud)
-
-
 def bounds(board: Board) -> tuple[int, int]:
-    """Return the least and the largest number that a cell can hold and send.
+    """Return the smallest and the largest number that a cell can send.
 
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor
@@ -294,7 +501,7 @@ def empty(board: Board) -> Cells:
 
 
 def blob(board: Board, seed: int = 0) -> Generator[Cells]:
-    """Give frames without end: something round that wanders over the sensor.
+    """Yield frames without end: a disc that wanders over the sensor.
 
     Example:
         >>> from fuzzytree.tactile.sensor import Sensor
@@ -317,10 +524,10 @@ def blob(board: Board, seed: int = 0) -> Generator[Cells]:
 
 
 def fitted(board: Board, cells: Cells, full: int) -> Cells:
-    """Return a frame of another sensor as the board could send it.
+    """Return a frame of another sensor, resampled to the board's cells and range.
 
-    Each cell is that of the other sensor which lies under its middle, and 0 to `full`
-    becomes what the board can hold, rounded down.
+    Each cell takes the nearest cell of the other sensor, and 0 to `full` becomes the
+    range of the board, rounded down.
 
     Args:
         board: The board.

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from tests.cli.conftest import call, folder, heard
+from tests.cli.conftest import call, folder, heard, originals
 
-__all__ = ["call", "folder", "heard"]
+__all__ = ["call", "folder", "heard", "originals"]

@@ -25,9 +25,8 @@ from fuzzytree.tactile.link import SerialPort, open_line, ports, records
 from fuzzytree.tactile.link.recording import Recorder, read_recording
 from fuzzytree.tactile.presses import read_presses
 from fuzzytree.tactile.sensor import Cells, Sensor
-from fuzzytree.tactile.simulation.device import Device, blob
+from fuzzytree.tactile.simulation.device import Device, Faults, Pause, blob
 from fuzzytree.tactile.simulation.encoding import encoded
-from fuzzytree.tactile.simulation.faults import Faults, Pause
 
 Call = Callable[..., tuple[int, str, str]]
 

@@ -24,6 +24,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from serial_faults import ConnectionFaults, FaultyDevice
 
 import fuzzytree as ft
 from fuzzytree.cli import main
@@ -33,8 +34,7 @@ from fuzzytree.tactile.cli.screen import look_of
 from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.link.recording import Recorder, read_recording
 from fuzzytree.tactile.sensor import Sensor
-from fuzzytree.tactile.simulation.device import Device
-from fuzzytree.tactile.simulation.faults import Faults, Pause
+from fuzzytree.tactile.simulation.device import Device, Pause
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -203,8 +203,8 @@ def test_a_board_is_answered_through_faults_and_a_pulled_plug(call: Call) -> Non
     # Nothing comes back, for a busy computer may miss the first of it.
     cycle = [*[SMALL] * 40, *[LARGE] * 40, *[NOTHING] * 20]
     shown = [NOTHING] * 30 + cycle * 5
-    faults = Faults(flip=0.002, unplug=Pause(0.1, every=150))
-    with Device(BOARD, shown, faults, rate=2.0, seed=1) as device:
+    faults = ConnectionFaults(flip=0.002, unplug=Pause(0.1, every=150))
+    with FaultyDevice(BOARD, shown, faults, rate=2.0, seed=1) as device:
         words = (device.port, "--board", "mat.yaml", "--model", "area.yaml")
         code, out, err = call(*words, "--frames", "250", "--record", "kept.ftr")
     assert code == 0

@@ -90,7 +90,7 @@ def test_a_recording_is_sent_over_and_over_with_its_baseline_first(call: Call) -
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--fault", "flop=1"], "no fault 'flop'; there is flip, lose, "),
+        (["--fault", "flop=1"], "no fault 'flop'; there is stall, unplug"),
         (["--object", "foot"], "no object 'foot'; there is rectangle-0, "),
         (
             ["--object", "circle", "--recording", "a.ftr"],

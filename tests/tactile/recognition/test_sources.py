@@ -14,8 +14,8 @@ from fuzzytree.tactile.boards import Board, Marker
 from fuzzytree.tactile.link import open_line
 from fuzzytree.tactile.recognition.sources import FromLine
 from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.simulation.device import Wire
 from fuzzytree.tactile.simulation.encoding import encoded
-from fuzzytree.tactile.simulation.wire import Wire
 
 BOARD = Board("mat", Sensor(4, 4), Marker("AA 55", checksum="crc16"))
 FRAME = encoded(BOARD, np.arange(16).reshape(4, 4), 0)

@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
+from serial_faults import ConnectionFaults, Receiver, damaged, noise, with_marker
 
 from fuzzytree.errors import InvalidModelError
 from fuzzytree.tactile.boards import Board, Marker, Port, Protocol, Text
 from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.tactile.simulation.encoding import encoded
-from fuzzytree.tactile.simulation.faults import (
-    Faults,
-    Pause,
-    damaged,
-    faults_of,
-    noise,
-    with_marker,
-)
-from fuzzytree.tactile.simulation.uart import Receiver
 
 DATA = np.random.default_rng(1).bytes(100_000)
 
 
 def test_each_fault_comes_as_often_as_its_chance_says() -> None:
-    faults = Faults(flip=0.01, lose=0.002, double=0.005)
+    faults = ConnectionFaults(flip=0.01, lose=0.002, double=0.005)
     after = damaged(DATA, faults, np.random.default_rng(0))
     counts = np.array([after.flipped, after.lost, after.doubled])
     expected = np.array([1000.0, 200.0, 500.0])
@@ -35,7 +25,7 @@ def test_each_fault_comes_as_often_as_its_chance_says() -> None:
 
 
 def test_a_flip_turns_one_bit_and_touches_no_other_byte() -> None:
-    after = damaged(DATA, Faults(flip=0.01), np.random.default_rng(0))
+    after = damaged(DATA, ConnectionFaults(flip=0.01), np.random.default_rng(0))
     sent, came = np.frombuffer(DATA, np.uint8), np.frombuffer(after.data, np.uint8)
     assert np.flatnonzero(sent != came).tolist() == after.touched.tolist()
     turned = (sent ^ came)[after.touched]
@@ -43,7 +33,7 @@ def test_a_flip_turns_one_bit_and_touches_no_other_byte() -> None:
 
 
 def test_faults_of_a_seed_are_the_same_again() -> None:
-    faults = Faults(flip=0.01, lose=0.01, noise=0.5)
+    faults = ConnectionFaults(flip=0.01, lose=0.01, noise=0.5)
     first, second = np.random.default_rng(7), np.random.default_rng(7)
     for _ in range(20):
         assert noise(faults, first) == noise(faults, second)
@@ -54,8 +44,8 @@ def test_faults_of_a_seed_are_the_same_again() -> None:
 
 def test_without_faults_nothing_changes_and_no_number_is_drawn() -> None:
     random = np.random.default_rng(0)
-    assert damaged(DATA, Faults(), random).data == DATA
-    assert noise(Faults(), random) == b""
+    assert damaged(DATA, ConnectionFaults(), random).data == DATA
+    assert noise(ConnectionFaults(), random) == b""
     assert random.random() == np.random.default_rng(0).random()
 
 
@@ -101,47 +91,13 @@ def test_cells_that_can_hold_no_marker_are_told(
     assert str(caught.value).startswith(text)
 
 
-def test_faults_are_written_as_names_and_values() -> None:
-    texts = ["flip=1e-4", "lose=0.5", "stall=2", "unplug=3s/500", "baud=9600"]
-    assert faults_of(texts) == Faults(
-        flip=1e-4, lose=0.5, stall=Pause(2.0), unplug=Pause(3.0, 500), baud=9600
-    )
-    assert faults_of([]) == Faults()
-
-
-NAMES = "flip, lose, double, noise, marker, stall, unplug, baud"
-
-
 @pytest.mark.parametrize(
-    ("texts", "sentence"),
-    [
-        (["flop=1"], f"no fault 'flop'; there is {NAMES}"),
-        (["flip"], "flip=: must be a chance, such as 1e-4"),
-        (["flip=much"], "flip=much: must be a chance, such as 1e-4"),
-        (["stall=soon"], "stall=soon: must be seconds, such as 2s or 2s/500"),
-        (["baud=9600.5"], "baud=9600.5: must be a whole number"),
-        (["flip=0.1", "flip=0.2"], "the fault 'flip' is given twice"),
-        (["flip=1.5"], "flip is a chance in 0 to 1, not 1.5"),
-        (["lose=nan"], "lose is a chance in 0 to 1, not -1.0"),
-        (["stall=0s"], "stall takes 0 to 86400 seconds, not 0.0"),
-        (["unplug=1s/0"], "unplug comes every so many frames, not 0"),
-        (["baud=-1"], "a baud is above 0, not -1"),
-        (
-            ["flip=0.5", "lose=0.4", "double=0.2"],
-            "the chances of flip, lose and double together are above 1",
-        ),
-    ],
+    "chances",
+    [{"flip": -1.0}, {"noise": 2.0}, {"flip": 0.5, "lose": 0.6}, {"baud": -1}],
 )
-def test_a_fault_that_is_none_is_told(texts: list[str], sentence: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(sentence)) as caught:
-        faults_of(texts)
-    assert str(caught.value) == sentence
-
-
-def test_all_mistakes_of_faults_are_told_at_once() -> None:
-    with pytest.raises(InvalidModelError) as caught:
-        Faults(flip=-1.0, noise=2.0)
-    assert len(caught.value.mistakes) == 2
+def test_impossible_faults_are_refused(chances: dict[str, float]) -> None:
+    with pytest.raises(InvalidModelError):
+        ConnectionFaults(**chances)  # type: ignore[arg-type] # a baud is one of them
 
 
 PORTS = [
