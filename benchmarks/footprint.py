@@ -200,7 +200,7 @@ def saved_rows(tree: FuzzyTree, uses: Sequence[Use]) -> list[tuple[str, ...]]:
 
 def title(file: File) -> str:
     """Return what people call a file."""
-    return f"{file.carrier} as {file.format}"
+    return f"{file.representation} as {file.format}"
 
 
 def size_text(file: File) -> str:
@@ -220,16 +220,18 @@ def timed() -> Iterator[str]:
         found, _ = costs(chosen, ("tree", "relative"), seconds=40.0, rounds=31)
         groups: dict[tuple[str, str, str], dict[str, Cost]] = {}
         for cost in found:
-            key = (cost.carrier, cost.runtime, cost.what)
+            key = (cost.representation, cost.runtime, cost.what)
             groups.setdefault(key, {})[cost.stage] = cost
-        for (carrier, runtime, what), group in groups.items():
+        for (representation, runtime, what), group in groups.items():
             before, after = (group[stage].timing for stage in chosen)
             ratio = times_faster(before, after)
             if ratio is None:
                 continue
             text = f"{ratio.median:.2f} ({ratio.low:.2f} to {ratio.high:.2f})"
             times = [f"{t.median_ns / 1e3:,.1f} us" for t in (before, after)]
-            rows.append((tree.name, f"{carrier}, {runtime}, {what}", *times, text))
+            rows.append(
+                (tree.name, f"{representation}, {runtime}, {what}", *times, text)
+            )
     yield from markdown(rows)
 
 

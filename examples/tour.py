@@ -91,13 +91,13 @@ def head(text: str) -> None:
 
 def verdicts(agreement: ft.Agreement) -> Iterator[str]:
     """Yield what a check says of rules and files, and the sum of the runtimes."""
-    runtimes = [one for one in agreement.comparisons if ": " in one.carrier]
+    runtimes = [one for one in agreement.comparisons if ": " in one.representation]
     for one in agreement.comparisons:
         if one not in runtimes:
-            carrier = Path(one.carrier).name
-            yield f"{carrier:<16}{one.against:<25}{one.basis:<11}{one.verdict}"
+            representation = Path(one.representation).name
+            yield f"{representation:<16}{one.against:<25}{one.basis:<11}{one.verdict}"
     agreeing = sum(one.verdict == "agrees" for one in runtimes)
-    names = {one.carrier.split(": ")[0] for one in runtimes}
+    names = {one.representation.split(": ")[0] for one in runtimes}
     equal = sum(one.allowed == one.flips == 0 for one in runtimes)
     yield (
         f"\n{len(names)} runtimes: {agreeing} of {len(runtimes)} comparisons agree, "

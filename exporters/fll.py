@@ -176,9 +176,9 @@ def _with_pointed_numbers(
     for output in system.outputs:
         shapes = tuple(one for one in output.labels if isinstance(one.curve, Band | LR))
         if shapes:
-            carrier = (SystemInput("of it", shapes),)
+            representation = (SystemInput("of it", shapes),)
             found, lost = pointed(
-                FuzzySystem(system.name, carrier, (_ONE,), (_ALWAYS,)), tolerance
+                FuzzySystem(system.name, representation, (_ONE,), (_ALWAYS,)), tolerance
             )
             known = {one.name: one for one in found.inputs[0].labels}
             labels = tuple(known.get(one.name, one) for one in output.labels)

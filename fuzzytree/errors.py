@@ -43,7 +43,7 @@ class LossError(FuzzyTreeError, ValueError):
 
 
 class DisagreementError(FuzzyTreeError, AssertionError):
-    """Carriers of one model that give different answers."""
+    """Representations of one model that give different answers."""
 
 
 class MissingExtraError(FuzzyTreeError, ImportError):

@@ -28,7 +28,7 @@ except ImportError as error:
     ) from error
 
 if TYPE_CHECKING:
-    from fuzzytree.model.contracts import Carrier, FloatArray, IntArray, Outcome, Run
+    from fuzzytree.model.contracts import FloatArray, IntArray, ModelKind, Outcome, Run
 
 LabelArray = npt.NDArray[np.generic]
 Mode = Literal["default", "paper"]
@@ -101,7 +101,7 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     n_features_in_: int
     feature_names_in_: npt.NDArray[np.object_]
     _learner: Learner
-    _run: Callable[[Carrier], Run]
+    _run: Callable[[ModelKind], Run]
 
     def __init__(
         self,
@@ -301,8 +301,8 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         position = {name: k for k, name in enumerate(self._columns())}
         return values.T[[position[name] for name in self.tree_.inputs]]
 
-    def _answers(self, values: FloatArray, carrier: Carrier) -> Outcome:
-        outcome = self._run(carrier)(values)
+    def _answers(self, values: FloatArray, representation: ModelKind) -> Outcome:
+        outcome = self._run(representation)(values)
         overflown = np.flatnonzero(outcome.status == Status.MISSING)
         if len(overflown):
             raise ValueError(
@@ -316,15 +316,15 @@ class FuzzyTreeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return np.array([number[leaf.label] for leaf in self.tree_.leaves], np.int64)
 
 
-def _prepared(tree: FuzzyTree) -> Callable[[Carrier], Run]:
+def _prepared(tree: FuzzyTree) -> Callable[[ModelKind], Run]:
     """Return a function that gives the native runtime's run of the tree or its rules.
 
     Each is prepared when it is first asked for.
     """
 
     @functools.cache
-    def run(carrier: Carrier) -> Run:
-        model = tree if carrier == "tree" else rules_from_tree(tree)
+    def run(representation: ModelKind) -> Run:
+        model = tree if representation == "tree" else rules_from_tree(tree)
         return find_runtime("native").load(model)
 
     return run

@@ -26,7 +26,7 @@ AT_THE_TOP = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md
 PAGES = [*AT_THE_TOP, *sorted(DOCS.rglob("*.md"))]
 KINDS = {"tutorials", "how-to", "reference", "explanation"}
 BARRED = re.compile(
-    r"\b(?:told|tells|asked|asks|held|whoever|carriers?)\b", re.IGNORECASE
+    r"\b(?:told|tells|asked|asks|held|whoever|representations?)\b", re.IGNORECASE
 )
 TABLE = re.compile(r"<!-- (\w+) -->\n\n(.*?)\n<!-- end -->\n", re.DOTALL)
 HOOKS = runpy.run_path(str(DOCS / "hooks.py"))
@@ -167,14 +167,14 @@ def _differences() -> str:
     names = [one.name for one in all_runtimes() if not one.programs]
     rows = [
         (
-            one.carrier.split(":")[0],
+            one.representation.split(":")[0],
             one.against,
             str(one.rows),
             f"{one.largest_difference:.2g}",
             f"{one.allowed:.2g}",
         )
         for one in ft.check(tree, data=table, runtimes=names).comparisons
-        if one.carrier.endswith(": relative rules") and one.basis == "rows"
+        if one.representation.endswith(": relative rules") and one.basis == "rows"
     ]
     return _table("runtime", "against", "rows", "largest difference", "allowed", rows)
 

@@ -68,7 +68,7 @@ class Size(msgspec.Struct, frozen=True):
         path: Questions that a row meets on its way, on average.
         clauses: Clauses of all rules together.
         distinct: Different ones among them.
-        checked: Rows on which all carriers gave the answers that they must give.
+        checked: Rows on which all representations gave the answers that they must give.
         prices: What a row costs.
     """
 

@@ -50,7 +50,7 @@ Everything that is timed runs in this thread alone.
 """
 
 
-class Carrier(NamedTuple):
+class ModelKind(NamedTuple):
     """A model, ready in a runtime."""
 
     what: What
@@ -98,14 +98,14 @@ class Bench:
         begin = time.thread_time()
         tree = multiway_tree(number) if family == "multiway" else _grown(number)
         rules = {kind: rules_from_tree(tree, kind) for kind in KINDS}
-        carriers = self._carriers(tree, rules, family)
+        representations = self._representations(tree, rules, family)
         rows = np.random.default_rng(1).normal(size=(len(COLUMNS), BATCH))
         rows = rows[[COLUMNS.index(name) for name in tree.inputs]]
-        path, checked = _verified(carriers, tree, rows)
+        path, checked = _verified(representations, tree, rows)
         left = max(seconds - (time.thread_time() - begin), 1.0)
         prices = [
-            *self._prices(carriers, rows, left / 2, is_batch=False),
-            *self._prices(carriers, rows, left / 2, is_batch=True),
+            *self._prices(representations, rows, left / 2, is_batch=False),
+            *self._prices(representations, rows, left / 2, is_batch=True),
         ]
         clauses = [clause for rule in rules["raw"].rules for clause in rule.when]
         return Size(
@@ -119,24 +119,24 @@ class Bench:
             tuple(prices),
         )
 
-    def _carriers(
+    def _representations(
         self, tree: FuzzyTree, rules: dict[Kind, RuleBase], family: Family
-    ) -> list[Carrier]:
-        found: list[Carrier] = []
+    ) -> list[ModelKind]:
+        found: list[ModelKind] = []
         for name in FIRING:
             if not is_installed(find_runtime(name)):
                 self._omit(f"{name}: it is not installed")
                 continue
             if "tree" in find_runtime(name).runs:
                 run = find_runtime(name).load(tree)
-                found.append(Carrier("tree", None, name, run))
+                found.append(ModelKind("tree", None, name, run))
             for kind in KINDS:
                 loaded = self._loaded(name, kind, rules[kind], family)
                 if loaded:
-                    found.append(Carrier("rules", kind, name, loaded))
+                    found.append(ModelKind("rules", kind, name, loaded))
         for kind in KINDS:
             run = find_runtime("best-first").load(rules[kind])
-            found.append(Carrier("best-first", kind, "native", run))
+            found.append(ModelKind("best-first", kind, "native", run))
         return found
 
     def _loaded(
@@ -172,18 +172,22 @@ class Bench:
 
     def _prices(
         self,
-        carriers: Sequence[Carrier],
+        representations: Sequence[ModelKind],
         rows: Floats,
         seconds: float,
         *,
         is_batch: bool,
     ) -> Iterator[Price]:
-        chosen = [c for c in carriers if not (is_batch and c.runtime == "reference")]
+        chosen = [
+            c for c in representations if not (is_batch and c.runtime == "reference")
+        ]
         counts: dict[str, int] = {}
         calls: dict[str, Callable[[], object]] = {}
-        for carrier in chosen:
+        for representation in chosen:
             prepare = _batch if is_batch else _singles
-            counts[carrier.name], calls[carrier.name] = prepare(carrier, rows)
+            counts[representation.name], calls[representation.name] = prepare(
+                representation, rows
+            )
         timed = time_calls(
             calls, rows=1, rounds=self.rounds, seconds=seconds, clock=OWN_TIME
         )
@@ -191,9 +195,9 @@ class Bench:
             raise KeyboardInterrupt
         for error in timed.failures.values():
             raise error
-        for carrier in chosen:
-            if carrier.name in timed.timings:
-                yield _price(carrier, timed, counts, is_batch=is_batch)
+        for representation in chosen:
+            if representation.name in timed.timings:
+                yield _price(representation, timed, counts, is_batch=is_batch)
 
 
 def _grown(number: int) -> FuzzyTree:
@@ -201,7 +205,7 @@ def _grown(number: int) -> FuzzyTree:
 
 
 def _verified(
-    carriers: Sequence[Carrier], tree: FuzzyTree, rows: Floats
+    representations: Sequence[ModelKind], tree: FuzzyTree, rows: Floats
 ) -> tuple[float, int]:
     """Return the questions that a row meets, and how many rows were compared.
 
@@ -211,7 +215,9 @@ def _verified(
     Raises:
         RuntimeError: If one answers differently.
     """
-    run = {carrier.name: carrier.run for carrier in carriers}
+    run = {
+        representation.name: representation.run for representation in representations
+    }
     lengths = [len(rule.when) for rule in rules_from_tree(tree).rules]
     met = np.array([0, *lengths])[run["tree native"](rows).rule]
     checked = min(BATCH, max(MOST_STRENGTHS // len(lengths), 1))
@@ -219,30 +225,34 @@ def _verified(
     by_tree = run["tree native"](few).rule
     by_raw = run["rules raw native"](few).rule
     most = {"reference": 2, "scikit-fuzzy": SLOW_BATCH}
-    for carrier in carriers:
-        if carrier.runtime == "scikit-fuzzy" and carrier.kind == "raw":
+    for representation in representations:
+        if representation.runtime == "scikit-fuzzy" and representation.kind == "raw":
             continue
-        count = most.get(carrier.runtime, checked)
-        expected = by_raw if carrier.kind == "raw" else by_tree
-        if np.any(carrier.run(few[:, :count]).rule != expected[:count]):
-            raise RuntimeError(f"{carrier.name} gives other answers than it must")
+        count = most.get(representation.runtime, checked)
+        expected = by_raw if representation.kind == "raw" else by_tree
+        if np.any(representation.run(few[:, :count]).rule != expected[:count]):
+            raise RuntimeError(
+                f"{representation.name} gives other answers than it must"
+            )
     return float(met.mean()), checked
 
 
-def _singles(carrier: Carrier, rows: Floats) -> tuple[int, Callable[[], object]]:
+def _singles(
+    representation: ModelKind, rows: Floats
+) -> tuple[int, Callable[[], object]]:
     """Return a call that gives rows one at a time, and how many it gives.
 
     What a tree and best-first take depends on the row, so they answer many. Firing
     takes as long for each, so that a few tell as much.
     """
     ones = [np.ascontiguousarray(rows[:, k : k + 1]) for k in range(SINGLES)]
-    if carrier.what == "rules":
-        carrier.run(ones[0])
+    if representation.what == "rules":
+        representation.run(ones[0])
         begin = time.perf_counter()
-        carrier.run(ones[0])
+        representation.run(ones[0])
         taken = time.perf_counter() - begin
         ones = ones[: max(1, min(SINGLES, int(SAMPLE_S / taken)))]
-    return len(ones), partial(_one_by_one, carrier.run, ones)
+    return len(ones), partial(_one_by_one, representation.run, ones)
 
 
 def _one_by_one(run: Run, ones: Sequence[Floats]) -> None:
@@ -250,28 +260,28 @@ def _one_by_one(run: Run, ones: Sequence[Floats]) -> None:
         run(row)
 
 
-def _batch(carrier: Carrier, rows: Floats) -> tuple[int, Callable[[], object]]:
+def _batch(representation: ModelKind, rows: Floats) -> tuple[int, Callable[[], object]]:
     """Return a call that gives all rows at once, and how many they are."""
     count = BATCH
-    if carrier.what == "rules":
-        count = min(BATCH, MOST_STRENGTHS // _rules_of(carrier, rows))
-    if carrier.runtime == "scikit-fuzzy":
+    if representation.what == "rules":
+        count = min(BATCH, MOST_STRENGTHS // _rules_of(representation, rows))
+    if representation.runtime == "scikit-fuzzy":
         count = min(count, SLOW_BATCH)
-    return count, partial(carrier.run, np.ascontiguousarray(rows[:, :count]))
+    return count, partial(representation.run, np.ascontiguousarray(rows[:, :count]))
 
 
-def _rules_of(carrier: Carrier, rows: Floats) -> int:
-    strengths = carrier.run(rows[:, :1]).strengths
+def _rules_of(representation: ModelKind, rows: Floats) -> int:
+    strengths = representation.run(rows[:, :1]).strengths
     return 1 if strengths is None else len(strengths)
 
 
 def _price(
-    carrier: Carrier, timed: Timed, counts: dict[str, int], *, is_batch: bool
+    representation: ModelKind, timed: Timed, counts: dict[str, int], *, is_batch: bool
 ) -> Price:
-    timing, rows = timed.timings[carrier.name], counts[carrier.name]
-    runs_trees = "tree" in find_runtime(carrier.runtime).runs
-    tree = f"tree {carrier.runtime if runs_trees else 'native'}"
-    firing = f"rules {carrier.kind} {carrier.runtime}"
+    timing, rows = timed.timings[representation.name], counts[representation.name]
+    runs_trees = "tree" in find_runtime(representation.runtime).runs
+    tree = f"tree {representation.runtime if runs_trees else 'native'}"
+    firing = f"rules {representation.kind} {representation.runtime}"
 
     def against(slow: str, fast: str) -> Times | None:
         if slow == fast or not {slow, fast} <= set(timed.timings):
@@ -279,19 +289,19 @@ def _price(
         found = times_faster(timed.timings[slow], timed.timings[fast])
         return _scaled(found, counts[fast] / counts[slow])
 
-    is_search = carrier.what == "best-first"
+    is_search = representation.what == "best-first"
     return Price(
-        carrier.what,
-        carrier.kind,
-        carrier.runtime,
+        representation.what,
+        representation.kind,
+        representation.runtime,
         is_batch,
         rows,
         ns=timing.median_ns / rows,
         low=timing.low_ns / rows,
         high=timing.high_ns / rows,
         rounds=len(timing.samples_ns),
-        to_tree=against(carrier.name, tree),
-        to_firing=against(firing, carrier.name) if is_search else None,
+        to_tree=against(representation.name, tree),
+        to_firing=against(firing, representation.name) if is_search else None,
     )
 
 

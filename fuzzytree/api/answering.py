@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, overload
 import msgspec
 import numpy as np
 
-from fuzzytree.checking.converting import CALLED, as_model, carrier_of
+from fuzzytree.checking.converting import CALLED, as_model, kind_of
 from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.files import read_bounded
 from fuzzytree.model.contracts import (
@@ -278,11 +278,11 @@ def _answering_onnx(
 
 def _runtime(name: str, model: Document) -> Runtime:
     runtime = find_runtime(name)
-    carrier = carrier_of(model)
-    if carrier not in runtime.runs:
+    representation = kind_of(model)
+    if representation not in runtime.runs:
         raise LossError(
             f"cannot run {model.name} in {name}: it runs "
-            f"{' or '.join(runtime.runs)}, not a {CALLED[carrier]}"
+            f"{' or '.join(runtime.runs)}, not a {CALLED[representation]}"
         )
     if not is_installed(runtime):
         raise MissingExtraError(f"the runtime {name!r} needs {needed_by(runtime)}")

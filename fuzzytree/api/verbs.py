@@ -19,11 +19,11 @@ from fuzzytree.checking.converting import (
     CALLED,
     Conversion,
     as_model,
-    carrier_of,
     convert,
     deciding,
     export,
     format_of,
+    kind_of,
     load,
     load_content,
     read,
@@ -589,7 +589,7 @@ def _model_of(model: ModelSource, verb: str) -> Model:
 def _tree_of(model: ModelSource, verb: str) -> FuzzyTree:
     found = as_model(model)
     if not isinstance(found, FuzzyTree):
-        kind = CALLED[carrier_of(found)]
+        kind = CALLED[kind_of(found)]
         raise TypeError(f"{verb} takes a tree, and {found.name} is a {kind}")
     return found
 

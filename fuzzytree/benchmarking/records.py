@@ -158,8 +158,8 @@ class Point(msgspec.Struct, frozen=True):
         load_ms: What it took to prepare it, in milliseconds, once.
         bytes: The size of the file or code that runs, if there is one.
         note: What a reader must know to compare it fairly.
-        probes: The error on rows aimed at edges and cuts, where carriers part; it says
-            nothing about how often that happens in use.
+        probes: The error on rows aimed at edges and cuts, where representations part;
+            it says nothing about how often that happens in use.
     """
 
     name: str

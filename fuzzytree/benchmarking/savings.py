@@ -47,7 +47,7 @@ class File(msgspec.Struct, frozen=True):
     """One file that a model makes.
 
     Attributes:
-        carrier: `tree`, `relative rules`, `raw rules` or `rules`.
+        representation: `tree`, `relative rules`, `raw rules` or `rules`.
         format: Its name.
         dtype: The number type; None where the format has none.
         bytes: The size.
@@ -55,7 +55,7 @@ class File(msgspec.Struct, frozen=True):
         constants: Of the graph; None if there is none.
     """
 
-    carrier: str
+    representation: str
     format: str
     dtype: Dtype | None
     bytes: int
@@ -86,14 +86,14 @@ class Cost(msgspec.Struct, frozen=True):
 
     Attributes:
         stage: As in `Size`.
-        carrier: As in `File`; empty for reading a table.
+        representation: As in `File`; empty for reading a table.
         runtime: What ran; empty for reading a table.
         what: `open`, `one row`, `10,000 rows` or `read the table`.
         timing: Of one call.
     """
 
     stage: str
-    carrier: str
+    representation: str
     runtime: str
     what: str
     timing: Timing
@@ -231,10 +231,10 @@ def _term_count(model: Model) -> int:
 
 def _files(model: Model, uses: Collection[Use], omissions: list[str]) -> Iterator[File]:
     yaml, python = find_format("yaml"), find_format("python")
-    for title, carrier in forms(model, uses).items():
+    for title, representation in forms(model, uses).items():
         for form in (yaml, python):
             try:
-                written = form.write(carrier)
+                written = form.write(representation)
             except LossError as error:
                 omissions.append(f"{title} as {form.name}: {error}")
                 continue
@@ -243,7 +243,7 @@ def _files(model: Model, uses: Collection[Use], omissions: list[str]) -> Iterato
             if title == "tree" and dtype == "mixed":
                 continue  # a path has comparisons alone: it is float64
             try:
-                content = write_onnx(carrier, dtype=dtype, verify=False).content
+                content = write_onnx(representation, dtype=dtype, verify=False).content
             except (LossError, MissingExtraError) as error:
                 omissions.append(f"{title} as onnx {dtype}: {error}")
                 continue
@@ -255,7 +255,7 @@ def _files(model: Model, uses: Collection[Use], omissions: list[str]) -> Iterato
 
 # --- costs
 
-_Key = tuple[str, str, str, str]  # stage, carrier, runtime, what
+_Key = tuple[str, str, str, str]  # stage, representation, runtime, what
 
 
 def costs(
@@ -289,8 +289,10 @@ def costs(
     groups: dict[int, dict[_Key, Call]] = {1: {}, BATCH: {}}
     for stage, model in made.items():
         rows = _plain_rows(model, BATCH)
-        for title, carrier in forms(model, uses).items():
-            for rows_of, key, call in _calls(stage, title, carrier, rows, omissions):
+        for title, representation in forms(model, uses).items():
+            for rows_of, key, call in _calls(
+                stage, title, representation, rows, omissions
+            ):
                 groups[rows_of][key] = call
         if table is not None:
             reading = _reading(table, model, delimiter)
@@ -324,7 +326,7 @@ def costs(
 def _calls(
     stage: str, title: str, model: Model, rows: FloatArray, omissions: list[str]
 ) -> Iterator[tuple[int, _Key, Call]]:
-    """Yield the calls of one carrier, each with the number of rows it answers."""
+    """Yield the calls of one representation, each with its number of rows."""
     runs = {"native": find_runtime("native").load(model)}
     try:
         content = write_onnx(model, verify=False).content

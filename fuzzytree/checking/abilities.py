@@ -7,7 +7,7 @@ from typing import Literal, cast
 
 import msgspec
 
-from fuzzytree.checking.converting import carrier_of, formed
+from fuzzytree.checking.converting import formed, kind_of
 from fuzzytree.checking.likeness import likeness
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.model.contracts import Document, Format, Written
@@ -94,7 +94,7 @@ def _ability(
         given = formed(model, form)
     except LossError:
         return Ability(name, "no")
-    if carrier_of(given) not in form.carries:
+    if kind_of(given) not in form.carries:
         return Ability(name, "no")
     # Each writer checks its own options; the protocol knows the common one alone.
     write = cast("Callable[..., Written]", form.write)

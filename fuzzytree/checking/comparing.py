@@ -1,4 +1,4 @@
-"""Hold the answers of one carrier against those of another, row by row."""
+"""Hold the answers of one representation against those of another, row by row."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LISTED = 20  # differences in the content of a file
 
 
 class Rows(msgspec.Struct, frozen=True):
-    """The rows that carriers answer: probes first, then the user's data.
+    """The rows that representations answer: probes first, then the user's data.
 
     Attributes:
         inputs: The names of the inputs.
@@ -75,10 +75,10 @@ def probed(model: Model, data: FloatArray | None, limit: int) -> Rows:
 
 
 class Answers(msgspec.Struct, frozen=True):
-    """What a carrier answered to some rows.
+    """What a representation answered to some rows.
 
     Attributes:
-        title: What to call the carrier.
+        title: What to call the representation.
         model: What it executed.
         outcome: Its answers, one for each of the rows.
     """
@@ -93,11 +93,11 @@ class Answers(msgspec.Struct, frozen=True):
 
 
 def counted(
-    basis: Basis, carrier: str, against: str, rows: int, faults: Sequence[str]
+    basis: Basis, representation: str, against: str, rows: int, faults: Sequence[str]
 ) -> Comparison:
     """Return a comparison that disagrees in as many rows as there are faults."""
     return Comparison(
-        carrier,
+        representation,
         against,
         basis,
         rows,
@@ -168,8 +168,8 @@ def compare_within(
     as such.
 
     Args:
-        found: The answers of the carrier examined.
-        expected: The answers of the carrier it is held against.
+        found: The answers of the representation examined.
+        expected: The answers of the representation it is held against.
         rows: The rows.
         allowed: The largest difference of a strength, for each row. The result shows
             that of the row that exceeds it most, or else of the largest difference.
@@ -197,8 +197,8 @@ def compare_answers(
     """Compare classes and missing rows alone.
 
     Args:
-        found: The answers of the carrier examined.
-        expected: The answers of the carrier it is held against.
+        found: The answers of the representation examined.
+        expected: The answers of the representation it is held against.
         rows: The rows.
         by_design: Whether the two are different functions, so that a difference is
             told but no fault.
@@ -391,7 +391,7 @@ def compare_exact(
     of the tree, and nowhere else.
 
     Args:
-        found: The answers of the carrier examined.
+        found: The answers of the representation examined.
         truth: The exact answers to the same rows.
         rows: The rows; those of the data are counted if there are any.
         dtype: The number type in which they were computed.

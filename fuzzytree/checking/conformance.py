@@ -15,10 +15,17 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import get_args
 
-from fuzzytree.checking.converting import carrier_of
+from fuzzytree.checking.converting import kind_of
 from fuzzytree.checking.likeness import likeness
 from fuzzytree.errors import FuzzyTreeError, LossError, ReadError
-from fuzzytree.model.contracts import Carrier, Document, Format, Loss, Reading, Written
+from fuzzytree.model.contracts import (
+    Document,
+    Format,
+    Loss,
+    ModelKind,
+    Reading,
+    Written,
+)
 from fuzzytree.model.rulebase import fingerprint
 
 _PATIENCE_S = 10.0  # for one hostile input
@@ -46,15 +53,15 @@ def failures(
     if found:
         return tuple(found)
     files: list[bytes] = []
-    tried: set[Carrier] = set()
+    tried: set[ModelKind] = set()
     for title, model in models:
-        if carrier_of(model) not in form.carries:
+        if kind_of(model) not in form.carries:
             continue
-        tried.add(carrier_of(model))
+        tried.add(kind_of(model))
         found += (f"{title}: {text}" for text in _model_failures(form, model, files))
-    for carrier in form.carries:
-        if carrier not in tried:
-            found.append(f"it carries {carrier}, and no such model was tried")
+    for representation in form.carries:
+        if representation not in tried:
+            found.append(f"it carries {representation}, and no such model was tried")
     if not files:
         found.append("it writes none of the models")
     good = sorted(set(files), key=lambda one: (len(one), one))[:damaged]
@@ -71,9 +78,9 @@ def _record_failures(form: Format) -> Iterator[str]:
     for suffix in form.suffixes:
         if not re.fullmatch(r"\.[a-z0-9]+", suffix):
             yield f"the suffix {suffix!r} must be a dot and small letters or digits"
-    unknown = [one for one in form.carries if one not in get_args(Carrier)]
+    unknown = [one for one in form.carries if one not in get_args(ModelKind)]
     if unknown or not form.carries:
-        yield f"what it carries must be some of {get_args(Carrier)}, not {form.carries}"
+        yield f"'carries' must be some of {get_args(ModelKind)}, not {form.carries}"
     for text in form.cannot:
         if not text or text != text.strip() or text.endswith("."):
             yield f"a limit is a phrase without a full stop, not {text!r}"
@@ -195,7 +202,7 @@ def _read_back_failures(
         yield f"reading what it writes loses {_listed(again.losses)}"
     match likeness(model, written, again):
         case "other":
-            what = f"{carrier_of(model)} {model.name!r}"
+            what = f"{kind_of(model)} {model.name!r}"
             yield f"read back, {what} is another model, and no loss was told"
         case "renamed":
             yield "read back, names or notes differ, and no remark was made"

@@ -18,12 +18,12 @@ from fuzzytree.formats.simpful import from_simpful
 from fuzzytree.formats.skfuzzy import from_skfuzzy
 from fuzzytree.formats.sklearn import from_sklearn
 from fuzzytree.model.contracts import (
-    Carrier,
     Document,
     Dtype,
     Format,
     Loss,
     Model,
+    ModelKind,
     ModelSource,
     Reading,
     Written,
@@ -48,12 +48,12 @@ _TRIED = 1000  # probes of what a loss does to decisions
 
 _NOT_READ = "the file is not read back here; other programs run it"
 
-CALLED: dict[Carrier, str] = {
+CALLED: dict[ModelKind, str] = {
     "tree": "tree",
     "rules": "rule base",
     "system": "fuzzy system",
 }
-"""What people call each carrier."""
+"""What people call each representation."""
 
 
 class Proof(msgspec.Struct, frozen=True):
@@ -99,7 +99,7 @@ class Conversion(msgspec.Struct, frozen=True):
     proof: Proof
 
 
-def carrier_of(model: Document) -> Carrier:
+def kind_of(model: Document) -> ModelKind:
     """Return which kind of model it is."""
     match model:
         case FuzzySystem():
@@ -295,7 +295,7 @@ def formed(
     model: Document,
     form: Format,
     *,
-    carrier: Carrier | None = None,
+    representation: ModelKind | None = None,
     kind: Kind | None = None,
     conjunction: Conjunction | None = None,
 ) -> Document:
@@ -308,7 +308,7 @@ def formed(
     Args:
         model: A tree, a rule base or a system.
         form: The format that it goes to.
-        carrier: What it shall be.
+        representation: What it shall be.
         kind: The terms of rules made from a tree; relative unless given.
         conjunction: The AND of rules made from a tree.
 
@@ -318,26 +318,26 @@ def formed(
     """
     asked_rules = kind is not None or conjunction is not None
     if isinstance(model, FuzzyTree):
-        carries = carrier or ("rules" if asked_rules else _nearest("tree", form))
+        carries = representation or ("rules" if asked_rules else _nearest("tree", form))
         if carries == "tree":
             return model
         model = rules_from_tree(model, kind or "relative", conjunction=conjunction)
-        carrier = carrier or _nearest("rules", form)
+        representation = representation or _nearest("rules", form)
     elif isinstance(model, RuleBase):
-        _refuse_remaking(model, carrier, kind, conjunction)
+        _refuse_remaking(model, representation, kind, conjunction)
     if isinstance(model, RuleBase):
-        if (carrier or _nearest("rules", form)) != "system":
+        if (representation or _nearest("rules", form)) != "system":
             return model
         from fuzzytree.semantics.conversion import as_system
 
         return as_system(model, scores="winner")
-    return _formed_system(model, form, carrier, kind, conjunction)
+    return _formed_system(model, form, representation, kind, conjunction)
 
 
 def _formed_system(
     system: FuzzySystem,
     form: Format,
-    carrier: Carrier | None,
+    representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
 ) -> FuzzySystem | RuleBase:
@@ -347,7 +347,7 @@ def _formed_system(
         LossError: If the format carries rules alone, and it is none.
         ValueError: If it cannot be had in the form that was asked for.
     """
-    if carrier == "tree":
+    if representation == "tree":
         raise ValueError(
             f"as tree: {system.name} is a fuzzy system, and no tree can be made of it"
         )
@@ -357,14 +357,14 @@ def _formed_system(
                 f"{option} {wanted}: {system.name} is a fuzzy system; "
                 "such rules are made from a tree"
             )
-    if (carrier or _nearest("system", form)) == "system":
+    if (representation or _nearest("system", form)) == "system":
         return system
     from fuzzytree.semantics.conversion import as_rules
 
     found = as_rules(system, None)
     if found is not None:
         return found
-    if carrier == "rules":
+    if representation == "rules":
         raise ValueError(
             f"as rules: {system.name} is a fuzzy system whose outputs are numbers, "
             "and no rules that decide for a class can be made of it"
@@ -372,31 +372,31 @@ def _formed_system(
     raise LossError(
         f"cannot write {system.name} as {form.name}: it carries "
         f"{' or '.join(form.carries)}, and this is a fuzzy system whose outputs "
-        f"are numbers; {', '.join(_carriers('system'))} carry one"
+        f"are numbers; {', '.join(_representations('system'))} carry one"
     )
 
 
-def _way_out(carrier: Carrier, form: Format) -> str:
+def _way_out(representation: ModelKind, form: Format) -> str:
     """Return what to do with a model that a format does not carry."""
-    nearest = _nearest(carrier, form)
-    if nearest != carrier:
+    nearest = _nearest(representation, form)
+    if nearest != representation:
         return f"fuzzytree.convert makes {_FEW_OF[nearest]} of it"
-    return f"{', '.join(_carriers(carrier))} carry one"
+    return f"{', '.join(_representations(representation))} carry one"
 
 
-_FEW_OF: dict[Carrier, str] = {
+_FEW_OF: dict[ModelKind, str] = {
     "tree": "a tree",
     "rules": "rules",
     "system": "a fuzzy system",
 }
 
 
-def _carriers(carrier: Carrier) -> list[str]:
+def _representations(representation: ModelKind) -> list[str]:
     """Return the names of the formats that carry a kind of model."""
-    return [form.name for form in all_formats() if carrier in form.carries]
+    return [form.name for form in all_formats() if representation in form.carries]
 
 
-_FORMS: dict[Carrier, tuple[Carrier, ...]] = {
+_FORMS: dict[ModelKind, tuple[ModelKind, ...]] = {
     "tree": ("tree", "rules", "system"),
     "rules": ("rules", "system"),
     "system": ("system", "rules"),
@@ -404,21 +404,21 @@ _FORMS: dict[Carrier, tuple[Carrier, ...]] = {
 """What each kind of model can be turned into, the nearest first."""
 
 
-def _nearest(carrier: Carrier, form: Format) -> Carrier:
+def _nearest(representation: ModelKind, form: Format) -> ModelKind:
     """Return the nearest kind of model that a format carries, or else the same."""
-    for one in _FORMS[carrier]:
+    for one in _FORMS[representation]:
         if one in form.carries:
             return one
-    return carrier
+    return representation
 
 
 def _refuse_remaking(
     rules: RuleBase,
-    carrier: Carrier | None,
+    representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
 ) -> None:
-    if carrier == "tree":
+    if representation == "tree":
         raise ValueError(
             f"as tree: {rules.name} is a rule base, and no tree can be made of it"
         )
@@ -458,12 +458,12 @@ def export(
     """
     model = as_model(model, allow_loss=allow_loss)
     form = find_format(to)
-    carrier = carrier_of(model)
-    if carrier not in form.carries:
+    representation = kind_of(model)
+    if representation not in form.carries:
         carried = " or ".join(form.carries)
         raise LossError(
             f"cannot write {model.name} as {form.name}: it carries {carried}, "
-            f"and this is a {CALLED[carrier]}; {_way_out(carrier, form)}"
+            f"and this is a {CALLED[representation]}; {_way_out(representation, form)}"
         )
     check_options(form, options)
     if isinstance(tolerance := options.get("tolerance"), int | float):
@@ -514,7 +514,7 @@ def _proved(model: Document, form: Format, written: Written, *, dtype: object) -
         ) from error
     match likeness(model, written, again):
         case "equal":
-            what = CALLED[carrier_of(model)]
+            what = CALLED[kind_of(model)]
             text = f"read back from the file, the {what} is equal in every number"
             return Proof("equal", text, _exact(model, text))
         case "alike":
@@ -587,7 +587,7 @@ def _exact(model: Document, origin: str) -> Certificate | None:
         return None
     from fuzzytree.numerics.bounds import Certificate
 
-    return Certificate(None, carrier_of(model), 0.0, origin)
+    return Certificate(None, kind_of(model), 0.0, origin)
 
 
 def convert(
@@ -596,7 +596,7 @@ def convert(
     *,
     format: str | None = None,
     allow_loss: bool = False,
-    carrier: Carrier | None = None,
+    representation: ModelKind | None = None,
     terms: Kind | None = None,
     conjunction: Conjunction | None = None,
     **options: Option,
@@ -608,7 +608,8 @@ def convert(
         to: The name of a format, or a suffix such as `.fll`.
         format: Of the file; the one of its suffix unless given.
         allow_loss: Whether to read and write what has no place as near as it can.
-        carrier: `tree`, `rules` or `system`; what the format carries unless given.
+        representation: `tree`, `rules` or `system`; what the format carries unless
+            given.
         terms: Of rules made from a tree: `relative`, which equal it, or `raw`.
         conjunction: Of rules made from a tree.
         options: The writer's own.
@@ -624,7 +625,7 @@ def convert(
 
     Example:
         >>> from fuzzytree.testing import random_tree
-        >>> convert(random_tree(1), "yaml", carrier="rules").proof.verdict
+        >>> convert(random_tree(1), "yaml", representation="rules").proof.verdict
         'equal'
     """
     form = find_format(to)
@@ -641,7 +642,11 @@ def convert(
     if found.losses and not allow_loss:
         raise LossError(losses_text(found.losses, name))
     model = formed(
-        found.model, form, carrier=carrier, kind=terms, conjunction=conjunction
+        found.model,
+        form,
+        representation=representation,
+        kind=terms,
+        conjunction=conjunction,
     )
     written = export(model, form.name, allow_loss=allow_loss, **options)
     proof = proved(model, form, written, dtype=options.get("dtype"))

@@ -21,7 +21,7 @@ from fuzzytree.errors import LossError, MissingExtraError
 from fuzzytree.exporters.onnx import write as write_onnx
 from fuzzytree.exporters.onnx_contents import Contents, contents
 from fuzzytree.model.agreement import Agreement, Comparison
-from fuzzytree.model.contracts import Carrier, Dtype, Model, Outcome
+from fuzzytree.model.contracts import Dtype, Model, ModelKind, Outcome
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -68,12 +68,12 @@ class Because(msgspec.Struct, frozen=True):
 
 
 class Graph(msgspec.Struct, frozen=True):
-    """The ONNX graph of one carrier in one number type, with label and rule number.
+    """The ONNX graph of one representation and number type, with label and rule.
 
     What is in it for what is told for `float64`; the other types differ by a cast.
 
     Attributes:
-        carrier: `tree`, `relative rules`, `raw rules` or `rules`.
+        representation: `tree`, `relative rules`, `raw rules` or `rules`.
         dtype: The number type.
         contents: How large it is.
         because: What of it is there on account of what the model has.
@@ -81,7 +81,7 @@ class Graph(msgspec.Struct, frozen=True):
         left_out: What the model does not have, of which the graph holds nothing.
     """
 
-    carrier: str
+    representation: str
     dtype: Dtype
     contents: Contents
     because: tuple[Because, ...] = ()
@@ -95,7 +95,7 @@ class Needs(msgspec.Struct, frozen=True):
     Attributes:
         model: Its name.
         fingerprint: The SHA-256 of its content.
-        carrier: Whether it is a tree or a rule base.
+        representation: Whether it is a tree or a rule base.
         columns: How many columns the training table had; None if unknown.
         inputs: The inputs that an answer depends on.
         idle_inputs: The inputs that matter only where their value is missing.
@@ -110,7 +110,7 @@ class Needs(msgspec.Struct, frozen=True):
 
     model: str
     fingerprint: str
-    carrier: Carrier
+    representation: ModelKind
     columns: int | None
     inputs: tuple[str, ...]
     idle_inputs: tuple[str, ...]
@@ -141,7 +141,7 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
     return Needs(
         model=model.name,
         fingerprint=fingerprint(model),
-        carrier="tree" if is_tree else "rules",
+        representation="tree" if is_tree else "rules",
         columns=len(model.columns) or None,
         inputs=asked.inputs,
         idle_inputs=tuple(n for n in model.inputs if n not in asked.inputs),
@@ -161,12 +161,12 @@ def needs(model: Model, *, uses: Collection[Use] = ("tree", "relative")) -> Need
 def _graphs(model: Model) -> tuple[tuple[Graph, ...], tuple[str, ...]]:
     found: list[Graph] = []
     omissions: list[str] = []
-    for title, carrier in forms(model).items():
+    for title, representation in forms(model).items():
         for dtype in DTYPES:
             if title == "tree" and dtype == "mixed":
                 continue  # a path has comparisons alone: it is float64
             try:
-                found.append(_graph(title, carrier, dtype))
+                found.append(_graph(title, representation, dtype))
             except (LossError, MissingExtraError) as error:
                 omissions.append(f"{title} in {dtype}: {error}")
     return tuple(found), tuple(omissions)
@@ -325,13 +325,13 @@ def prove(
     kinds: dict[str, Dtype] = {name: find_runtime(name).dtype for name in runtimes}
     types: set[Dtype] = set(kinds.values())
     seen = {dtype: _is_seen(model, found.model, rows, dtype) for dtype in types}
-    for title, carrier in whole.items():
+    for title, representation in whole.items():
         other = left.get(title)
         if other is None or not set(other.inputs) <= set(model.inputs):
             continue
         for name in runtimes:
             comparisons += _compared(
-                title, name, carrier, other, found, rows, seen[kinds[name]]
+                title, name, representation, other, found, rows, seen[kinds[name]]
             )
     return Agreement(
         model.name, fingerprint(model), tuple(comparisons), probes=rows.probes
@@ -377,7 +377,7 @@ def _compared(
     is_seen: BoolArray,
 ) -> Iterator[Comparison]:
     runtime = find_runtime(name)
-    kind: Carrier = "tree" if isinstance(model, FuzzyTree) else "rules"
+    kind: ModelKind = "tree" if isinstance(model, FuzzyTree) else "rules"
     if kind not in runtime.runs:
         return
     order = [model.inputs.index(one) for one in left.inputs]

@@ -1,6 +1,7 @@
-"""Do all carriers of a model give its answers?
+"""Do all representations of a model give its answers?
 
-Nothing here believes a carrier: each is loaded and run. Kinds of evidence are kept
+Nothing here believes a representation: each is loaded and run. Kinds of evidence are
+kept
 apart: *file* (two contents are equal), *proof* and *all cells* (statements about every
 input), *rows* (probes aimed at every clause, and the user's data: a sample, however
 well aimed) and *calls* (ways of calling that break programs).
@@ -92,7 +93,7 @@ def check(
     rows_only: bool = False,
     progress: Progress | None = None,
 ) -> Agreement:
-    """Hold every carrier of a model against the model itself.
+    """Hold every representation of a model against the model itself.
 
     Args:
         model: A tree or a rule base.
@@ -113,27 +114,27 @@ def check(
     """
     rows = probed(model, data, limit)
     chosen = chosen_runtimes(runtimes)
-    carriers = _carriers(model, rows)
+    representations = _representations(model, rows)
     findings: list[Finding] = []
     if isinstance(model, FuzzyTree):
-        findings += _equivalence(model, carriers, rows)
+        findings += _equivalence(model, representations, rows)
     certificates: list[Certified] = []
-    parts = len(carriers) + len(others)
-    for number, carrier in enumerate(carriers):
+    parts = len(representations) + len(others)
+    for number, representation in enumerate(representations):
         if progress:
-            progress(f"comparing {carrier.title}", number / parts)
-        findings += _runtimes(carrier, chosen, rows)
-        certificates += _certificates(carrier, chosen, rows)
+            progress(f"comparing {representation.title}", number / parts)
+        findings += _runtimes(representation, chosen, rows)
+        certificates += _certificates(representation, chosen, rows)
     for number, other in enumerate(others):
         title = names[number] if number < len(names) else f"file {number + 1}"
         if progress:
-            progress(f"comparing {title}", (len(carriers) + number) / parts)
+            progress(f"comparing {title}", (len(representations) + number) / parts)
         findings += _shipped(title, other, model, rows)
     return Agreement(
         model.name,
         fingerprint(model),
         tuple(f for f in findings if isinstance(f, Comparison)),
-        tuple(map(_count, carriers)),
+        tuple(map(_count, representations)),
         tuple(dict.fromkeys(f for f in findings if isinstance(f, str))),
         cells.cell_count(model) if isinstance(model, FuzzyTree) else None,
         rows.probes,
@@ -146,16 +147,16 @@ def _native(title: str, model: Model, rows: Rows) -> Answers:
     return Answers(title, model, find_runtime("native").load(model)(rows.values))
 
 
-def _carriers(model: Model, rows: Rows) -> tuple[Answers, ...]:
+def _representations(model: Model, rows: Rows) -> tuple[Answers, ...]:
     """Return what can be made of a model, each with the native runtime's answers."""
     return tuple(_native(title, form, rows) for title, form in forms(model).items())
 
 
 def _equivalence(
-    tree: FuzzyTree, carriers: Sequence[Answers], rows: Rows
+    tree: FuzzyTree, representations: Sequence[Answers], rows: Rows
 ) -> Iterator[Finding]:
     """Show that the relative rules are the tree, and how far the raw rules are not."""
-    path, relative, *raw = carriers
+    path, relative, *raw = representations
     faults = tuple(cells.node_faults(tree))
     points = sum(map(len, map(cells.node_points, tree.nodes)))
     yield counted("proof", relative.title, path.title, points, faults)
@@ -172,7 +173,9 @@ def _equivalence(
         yield compare_answers(found, expected, rows.part(own), by_design=True)
 
 
-def _all_cells(tree: FuzzyTree, carrier: str, against: str, size: int) -> Comparison:
+def _all_cells(
+    tree: FuzzyTree, representation: str, against: str, size: int
+) -> Comparison:
     free = cells.free_axes(tree)
     native = find_runtime("native")
     descend, fire = native.load(free), native.load(rules_from_tree(free))
@@ -183,74 +186,74 @@ def _all_cells(tree: FuzzyTree, carrier: str, against: str, size: int) -> Compar
             values = zip(free.inputs, points[:, row].tolist(), strict=True)
             where = ", ".join(f"{name} {value!r}" for name, value in values)
             faults.append(f"{where}: leaf {path.rule[row]}, rule {fired.rule[row]}")
-    return counted("all cells", carrier, against, size, tuple(faults))
+    return counted("all cells", representation, against, size, tuple(faults))
 
 
 def _runtimes(
-    carrier: Answers, runtimes: Sequence[Runtime], rows: Rows
+    representation: Answers, runtimes: Sequence[Runtime], rows: Rows
 ) -> Iterator[Finding]:
-    """Run one carrier in every runtime that can, against the native one."""
-    kind = "rules" if isinstance(carrier.model, RuleBase) else "tree"
-    bases: dict[str, Answers] = {"native": carrier}
+    """Run one representation in every runtime that can, against the native one."""
+    kind = "rules" if isinstance(representation.model, RuleBase) else "tree"
+    bases: dict[str, Answers] = {"native": representation}
     for runtime in runtimes:
         if kind not in runtime.runs:
             continue
-        title = f"{runtime.name}: {carrier.title}"
+        title = f"{runtime.name}: {representation.title}"
         if not is_installed(runtime):
             yield f"{runtime.name} is not installed ({needed_by(runtime)})"
             continue
         checkpoint()
         try:
-            run = runtime.load(carrier.model)
+            run = runtime.load(representation.model)
         except LossError as error:
             yield f"{title}: {error}"
             continue
-        step = _stride(carrier.model, rows) if runtime.is_slow else 1
+        step = _stride(representation.model, rows) if runtime.is_slow else 1
         share = slice(None, None, step)
         some = rows.part(share)
         checkpoint()
-        found = Answers(title, carrier.model, run(some.values))
+        found = Answers(title, representation.model, run(some.values))
         checkpoint()
         if runtime.name != "native":
-            base = _base(runtime, carrier, bases, rows)
+            base = _base(runtime, representation, bases, rows)
             yield _held(runtime, found, base.part(share), some)
         yield _calls(title, run, some)
 
 
 def _certificates(
-    carrier: Answers, runtimes: Sequence[Runtime], rows: Rows
+    representation: Answers, runtimes: Sequence[Runtime], rows: Rows
 ) -> Iterator[Certified]:
     """Hold each number type that was run against exact arithmetic.
 
     The native runtime of a type stands for all of it, for the others equal its bits.
     """
-    kind = "rules" if isinstance(carrier.model, RuleBase) else "tree"
+    kind = "rules" if isinstance(representation.model, RuleBase) else "tree"
     ran = {r.dtype for r in runtimes if kind in r.runs and r.bound is None}
-    truth = decide(carrier.model, rows.values, with_strengths=False)
+    truth = decide(representation.model, rows.values, with_strengths=False)
     for dtype, name in _NATIVE.items():
         if dtype not in ran:
             continue
         try:
-            run = find_runtime(name).load(carrier.model)
+            run = find_runtime(name).load(representation.model)
         except LossError:  # told among what was not examined
             continue
-        title = f"{carrier.title} in {dtype}"
-        found = Answers(title, carrier.model, run(rows.values))
+        title = f"{representation.title} in {dtype}"
+        found = Answers(title, representation.model, run(rows.values))
         yield compare_exact(found, truth, rows, dtype=dtype)
 
 
 def _base(
-    runtime: Runtime, carrier: Answers, bases: dict[str, Answers], rows: Rows
+    runtime: Runtime, representation: Answers, bases: dict[str, Answers], rows: Rows
 ) -> Answers:
     """Return what a runtime is held against: the native one of its number type."""
     name = _NATIVE[runtime.dtype]
-    is_rules = isinstance(carrier.model, RuleBase)
+    is_rules = isinstance(representation.model, RuleBase)
     if runtime.bound is not None or runtime.name == name or not is_rules:
-        return carrier
+        return representation
     if name not in bases:
-        run = find_runtime(name).load(carrier.model)
+        run = find_runtime(name).load(representation.model)
         bases[name] = Answers(
-            f"{name}: {carrier.title}", carrier.model, run(rows.values)
+            f"{name}: {representation.title}", representation.model, run(rows.values)
         )
     return bases[name]
 
@@ -429,7 +432,7 @@ def _shipped_onnx(
 
 
 def _onnx_counterpart(other: OnnxModel, model: Model) -> Model | None:
-    if other.carrier == "tree":
+    if other.representation == "tree":
         return model if isinstance(model, FuzzyTree) else None
     if isinstance(model, RuleBase):
         return model
@@ -509,10 +512,10 @@ def _differ(path: tuple[str, ...], expected: object, found: object) -> str | Non
     return f"{where}: {found!r} where {expected!r} is right"
 
 
-def _count(carrier: Answers) -> Count:
-    status = carrier.outcome.status
+def _count(representation: Answers) -> Count:
+    status = representation.outcome.status
     return Count(
-        carrier.title,
+        representation.title,
         int(status.size),
         *(
             int((status == kind).sum())

@@ -1,4 +1,4 @@
-"""Do all carriers of a fuzzy system give its numbers?
+"""Do all representations of a fuzzy system give its numbers?
 
 The inference is the meaning; the native runtime is held against it, every other runtime
 against the native one, and shipped files against both. Bits are compared first. Where
@@ -100,7 +100,7 @@ def check_system(
     rows_only: bool = False,
     progress: Progress | None = None,
 ) -> Agreement:
-    """Hold every carrier of a fuzzy system against the system itself.
+    """Hold every representation of a fuzzy system against the system itself.
 
     Args:
         system: The system.
@@ -300,7 +300,7 @@ def _faults(
 
 
 def _compared(
-    carrier: str,
+    representation: str,
     against: str,
     found: SystemOutcome,
     right: SystemOutcome,
@@ -317,7 +317,7 @@ def _compared(
     faults = list(itertools.islice(_faults(one, two, subject, rows), _TOLD))
     total = len(rows.numbers)
     yield Comparison(
-        carrier,
+        representation,
         against,
         "rows",
         total,
@@ -332,7 +332,7 @@ def _compared(
     edges = int(is_edge.any(axis=0).sum())
     if edges:
         yield (
-            f"{carrier} against {against}: in {edges} of {total} rows last bits "
+            f"{representation} against {against}: in {edges} of {total} rows last bits "
             "decide, so near is an edge or a division by 0; the two may be "
             f"{_largest(gaps.allowed, is_edge):.2g} apart there, and are "
             f"{_largest(gaps.gap, is_edge):.2g}"
@@ -517,10 +517,10 @@ def _shipped_system(
     yield from results
 
 
-def _count(carrier: str, outcome: SystemOutcome) -> Count:
+def _count(representation: str, outcome: SystemOutcome) -> Count:
     status = outcome.status
     return Count(
-        carrier,
+        representation,
         int(status.size),
         0,
         int((status == Status.UNCOVERED).sum()),

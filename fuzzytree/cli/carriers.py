@@ -8,12 +8,12 @@ import click
 
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.exporters import find_format
-from fuzzytree.model.contracts import Carrier, Document, Format
+from fuzzytree.model.contracts import Document, Format, ModelKind
 from fuzzytree.model.rulebase import Conjunction, Kind
 
 as_option = click.option(
     "--as",
-    "carrier",
+    "representation",
     type=click.Choice(["tree", "rules", "system"]),
     help="Write the tree, rules made from it, or the system that decides alike.",
 )
@@ -52,7 +52,7 @@ def carried(
     model: Document,
     form: Format,
     *,
-    carrier: Carrier | None,
+    representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
 ) -> Document:
@@ -64,10 +64,16 @@ def carried(
     """
     from fuzzytree.checking.converting import formed
 
-    if carrier == "tree" and (kind is not None or conjunction is not None):
+    if representation == "tree" and (kind is not None or conjunction is not None):
         raise click.UsageError("--terms and --conjunction are for --as rules")
     try:
-        return formed(model, form, carrier=carrier, kind=kind, conjunction=conjunction)
+        return formed(
+            model,
+            form,
+            representation=representation,
+            kind=kind,
+            conjunction=conjunction,
+        )
     except FuzzyTreeError:
         raise
     except ValueError as error:

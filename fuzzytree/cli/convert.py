@@ -33,7 +33,7 @@ from fuzzytree.cli.talk import (
 )
 from fuzzytree.errors import LossError
 from fuzzytree.files import LIMIT, write_atomically
-from fuzzytree.model.contracts import Carrier, Document, Format, Reading, Written
+from fuzzytree.model.contracts import Document, Format, ModelKind, Reading, Written
 from fuzzytree.model.rulebase import Conjunction, Kind
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def command(
     output: str,
     read_as: str | None,
     to: str | None,
-    carrier: Carrier | None,
+    representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
     dialect: str | None,
@@ -106,7 +106,7 @@ def command(
         used,
         form,
         output,
-        choice=Choice(carrier, kind, conjunction),
+        choice=Choice(representation, kind, conjunction),
         options=options,
         notes=[("read", source, head)],
         allow_loss=allow_loss,
@@ -155,7 +155,7 @@ def read_source(source: str, read_as: str | None) -> tuple[Reading, str]:
 class Choice(msgspec.Struct, frozen=True):
     """The form of a model that was asked for."""
 
-    carrier: Carrier | None = None
+    representation: ModelKind | None = None
     kind: Kind | None = None
     conjunction: Conjunction | None = None
 
@@ -191,7 +191,7 @@ def carry(
         as_json: Whether to print the facts as JSON.
         quiet: Whether to print nothing but errors.
     """
-    from fuzzytree.checking.converting import carrier_of, export, proved
+    from fuzzytree.checking.converting import export, kind_of, proved
     from fuzzytree.cli.carriers import carried
     from fuzzytree.model.losses import loss_text
     from fuzzytree.report import systems
@@ -199,7 +199,7 @@ def carry(
     model = carried(
         found.model,
         form,
-        carrier=choice.carrier,
+        representation=choice.representation,
         kind=choice.kind,
         conjunction=choice.conjunction,
     )
@@ -212,7 +212,7 @@ def carry(
             "remarks": found.remarks,
         },
         "format": form.name,
-        "carrier": carrier_of(model),
+        "representation": kind_of(model),
     }
     with progress_bar(quiet=quiet) as show:
         show(f"writing {form.name}", 0.0)
@@ -237,7 +237,7 @@ def carry(
     after = next_check((source, read_as), (output, form.name))
     if after and found.losses:
         after += " --allow-loss"
-    if carrier_of(model) == "system" != carrier_of(found.model):
+    if kind_of(model) == "system" != kind_of(found.model):
         after = ""  # numbers are not compared with classes
     shows = " (shows what the losses change)" if written.losses else ""
     lost = [f"lost     {loss_text(one)}" for one in (*found.losses, *written.losses)]

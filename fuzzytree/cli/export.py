@@ -12,7 +12,7 @@ from fuzzytree.cli.carriers import (
 )
 from fuzzytree.cli.convert import Choice, carry, read_source
 from fuzzytree.cli.talk import json_option, quiet_option, verbose_option, wrong_options
-from fuzzytree.model.contracts import Carrier
+from fuzzytree.model.contracts import ModelKind
 from fuzzytree.model.rulebase import Conjunction, Kind
 
 
@@ -52,7 +52,7 @@ def command(
     model: str,
     output: str,
     to: str | None,
-    carrier: Carrier | None,
+    representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
     dtype: str | None,
@@ -94,7 +94,7 @@ def command(
         read_as,
         form,
         output,
-        choice=Choice(carrier, kind, conjunction),
+        choice=Choice(representation, kind, conjunction),
         options=options,
         allow_loss=allow_loss,
         verbose=verbose,

@@ -31,7 +31,7 @@ from fuzzytree.cli.talk import (
     wrong_options,
 )
 from fuzzytree.files import check_place, read_bounded, write_atomically
-from fuzzytree.model.contracts import Carrier, Document, Format
+from fuzzytree.model.contracts import Document, Format, ModelKind
 from fuzzytree.model.naming import printable
 from fuzzytree.model.rulebase import Conjunction, Kind
 
@@ -142,7 +142,7 @@ def command(
     name: str | None,
     ignore: Sequence[str],
     units: Sequence[str],
-    carrier: Carrier | None,
+    representation: ModelKind | None,
     kind: Kind | None,
     conjunction: Conjunction | None,
     no_test: bool,
@@ -204,7 +204,11 @@ def command(
     width = max(map(len, (output, *(thing for _, thing, _ in rows))))
     say_rows(*rows, width=width, quiet=is_silent)
     model = carried(
-        learnt.tree, form, carrier=carrier, kind=kind, conjunction=conjunction
+        learnt.tree,
+        form,
+        representation=representation,
+        kind=kind,
+        conjunction=conjunction,
     )
     content = export(model, form.name).content
     if output == "-":

@@ -109,14 +109,14 @@ def _lines(model: Document) -> list[str]:
 def _facts(found: Reading) -> dict[str, object]:
     import msgspec
 
-    from fuzzytree.checking.converting import carrier_of
+    from fuzzytree.checking.converting import kind_of
     from fuzzytree.model.rulebase import fingerprint
     from fuzzytree.model.system import FuzzySystem
     from fuzzytree.report import systems, text
 
     model = found.model
     facts: dict[str, object] = {
-        "carrier": carrier_of(model),
+        "representation": kind_of(model),
         "fingerprint": fingerprint(model),
     }
     if isinstance(model, FuzzySystem):

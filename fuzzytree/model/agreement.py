@@ -25,10 +25,10 @@ def version() -> str:
 
 
 class Comparison(msgspec.Struct, frozen=True):
-    """One carrier of a model held against another.
+    """One representation of a model held against another.
 
     Attributes:
-        carrier: What was examined.
+        representation: What was examined.
         against: What it was held against.
         basis: `file` compares content, `proof` covers every input, `all cells` every
             cell of the input space with its edges, `rows` the rows counted, `calls`
@@ -49,7 +49,7 @@ class Comparison(msgspec.Struct, frozen=True):
         largest_unbounded: The largest difference of any two strengths in them.
     """
 
-    carrier: str
+    representation: str
     against: str
     basis: Basis
     rows: int
@@ -67,10 +67,10 @@ class Comparison(msgspec.Struct, frozen=True):
 
 
 class Certified(msgspec.Struct, frozen=True):
-    """What a number type can change about a carrier's answers, and what it changed.
+    """What a number type can change about predictions, and what it changed.
 
     Attributes:
-        carrier: What was examined.
+        representation: What was examined.
         dtype: The number type.
         sentence: What is certain about its decisions.
         delta: The certified largest error of a strength; None where there is none.
@@ -91,7 +91,7 @@ class Certified(msgspec.Struct, frozen=True):
         detail: What is not, worst first, in sentences.
     """
 
-    carrier: str
+    representation: str
     dtype: str
     sentence: str
     delta: float | None
@@ -110,9 +110,9 @@ class Certified(msgspec.Struct, frozen=True):
 
 
 class Count(msgspec.Struct, frozen=True):
-    """How a carrier answered the rows: nothing of this is hidden in a total."""
+    """How a representation answered the rows: nothing of this is hidden in a total."""
 
-    carrier: str
+    representation: str
     rows: int
     ties: int
     uncovered: int
@@ -160,7 +160,7 @@ class Agreement(msgspec.Struct, frozen=True):
         model: The model's name.
         fingerprint: The SHA-256 of its content.
         comparisons: Everything that was held against something.
-        counts: Ties, uncovered and missing rows, for each carrier.
+        counts: Ties, uncovered and missing rows, for each representation.
         skipped: What was not examined and why, in sentences.
         cells: The number of cells of the tree, or None for a rule base.
         probes: How many of the rows are probes; the others are data.
@@ -222,7 +222,7 @@ class Agreement(msgspec.Struct, frozen=True):
 
 def _fault(one: Comparison | Certified) -> str:
     if isinstance(one, Certified):
-        return f"{one.carrier} disagrees with exact arithmetic"
+        return f"{one.representation} disagrees with exact arithmetic"
     if one.verdict == "rows only":
-        return f"{one.carrier} is not {one.against}; its rows agree"
-    return f"{one.carrier} disagrees with {one.against}"
+        return f"{one.representation} is not {one.against}; its rows agree"
+    return f"{one.representation} disagrees with {one.against}"

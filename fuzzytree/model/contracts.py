@@ -37,7 +37,7 @@ class Fitted(Protocol):
 ModelSource = Document | Fitted | str | os.PathLike[str]
 """What public functions take as a model; `checking.converting.as_model` reads it."""
 
-Carrier = Literal["tree", "rules", "system"]
+ModelKind = Literal["tree", "rules", "system"]
 Dtype = Literal["float64", "mixed", "float32"]
 
 
@@ -131,7 +131,7 @@ class Format(msgspec.Struct, frozen=True):
 
     name: str
     suffixes: tuple[str, ...]
-    carries: tuple[Carrier, ...]
+    carries: tuple[ModelKind, ...]
     write: Writer
     read: Callable[[bytes, str], Reading] | None = None
     cannot: tuple[str, ...] = ()
@@ -222,7 +222,7 @@ class Runtime(msgspec.Struct, frozen=True):
     """
 
     name: str
-    runs: tuple[Carrier, ...]
+    runs: tuple[ModelKind, ...]
     load: Callable[[Model], Run]
     load_system: SystemLoader | None = None
     dtype: Dtype = "float64"

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.model.contracts import Carrier, Dtype, Model
+from fuzzytree.model.contracts import Dtype, Model, ModelKind
 from fuzzytree.model.rulebase import Clause, RuleBase, Variable
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.enclosures import axis_value
@@ -190,7 +190,7 @@ class Certificate(msgspec.Struct, frozen=True):
     Attributes:
         dtype: The number type; None for a file that holds the model and computes
             nothing.
-        carrier: `rules` or `tree`.
+        representation: `rules` or `tree`.
         delta: The largest error of a strength; None for a tree that computes, and
             where there is no bound below 1.
         origin: What it is derived from, and for which values it holds.
@@ -202,7 +202,7 @@ class Certificate(msgspec.Struct, frozen=True):
     """
 
     dtype: Dtype | None
-    carrier: Carrier
+    representation: ModelKind
     delta: float | None
     origin: str
     terms: tuple[TermBound, ...] = ()
@@ -216,7 +216,7 @@ class Certificate(msgspec.Struct, frozen=True):
         """Return what it says about decisions, for people."""
         if self.dtype is None:
             return "no decision can differ: every number is written in full, error 0"
-        if self.carrier == "tree":
+        if self.representation == "tree":
             return self._of_paths()
         if self.delta is None:
             return f"no bound: {'; '.join(self.reasons)}"

@@ -60,8 +60,8 @@ def _verdict(found: Report) -> str:
 
 
 def _head(needs: Needs) -> Iterator[str]:
-    ends = ("leaf", "leaves") if needs.carrier == "tree" else ("rule", "rules")
-    what = "fuzzy tree" if needs.carrier == "tree" else "rule base"
+    ends = ("leaf", "leaves") if needs.representation == "tree" else ("rule", "rules")
+    what = "fuzzy tree" if needs.representation == "tree" else "rule base"
     sizes = [counted(needs.rules, *ends), counted(needs.terms, "term")]
     sizes += [counted(needs.sets, "fitted set")] if needs.sets else []
     yield f"model    {what}, {', '.join(sizes)}"
@@ -95,11 +95,11 @@ def _graph_lines(graphs: Sequence[Graph]) -> Iterator[str]:
     for graph in graphs:
         inside = graph.contents
         sizes = (inside.bytes, inside.nodes, inside.constants)
-        rows.append((graph.carrier, graph.dtype, *map(str, sizes)))
+        rows.append((graph.representation, graph.dtype, *map(str, sizes)))
     yield from aligned(rows)
     for graph in graphs:
         if graph.because or graph.left_out:
-            yield f"{graph.carrier}: {_operators(graph.contents.operators)}"
+            yield f"{graph.representation}: {_operators(graph.contents.operators)}"
             yield from _because_lines(graph)
 
 
@@ -138,7 +138,7 @@ def _size_rows(sizes: Sequence[Size]) -> Iterator[tuple[str, ...]]:
 
 
 def _file_title(file: File) -> str:
-    return " ".join(filter(None, (file.carrier, file.format, file.dtype)))
+    return " ".join(filter(None, (file.representation, file.format, file.dtype)))
 
 
 def _file_text(file: File | None) -> str:
@@ -163,9 +163,9 @@ def _cost_rows(costs: Sequence[Cost]) -> Iterator[tuple[str, ...]]:
 
 
 def _cost_title(cost: Cost) -> str:
-    if not cost.carrier:
+    if not cost.representation:
         return cost.what
-    return f"{cost.carrier}, {cost.runtime}, {cost.what}"
+    return f"{cost.representation}, {cost.runtime}, {cost.what}"
 
 
 def _ratio_text(before: Cost | None, after: Cost | None) -> str:

@@ -117,7 +117,7 @@ def _stiff_row(one: Stiff) -> tuple[str, ...]:
 def _offset_lines(costs: tuple[OffsetCost, ...]) -> Iterator[str]:
     rows = [
         (
-            one.carrier,
+            one.representation,
             f"{one.ratio:.0e}",
             *(
                 "cannot" if error is None else f"{error:.1e}"

@@ -312,11 +312,11 @@ def agreement_lines(
         yield from _more(len(wrong) - len(shown), "comparison")
     for comparison in shown:
         if comparison.detail and (is_full or comparison in wrong):
-            yield f"{comparison.carrier} compared with {comparison.against}:"
+            yield f"{comparison.representation} compared with {comparison.against}:"
             yield from (f"  {line}" for line in comparison.detail)
     for count in found.counts:
         yield (
-            f"{count.carrier}: {counted(count.rows, 'row')}, {count.ties} tied, "
+            f"{count.representation}: {counted(count.rows, 'row')}, {count.ties} tied, "
             f"{count.uncovered} with no rule fired, "
             f"{count.missing} with a missing input"
         )
@@ -356,7 +356,7 @@ def _bound_lines(bounds: Sequence[Certified], *, is_verbose: bool) -> Iterator[s
             f"arithmetic, none is exceeded; largest error {largest:.2g}"
         )
     for one in wrong:
-        yield f"{one.carrier} compared with exact arithmetic:"
+        yield f"{one.representation} compared with exact arithmetic:"
         yield from (f"  {line}" for line in one.detail)
 
 
@@ -428,7 +428,7 @@ def comparison_row(one: Comparison) -> tuple[str, ...]:
         elif one.largest_unbounded:
             verdict += f" differ by up to {one.largest_unbounded:.2g}"
     return (
-        one.carrier,
+        one.representation,
         one.against,
         one.basis,
         str(one.rows),
@@ -457,7 +457,7 @@ def certified_row(one: Certified) -> tuple[str, ...]:
         flips += f", cover lost in {one.cover_lost}, gained in {one.cover_gained}"
     noun = "row" if one.on == "data" else "probe"
     return (
-        one.carrier,
+        one.representation,
         "-" if one.largest is None else f"{one.largest:.2g}",
         f"{one.in_band} of {counted(one.rows, noun)}",
         flips,

@@ -16,9 +16,9 @@ import msgspec
 from fuzzytree.errors import LossError, MissingExtraError, ReadError, install_hint
 from fuzzytree.exporters.onnx import FORMAT_VERSION, Output, write
 from fuzzytree.model.contracts import (
-    Carrier,
     Dtype,
     Model,
+    ModelKind,
     Outcome,
     Run,
     Runtime,
@@ -51,7 +51,7 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         name: Of the model.
-        carrier: Whether its graph follows a tree's path or fires rules.
+        representation: Whether its graph follows a tree's path or fires rules.
         kind: `descent`, `relative`, `raw`, or `rules` for rules from no tree.
         dtype: The number type.
         fingerprint: Of the model that was written
@@ -69,7 +69,7 @@ class Facts(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     name: str
-    carrier: Carrier
+    representation: ModelKind = msgspec.field(name="carrier")
     kind: str
     dtype: Dtype
     fingerprint: str
@@ -133,7 +133,7 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
 
     session = named(loaded(content, name))
     has_labels = "label" in facts.outputs
-    is_system = facts.carrier == "system"
+    is_system = facts.representation == "system"
     return OnnxModel(
         **msgspec.structs.asdict(facts),
         run=functools.partial(_refuse if is_system else _run, session, facts),
@@ -358,9 +358,9 @@ def _chunks(
 
 def _rows_at_once(facts: Facts) -> int:
     """Return how many rows are answered together, so that they stay in the cache."""
-    if facts.carrier == "tree":
+    if facts.representation == "tree":
         return 2**16
-    if facts.carrier == "system":
+    if facts.representation == "system":
         return min(max(facts.chunk, 1), 2**16)
     degree = 8 if facts.dtype == "float64" else 4
     return max(128, min(2**13, _CACHE_BYTES // (degree * facts.rules)))
@@ -486,9 +486,9 @@ def _facts(proto: onnx.ModelProto, name: str) -> Facts:
         facts = msgspec.convert(known, Facts)
     except (json.JSONDecodeError, msgspec.ValidationError) as error:
         raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
-    least = 0 if facts.carrier == "system" else 1
+    least = 0 if facts.representation == "system" else 1
     is_possible = least <= facts.rules <= proto.ByteSize()
-    is_possible &= (facts.carrier == "system") == bool(facts.names)
+    is_possible &= (facts.representation == "system") == bool(facts.names)
     if not set(facts.inputs) <= set(facts.columns) or not is_possible:
         raise ReadError(f"{name}: the file's metadata contradicts itself")
     names = (*facts.columns, *facts.units, *facts.classes, *facts.names)
@@ -531,7 +531,7 @@ def _check_signature(proto: onnx.ModelProto, facts: Facts, name: str) -> None:
             f"{name}: the graph's inputs and outputs are not those of its metadata"
         )
     needed, wanted = "rule", "label and rule"
-    if facts.carrier == "system":
+    if facts.representation == "system":
         needed, wanted = "outputs", "outputs and status"
     if needed not in outputs:
         raise ReadError(
@@ -542,7 +542,7 @@ def _check_signature(proto: onnx.ModelProto, facts: Facts, name: str) -> None:
 
 def _runtime(
     name: str,
-    runs: tuple[Carrier, ...],
+    runs: tuple[ModelKind, ...],
     dtype: Dtype,
     *cannot: str,
     readable: bool = False,

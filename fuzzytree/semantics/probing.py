@@ -1,9 +1,9 @@
-"""Rows at which the carriers of a model tend to part.
+"""Rows at which the representations of a model tend to part.
 
-Uniform rows almost never fall where two carriers could differ: within rounding of a
-cut, of a support's end, of a mean. A probe puts one clause of one rule exactly there,
-or on a neighbouring float, while the other clauses of that rule hold as far as they
-can, so that a fault in the clause reaches the answer.
+Uniform rows almost never fall where two representations could differ: within rounding
+of a cut, of a support's end, of a mean. A probe puts one clause of one rule exactly
+there, or on a neighbouring float, while the other clauses of that rule hold as far as
+they can, so that a fault in the clause reaches the answer.
 """
 
 from __future__ import annotations

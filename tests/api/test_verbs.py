@@ -243,14 +243,14 @@ def test_every_carrier_of_a_tree_answers_alike(
     path = tmp_path / "tree.onnx"
     content = ft.save(TREE, path).content
     expected = ft.run(TREE, rows).classes
-    for carrier in (
+    for representation in (
         ft.rules_from_tree(TREE),
         content,
         path,
         str(path),
         open_onnx(content, "tree.onnx"),
     ):
-        found = ft.run(carrier, rows)
+        found = ft.run(representation, rows)
         assert isinstance(found, ft.Answers)
         assert found.classes == expected
 
@@ -324,7 +324,7 @@ def test_check_takes_files_and_names_them(tmp_path: Path) -> None:
     ft.save(TREE, onnx)
     found = ft.check(yaml, onnx, data=ROWS, runtimes=["native"], limit=300)
     assert found.ok
-    assert str(onnx) in {comparison.carrier for comparison in found.comparisons}
+    assert str(onnx) in {comparison.representation for comparison in found.comparisons}
 
 
 def test_check_finds_a_file_of_another_model() -> None:

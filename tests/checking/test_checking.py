@@ -21,8 +21,8 @@ TREE = random_tree(3, leaves=6, inputs=3)
 LIMIT = 1500
 
 
-def by(found: Agreement, carrier: str) -> list[str]:
-    return [c.verdict for c in found.comparisons if c.carrier == carrier]
+def by(found: Agreement, representation: str) -> list[str]:
+    return [c.verdict for c in found.comparisons if c.representation == representation]
 
 
 @pytest.mark.one_in(3)
@@ -45,20 +45,20 @@ def test_every_installed_runtime_is_compared_in_all_it_can_run() -> None:
 
 def test_the_proof_and_all_cells_stand_beside_the_rows() -> None:
     found = check(TREE, limit=300, runtimes=["native"])
-    bases = [c.basis for c in found.comparisons if c.carrier == "relative rules"]
+    bases = [c.basis for c in found.comparisons if c.representation == "relative rules"]
     assert bases == ["proof", "all cells", "rows"]
 
 
 def test_the_difference_of_raw_rules_is_told_and_no_fault() -> None:
     found = check(TREE, limit=300, runtimes=["native"])
-    (raw,) = [c for c in found.comparisons if c.carrier == "raw rules"]
+    (raw,) = [c for c in found.comparisons if c.representation == "raw rules"]
     assert raw.verdict == "differs by design"
     assert raw.flips > 0
 
 
 def test_missing_rows_are_counted_for_each_carrier() -> None:
     found = check(TREE, limit=300, runtimes=["native"])
-    missing = {count.carrier: count.missing for count in found.counts}
+    missing = {count.representation: count.missing for count in found.counts}
     assert set(missing) == {"tree", "relative rules", "raw rules"}
     assert len(set(missing.values())) == 1
     assert missing["tree"] >= 3 * len(TREE.inputs)  # nan, inf and -inf in each input
@@ -174,7 +174,11 @@ def test_a_fault_in_a_rule_file_is_found_in_content_and_in_answers(
 ) -> None:
     faulty = plant(rules_from_tree(TREE))
     found = check(TREE, faulty, names=["rules.yaml"], limit=3000, runtimes=["native"])
-    told = {c.basis: c.verdict for c in found.comparisons if c.carrier == "rules.yaml"}
+    told = {
+        c.basis: c.verdict
+        for c in found.comparisons
+        if c.representation == "rules.yaml"
+    }
     assert not found.ok
     assert told == {"file": "DISAGREES", "rows": "DISAGREES"}
 

@@ -25,7 +25,9 @@ def checked(model: Model, shipped: OnnxModel) -> Agreement:
 
 
 def verdicts(found: Agreement) -> dict[str, str]:
-    return {c.against: c.verdict for c in found.comparisons if c.carrier == "m.onnx"}
+    return {
+        c.against: c.verdict for c in found.comparisons if c.representation == "m.onnx"
+    }
 
 
 def opened(content: bytes) -> OnnxModel:

@@ -38,7 +38,9 @@ def checked(model: Document, path: str, **options: Any) -> Agreement:
 
 
 def about(found: Agreement, path: str) -> list[tuple[str, str]]:
-    return [(c.against, c.verdict) for c in found.comparisons if c.carrier == path]
+    return [
+        (c.against, c.verdict) for c in found.comparisons if c.representation == path
+    ]
 
 
 WRITTEN: Sequence[Any] = (
@@ -90,12 +92,16 @@ def test_the_first_line_that_differs_is_shown() -> None:
     ft.save(TREE, "m.py")
     text = Path("m.py").read_text("utf-8")
     Path("m.py").write_text(f"import os\n{text}", "utf-8")
-    (one,) = (c for c in checked(TREE, "m.py").comparisons if c.carrier == "m.py")
+    (one,) = (
+        c for c in checked(TREE, "m.py").comparisons if c.representation == "m.py"
+    )
     assert one.detail == (
         "line 1: 'import os' where '# -*- coding: utf-8 -*-' is right",
     )
     Path("m.py").write_text(text[: text.rindex("if __name__")], "utf-8")
-    (one,) = (c for c in checked(TREE, "m.py").comparisons if c.carrier == "m.py")
+    (one,) = (
+        c for c in checked(TREE, "m.py").comparisons if c.representation == "m.py"
+    )
     number = text[: text.rindex("if __name__")].count("\n") + 1
     shown = "'if __name__ == \"__main__\":'"
     assert one.detail == (f"line {number}: '' where {shown} is right",)
@@ -149,7 +155,9 @@ def test_a_program_that_fails_is_a_disagreement(
         ("a freshly written file", "DISAGREES"),
         ("the model", "DISAGREES"),
     ]
-    rows = next(c for c in found.comparisons if c.basis == "rows" and c.carrier == path)
+    rows = next(
+        c for c in found.comparisons if c.basis == "rows" and c.representation == path
+    )
     assert fault in rows.detail[0]
 
 

@@ -43,11 +43,12 @@ def opened(system: FuzzySystem, **facts: object) -> OnnxModel:
     return replace(found, **facts)
 
 
-def about(found: Agreement, carrier: str, basis: str) -> Comparison:
+def about(found: Agreement, representation: str, basis: str) -> Comparison:
     (one,) = (
         c
         for c in found.comparisons
-        if (c.carrier, c.basis) == (carrier, basis) and c.verdict != "agrees"
+        if (c.representation, c.basis) == (representation, basis)
+        and c.verdict != "agrees"
     )
     return one
 
@@ -56,7 +57,7 @@ def test_every_runtime_is_compared_and_called() -> None:
     names = ["reference", "native", "onnxruntime float64"]
     found = check_system(washer(), limit=100, runtimes=names)
     assert found.ok
-    assert [(c.carrier, c.against, c.basis) for c in found.comparisons] == [
+    assert [(c.representation, c.against, c.basis) for c in found.comparisons] == [
         ("native", "the inference", "rows"),
         ("reference", "itself", "calls"),
         ("native", "itself", "calls"),
@@ -85,7 +86,11 @@ def test_files_with_the_system_agree() -> None:
         washer(), washer(), opened(washer()), names=["a.yaml", "b.onnx"]
     )
     assert found.ok
-    told = [(c.carrier, c.against) for c in found.comparisons if c.carrier == "b.onnx"]
+    told = [
+        (c.representation, c.against)
+        for c in found.comparisons
+        if c.representation == "b.onnx"
+    ]
     assert told == [
         ("b.onnx", "the system's metadata"),
         ("b.onnx", "a freshly written graph"),
@@ -96,7 +101,9 @@ def test_files_with_the_system_agree() -> None:
 def test_a_file_with_other_names_agrees() -> None:
     found = check_system(washer(), washer(output="t"), limit=50)
     assert found.ok
-    told = [(c.against, c.basis) for c in found.comparisons if c.carrier == "file 1"]
+    told = [
+        (c.against, c.basis) for c in found.comparisons if c.representation == "file 1"
+    ]
     assert told == [("the system but for names", "file"), ("native", "rows")]
 
 
@@ -199,7 +206,11 @@ def test_rows_on_an_edge_are_told_apart_from_the_table() -> None:
     )
     (told,) = (text for text in found.skipped if text.startswith("file 1"))
     assert "in 1 of 3 rows last bits decide" in told
-    rows = [c for c in found.comparisons if (c.carrier, c.basis) == ("file 1", "rows")]
+    rows = [
+        c
+        for c in found.comparisons
+        if (c.representation, c.basis) == ("file 1", "rows")
+    ]
     assert [c.allowed < 1e-12 for c in rows] == [True]
 
 

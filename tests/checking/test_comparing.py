@@ -117,7 +117,8 @@ def test_nan_equals_nan_and_nothing_else() -> None:
 
 
 def test_classes_may_differ_only_within_twice_the_bound() -> None:
-    # Row 2: b leads by 0.4 - 0.2; a carrier that answers a there needs a bound of 0.1.
+    # Row 2: b leads by 0.4 - 0.2; a representation that answers a there needs a bound
+    # of 0.1.
     flipped = answers(
         "flipped",
         [1, 1, 0],

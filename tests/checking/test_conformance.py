@@ -24,12 +24,12 @@ WRITERS = """
 import hashlib
 from fuzzytree.errors import LossError
 from fuzzytree.exporters import all_formats
-from fuzzytree.checking.converting import carrier_of
+from fuzzytree.checking.converting import kind_of
 from fuzzytree.testing import exporter_models
 models = list(exporter_models(rounds=0))
 for form in all_formats():
     for title, model in models:
-        if carrier_of(model) in form.carries:
+        if kind_of(model) in form.carries:
             try:
                 content = form.write(model, allow_loss=True).content
             except LossError as error:
@@ -222,7 +222,7 @@ def _with_unnamed_option() -> Format:
         ),
         (replace(YAML, name="Yaml!"), "the name 'Yaml!' must be small letters"),
         (replace(YAML, suffixes=("yaml",)), "the suffix 'yaml' must be a dot"),
-        (replace(YAML, carries=()), "what it carries must be some of"),
+        (replace(YAML, carries=()), "'carries' must be some of"),
     ],
     ids=lambda one: one[:40] if isinstance(one, str) else "",
 )

@@ -214,8 +214,8 @@ def test_a_pruned_model_is_nowhere_larger() -> None:
     told = report(tree, pruned(tree, uses=PATH), uses=PATH)
     before, after = told.sizes[-2:]
     for one, two in zip(before.files, after.files, strict=True):
-        assert (one.carrier, one.format, one.dtype) == (
-            two.carrier,
+        assert (one.representation, one.format, one.dtype) == (
+            two.representation,
             two.format,
             two.dtype,
         )

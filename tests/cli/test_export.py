@@ -46,7 +46,7 @@ def test_json_tells_the_same_facts(call: Call) -> None:
     assert facts == {
         "file": "new.onnx",
         "format": "onnx",
-        "carrier": "tree",
+        "representation": "tree",
         "bytes": len(content),
         "sha256": hashlib.sha256(content).hexdigest(),
         "losses": [],
@@ -61,7 +61,7 @@ def test_json_tells_the_same_facts(call: Call) -> None:
         "certificate": {
             "sentence": "no path can differ: no value is rounded before it meets a cut",
             "dtype": "float64",
-            "carrier": "tree",
+            "representation": "tree",
             "delta": None,
             "origin": "largest derived error of a value in float64, "
             "for values in the declared ranges",
@@ -85,19 +85,21 @@ def test_the_certificate_is_that_of_the_number_type_that_was_written(
     assert f"bound    float32  {text} 7.2e-07\n" in single
 
 
-@pytest.mark.parametrize("carrier", ["tree", "rules"])
-def test_a_file_that_holds_the_model_changes_nothing(call: Call, carrier: str) -> None:
-    words = ("export", "grip.yaml", "-o", "new.yaml", "--as", carrier, "--json")
+@pytest.mark.parametrize("representation", ["tree", "rules"])
+def test_a_file_that_holds_the_model_changes_nothing(
+    call: Call, representation: str
+) -> None:
+    words = ("export", "grip.yaml", "-o", "new.yaml", "--as", representation, "--json")
     code, out, err = call(*words)
     sentence = "no decision can differ: every number is written in full, error 0"
     assert code == 0
-    what = "tree" if carrier == "tree" else "rule base"
+    what = "tree" if representation == "tree" else "rule base"
     proof = f"read back from the file, the {what} is equal in every number"
     assert err.splitlines()[1] == f"proved   equal    {proof}"
     assert json.loads(out)["certificate"] == {
         "sentence": sentence,
         "dtype": None,
-        "carrier": carrier,
+        "representation": representation,
         "delta": 0.0,
         "origin": proof,
         "terms": [],

@@ -63,7 +63,7 @@ def test_rules_are_numbered_sentences(call: Call) -> None:
 
 def test_json_tells_the_same_facts(call: Call) -> None:
     facts = json.loads(call("show", "grip.yaml", "--json")[1])
-    assert facts["carrier"] == "tree"
+    assert facts["representation"] == "tree"
     assert facts["fingerprint"] == fingerprint(grip())
     assert facts["rules"][0] == {
         "number": 1,
@@ -79,7 +79,7 @@ def test_an_onnx_file_tells_what_it_says_about_itself(call: Call) -> None:
     assert code == 0
     assert out.splitlines()[:5] == [
         "name         grip",
-        "carrier      tree",
+        "representation      tree",
         "kind         descent",
         "dtype        float64",
         f"fingerprint  {fingerprint(grip())}",

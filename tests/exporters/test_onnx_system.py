@@ -91,7 +91,7 @@ def test_hostile_names_become_short_unique_identifiers() -> None:
 def test_an_opened_file_runs() -> None:
     content = write(SYSTEM, outputs=("activations", "outputs", "status")).content
     opened = open_onnx(content, "s.onnx")
-    assert (opened.carrier, opened.names) == ("system", ("y1", "y2"))
+    assert (opened.representation, opened.names) == ("system", ("y1", "y2"))
     rows = random_rows(SYSTEM, 0, 50)
     values = np.array([[row[name] for row in rows] for name in SYSTEM.columns])
     assert opened.run_system is not None

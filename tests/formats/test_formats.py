@@ -196,11 +196,11 @@ def test_a_tree_goes_as_rules_and_rules_as_a_system() -> None:
 def test_a_system_whose_outputs_are_numbers_is_no_rule_base() -> None:
     with pytest.raises(LossError) as caught:
         formed(samples()["Mamdani, centroid"], replace(YAML, carries=("rules",)))
-    carriers = [form.name for form in all_formats() if "system" in form.carries]
+    representations = [form.name for form in all_formats() if "system" in form.carries]
     assert str(caught.value) == (
         "cannot write fan as yaml: it carries rules, "
         "and this is a fuzzy system whose outputs are numbers; "
-        f"{', '.join(carriers)} carry one"
+        f"{', '.join(representations)} carry one"
     )
 
 

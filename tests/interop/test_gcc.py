@@ -307,8 +307,10 @@ def test_compiled_c_answers_the_wine_table_as_native(
     tree = ft.learn(WINE, target="cultivar", entry=entry)
     found = ft.check(tree, data=None, runtimes=["native", "c", "c best-first"])
     assert found.ok
-    carriers = {one.carrier.partition(":")[0] for one in found.comparisons}
-    assert {"c", "c best-first"} <= carriers
+    representations = {
+        one.representation.partition(":")[0] for one in found.comparisons
+    }
+    assert {"c", "c best-first"} <= representations
 
 
 @pytest.mark.heavy

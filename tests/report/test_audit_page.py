@@ -334,13 +334,16 @@ def test_agreement_and_stability_are_on_the_page_where_they_are_given() -> None:
 def test_many_comparisons_that_agree_are_folded_below_those_that_do_not() -> None:
     rules = rule_base()
     alike = tuple(
-        Comparison(f"carrier {k}", "tree", "rows", 9, "agrees") for k in range(13)
+        Comparison(f"representation {k}", "tree", "rows", 9, "agrees")
+        for k in range(13)
     )
     wrong = Comparison("x.onnx", "tree", "rows", 9, "DISAGREES")
     found = page(audit_of(rules), rules, agreement=Agreement("g", "", (*alike, wrong)))
     text = Outline(found).text
     order = ["1 of 14 comparisons disagrees", "x.onnx", "13 comparisons agree"]
-    places = [text.index(said) for said in (*order, "carrier 0", "carrier 12")]
+    places = [
+        text.index(said) for said in (*order, "representation 0", "representation 12")
+    ]
     assert places == sorted(places)
 
 

@@ -149,12 +149,12 @@ def believed(position: int) -> tuple[FloatArray, Outcome]:
 
 
 def run_or_skip(runtime: Runtime, model: Model, values: FloatArray) -> Outcome:
-    """Run a model; skip what a runtime says, by carrier or by error, it cannot run."""
-    carrier = "rules" if isinstance(model, RuleBase) else "tree"
-    if carrier not in runtime.runs:
-        with pytest.raises(ValueError, match=carrier):
+    """Run a model, or skip what the runtime says that it cannot run."""
+    representation = "rules" if isinstance(model, RuleBase) else "tree"
+    if representation not in runtime.runs:
+        with pytest.raises(ValueError, match=representation):
             runtime.load(model)
-        pytest.skip(f"{runtime.name} runs no {carrier}")
+        pytest.skip(f"{runtime.name} runs no {representation}")
     try:
         return runtime.load(model)(values)
     except LossError as error:

@@ -1,4 +1,4 @@
-"""Points joined by lines: what they mean, and that every carrier means the same."""
+"""Points joined by lines, and that they mean the same everywhere."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.places import ModelFile
 from fuzzytree.auditing.findings.records import Settings, Source
 from fuzzytree.auditing.findings.subject import Rows
-from fuzzytree.checking.converting import carrier_of
+from fuzzytree.checking.converting import kind_of
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.yaml.spots import in_system
 from fuzzytree.model.agreement import version
@@ -163,7 +163,7 @@ def difference(
     one, other = (
         Compared(
             model.name,
-            carrier_of(model),
+            kind_of(model),
             fingerprint(model),
             source_of(file.name, file.content) if file else None,
         )

@@ -26,9 +26,9 @@ from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.probes import drawn_in, ends_of, near_strengths
 from fuzzytree.auditing.engine.ranges import clause_ranges
 from fuzzytree.auditing.engine.states import (
-    Carrier,
     Claim,
     Proved,
+    Representation,
     State,
     Witness,
     coordinates,
@@ -329,7 +329,7 @@ def other_decision(
     label: str | None,
     clock: Clock | None = None,
     *,
-    of: Carrier = "rules",
+    of: Representation = "rules",
 ) -> State:
     """Return whether some point of a box is decided otherwise than as a class.
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from fuzzytree.model.rulebase import Value
 
-Carrier = Literal["rules", "tree", "raw rules", "old", "new"]
+Representation = Literal["rules", "tree", "raw rules", "old", "new"]
 """Which model a claim is about: the audited rules, the tree they come from, its raw
 rules, or one of two that are compared."""
 
@@ -56,7 +56,7 @@ class Claim(Value, frozen=True):
     """
 
     kind: ClaimKind
-    of: Carrier = "rules"
+    of: Representation = "rules"
     rules: tuple[int, ...] = ()
     rivals: tuple[int, ...] = ()
     level: str | None = None

@@ -37,5 +37,5 @@ Families, each with `answers(subject)`
       how near to rows
     - `robustness`: how far a row is from another decision
     - `support`: what rows say; shares of the domain
-    - `carriers`, with `conventions`: do all forms and runtimes answer alike
+    - `representations`, with `conventions`: do all forms and runtimes answer alike
 """

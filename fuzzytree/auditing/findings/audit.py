@@ -65,7 +65,7 @@ FAMILIES: Final = (
     Family("overlaps", ("FT403",), 0.2),
     Family("complexity", ("FT501",), 0.2),
     Family("robustness", ("FT204",)),
-    Family("carriers", ("FT601", "FT602"), 1.0),
+    Family("representations", ("FT601", "FT602"), 1.0),
 )
 """In the order in which they are asked: first what is quick and what is grave, so that
 a spent budget costs as little as it can."""
@@ -134,11 +134,11 @@ def audit(
     )
     held = viewed.held
     whole = (viewed.rules, viewed.raw) if held is None else (held.lower,)
-    carriers = [rules for rules in whole if rules is not None]
+    representations = [rules for rules in whole if rules is not None]
     curves = {name: one.key for name, one in held.terms.items()} if held else {}
     answers = tuple(
         _placed(one, viewed, model, file, repeat)
-        for one in with_ids(kept, carriers, curves)
+        for one in with_ids(kept, representations, curves)
     )
     ids = {one.id for one in answers if one.is_finding}
     found = Audit(

@@ -69,7 +69,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         for one in found.certificates:
             subject.clock.check()
             yield from _certified(
-                subject, one, made[one.carrier.rpartition(" in ")[0]], how
+                subject, one, made[one.representation.rpartition(" in ")[0]], how
             )
     yield from conventions.answers(subject)
 
@@ -101,7 +101,7 @@ def agreement(
     Args:
         subject: The model.
         values: Rows beside the probes, shape (inputs, rows).
-        others: Carriers that were shipped with it.
+        others: Representations that were shipped with it.
     """
     if subject.system is not None:
         return check_system(
@@ -139,7 +139,7 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answ
     noun = "probes and rows" if one.basis == "rows" else "ways"
     facts = "; ".join(one.detail[:2])
     sentence = (
-        f"{one.carrier} disagrees with {one.against} in {one.differing} of "
+        f"{one.representation} disagrees with {one.against} in {one.differing} of "
         f"{one.rows} {noun}"
     )
     state: State = Proved(f"both were run or read; {facts}")
@@ -152,7 +152,7 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answ
         state = witness or state
     return Answer(
         "FT601",
-        one.carrier,
+        one.representation,
         f"{sentence}: {facts}" if facts else sentence,
         state,
         is_finding=True,
@@ -166,23 +166,30 @@ def _disagreement(subject: Subject, one: Comparison, values: FloatArray) -> Answ
 
 
 def _form(one: Comparison) -> str:
-    """Return the form of the model that a carrier's title names, after its runtime."""
-    return one.carrier.rpartition(": ")[2]
+    """Return the form of the model that a title names, after its runtime."""
+    return one.representation.rpartition(": ")[2]
 
 
 def _agreeing(basis: Basis, ones: Iterable[Comparison]) -> Answer:
     """Return the answer that sums up comparisons in which nothing differs."""
     ones = [*ones]
-    how = "; ".join(f"{c.carrier} and {c.against}: {c.rows}, {c.origin}" for c in ones)
+    how = "; ".join(
+        f"{c.representation} and {c.against}: {c.rows}, {c.origin}" for c in ones
+    )
     match basis:
         case "rows":
             rows = max(one.rows for one in ones)
-            text = f"{len(ones)} carriers answer alike on up to {rows} probes and rows"
+            count = len(ones)
+            text = (
+                f"{count} representations answer alike on up to {rows} probes and rows"
+            )
         case "calls":
-            text = f"{len(ones)} carriers answer alike however they are called"
+            text = f"{len(ones)} representations answer alike however they are called"
         case _:
-            text = f"{len(ones)} carriers are equal on every input"
-    return Answer("FT601", f"carriers, by {basis}", text, Proved(how), is_finding=False)
+            text = f"{len(ones)} representations are equal on every input"
+    return Answer(
+        "FT601", f"representations, by {basis}", text, Proved(how), is_finding=False
+    )
 
 
 # --- what a number type can change
@@ -192,7 +199,7 @@ def _certified(
     subject: Subject, one: Certified, form: Model, how: str
 ) -> Iterator[Answer]:
     """Yield the bound of a number type's error, and where it leaves a class open."""
-    name = one.carrier
+    name = one.representation
     if one.verdict == "DISAGREES":
         facts = "; ".join(one.detail[:2])
         text = f"{name} errs by more than its certified bound: {facts}"
@@ -220,7 +227,7 @@ def _bounded(bound: Certificate, one: Certified) -> State:
     if bound.delta is not None or not bound.reasons:
         return Proved(origin)
     seen = one.largest or 0.0
-    of = f"the largest error of a strength of {one.carrier}"
+    of = f"the largest error of a strength of {one.representation}"
     return Bracket(of, seen, 1.0, "; ".join(bound.reasons))
 
 

@@ -277,7 +277,7 @@ _CODES = (
     ),
     Code(
         "FT601",
-        "carriers disagree",
+        "representations disagree",
         "error",
         what="The rules and another form of them, such as the ONNX graph, give "
         "different strengths or classes to a row.",

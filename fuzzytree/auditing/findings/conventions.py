@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from fuzzytree.auditing.engine.states import (
-    Carrier,
     Claim,
     Proved,
+    Representation,
     State,
     Witness,
     coordinates,
@@ -177,14 +177,14 @@ def _outside(subject: Subject) -> Iterator[tuple[str, float]]:
 def told(
     subject: Subject, question: Question, found: Sequence[Answers]
 ) -> Iterator[Answer]:
-    """Yield what carriers answer to a question: each that differs, or that none does.
+    """Yield each representation that differs in a question, or that none does.
 
     Args:
         subject: The model.
         question: The question.
-        found: Answers of each carrier; the first of a form is held against the first
-            of all, the others against the first of their form. Raw rules are a model
-            of their own.
+        found: Answers of each representation; the first of a form is held against the
+            first of all, the others against the first of their form. Raw rules are a
+            model of their own.
     """
     count = question.values.shape[1]
     first: dict[str, Answers] = {}
@@ -199,7 +199,9 @@ def told(
             is_alike = False
             yield _broken(subject, question, one, base, rows)
     if is_alike:
-        text = f"{question.name}: {len(found)} carriers answer {count} probes alike"
+        text = (
+            f"{question.name}: {len(found)} representations answer {count} probes alike"
+        )
         if not count:
             text = f"{question.name}: no probe of it was met"
         how = f"each probe was answered by {', '.join(one.title for one in found)}"
@@ -209,7 +211,7 @@ def told(
 
 
 def _differ(one: Answers, base: Answers) -> BoolArray:
-    """Return where two carriers answer another class, or miss a value differently.
+    """Return where two representations differ in class or in a missing value.
 
     A tree does not know ties: between a tree and rules these are no difference.
     """
@@ -261,7 +263,7 @@ def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
     """Ask a system's runtimes where values are missing, infinite or far away.
 
     How an answer came about must be alike, and which outputs have a number. Numbers
-    are compared among the carriers, within what rounding may do to them.
+    are compared among the representations, within what rounding may do to them.
     """
     runs: list[tuple[str, SystemRun]] = []
     for runtime in map(find_runtime, RUNTIMES):
@@ -304,7 +306,9 @@ def told_of_system(
             severity="error",
         )
     if is_alike:
-        text = f"{question.name}: {len(found)} carriers answer {count} probes alike"
+        text = (
+            f"{question.name}: {len(found)} representations answer {count} probes alike"
+        )
         how = f"each probe was answered by {', '.join(name for name, _ in found)}"
         yield Answer("FT602", question.name, text, Proved(how), is_finding=False)
 
@@ -329,7 +333,7 @@ def witness(subject: Subject, form: Model, values: FloatArray) -> Witness | None
     inside &= np.isfinite(values).all(axis=0)
     for row in np.flatnonzero(inside).tolist()[:1]:
         named = dict(zip(form.inputs, values[:, row].tolist(), strict=True))
-        of: Carrier = "rules"
+        of: Representation = "rules"
         if isinstance(form, FuzzyTree):
             of = "tree"
         elif form.kind == "raw" and subject.tree is not None:

@@ -27,7 +27,13 @@ from fuzzytree.auditing.engine.nearest import (
     polytope_of,
 )
 from fuzzytree.auditing.engine.regions import Region, boxes, leaf_at, regions
-from fuzzytree.auditing.engine.states import Carrier, Claim, Proved, State, Witness
+from fuzzytree.auditing.engine.states import (
+    Claim,
+    Proved,
+    Representation,
+    State,
+    Witness,
+)
 from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import RuleBase
@@ -41,7 +47,7 @@ _HALVINGS = 16  # of a radius, to find one within which bounds tell the decision
 class Decider(Protocol):
     """A model that decides, asked exactly."""
 
-    of: Carrier
+    of: Representation
 
     def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
         """Return the answer at a point, and what gave it."""
@@ -75,7 +81,7 @@ class CrispDecider:
         domain: Where it is asked.
     """
 
-    of: Carrier = "tree"
+    of: Representation = "tree"
 
     def __init__(self, tree: FuzzyTree, domain: Domain) -> None:
         self.tree, self.domain = tree, domain
@@ -129,7 +135,7 @@ class RuleDecider:
         subject: The rules as they are audited.
     """
 
-    of: Carrier = "rules"
+    of: Representation = "rules"
 
     def __init__(self, subject: Subject) -> None:
         self.subject = subject

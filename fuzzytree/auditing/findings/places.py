@@ -133,7 +133,7 @@ def places_of(
 
 def with_ids(
     answers: Iterable[Answer],
-    carriers: Sequence[RuleBase],
+    representations: Sequence[RuleBase],
     curves: Mapping[tuple[str, str], object] | None = None,
 ) -> Iterator[Answer]:
     """Yield answers with ids: the code and a hash of what it is about.
@@ -144,15 +144,15 @@ def with_ids(
 
     Args:
         answers: The answers.
-        carriers: The rules that their numbers mean, if there are any; then others
-            whose terms may be concerned as well.
+        representations: The rules that their numbers mean, if there are any; then
+            others whose terms may be concerned as well.
         curves: What terms are in truth whose shape is another.
     """
     shapes: dict[tuple[str, str], object] = {}
-    for carrier in reversed(carriers):
-        shapes |= shapes_of(carrier.variables)
+    for representation in reversed(representations):
+        shapes |= shapes_of(representation.variables)
     shapes |= curves or {}
-    rules = carriers[0].rules if carriers else ()
+    rules = representations[0].rules if representations else ()
     counts: dict[str, int] = {}
     for answer in answers:
         known = [_rule_facts(rules[k - 1], shapes) for k in answer.rules]

@@ -64,7 +64,7 @@ class Case:
         view: A system as it is audited; None for what is none.
         weights: What the strength of each rule is multiplied by.
         terms: The terms that are asked about.
-        carriers: Everything that a claim can be of, by name.
+        representations: Everything that a claim can be of, by name.
         variables: The variables of the model by name.
         sides: The sides of the domain by name.
         is_free: Whether no variable is a combination of others.

@@ -30,14 +30,14 @@ class Ready(msgspec.Struct, frozen=True):
 
     Attributes:
         title: What to call it, such as `onnxruntime float32: raw rules`.
-        carrier: What to call the form.
+        representation: What to call the form.
         runtime: The runtime.
         model: The form.
         loud: Its answers, with whatever warnings it lets out.
     """
 
     title: str
-    carrier: str
+    representation: str
     runtime: Runtime
     model: Model
     loud: Run
@@ -64,15 +64,15 @@ def ready(
         runtimes: The runtimes.
         skipped: Gets a sentence for each that is not installed or cannot.
     """
-    for carrier, form in forms(model).items():
+    for representation, form in forms(model).items():
         for runtime in runtimes:
-            found = made_ready(carrier, form, runtime, skipped)
+            found = made_ready(representation, form, runtime, skipped)
             if found is not None:
                 yield found
 
 
 def made_ready(
-    carrier: str, form: Model, runtime: Runtime, skipped: list[str]
+    representation: str, form: Model, runtime: Runtime, skipped: list[str]
 ) -> Ready | None:
     """Return one form in one runtime; None if that cannot be, with a reason kept."""
     kind = "tree" if isinstance(form, FuzzyTree) else "rules"
@@ -81,13 +81,13 @@ def made_ready(
     if not is_installed(runtime):
         skipped.append(f"{runtime.name} is not installed ({needed_by(runtime)})")
         return None
-    title = f"{runtime.name}: {carrier}"
+    title = f"{runtime.name}: {representation}"
     try:
         run = runtime.load(form)
     except LossError as error:
         skipped.append(f"{title}: {first_line(error)}")
         return None
-    return Ready(title, carrier, runtime, form, run)
+    return Ready(title, representation, runtime, form, run)
 
 
 def answered(one: Ready, values: FloatArray) -> tuple[Outcome, str | None]:

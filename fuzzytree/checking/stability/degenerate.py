@@ -40,12 +40,14 @@ def degenerate(
     faults: list[str] = []
     skipped: list[str] = []
     cases = 0
-    for carrier, form in forms(model).items():
+    for representation, form in forms(model).items():
         question = asked(form, shape=collapsed) if isinstance(form, RuleBase) else None
         if question is None:
             continue
         for runtime in runtimes:
-            one = made_ready(f"{carrier}, collapsed", question.rules, runtime, skipped)
+            one = made_ready(
+                f"{representation}, collapsed", question.rules, runtime, skipped
+            )
             if one is not None:
                 told = held(one, question, skipped)
                 cases += told.cases
@@ -90,13 +92,14 @@ def repeated(alone: Outcome, count: int) -> Outcome:
 
 def _thin_terms(model: Model) -> Iterator[str]:
     """Yield the model's own terms that are as good as made from a single value."""
-    for carrier, form in forms(model).items():
+    for representation, form in forms(model).items():
         for variable in form.variables if isinstance(form, RuleBase) else ():
             for term in variable.terms:
                 ulps = width_in_ulps(term.shape)
                 if ulps < _FEW:
                     yield (
-                        f"{carrier}: {variable.name} is {term.name} changes within "
+                        f"{representation}: {variable.name} is {term.name} changes "
+                        f"within "
                         f"{ulps:.3g} units in the last place, as if from one value"
                     )
 

@@ -35,13 +35,15 @@ def edges(model: Model, runtimes: Sequence[Runtime]) -> Criterion:
     faults: list[str] = []
     skipped: list[str] = []
     cases, worst = 0, 0.0
-    for carrier, form in forms(model).items():
+    for representation, form in forms(model).items():
         question = asked(form) if isinstance(form, RuleBase) else None
         if question is None:
             continue
         exact = _Exact(question)
         for runtime in runtimes:
-            one = made_ready(f"terms of {carrier}", question.rules, runtime, skipped)
+            one = made_ready(
+                f"terms of {representation}", question.rules, runtime, skipped
+            )
             if one is None:
                 continue
             allowed = allowed_errors(one, question.values)

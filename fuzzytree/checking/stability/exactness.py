@@ -42,14 +42,14 @@ def exactness(
     cases = 0
     for one in ready(model, runtimes, skipped):
         rows = one.some(values)
-        key = (one.carrier, rows.shape[1])
+        key = (one.representation, rows.shape[1])
         if key not in exact:
             exact[key] = decide(one.model, rows)
         found = observed(one, rows, exact[key])
         cases += found.rows
         faults += found.faults
         if one.runtime.bound is None:
-            same = (one.carrier, one.runtime.dtype, one.runtime.is_slow)
+            same = (one.representation, one.runtime.dtype, one.runtime.is_slow)
             title, other = first.setdefault(same, (one.title, found.outcome))
             wrong = int(unequal(found.outcome, other).sum())
             if wrong:

@@ -56,23 +56,23 @@ def offsets(
     cases, worst = 0, 0.0
     scales = input_scales(model, data)
     rows = data[:, :: max(-(-data.shape[1] // _DATA), 1)]
-    for carrier, form in forms(model).items():
+    for representation, form in forms(model).items():
         for ratio in RATIOS:
             steps = {name: _step(scale, ratio) for name, scale in scales.items()}
             try:
                 far = moved(form, steps)
             except InvalidModelError as error:
-                skipped.append(f"{carrier} at {ratio:.0e}: {first_line(error)}")
+                skipped.append(f"{representation} at {ratio:.0e}: {first_line(error)}")
                 continue
             away = rows + np.array([[steps[name]] for name in model.inputs])
             values = np.concatenate([probe_values(far, _PROBES), away], axis=1)
-            found = _observed(carrier, far, runtimes, values, skipped, ratio)
+            found = _observed(representation, far, runtimes, values, skipped, ratio)
             cases += sum(one.rows for one, _ in found)
             worst = max([worst, *(one.worst for one, _ in found)])
             for one, _ in found:
                 faults += [f"spread over distance {ratio:.0e}: {f}" for f in one.faults]
-            if ratio in _TOLD and carrier != "tree":
-                costs.append(_cost(carrier, ratio, found, values.shape[1]))
+            if ratio in _TOLD and representation != "tree":
+                costs.append(_cost(representation, ratio, found, values.shape[1]))
     criterion = judged(
         "N2", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped
     )
@@ -87,7 +87,7 @@ def _step(scale: Scale, ratio: float) -> float:
 
 
 def _observed(
-    carrier: str,
+    representation: str,
     form: Model,
     runtimes: Sequence[Runtime],
     values: FloatArray,
@@ -100,7 +100,7 @@ def _observed(
     for runtime in runtimes:
         if runtime.bound is not None:
             continue  # its bound covers points and lines, not its arithmetic at 1e12
-        one = made_ready(carrier, form, runtime, lost)
+        one = made_ready(representation, form, runtime, lost)
         if one is not None:
             some = one.some(values)
             same = exact if some.shape == values.shape else None
@@ -114,14 +114,17 @@ def _observed(
 
 
 def _cost(
-    carrier: str, ratio: float, found: Sequence[tuple[Observed, Dtype]], rows: int
+    representation: str,
+    ratio: float,
+    found: Sequence[tuple[Observed, Dtype]],
+    rows: int,
 ) -> OffsetCost:
     def largest(dtype: Dtype) -> float | None:
         return max((one.largest for one, kind in found if kind == dtype), default=None)
 
     flips = max((one.flips for one, kind in found if kind == "float32"), default=0)
     return OffsetCost(
-        carrier,
+        representation,
         ratio,
         largest("float32"),
         largest("mixed"),

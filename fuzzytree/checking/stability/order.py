@@ -83,7 +83,7 @@ def _renumbered(
         return
     others = [v for v in one.model.variables if v.parts]
     turned = msgspec.structs.replace(one.model, variables=(*reversed(inputs), *others))
-    after = made_ready(one.carrier, turned, one.runtime, [])
+    after = made_ready(one.representation, turned, one.runtime, [])
     if after is not None:
         found = after.run(np.ascontiguousarray(rows[::-1]))
         yield "when the inputs stand in another order", unequal(found, whole)

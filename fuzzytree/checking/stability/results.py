@@ -43,13 +43,13 @@ class Usable(msgspec.Struct, frozen=True):
     """Powers of two by which all inputs can be multiplied without changing an answer.
 
     Attributes:
-        carrier: Which form of the model.
+        representation: Which form of the model.
         dtype: In which number type.
         lowest: The smallest exponent at which every number of the model is normal.
         highest: The largest.
     """
 
-    carrier: str
+    representation: str
     dtype: str
     lowest: int
     highest: int
@@ -59,7 +59,7 @@ class OffsetCost(msgspec.Struct, frozen=True):
     """What a distance from zero costs, for one form of the model.
 
     Attributes:
-        carrier: Which form.
+        representation: Which form.
         ratio: The spread of the narrowest term over the distance, for every input.
         float32: The largest error of a strength in float32; None where float32
             cannot hold the model.
@@ -69,7 +69,7 @@ class OffsetCost(msgspec.Struct, frozen=True):
         rows: How many rows were asked.
     """
 
-    carrier: str
+    representation: str
     ratio: float
     float32: float | None
     mixed: float | None

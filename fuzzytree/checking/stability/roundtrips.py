@@ -49,34 +49,40 @@ def roundtrips(
     skipped: list[str] = []
     cases = 0
     worst = 0.0
-    for carrier, form in forms(model).items():
+    for representation, form in forms(model).items():
         kind = "rules" if isinstance(form, RuleBase) else "tree"
         for one in formats:
             if kind not in one.carries:
                 continue
             try:
-                for count, gap, fault in _tried(one, carrier, form, values, skipped):
+                for count, gap, fault in _tried(
+                    one, representation, form, values, skipped
+                ):
                     cases += count
                     worst = max(worst, gap)
                     faults += [fault] if fault else []
             except (LossError, MissingExtraError) as error:
-                skipped.append(f"{one.name}: {carrier}: {first_line(error)}")
+                skipped.append(f"{one.name}: {representation}: {first_line(error)}")
     return judged("N9", cases, faults, worst=worst, advice=_ADVICE, skipped=skipped)
 
 
 def _tried(
-    one: Format, carrier: str, form: Model, values: FloatArray, skipped: list[str]
+    one: Format,
+    representation: str,
+    form: Model,
+    values: FloatArray,
+    skipped: list[str],
 ) -> Iterator[tuple[int, float, str | None]]:
     """Yield, for each variant, how much was compared, its gap, and its fault."""
     if one.read is not None:
-        yield _read_again(one, carrier, form, values)
+        yield _read_again(one, representation, form, values)
         return
     opener = _OPENERS.get(one.name)
     if opener is None:
         skipped.append(f"{one.name}: there is no way back from it")
         return
     for dtype in _dtypes(one):
-        title = f"{one.name} {dtype}: {carrier}"
+        title = f"{one.name} {dtype}: {representation}"
         # Every writer knows allow_loss; those with number types know dtype as well.
         write = cast("Callable[..., Written]", one.write)
         options: dict[str, object] = {}
@@ -95,9 +101,9 @@ def _tried(
 
 
 def _read_again(
-    one: Format, carrier: str, form: Model, values: FloatArray
+    one: Format, representation: str, form: Model, values: FloatArray
 ) -> tuple[int, float, str | None]:
-    title = f"{one.name}: {carrier}"
+    title = f"{one.name}: {representation}"
     if one.read is None:
         raise ValueError(f"{one.name} is not read")
     content = one.write(form).content

@@ -55,8 +55,8 @@ def scaling(
         if low > high:
             skipped.append(f"{one.title}: its numbers span more than the type does")
             continue
-        key = (one.carrier, one.runtime.dtype)
-        usable[key] = Usable(one.carrier, one.runtime.dtype, low, high)
+        key = (one.representation, one.runtime.dtype)
+        usable[key] = Usable(one.representation, one.runtime.dtype, low, high)
         ks = [k for k in _STEPS if low < k < high]
         # An engine of others divides and multiplies in between as it likes.
         ks += [] if one.runtime.bound is not None else [low, high]
@@ -132,7 +132,7 @@ def _tried(
     except (LossError, InvalidModelError) as error:
         return 1, f"{one.title}, inputs times {said}: {error}"
     lost: list[str] = []
-    after = made_ready(one.carrier, other, one.runtime, lost)
+    after = made_ready(one.representation, other, one.runtime, lost)
     if after is None:
         return 1, f"inputs times {said}: {lost[0]}"
     some = one.some(values)

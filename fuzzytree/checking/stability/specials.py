@@ -88,7 +88,7 @@ def specials(
             if wrong.any():
                 faults.append(f"{one.title}: 0.0 and -0.0 are not answered alike")
         if one.runtime.bound is None:
-            key = (one.carrier, one.runtime.dtype, one.runtime.is_slow)
+            key = (one.representation, one.runtime.dtype, one.runtime.is_slow)
             title, other = first.setdefault(key, (one.title, found))
             faults += _disagreement(one, asked, found, title, other)
     return judged("N6", cases, faults, advice=_ADVICE, skipped=skipped)

@@ -70,7 +70,7 @@ def frames_file(content: bytes, name: str) -> FramesFile:
     """
     proto = parsed(content, name)
     texts = texts_of(proto, name)
-    if texts.get("carrier") != "frames":
+    if texts.get("representation") != "frames":
         raise ReadError(
             f"{name}: the file takes rows, and not frames of a sensor; "
             "`fuzzytree check` asks it"

@@ -75,7 +75,7 @@ def test_every_module_that_asks_is_in_the_table_or_asked_by_one() -> None:
         for path in folder.glob("*.py")
         if re.search(r"^def answers\(subject: Subject\)", path.read_text("utf-8"), re.M)
     }
-    inner = {"conventions"}  # carriers ask it
+    inner = {"conventions"}  # representations ask it
     assert asking - inner == {family.module for family in FAMILIES}
 
 

@@ -184,13 +184,13 @@ def asked(subject: Subject, name: str) -> Question:
 
 
 def answered(
-    subject: Subject, question: Question, carrier: OnnxModel | None
+    subject: Subject, question: Question, representation: OnnxModel | None
 ) -> list[Answer]:
     """Return what the native runtime and a graph answer to a question."""
     native = find_runtime("native").load(subject.rules)(question.values)
     found = [Answers("native: rules", subject.rules, native)]
-    if carrier is not None:
-        outcome = carrier.run(question.values)
+    if representation is not None:
+        outcome = representation.run(question.values)
         found.append(Answers("m.onnx: rules", subject.rules, outcome))
     return [*conventions.told(subject, question, found)]
 

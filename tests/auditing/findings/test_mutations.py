@@ -241,7 +241,7 @@ OF_FORMS = {"FT601", "FT602"}
 
 @functools.cache
 def answers(model: Document) -> tuple[Answer, ...]:
-    """Return what a whole audit, without carriers, answers."""
+    """Return what a whole audit, without representations, answers."""
     data, columns, limits = None, None, {}
     match model:
         case RuleBase(inputs=inputs):

@@ -38,7 +38,7 @@ def test_a_graph_is_checked_and_written(capsys: Said) -> None:
     assert main(words) == 0
     out, err = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[1].split()[:3] == ["carrier", "against", "on"]
+    assert lines[1].split()[:3] == ["representation", "against", "on"]
     assert "4 show nothing" in out  # three are made
     assert "exact arithmetic" in lines[2]
     assert all(line.endswith("agrees") for line in lines[2:8])

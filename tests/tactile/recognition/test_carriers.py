@@ -29,7 +29,7 @@ def test_every_way_gives_the_same_bits_and_classes(sensor: Sensor) -> None:
     tree = learnt_tree(sensor, MIXED)
     found = check_frames_carriers(tree, sensor, aimed_frames(sensor, 40, seed=5))
     assert found.ok
-    pairs = {(one.carrier, one.against) for one in found.comparisons}
+    pairs = {(one.representation, one.against) for one in found.comparisons}
     assert {("plain Python", "exact arithmetic"), ("onnx", "numpy"), ("c", "numpy")} < (
         pairs
     )
@@ -91,7 +91,7 @@ def test_a_bit_that_differs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(carriers, "runners", broken)
     found = check_frames_carriers(tree, SMALL)
     wrong = [one for one in found.comparisons if one.verdict == "DISAGREES"]
-    assert [(one.carrier, one.against, one.differing) for one in wrong[:2]] == [
+    assert [(one.representation, one.against, one.differing) for one in wrong[:2]] == [
         ("onnx", "numpy", 1),
         ("onnx", "plain Python", 1),
     ]

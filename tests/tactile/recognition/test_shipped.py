@@ -87,7 +87,7 @@ def test_a_file_that_takes_rows_is_refused() -> None:
         ("sensor", '{"rows": 0, "columns": 4}', "the file's metadata is broken: "),
         ("outputs", '["state"]', "the graph's inputs and outputs are not those of"),
         ("features", "[" * 3000, "the file's metadata is broken: "),
-        ("carrier", "tree", "the file takes rows, and not frames of a sensor; "),
+        ("representation", "tree", "the file takes rows, and not frames of a sensor; "),
         ("format", "99", "the file has format '99', and this fuzzytree reads"),
     ],
 )
