@@ -16,7 +16,7 @@ import griffe
 
 import fuzzytree
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.limits import LIMITS
+from fuzzytree.auditing.findings.records import LIMITS
 from fuzzytree.cli import program
 from fuzzytree.exporters import all_formats
 from fuzzytree.model.contracts import Runtime

@@ -659,10 +659,10 @@ def audit(
     from fuzzytree.auditing.engine.clock import Clock
     from fuzzytree.auditing.engine.domain import limited
     from fuzzytree.auditing.findings import audit as auditing
+    from fuzzytree.auditing.findings.configuration import check_settings
     from fuzzytree.auditing.findings.domains import domain_of
     from fuzzytree.auditing.findings.records import Settings
     from fuzzytree.auditing.findings.results import with_results
-    from fuzzytree.auditing.findings.selecting import check_settings
     from fuzzytree.auditing.findings.subject import Material
 
     chosen = settings or Settings()
@@ -732,7 +732,7 @@ def material(
         TableError: If a column is absent or holds text, the table has no row, or it
             changes while it is read.
     """
-    from fuzzytree.auditing.findings.places import model_file
+    from fuzzytree.auditing.findings.locations import model_file
     from fuzzytree.auditing.findings.results import read_results
     from fuzzytree.auditing.findings.subject import Material
 
@@ -784,7 +784,7 @@ def _bytes_of(path: str | os.PathLike[str]) -> bytes:
 def _source_of(data: object, name: str | None = None) -> Source | None:
     """Return the name and the hash of a table that is a file, None for another."""
     from fuzzytree.auditing.findings.audit import source_of
-    from fuzzytree.auditing.findings.places import writable
+    from fuzzytree.auditing.findings.locations import writable
     from fuzzytree.auditing.findings.records import Source
 
     if isinstance(data, io.BytesIO):
@@ -905,7 +905,7 @@ def diff(
         refuse_strangers,
     )
     from fuzzytree.auditing.engine.clock import Clock
-    from fuzzytree.auditing.findings.places import ModelFile, model_file
+    from fuzzytree.auditing.findings.locations import ModelFile, model_file
     from fuzzytree.auditing.findings.records import Settings
     from fuzzytree.auditing.findings.subject import Rows
 

@@ -169,7 +169,7 @@ def settings_of(asked: Options, known: Configuration) -> Settings:
     Raises:
         ValueError: If one is out of its range.
     """
-    from fuzzytree.auditing.findings.selecting import changed, check_settings
+    from fuzzytree.auditing.findings.configuration import changed, check_settings
 
     found = changed(known.settings, dict(map(setting, asked.settings)))
     if asked.budget is not None:

@@ -16,8 +16,7 @@ import msgspec
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.findings.limits import LIMITS, digest_of
-from fuzzytree.auditing.findings.records import Audit
+from fuzzytree.auditing.findings.records import LIMITS, Audit, digest_of
 from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.testing import random_tree
 from tests.cli.conftest import Call, grip

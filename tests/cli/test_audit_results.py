@@ -11,7 +11,7 @@ import jsonschema  # type: ignore[import-untyped]  # it has no types of its own
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.findings.limits import digest_of
+from fuzzytree.auditing.findings.records import digest_of
 from fuzzytree.auditing.findings.results import read_results
 from fuzzytree.checking.stability.results import Stability, judged
 from fuzzytree.model.agreement import Agreement, Comparison

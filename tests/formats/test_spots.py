@@ -15,7 +15,7 @@ from pathlib import Path as File
 import pytest
 
 import fuzzytree as ft
-from fuzzytree.auditing.findings.places import model_file, rule_path, term_path
+from fuzzytree.auditing.findings.locations import model_file, rule_path, term_path
 from fuzzytree.auditing.findings.records import Label
 from fuzzytree.checking.converting import format_of, load_content
 from fuzzytree.errors import LossError

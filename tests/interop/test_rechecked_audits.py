@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.places import model_file
+from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import Settings
 from fuzzytree.auditing.recheck import recheck
 from fuzzytree.auditing.recheck.head import digest_of

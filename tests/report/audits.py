@@ -17,8 +17,8 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.auditing.findings.limits import LIMITS, digest_of
 from fuzzytree.auditing.findings.records import (
+    LIMITS,
     Answer,
     Audit,
     Label,
@@ -27,6 +27,7 @@ from fuzzytree.auditing.findings.records import (
     Policy,
     Settings,
     Source,
+    digest_of,
 )
 
 LINES = (

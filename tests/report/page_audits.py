@@ -19,8 +19,8 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     coordinates,
 )
-from fuzzytree.auditing.findings.limits import LIMITS, digest_of
 from fuzzytree.auditing.findings.records import (
+    LIMITS,
     Answer,
     Audit,
     Label,
@@ -29,6 +29,7 @@ from fuzzytree.auditing.findings.records import (
     Policy,
     Settings,
     Source,
+    digest_of,
 )
 from fuzzytree.auditing.findings.subject import Rows
 from fuzzytree.model.rulebase import (

@@ -8,8 +8,7 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.limits import LIMITS
-from fuzzytree.auditing.findings.records import Source
+from fuzzytree.auditing.findings.records import LIMITS, Source
 from fuzzytree.report.audit import (
     MOST_FINDINGS,
     WIDTH,

@@ -1,13 +1,13 @@
-"""What changed between two models, and where they decide otherwise.
+"""What changed between two models, and where they decide differently.
 
 In reading order:
 
-- `difference_records`, `drafting`: a change, and what grades it
-- `matching`: which rule is which, by what it says
-- `structure`, `structure_terms`: what is said otherwise
-- `decisions`: where two models decide otherwise
-- `system_meanings`, `system_bounds`, `system_numbers`: what an output is computed
-  by; its number in fractions, and how far two can be apart; what is known of both
+- `difference_records`: a change, its grade, and the whole difference
+- `matching`: which rule corresponds to which, by content
+- `structure`: changes of rules, classes, variables and terms
+- `decisions`: where two models decide differently
+- `system_keys`, `system_bounds`, `system_numbers`: how a system computes an output; its
+  number in fractions, and how far two can be apart; what is known of both
 - `system_differences`: the same for fuzzy systems
-- `differences`: all of it, of two models
+- `differences`: all of it, for two models
 """

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.diff.drafting import Evidence
+from fuzzytree.auditing.diff.difference_records import Evidence
 from fuzzytree.auditing.diff.matching import have_same_classes
 from fuzzytree.auditing.engine.arrangement import Answered, answer_at, difference_at
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced

@@ -7,15 +7,19 @@ from collections.abc import Mapping, Sequence
 import msgspec
 
 from fuzzytree.auditing.diff.decisions import Pair, all_inputs, decisions, union
-from fuzzytree.auditing.diff.difference_records import Change, Compared, Difference
-from fuzzytree.auditing.diff.drafting import graded
+from fuzzytree.auditing.diff.difference_records import (
+    Change,
+    Compared,
+    Difference,
+    graded,
+)
 from fuzzytree.auditing.diff.structure import drafts
 from fuzzytree.auditing.diff.system_differences import compared
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side, limited
 from fuzzytree.auditing.findings.audit import source_of
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
-from fuzzytree.auditing.findings.places import ModelFile
+from fuzzytree.auditing.findings.locations import ModelFile
 from fuzzytree.auditing.findings.records import Settings, Source
 from fuzzytree.auditing.findings.subject import Rows
 from fuzzytree.checking.converting import kind_of

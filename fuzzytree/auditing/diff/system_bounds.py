@@ -13,7 +13,7 @@ from functools import reduce
 from types import MappingProxyType
 from typing import NoReturn
 
-from fuzzytree.auditing.diff.system_meanings import Entry, entries, facts_of
+from fuzzytree.auditing.diff.system_keys import Entry, entries, facts_of
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.model.system import (
     And,

@@ -20,7 +20,7 @@ import numpy as np
 from fuzzytree.auditing.diff.decisions import portions
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
-from fuzzytree.auditing.diff.system_meanings import computed, meant
+from fuzzytree.auditing.diff.system_keys import computed, meant
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import (

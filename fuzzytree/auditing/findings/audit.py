@@ -8,26 +8,32 @@ import importlib
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import msgspec
 
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, counted
-from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
+from fuzzytree.auditing.findings.configuration import check_settings, chosen_codes
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
-from fuzzytree.auditing.findings.limits import LIMITS, digest_of
-from fuzzytree.auditing.findings.places import ModelFile, places_of, with_ids, writable
+from fuzzytree.auditing.findings.locations import (
+    ModelFile,
+    places_of,
+    with_ids,
+    writable,
+)
 from fuzzytree.auditing.findings.records import (
     INTERRUPTED,
+    LIMITS,
     Answer,
     Audit,
     Policy,
     Settings,
     Source,
+    digest_of,
 )
-from fuzzytree.auditing.findings.selecting import check_settings, chosen_codes
 from fuzzytree.auditing.findings.subject import Rows, Subject
 from fuzzytree.auditing.findings.views import View, view
 from fuzzytree.model.agreement import version
@@ -37,41 +43,6 @@ from fuzzytree.model.tree import FuzzyTree
 
 Asking = Callable[[Subject], Iterator[Answer]]
 
-
-class Family(msgspec.Struct, frozen=True):
-    """Questions that one module of this package asks.
-
-    Attributes:
-        module: Its name; its `answers` yields an answer to each question.
-        codes: Of the questions.
-        part: How much it may take of the time that is left. Who needs less leaves the
-            rest to those behind.
-    """
-
-    module: str
-    codes: tuple[str, ...]
-    part: float = 0.5
-
-
-FAMILIES: Final = (
-    Family("terms", ("FT401", "FT404"), 0.2),
-    Family("support", ("FT701",), 0.2),
-    Family("gaps", ("FT301",), 0.2),
-    Family("deciding", ("FT101", "FT102", "FT103", "FT202")),
-    Family("trees", ("FT101", "FT205")),
-    Family("pairs", ("FT104", "FT105", "FT106", "FT107", "FT201")),
-    Family("disagreement", ("FT203",)),
-    Family("shapes", ("FT402",), 0.2),
-    Family("overlaps", ("FT403",), 0.2),
-    Family("complexity", ("FT501",), 0.2),
-    Family("robustness", ("FT204",)),
-    Family("representations", ("FT601", "FT602"), 1.0),
-)
-"""In the order in which they are asked: first what is quick and what is grave, so that
-a spent budget costs as little as it can."""
-
-ASKED: Final = frozenset(code for family in FAMILIES for code in family.codes)
-"""The codes that an audit asks; the others belong to a comparison, or say why not."""
 
 _OF_A_ROW = "FT204"
 _LATE = "FTD03"
@@ -247,15 +218,16 @@ def _tasks(wanted: set[str], row: Mapping[str, float] | None) -> Iterator[_Task]
     for family in FAMILIES:
         codes = [code for code in family.codes if code in wanted]
         if codes:
-            ask = functools.partial(_answers, family.module)
+            ask = functools.partial(_answers, family.function)
             yield _Task(codes, ask, family.part)
 
 
-def _answers(module: str, subject: Subject) -> Iterator[Answer]:
-    """Return what a family answers; it is imported when it is asked."""
-    found = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
-    # Every module of the table has a function of this type; a test asks each.
-    return cast("Asking", found.answers)(subject)
+def _answers(place: str, subject: Subject) -> Iterator[Answer]:
+    """Return what a function of a family yields; its module is imported here."""
+    module, _, name = place.partition(":")
+    family = importlib.import_module(f"fuzzytree.auditing.findings.{module}")
+    # Every function of the table has this type; a test calls each.
+    return cast("Asking", getattr(family, name))(subject)
 
 
 def _row_answers(row: Mapping[str, float], subject: Subject) -> Iterator[Answer]:
@@ -302,7 +274,7 @@ def _telling(clock: Clock, position: int, count: int) -> Callable[[str, float], 
 def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
     """Yield what was not asked and why, in order of the codes."""
     answered = Counter(one.code for one in asked.answers)
-    for code in sorted(ASKED):
+    for code in sorted(AUDITED):
         name = f"{code} {CODES[code].title}"
         if code not in wanted:
             yield f"{name}: left out by the user"

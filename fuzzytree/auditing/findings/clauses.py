@@ -28,9 +28,8 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import is_within
 from fuzzytree.auditing.findings.records import Answer, Label, Measure
-from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.findings.subject import Subject, Turns
 from fuzzytree.auditing.findings.support import drawn
-from fuzzytree.auditing.findings.turns import Turns
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, clause_text
 from fuzzytree.numerics.oracle import decide
 

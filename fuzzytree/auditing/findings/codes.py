@@ -421,3 +421,40 @@ _CODES = (
 )
 
 CODES: Final = MappingProxyType({code.code: code for code in _CODES})
+
+
+class Family(Value, frozen=True):
+    """Codes that one function of this package answers.
+
+    Attributes:
+        function: The function, as `module:name`; it yields the answers for a subject.
+        codes: The codes.
+        part: The share of the remaining time that it may use; what it leaves goes to
+            the families after it.
+    """
+
+    function: str
+    codes: tuple[str, ...]
+    part: float = 0.5
+
+
+FAMILIES: Final = (
+    Family("terms:answers", ("FT401", "FT404"), 0.2),
+    Family("support:answers", ("FT701",), 0.2),
+    Family("gaps:answers", ("FT301",), 0.2),
+    Family("deciding:answers", ("FT101", "FT102", "FT103", "FT202")),
+    Family("leaves:answers", ("FT101", "FT205")),
+    Family("pairs:answers", ("FT104", "FT105", "FT106", "FT107", "FT201")),
+    Family("disagreement:answers", ("FT203",)),
+    Family("term_shapes:shape_answers", ("FT402",), 0.2),
+    Family("term_shapes:overlap_answers", ("FT403",), 0.2),
+    Family("complexity:answers", ("FT501",), 0.2),
+    Family("robustness:answers", ("FT204",)),
+    Family("representations:answers", ("FT601", "FT602"), 1.0),
+)
+"""In the order of the audit: quick and severe questions first, so that a spent budget
+costs as little as it can."""
+
+AUDITED: Final = frozenset(code for family in FAMILIES for code in family.codes)
+"""The codes that an audit answers; the others belong to `diff`, or are reasons for
+declining."""

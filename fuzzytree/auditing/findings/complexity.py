@@ -16,9 +16,9 @@ from fuzzytree.auditing.engine.polynomials import (
     value_at,
 )
 from fuzzytree.auditing.engine.states import Proved, counted, short
-from fuzzytree.auditing.findings.ranges import Range, measure, ranges
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.findings.terms import Range, measure, ranges
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 

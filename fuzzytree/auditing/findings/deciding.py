@@ -23,9 +23,8 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
-from fuzzytree.auditing.findings.sides import Sides, sides_of
-from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.turns import Turns
+from fuzzytree.auditing.findings.strength_bounds import Sides, sides_of
+from fuzzytree.auditing.findings.subject import Subject, Turns
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.arrangement import BoolArray
@@ -119,7 +118,7 @@ def _winning(
             turns.left_out += 1
             continue
         # A tree's own cuts tell this of its leaves:
-        # `fuzzytree.auditing.findings.trees`.
+        # `fuzzytree.auditing.findings.leaves`.
         if subject.tree is None:
             yield _won(subject, given, number, state)
         if not isinstance(state, Proved | Witness):

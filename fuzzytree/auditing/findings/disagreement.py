@@ -2,27 +2,378 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import NamedTuple
 
-from fuzzytree.auditing.engine.arrangement import Ground, ground, strengths_at
-from fuzzytree.auditing.engine.regions import Region, boxes, regions
+import numpy as np
+
+from fuzzytree.auditing.engine.arrangement import Ground, ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError
+from fuzzytree.auditing.engine.decisions import (
+    Around,
+    columns,
+    decision_at,
+    other_decision,
+)
+from fuzzytree.auditing.engine.domain import Domain
+from fuzzytree.auditing.engine.nearest import NARROW, Nearest, nearest
+from fuzzytree.auditing.engine.regions import Region, boxes, leaf_at, regions
 from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Claim,
+    Declined,
     Proved,
     State,
     Witness,
     answer_text,
+    percent,
     point_of,
 )
-from fuzzytree.auditing.findings.deciders import Both, other_in
-from fuzzytree.auditing.findings.nearby import nearest_difference
-from fuzzytree.auditing.findings.records import Answer
-from fuzzytree.auditing.findings.rows import points_of
+from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.findings.leaves import NOT_LOOKED_AT, too_many
+from fuzzytree.auditing.findings.records import Answer, Measure
+from fuzzytree.auditing.findings.robustness import CrispDecider
+from fuzzytree.auditing.findings.rows import (
+    OF_RANGES,
+    Points,
+    distance_measure,
+    narrowed_state,
+    not_asked,
+    points_of,
+)
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.trees import NOT_LOOKED_AT, too_many
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.numerics.exact import outwards
+from fuzzytree.numerics.oracle import decide
 
-_PART = 0.25  # of the time that is left, for one leaf
+MOST_ROWS = 2000
+"""Rows around which the nearest disagreement is sought."""
+
+_LEAF_PART = 0.25  # of the time that is left, for one leaf
+_PART = 0.9  # of the time, to seek; the rest is for the answers
+_HINTS = 16  # rows from which a point where both differ is sought by doubles
+_CROSSED = 8  # rows whose nearest cut is looked at
+
+
+class Both:
+    """A tree and its raw rules, asked together.
+
+    Args:
+        tree: The tree.
+        raw: Its raw rules.
+        domain: Where they are asked.
+        found: The tree's regions.
+    """
+
+    def __init__(
+        self,
+        tree: FuzzyTree,
+        raw: RuleBase,
+        domain: Domain,
+        found: Sequence[Region],
+    ) -> None:
+        self.tree, self.domain, self.found = tree, domain, found
+        self.given = ground(raw, domain)
+        self.crisp = CrispDecider(tree, domain)
+        self.around = Around(raw, domain)
+
+    def claims(self, point: Mapping[str, Fraction]) -> tuple[Claim, Claim]:
+        """Return what both decide at a point."""
+        label = self.tree.leaves[leaf_at(self.tree, point) - 1].label
+        other = decision_at(self.given, point)
+        return (
+            Claim("decides", of="tree", label=label),
+            Claim("decides", of="raw rules", label=other),
+        )
+
+    def differ(self, point: Mapping[str, Fraction]) -> bool:
+        """Return whether both decide differently at a point of the domain."""
+        one, other = self.claims(point)
+        return one.label != other.label and is_within(self.given, point)
+
+    def ask(self, box: Domain, clock: Clock) -> State:
+        """Return whether both decide differently somewhere in a box."""
+        left_open: State | None = None
+        for region in self.found:
+            inside = [*boxes(region, self.tree, box)]
+            state = other_in(self.given, inside, region.label, clock)
+            if isinstance(state, Witness):
+                return state
+            if not isinstance(state, Proved):
+                left_open = left_open or state
+        return left_open or Proved("all leaves asked")
+
+    def clear_of_cuts(self, point: Mapping[str, Fraction], label: str | None) -> float:
+        """Return a radius within which the tree decides alike, by doubles."""
+        return self.crisp.bound(point, label)
+
+
+def other_in(
+    given: Ground, inside: Sequence[Domain], label: str, clock: Clock
+) -> State:
+    """Return whether raw rules decide somewhere in some boxes otherwise than a class.
+
+    Args:
+        given: The raw rules.
+        inside: The boxes.
+        label: The class.
+        clock: How much time there is.
+    """
+    left_open: State | None = None
+    for box in inside:
+        state = other_decision(narrowed(given, box), label, clock, of="raw rules")
+        if isinstance(state, Witness):
+            tree_too = Claim("decides", of="tree", label=label)
+            return Witness(state.point, (tree_too, *state.claims), state.region)
+        if not isinstance(state, Proved):
+            left_open = left_open or state
+    return left_open or Proved(f"{len(inside)} boxes asked")
+
+
+class _Row(NamedTuple):
+    """A row at which both decide alike: its number, values, class, distance to cuts."""
+
+    number: int
+    point: dict[str, Fraction]
+    label: str | None
+    cut: float
+
+
+def nearest_difference(
+    both: Both,
+    points: Points,
+    clock: Clock,
+    *,
+    known: Sequence[Mapping[str, Fraction]] = (),
+    is_alike: bool = False,
+) -> Iterator[Answer]:
+    """Yield how near to a row a tree and its raw rules differ.
+
+    Rows at which they differ already are counted, and then left aside.
+
+    Args:
+        both: The two.
+        points: The rows.
+        clock: How much time there is.
+        known: Points at which they differ.
+        is_alike: Whether they are known to differ nowhere.
+    """
+    inputs = both.tree.inputs
+    values = columns([point for _, point in points.at], inputs)
+    tree = decide(both.tree, values)
+    raw = decide(both.given.rules, values, with_strengths=False)
+    alike: list[_Row] = []
+    differ: list[Mapping[str, Fraction]] = []
+    for place in np.argsort(raw.margin, kind="stable").tolist():
+        number, point = points.at[place]
+        label = both.tree.leaves[int(tree.rule[place]) - 1].label
+        if label == answer_of(both.given.rules, int(raw.rule[place])):
+            cut = both.clear_of_cuts(point, label)
+            alike.append(_Row(number, point, label, cut))
+        else:
+            differ.append(point)
+    search = _Search(both, alike[:MOST_ROWS], clock)
+    if is_alike:
+        search.settled = set(range(len(search.rows)))
+    else:
+        search.run([*differ, *known])
+    yield _nearest_answer(points, search, len(differ), len(alike))
+    if 0 < len(search.settled) < len(search.rows):
+        yield not_asked("FT203", len(search.rows) - len(search.settled))
+
+
+def answer_of(rules: RuleBase, number: int) -> str | None:
+    """Return what rules answer where a rule wins, by its number; 0 is none."""
+    return rules.rules[number - 1].then if number else rules.semantics.uncovered
+
+
+class _Search:
+    """The nearest disagreement to any of some rows, as far as it is known.
+
+    As long as a ball around a row touches no leaf of another class, both can only
+    differ where the raw rules change their mind; and just beyond the nearest cut they
+    do differ, unless the raw rules change theirs there too. So distances to cuts tell
+    how far to look, and bounds on all balls at once which rows are left.
+    """
+
+    def __init__(self, both: Both, rows: Sequence[_Row], clock: Clock) -> None:
+        self.both, self.rows, self.clock = both, rows, clock
+        self.end = clock.share(_PART)
+        self.settled: set[int] = set()
+        self.place = 0
+        self.low: Fraction | None = None
+        self.best: Nearest | None = None
+        self.claims: tuple[Claim, ...] = ()
+        self.why = ""
+        self.exact: dict[int, Fraction] = {}
+
+    @property
+    def row(self) -> int:
+        """The number of the row that the best one is near to."""
+        return self.rows[self.place].number
+
+    def run(self, seeds: Sequence[Mapping[str, Fraction]]) -> None:
+        """Seek it, first near what may lead to it.
+
+        Args:
+            seeds: Points at which both differ.
+        """
+        try:
+            if self.rows:
+                self._run(seeds)
+        except OutOfTimeError:
+            self.why = self.why or "the budget was spent"
+        if self.best is not None and self.place not in self.settled:
+            self.low = Fraction(0)
+
+    def _run(self, seeds: Sequence[Mapping[str, Fraction]]) -> None:
+        self._cross()
+        hints = self._hints(seeds)
+        far = (np.inf,)
+        order = sorted(
+            range(len(self.rows)),
+            key=lambda place: (place != self.place, hints.get(place, far)[0]),
+        )
+        left = self._left(order)
+        while left and not self.end.is_over:
+            place, row = left[0], self.rows[left[0]]
+            share = len(self.settled) / len(self.rows)
+            self.clock.tell(f"nearest disagreement to row {row.number}", share)
+            found = nearest(
+                self.both.domain,
+                row.point,
+                lambda box: self.both.ask(box, self.end),
+                self.both.differ,
+                self.end,
+                within=None if self.best is None else self.best.high,
+                near=[hints[place][1]] if place in hints else (),
+            )
+            if found.is_none:  # and so for all of them: it was asked on the domain
+                self.settled, self.low = set(range(len(self.rows))), None
+                return
+            before = self.best
+            self._add(place, found)
+            if found.why and not found.is_narrow:
+                self.why = self.why or f"around row {row.number}: {found.why}"
+            left = left[1:] if self.best is before else self._left(left[1:])
+        if left:
+            self.why = self.why or "the budget was spent"
+
+    def _add(self, place: int, found: Nearest) -> None:
+        self._lower(found.low)
+        self.settled.add(place)
+        if found.high is not None and found.point is not None:
+            best = None if self.best is None else self.best.high
+            if best is None or found.high < best:
+                self._keep(place, found)
+
+    def _keep(self, place: int, found: Nearest) -> None:
+        assert found.point is not None  # asked by the caller
+        self.claims = self.both.claims(found.point)
+        self.best, self.place = found, place
+
+    def _lower(self, low: Fraction) -> None:
+        self.low = low if self.low is None else min(self.low, low)
+
+    def _cross(self) -> None:
+        """Look just beyond the nearest cuts."""
+        order = sorted(range(len(self.rows)), key=lambda place: self.rows[place].cut)
+        for place in order[:_CROSSED]:
+            row = self.rows[place]
+            best = None if self.best is None else self.best.high
+            if self.end.is_over or (best is not None and row.cut > best):
+                return
+            found = self.both.crisp.nearest_other(row.point, self.end)
+            if not found.why:
+                self.exact[place] = found.low
+            if found.point is None or found.high is None:
+                continue
+            if self.both.differ(found.point) and (best is None or found.high < best):
+                self._keep(place, found)
+
+    def _hints(
+        self, seeds: Sequence[Mapping[str, Fraction]]
+    ) -> dict[int, tuple[float, dict[str, Fraction]]]:
+        """Return points where both may differ, with their distances, by row."""
+        inputs, around = self.both.tree.inputs, self.both.around
+        hints: dict[int, tuple[float, dict[str, Fraction]]] = {}
+        rows = self.rows[:_HINTS]
+        values = columns([row.point for row in rows], inputs)
+        found, away = around.approached(values, [row.label for row in rows])
+        for place, distance_of in enumerate(away.tolist()):
+            if distance_of < np.inf:
+                moved = map(Fraction, found[:, place].tolist())
+                hints[place] = distance_of, dict(zip(inputs, moved, strict=True))
+        every = columns([row.point for row in self.rows], inputs)
+        nearest_seed = around.pairs(every, columns(seeds, inputs))
+        order = np.argsort([far for _, far in nearest_seed], kind="stable")
+        for place in order[:_HINTS].tolist():
+            seed, far = nearest_seed[place]
+            if far < hints.get(place, (np.inf,))[0]:
+                hints[place] = far, dict(seeds[seed])
+        return hints
+
+    def _left(self, places: Sequence[int]) -> list[int]:
+        """Return the rows around which both may differ nearer than is known."""
+        if self.best is None or self.best.high is None or not places:
+            return list(places)
+        radius = max(self.best.low, self.best.high * (1 - NARROW))
+        rows = [self.rows[place] for place in places]
+        around, reach = self.both.around, outwards(radius)[1]
+        balls = around.ball(columns([r.point for r in rows], around.inputs), reach)
+        clear = around.is_clear(*balls, [row.label for row in rows])
+        left: list[int] = []
+        for place, row, is_clear in zip(places, rows, clear.tolist(), strict=True):
+            if is_clear and max(self.exact.get(place, row.cut), row.cut) >= radius:
+                self.settled.add(place)
+                self._lower(radius)
+            else:
+                left.append(place)
+        return left
+
+
+def _nearest_answer(points: Points, search: _Search, differ: int, alike: int) -> Answer:
+    measures = [Measure("rows that differ already", differ)]
+    measures.append(Measure("rows asked", len(search.settled)))
+    before = f"of {points.text} {differ} differ already"
+    asked = len(search.settled)
+    if not asked:
+        why = "no row of the domain is decided alike by both"
+        if alike:
+            why = "the budget was spent before the first row"
+        declined = Declined("FTD03" if alike else "FTD06", why)
+        text = f"{before}; the nearest disagreement to others is not sought"
+        return Answer("FT203", "rows", text, declined, False, measures=tuple(measures))
+    some = f"{asked} of {alike}" if asked < alike else str(alike)
+    best, low = search.best, search.low or Fraction(0)
+    if best is None or best.point is None or best.high is None:
+        state = _no_nearest(search, low)
+        text = f"{before}; no disagreement is known around {some} others"
+        return Answer("FT203", "rows", text, state, False, measures=tuple(measures))
+    measures.append(distance_measure("certified distance", low))
+    measures.append(distance_measure("distance of the witness", best.high))
+    measures.append(Measure("row", search.row))
+    state = narrowed_state(
+        "the distance of the nearest disagreement", low, best, search.claims, search.why
+    )
+    return Answer(
+        code="FT203",
+        subject="rows",
+        sentence=f"{before}; around {some} others the nearest disagreement is "
+        f"{percent(best.high)} {OF_RANGES} from row {search.row}",
+        state=state,
+        is_finding=False,
+        measures=tuple(measures),
+    )
+
+
+def _no_nearest(search: _Search, low: Fraction) -> State:
+    if search.why:
+        name = "the distance of the nearest disagreement"
+        return Bracket(name, float(low), 1.0, search.why)
+    return Proved("both asked on the whole domain")
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
@@ -74,7 +425,7 @@ def differing(
         )
         inside = [*boxes(region, tree, subject.domain)]
         subject.clock.check()
-        part = subject.clock.share(_PART)
+        part = subject.clock.share(_LEAF_PART)
         state = other_in(given, inside, region.label, part)
         asked += len(inside)
         if isinstance(state, Proved):

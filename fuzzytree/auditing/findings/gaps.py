@@ -17,7 +17,7 @@ from fuzzytree.auditing.engine.domain import Domain, Side, span
 from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
 from fuzzytree.auditing.findings.rows import ranked
-from fuzzytree.auditing.findings.sides import Sides, sides_of
+from fuzzytree.auditing.findings.strength_bounds import Sides, sides_of
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics.exact import outwards
 

@@ -19,10 +19,10 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import coupled
 from fuzzytree.auditing.findings.clauses import clause_answers
-from fuzzytree.auditing.findings.ranges import measure
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
-from fuzzytree.auditing.findings.sides import Sides, sides_of
+from fuzzytree.auditing.findings.strength_bounds import Sides, sides_of
 from fuzzytree.auditing.findings.subject import Subject
+from fuzzytree.auditing.findings.terms import measure
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray

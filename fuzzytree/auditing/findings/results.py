@@ -11,9 +11,8 @@ from typing import NamedTuple
 import msgspec
 from msgspec import inspect
 
-from fuzzytree.auditing.findings.limits import digest_of
-from fuzzytree.auditing.findings.places import writable
-from fuzzytree.auditing.findings.records import Audit, Result, Source
+from fuzzytree.auditing.findings.locations import writable
+from fuzzytree.auditing.findings.records import Audit, Result, Source, digest_of
 from fuzzytree.checking.stability.results import Stability
 from fuzzytree.errors import ReadError
 from fuzzytree.files import PathLike, read_bounded

@@ -5,16 +5,35 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from fuzzytree.auditing.engine.domain import contains, variable_value
-from fuzzytree.auditing.engine.nearest import Nearest
-from fuzzytree.auditing.engine.regions import regions
+import numpy as np
+
+from fuzzytree.auditing.engine.arrangement import ground, narrowed, strengths_at
+from fuzzytree.auditing.engine.clock import Clock
+from fuzzytree.auditing.engine.decisions import (
+    Around,
+    columns,
+    decision_at,
+    other_decision,
+)
+from fuzzytree.auditing.engine.domain import Domain, contains, variable_value
+from fuzzytree.auditing.engine.nearest import (
+    NARROW,
+    Nearest,
+    Polytope,
+    Polytopes,
+    nearest,
+    nearest_box,
+    polytope_of,
+)
+from fuzzytree.auditing.engine.regions import boxes, leaf_at, regions
 from fuzzytree.auditing.engine.states import (
     Bracket,
     Claim,
     Declined,
     Proved,
+    Representation,
     State,
     Witness,
     answer_text,
@@ -22,18 +41,189 @@ from fuzzytree.auditing.engine.states import (
     number_text,
     percent,
 )
-from fuzzytree.auditing.findings.deciders import Decider, decider_of
-from fuzzytree.auditing.findings.nearby import narrowed_state, not_asked
+from fuzzytree.auditing.engine.witnesses import is_within
+from fuzzytree.auditing.findings.leaves import too_many
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.rows import (
     OF_RANGES,
     Points,
     distance_measure,
+    narrowed_state,
+    not_asked,
     points_of,
 )
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.trees import too_many
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.exact import outwards
+
+Point = dict[str, Fraction]
+
+_HALVINGS = 16  # of a radius, to find one within which bounds tell the decision
+
+
+class Decider(Protocol):
+    """A model that decides, asked exactly."""
+
+    of: Representation
+
+    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
+        """Return the answer at a point, and what gave it."""
+        ...
+
+    def leaves_out(self, label: str | None) -> bool:
+        """Return whether another answer may be where strengths only touch a class's."""
+        ...
+
+    def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
+        """Look at points together, before each is asked about."""
+        ...
+
+    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
+        """Return how far the nearest point with another answer is."""
+        ...
+
+
+def decider_of(subject: Subject) -> Decider:
+    """Return a model as it is asked: trees by regions, rules by strengths."""
+    if subject.tree is not None:
+        return CrispDecider(subject.tree, subject.domain)
+    return RuleDecider(subject)
+
+
+class CrispDecider:
+    """A tree, by the regions of its leaves.
+
+    Args:
+        tree: The tree.
+        domain: Where it is asked.
+    """
+
+    of: Representation = "tree"
+
+    def __init__(self, tree: FuzzyTree, domain: Domain) -> None:
+        self.tree, self.domain = tree, domain
+        self.labels: list[str] = []
+        self.boxes: list[Domain] = []
+        parts: list[Polytope] = []
+        variables = {variable.name: variable for variable in tree.variables}
+        for region in regions(tree):
+            for box in boxes(region, tree, domain):
+                self.labels.append(region.label)
+                self.boxes.append(box)
+                parts.append(polytope_of(box, tree.inputs, variables))
+        self.is_plain = not any(variable.parts for variable in tree.variables)
+        self.polytopes = Polytopes(domain, tree.inputs, parts)
+
+    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
+        """Return the class of the leaf that a point reaches, and the leaf."""
+        leaf = leaf_at(self.tree, point)
+        return self.tree.leaves[leaf - 1].label, f"leaf {leaf}"
+
+    def leaves_out(self, label: str | None) -> bool:
+        """Return False: regions are exact, and have no strengths."""
+        del label
+        return False
+
+    def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
+        """Do nothing: regions are known."""
+
+    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
+        """Return how far the nearest region of another class is."""
+        label, _ = self.decided(point)
+        chosen = self._others(label)
+        if self.is_plain:
+            others = [self.boxes[number] for number in chosen]
+            return nearest_box(self.domain, point, others)
+        return self.polytopes.nearest(point, chosen, clock)
+
+    def bound(self, point: Mapping[str, Fraction], label: str | None) -> float:
+        """Return a radius within which no region of another class is, by doubles."""
+        bounds = self.polytopes.bounds(point)
+        return min((bounds[number] for number in self._others(label)), default=np.inf)
+
+    def _others(self, label: str | None) -> list[int]:
+        return [number for number, own in enumerate(self.labels) if own != label]
+
+
+class RuleDecider:
+    """Rules of which the strongest decides.
+
+    Args:
+        subject: The rules as they are audited.
+    """
+
+    of: Representation = "rules"
+
+    def __init__(self, subject: Subject) -> None:
+        self.subject = subject
+        self.given = ground(subject.rules, subject.domain)
+        self.around = Around(subject.rules, subject.domain)
+        self.ahead: dict[tuple[Fraction, ...], tuple[Point, float]] = {}
+
+    def decided(self, point: Mapping[str, Fraction]) -> tuple[str | None, str]:
+        """Return the class of the first of the strongest rules, and the rule."""
+        strengths = strengths_at(self.given, point)
+        best = max(strengths)
+        if not best:
+            return self.subject.rules.semantics.uncovered, "no rule"
+        number = strengths.index(best) + 1
+        label = self.subject.rules.rules[number - 1].then
+        return label, self.subject.rule_name(number)
+
+    def leaves_out(self, label: str | None) -> bool:
+        """Return whether a rule of another class stands before one of a class's.
+
+        It wins where both are equally strong, and that is asked on sets with an
+        interior only.
+        """
+        order = [rule.then == label for rule in self.subject.rules.rules]
+        return any(order) and not all(order[: len(order) - order[::-1].index(True)])
+
+    def look(self, points: Sequence[Mapping[str, Fraction]]) -> None:
+        """Seek points near some others that are decided otherwise, by doubles."""
+        inputs = self.subject.rules.inputs
+        labels = [decision_at(self.given, point) for point in points]
+        found, away = self.around.approached(columns(points, inputs), labels)
+        for place, point in enumerate(points):
+            values = map(Fraction, found[:, place].tolist())
+            other = dict(zip(inputs, values, strict=True))
+            self.ahead[tuple(point[n] for n in inputs)] = other, float(away[place])
+
+    def nearest_other(self, point: Mapping[str, Fraction], clock: Clock) -> Nearest:
+        """Return how far the nearest point is where a rule of another class wins."""
+        label = decision_at(self.given, point)
+        key = tuple(point[name] for name in self.subject.rules.inputs)
+        if key not in self.ahead:
+            self.look([point])
+        other, away = self.ahead[key]
+
+        def is_one(other: Mapping[str, Fraction]) -> bool:
+            return is_within(self.given, other) and (
+                decision_at(self.given, other) != label
+            )
+
+        return nearest(
+            self.subject.domain,
+            point,
+            lambda box: other_decision(narrowed(self.given, box), label, clock),
+            is_one,
+            clock,
+            clear=self._clear(point, label, away),
+            near=[other] if away < np.inf else (),
+        )
+
+    def _clear(
+        self, point: Mapping[str, Fraction], label: str | None, away: float
+    ) -> Fraction | None:
+        """Return a radius within which bounds of doubles tell the decision."""
+        centre = columns([point], self.subject.rules.inputs)
+        top = min(away, 1.0) * (1.0 - float(NARROW))
+        radii = [top * 0.5**number for number in range(_HALVINGS)]
+        balls = [self.around.ball(centre, radius) for radius in radii]
+        low, high = (np.concatenate(ends, axis=1) for ends in zip(*balls, strict=True))
+        clear = self.around.is_clear(low, high, [label] * len(radii))
+        return Fraction(radii[int(clear.argmax())]) if clear.any() else None
+
 
 MOST_ROWS = 50
 """Rows whose radius is sought by strengths."""

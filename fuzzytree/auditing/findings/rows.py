@@ -11,8 +11,17 @@ import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain, Side, contains
 from fuzzytree.auditing.engine.domain import span as ends_on
-from fuzzytree.auditing.engine.nearest import Polytope, Polytopes, polytope_of
-from fuzzytree.auditing.engine.states import Span, Witness, point_of
+from fuzzytree.auditing.engine.nearest import Nearest, Polytope, Polytopes, polytope_of
+from fuzzytree.auditing.engine.states import (
+    Bracket,
+    Claim,
+    Declined,
+    Span,
+    State,
+    Witness,
+    coordinates,
+    point_of,
+)
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Rows, Subject
 from fuzzytree.model.rulebase import Variable
@@ -239,3 +248,31 @@ def box_distance(
         if span.high is not None:
             away = max(away, (x - Fraction(span.high)) / width)
     return away
+
+
+def not_asked(code: str, count: int) -> Answer:
+    """Return an answer that says how many rows the budget left out."""
+    declined = Declined("FTD03", "the budget was spent")
+    text = f"{count} more rows are not asked"
+    return Answer(code, "more rows", text, declined, False)
+
+
+def narrowed_state(
+    name: str, low: Fraction, found: Nearest, claims: Sequence[Claim], why: str
+) -> State:
+    """Return how a distance is known: by a witness, or between two bounds.
+
+    Args:
+        name: What the distance is.
+        low: Its lower bound.
+        found: The search for it, which found a point.
+        claims: What holds at that point.
+        why: Why the bounds are wide, if they are.
+    """
+    assert found.point is not None  # asked by the caller
+    assert found.high is not None
+    point = coordinates(found.point)
+    if msgspec.structs.replace(found, low=low).is_narrow:
+        return Witness(point, tuple(claims))
+    high = outwards(found.high)[1]
+    return Bracket(name, outwards(low)[0], high, why, point, tuple(claims))

@@ -6,8 +6,8 @@ as rules whose classes are the texts of what they conclude. A rule that asks `a 
 or c)` becomes two rules, one for each way in which it can hold: under minimum or
 product, and maximum, its strength is that of the stronger one, exactly. A curve
 without an exact counterpart is held between two lines of points, and a weight is part
-of a rule (`fuzzytree.auditing.findings.held`). What has no place here is left out, and
-an answer says so for each term and each rule.
+of a rule (see `rule_bounds`). What has no place here is left out, and an answer says
+so for each term and each rule.
 
 A view tells how strongly conditions hold, at every double. What outputs make of it,
 their curves and numbers, is not part of it.
@@ -21,17 +21,19 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Declined, Proved
-from fuzzytree.auditing.findings.conditions import (
+from fuzzytree.auditing.findings.records import Answer, Policy
+from fuzzytree.auditing.findings.rule_bounds import Held, held
+from fuzzytree.auditing.findings.system_conditions import (
     MOST_QUESTIONS,
     NORMS,
     Conditions,
     DecliningError,
+    Terms,
     Way,
     decline,
+    ranges_of,
+    terms_of,
 )
-from fuzzytree.auditing.findings.held import Held, held
-from fuzzytree.auditing.findings.records import Answer, Policy
-from fuzzytree.auditing.findings.system_terms import Terms, ranges_of, terms_of
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Conjunction, Rule, RuleBase, Semantics
 from fuzzytree.model.system import (

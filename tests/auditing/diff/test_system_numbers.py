@@ -15,7 +15,7 @@ from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference, joined_domain
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
-from fuzzytree.auditing.diff.system_meanings import computed, meant
+from fuzzytree.auditing.diff.system_keys import computed, meant
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import (
     Bracket,

@@ -18,9 +18,7 @@ from fuzzytree.auditing.engine.states import (
     percent,
     point_of,
 )
-from fuzzytree.auditing.findings.deciders import Both
-from fuzzytree.auditing.findings.disagreement import answers
-from fuzzytree.auditing.findings.nearby import nearest_difference
+from fuzzytree.auditing.findings.disagreement import Both, answers, nearest_difference
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.rows import points_of
 from fuzzytree.auditing.findings.subject import Subject

@@ -1,9 +1,9 @@
 """Each defect is found by a whole audit where it is planted, and gone without it.
 
-Two codes cannot be planted in a model: FT601 and FT602 hold an audit's own forms of
-the model against each other, and these are made of it as it stands. Damaged graphs and
-runtimes are planted in `tests/auditing/findings/test_carriers.py`. FT204, FT205 and
-FT501 are never findings: here the facts that they tell move with the model.
+Two codes cannot be planted in a model: FT601 and FT602 compare an audit's own
+representations of the model, and these are made of it as it stands. Damaged graphs and
+runtimes are planted in `test_representations`. FT204, FT205 and FT501 are never
+findings: their measures change with the model.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 import fuzzytree as ft
 from fuzzytree.auditing.engine.states import Bracket, Proved, Sampled, State, Witness
-from fuzzytree.auditing.findings.audit import ASKED
+from fuzzytree.auditing.findings.codes import AUDITED
 from fuzzytree.auditing.findings.records import Answer, Severity
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
@@ -261,7 +261,7 @@ def asked(model: Document, code: str) -> list[Answer]:
 
 
 def test_every_code_of_an_audit_is_planted_or_said_why_not() -> None:
-    assert {one.code for one in PLANTED} | NEVER_FOUND | OF_FORMS == ASKED
+    assert {one.code for one in PLANTED} | NEVER_FOUND | OF_FORMS == AUDITED
 
 
 @pytest.mark.one_in(3)

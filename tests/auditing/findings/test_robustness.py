@@ -13,9 +13,13 @@ import fuzzytree as ft
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.nearest import distance
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness, point_of
-from fuzzytree.auditing.findings.deciders import decider_of
 from fuzzytree.auditing.findings.records import Answer
-from fuzzytree.auditing.findings.robustness import answers, radius, row_answers
+from fuzzytree.auditing.findings.robustness import (
+    answers,
+    decider_of,
+    radius,
+    row_answers,
+)
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import Conjunction, RuleBase
 from fuzzytree.numerics.exact import exact_answer

@@ -5,8 +5,12 @@ from __future__ import annotations
 import pytest
 
 from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.auditing.findings.configuration import (
+    changed,
+    check_settings,
+    chosen_codes,
+)
 from fuzzytree.auditing.findings.records import Settings
-from fuzzytree.auditing.findings.selecting import changed, check_settings, chosen_codes
 
 
 def test_all_codes_are_asked_unless_some_are_chosen() -> None:

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.findings.conditions import MOST_QUESTIONS, MOST_WAYS
+from fuzzytree.auditing.findings.system_conditions import MOST_QUESTIONS, MOST_WAYS
 from fuzzytree.auditing.findings.views import View, view
 from fuzzytree.model.rulebase import sentence
 from fuzzytree.model.system import (

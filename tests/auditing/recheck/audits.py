@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.places import model_file
+from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.subject import Rows
 from fuzzytree.exporters import yaml
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable

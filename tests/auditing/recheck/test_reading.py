@@ -11,8 +11,7 @@ import pytest
 from fuzzytree.api.verbs import learn
 from fuzzytree.auditing.engine import states
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.limits import LIMITS
-from fuzzytree.auditing.findings.records import Answer, Audit
+from fuzzytree.auditing.findings.records import LIMITS, Answer, Audit
 from fuzzytree.auditing.recheck import (
     CannotRunError,
     audit_records,

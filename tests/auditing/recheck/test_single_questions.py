@@ -15,8 +15,9 @@ import pytest
 
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Proved
-from fuzzytree.auditing.findings.audit import ASKED, audit
-from fuzzytree.auditing.findings.places import model_file
+from fuzzytree.auditing.findings.audit import audit
+from fuzzytree.auditing.findings.codes import AUDITED
+from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.findings.records import Answer, Audit
 from fuzzytree.auditing.recheck import recheck
 from fuzzytree.exporters import yaml
@@ -52,7 +53,7 @@ from fuzzytree.numerics.exact import exact_degree
 
 Numbers = npt.NDArray[np.int64]
 
-CODES = sorted(ASKED - {"FT601", "FT602"})  # these two run programs
+CODES = sorted(AUDITED - {"FT601", "FT602"})  # these two run programs
 """The questions, each of which is selected alone."""
 
 TOP, STEPS = 4, 12  # inputs go from 0 to 4; the grid has 12 places to each number

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.places import model_file
+from fuzzytree.auditing.findings.locations import model_file
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.audit_records import Audit
 from fuzzytree.auditing.recheck.enclosing import NORMS, bounds, hedged

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.turns import Turns
+from fuzzytree.auditing.findings.subject import Turns
 from fuzzytree.model.interrupts import checkpoint
 
 

@@ -6,10 +6,10 @@ import pytest
 
 from fuzzytree.auditing.engine.regions import Region
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness
-from fuzzytree.auditing.findings import trees
+from fuzzytree.auditing.findings import leaves
+from fuzzytree.auditing.findings.leaves import answers, too_many, values_text
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.trees import answers, too_many, values_text
 from fuzzytree.numerics.exact import exact_answer
 from fuzzytree.testing import random_tree
 from tests.auditing.findings.small_trees import one_cut, subject_of, two_cuts
@@ -113,7 +113,7 @@ def test_leaves_of_too_many_boxes_are_declined() -> None:
 def test_many_regions_are_not_told_one_by_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(trees, "MOST_TOLD", 1)
+    monkeypatch.setattr(leaves, "MOST_TOLD", 1)
     told = [*answers(subject_of(two_cuts(0.25)))]
     assert [one.code for one in told] == ["FT205", "FT101", "FT101"]
     assert told[0].state == Declined(

@@ -9,7 +9,7 @@ import pytest
 import fuzzytree as ft
 from fuzzytree.auditing.engine.states import Proved, Span
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.places import (
+from fuzzytree.auditing.findings.locations import (
     ModelFile,
     model_file,
     places_of,

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from fuzzytree.auditing.findings.enclosing import (
+from fuzzytree.auditing.findings.curve_bounds import (
     HALF_GAP,
     Enclosed,
     complement,

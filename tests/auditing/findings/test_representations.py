@@ -16,10 +16,10 @@ from fuzzytree.auditing.engine.states import (
     Witness,
     point_of,
 )
-from fuzzytree.auditing.findings import carriers, conventions
-from fuzzytree.auditing.findings.carriers import agreement, told
+from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.conventions import Question, questions
 from fuzzytree.auditing.findings.records import Answer
+from fuzzytree.auditing.findings.representations import agreement, answers, told
 from fuzzytree.auditing.findings.subject import Rows, Subject
 from fuzzytree.auditing.findings.support import drawn
 from fuzzytree.checking.comparing import Answers
@@ -52,7 +52,7 @@ def findings(subject: Subject, *others: Model | OnnxModel) -> list[Answer]:
 
 
 def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
-    found = [*carriers.answers(subject_of(TREE))]
+    found = [*answers(subject_of(TREE))]
     assert not any(one.is_finding for one in found)
     by_name = {one.subject: one for one in found}
     assert by_name["carriers, by proof"].sentence == (
@@ -89,7 +89,7 @@ def test_shipped_rules_that_part_from_the_model_are_found() -> None:
 
 def test_what_a_number_type_can_change_is_bounded_and_how_often_is_sampled() -> None:
     rows = Rows("grips.csv", np.array([np.linspace(0.0, 4.0, 50)]))
-    found = {one.subject: one for one in carriers.answers(subject_of(RULES, rows))}
+    found = {one.subject: one for one in answers(subject_of(RULES, rows))}
     facts = found["rules in float32"]
     assert facts.sentence.startswith(
         "rules in float32: no decision can differ where the margin exceeds 2 x "
@@ -108,7 +108,7 @@ def test_what_a_number_type_can_change_is_bounded_and_how_often_is_sampled() -> 
 
 
 def test_an_error_without_a_bound_lies_between_what_was_seen_and_1() -> None:
-    found = {o.subject: o for o in carriers.answers(subject_of(random_tree(1)))}
+    found = {o.subject: o for o in answers(subject_of(random_tree(1)))}
     state = found["relative rules in float32"].state
     assert isinstance(state, Bracket)
     assert state.low < state.high == 1.0
@@ -117,7 +117,7 @@ def test_an_error_without_a_bound_lies_between_what_was_seen_and_1() -> None:
 
 def test_many_rows_are_drawn_from_by_the_seed() -> None:
     rows = Rows("grips.csv", np.array([np.linspace(0.0, 4.0, 9000)]))
-    found = {one.subject: one for one in carriers.answers(subject_of(RULES, rows))}
+    found = {one.subject: one for one in answers(subject_of(RULES, rows))}
     band = found["rules in float64, its band"].state
     assert isinstance(band, Sampled)
     assert (band.rows, band.how) == (500, "rows drawn from grips.csv, seed 0")
@@ -143,7 +143,7 @@ def test_raw_rules_that_differ_from_their_tree_by_design_are_no_finding() -> Non
 
 
 def test_a_system_is_compared_in_all_runtimes() -> None:
-    found = [*carriers.answers(subject_of(system_of(block_of(A_LOW))))]
+    found = [*answers(subject_of(system_of(block_of(A_LOW))))]
     assert [one.subject for one in found] == [
         *("carriers, by rows", "carriers, by calls"),
         *("missing values", "infinite values", "far outside"),

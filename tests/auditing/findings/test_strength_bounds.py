@@ -16,9 +16,9 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.held import held
 from fuzzytree.auditing.findings.records import Answer, Settings
-from fuzzytree.auditing.findings.sides import Sides
+from fuzzytree.auditing.findings.rule_bounds import held
+from fuzzytree.auditing.findings.strength_bounds import Sides
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.rulebase import (
     LR,

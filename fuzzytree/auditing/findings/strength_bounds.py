@@ -1,8 +1,7 @@
-"""Questions about rules that are known from below and from above.
+"""Questions about rules whose firing strengths are known between bounds.
 
-What a rule does somewhere is asked of the lower rules, what it never does of the upper
-ones; what neither decides lies between. Rules without a held curve or a weight are the
-same in both, and everything is asked once.
+The lower rules show what a rule does somewhere, the upper ones what it never does; what
+neither decides is a bracket. Without an inexact curve or a weight both are the same.
 
 Where two rules share a clause, its degree v is one number for both. If one rule is
 nowhere weaker than the other with the upper degree u in both, it is so with v <= u too:
@@ -32,7 +31,7 @@ from fuzzytree.auditing.engine.factors import Distance, distance
 from fuzzytree.auditing.engine.joint_maximum import Meeting, highest, meet
 from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
-from fuzzytree.auditing.findings.held import Held
+from fuzzytree.auditing.findings.rule_bounds import Held
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import (
     Clause,
@@ -55,6 +54,7 @@ from fuzzytree.numerics.exact import outwards
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.arrangement import BoolArray
     from fuzzytree.model.contracts import FloatArray
+
 
 _BELOW: Final = "from below: "
 _ROUNDING: Final = 1e-9

@@ -1,13 +1,12 @@
-"""A view's rules with their weights, from below and from above.
+"""Lower and upper rule bases between which the strengths of a view's rules lie.
 
-Every strength lies between those of two rule bases of points: the *lower* one takes
-each curve from below and the *upper* one from above; of a negated clause it is the
-other way round. Both have the same rules, in which a clause may ask a term made for
-it, so that "it does" is asked of the lower one and "it never does" of the upper one.
+The *lower* rule base takes each curve from below and the *upper* one from above; in a
+negated clause it is the other way round. Both have the same rules, in which a clause
+may use a term that exists only for it.
 
 A weight w is part of both. Under the minimum `w min(a, b) = min(w a, w b)`: each clause
-asks its terms times the weight, exactly where every product is a double, and between
-its neighbours otherwise. Under the product, and where a rule asks nothing, a clause is
+uses its terms times the weight, exactly where every product is a double, and between
+its neighbours otherwise. Under the product, and in a rule without clauses, a clause is
 added whose degree is the weight everywhere. (`fuzzytree.semantics.inference` multiplies
 the rounded degree of the condition by the weight, in one rounding more.)
 """
@@ -21,7 +20,7 @@ from fractions import Fraction
 import msgspec
 
 from fuzzytree.auditing.engine.states import Bracket, State, Witness
-from fuzzytree.auditing.findings.enclosing import (
+from fuzzytree.auditing.findings.curve_bounds import (
     Enclosed,
     Name,
     Range,

@@ -1,8 +1,8 @@
-"""Does every form of a model, in every runtime at hand, answer as the model?
+"""Do all representations of a model, in every installed runtime, answer as the model?
 
-Bits are compared on probes that aim at every clause, and on the rows; what a number
-type can change about a decision is certified for all of the domain; and a share of the
-rows, or of drawn points, tells how often that could matter.
+Bits are compared on probes of every clause, and on the rows. A certificate bounds what
+a number type can change on all of the domain, and a share of the rows, or of random
+points, shows how often that could matter.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from fuzzytree.semantics.lowering import forms
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
     from fuzzytree.runtimes.onnxruntime import OnnxModel
+
 
 RUNTIMES: Final = (
     "native",

@@ -1,0 +1,391 @@
+"""Terms and conditions of fuzzy systems as clauses of rules, where that is exact.
+
+A condition becomes *ways*: each way is a number of clauses that are all true, and the
+condition is as true as the best of its ways. Under minimum and maximum, or product and
+maximum, `a and (b or c)` is as strong as the stronger of `a and b` and `a and c`, and 1
+minus the least is the largest of 1 minus each.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Final, Literal, NoReturn
+
+from fuzzytree.auditing.engine.domain import Domain, span
+from fuzzytree.auditing.engine.states import Declined
+from fuzzytree.auditing.findings.curve_bounds import (
+    Enclosed,
+    Name,
+    Range,
+    enclosed,
+    gap,
+    hedged,
+    pointed,
+    scaled,
+)
+from fuzzytree.auditing.findings.records import Answer, Label
+from fuzzytree.model.rulebase import (
+    Clause,
+    Conjunction,
+    Points,
+    Shape,
+    Term,
+    Variable,
+    shape_mistakes,
+)
+from fuzzytree.model.system import (
+    And,
+    Condition,
+    FuzzySystem,
+    Hedge,
+    Is,
+    Not,
+    Or,
+    RuleBlock,
+    SystemInput,
+    questions,
+)
+from fuzzytree.model.system import Label as SystemLabel
+from fuzzytree.semantics.conversion.shapes import shape_of
+
+
+class Terms:
+    """The terms of each input.
+
+    Args:
+        plain: Those with an exact shape, by variable and name.
+        held: Those between two lines.
+        ranges: The values of each input, as far as they are known.
+
+    Attributes:
+        plain: As given.
+        held: As given.
+        made: Hedged terms that conditions ask, by variable and a name of their own.
+    """
+
+    def __init__(
+        self,
+        plain: Mapping[str, Mapping[str, Shape]],
+        held: Mapping[Name, Enclosed] | None = None,
+        ranges: Mapping[str, Range | None] | None = None,
+    ) -> None:
+        self.plain = plain
+        self.held = held or {}
+        self.ranges = ranges or {}
+        self.made: dict[Name, Enclosed] = {}
+
+    def knows(self, variable: str, term: str) -> bool:
+        """Return whether rules can ask a term."""
+        return term in self.plain[variable] or (variable, term) in self.held
+
+    def pointed(self, variable: str, term: str) -> Enclosed | None:
+        """Return a term between lines of points, or as points; None if it has none."""
+        known = {**self.held, **self.made}.get((variable, term))
+        if known is not None:
+            return known
+        return pointed(self.plain[variable][term], self.ranges.get(variable))
+
+    def hedged(self, variable: str, term: str, hedges: Sequence[Hedge]) -> str | None:
+        """Return the name of a hedged term, which rules can then ask.
+
+        Returns:
+            None if there are no lines between which it is.
+        """
+        found = self.pointed(variable, term)
+        for hedge in reversed(hedges):
+            found = found and hedged(found, hedge)
+        if found is None:
+            return None
+        name = " ".join((*hedges, term))
+        while (
+            self.knows(variable, name)
+            or self.made.get((variable, name), found) != found
+        ):
+            name += "'"
+        self.made[variable, name] = found
+        return name
+
+    def variable(self, one: SystemInput) -> Variable:
+        """Return an input as a variable; what is held is there as its lower line."""
+        shapes = {**self.plain[one.name]}
+        for (variable, term), found in {**self.held, **self.made}.items():
+            if variable == one.name:
+                shapes[term] = found.lower
+        terms = tuple(Term(name, shape) for name, shape in shapes.items())
+        return Variable(one.name, terms, one.unit, one.low, one.high, one.parts)
+
+
+def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Range | None]:
+    """Return the values of each input on a domain, None where they are not known."""
+    found: dict[str, Range | None] = {}
+    for one in system.inputs:
+        needed = [part.input for part in one.parts] or [one.name]
+        found[one.name] = None
+        if all(domain.side(name) is not None for name in needed):
+            low, high = span(Variable(one.name, parts=one.parts), domain)
+            found[one.name] = (low, high) if low <= high else None
+    return found
+
+
+def terms_of(
+    system: FuzzySystem, ranges: Mapping[str, Range | None]
+) -> tuple[Terms, tuple[Answer, ...]]:
+    """Return the terms of a system's inputs, and what is to be said of some.
+
+    Args:
+        system: The system.
+        ranges: The values of each input.
+    """
+    plain: dict[str, dict[str, Shape]] = {}
+    held: dict[Name, Enclosed] = {}
+    answers: list[Answer] = []
+    asking = Counter(
+        key
+        for rule in system.rules
+        for key in {(asked.variable, asked.label) for asked in questions(rule.when)}
+    )
+    for one in system.inputs:
+        plain[one.name] = {}
+        for label in one.labels:
+            is_moved = bool(one.parts) and one.clips
+            shape = None if is_moved else _shape(label)
+            if shape is not None:
+                plain[one.name][label.name] = shape
+                continue
+            found = None if is_moved else _between(label, ranges[one.name])
+            if found is not None:
+                held[one.name, label.name] = found
+            count = asking[one.name, label.name]
+            few = {0: "no rule asks", 1: "1 rule asks"}
+            asks = few.get(count, f"{count} rules ask")
+            told = _told(one, label, found, ranges[one.name])
+            answers.append(_answer(one, label, told, f"{asks} for it"))
+    return Terms(plain, held, ranges), tuple(answers)
+
+
+def _shape(label: SystemLabel) -> Shape | None:
+    """Return the exact shape of a term, with its height; None if there is none."""
+    shape = shape_of(label.curve)
+    if shape is None or label.height == 1.0:
+        return None if shape is None or any(shape_mistakes(shape)) else shape
+    if not isinstance(shape, Points):
+        return None
+    found = scaled(Enclosed(shape, shape, (shape,)), label.height)
+    return found.lower if found is not None and found.is_exact else None
+
+
+def _between(label: SystemLabel, of: Range | None) -> Enclosed | None:
+    shape = shape_of(label.curve)
+    if shape is not None and any(shape_mistakes(shape)):
+        return None
+    found = enclosed(label.curve, of)
+    return found and (found if label.height == 1.0 else scaled(found, label.height))
+
+
+def _told(
+    one: SystemInput, label: SystemLabel, found: Enclosed | None, of: Range | None
+) -> tuple[str, str]:
+    """Return what becomes of a term, and why."""
+    kind = str(label.curve.__struct_config__.tag)
+    reason = f"its curve ({kind}) has no exact method"
+    if one.parts and one.clips:
+        reason = "a combination that is moved into a range has no exact method"
+    if found is None:
+        return "is not taken over", reason
+    if of is None and isinstance(found.lower, Points):
+        of = Fraction(found.lower.values[0]), Fraction(found.lower.values[-1])
+    apart = f" {float(gap(found, of)):.2g} apart" if of else ""
+    return (
+        f"is asked between two lines{apart} at most",
+        f"{reason}; its shape and its overlaps are not asked",
+    )
+
+
+def _answer(
+    one: SystemInput, label: SystemLabel, told: tuple[str, str], asks: str
+) -> Answer:
+    name, (what, reason) = f"term {label.name!r} of {one.name!r}", told
+    return Answer(
+        "FTD02",
+        name,
+        f"{name} {what}: {reason}; {asks}",
+        Declined("FTD02", f"{reason}; {asks}"),
+        is_finding=False,
+        terms=(Label(one.name, label.name),),
+    )
+
+
+MOST_WAYS: Final = 64
+"""The most rules that one rule of a system becomes."""
+
+MOST_QUESTIONS: Final = 1_000
+"""The most that a rule may ask."""
+
+NORMS: Mapping[str | None, Conjunction] = {"minimum": "min", "product": "product"}
+"""The norms with an exact method, and what rules of ours call them."""
+
+Way = tuple[Clause, ...]
+"""Clauses that all hold."""
+
+_ALWAYS: tuple[Way, ...] = ((),)
+_NEVER: tuple[Way, ...] = ()
+
+
+class DecliningError(Exception):
+    """A condition has no exact counterpart.
+
+    Attributes:
+        code: Why, as a code of an audit.
+        reason: Why, in a sentence.
+    """
+
+    def __init__(self, code: str, reason: str) -> None:
+        super().__init__(reason)
+        self.code = code
+        self.reason = reason
+
+
+def decline(code: str, reason: str) -> NoReturn:
+    """Raise DecliningError."""
+    raise DecliningError(code, reason)
+
+
+class Conditions:
+    """Makes ways of a block's conditions: each holds as far as the best of them.
+
+    Args:
+        conjunction: The AND of the rules that ways become part of.
+        terms: The terms of each input.
+        block: The block, whose norms join the conditions.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Points
+        >>> line = Points((0.0, 1.0), (0.0, 1.0))
+        >>> terms = Terms({"a": {"high": line}, "b": {"high": line}})
+        >>> made = Conditions("min", terms, RuleBlock(()))
+        >>> len(made.ways(Or((Is("a", "high"), Is("b", "high")))))
+        2
+    """
+
+    def __init__(
+        self, conjunction: Conjunction, terms: Terms, block: RuleBlock
+    ) -> None:
+        self.conjunction = conjunction
+        self.terms = terms
+        self.block = block
+
+    def ways(self, condition: Condition | None, *, negated: bool = False) -> list[Way]:
+        """Return the ways in which a condition holds; none if it never does.
+
+        Args:
+            condition: The condition; None holds always.
+            negated: Whether the ways in which it does not hold are asked for.
+
+        Raises:
+            DecliningError: If it has none that are exact.
+        """
+        match condition:
+            case None:
+                return [*_ALWAYS]
+            case Is():
+                return self._asked(condition, negated=negated)
+            case Not(part=part):
+                return self.ways(part, negated=not negated)
+            case And(parts=(part,)) | Or(parts=(part,)):
+                return self.ways(part, negated=negated)
+            case And(parts=parts):
+                self._check_joint("and", negated=negated)
+                return self._joined(parts, is_union=negated, negated=negated)
+            case Or(parts=parts):
+                whole = self._one_clause(parts, negated=negated)
+                if whole is not None:
+                    return [(whole,)]
+                self._check_joint("or", negated=negated)
+                return self._joined(parts, is_union=not negated, negated=negated)
+
+    def _asked(self, asked: Is, *, negated: bool) -> list[Way]:
+        """Return the only way of a question: a clause, or always, or never."""
+        hedges = asked.hedges
+        while hedges and hedges[0] == "not":
+            negated, hedges = not negated, hedges[1:]
+        if hedges and hedges[0] == "any":
+            return [*(_NEVER if negated else _ALWAYS)]
+        if "any" in hedges:
+            decline("FTD07", f"the hedge {hedges[0]!r} of 'any' has no exact method")
+        if asked.variable not in self.terms.plain:
+            decline("FTD07", f"it asks the output {asked.variable!r}")
+        if asked.label is None or not self.terms.knows(asked.variable, asked.label):
+            name = f"{asked.label!r} of {asked.variable!r}"
+            decline("FTD02", f"the curve of {name} has no exact method")
+        if hedges:
+            made = self.terms.hedged(asked.variable, asked.label, hedges)
+            if made is None:
+                decline("FTD07", f"the hedge {hedges[0]!r} has no exact method")
+            return [(Clause(asked.variable, (made,), negated),)]
+        return [(Clause(asked.variable, (asked.label,), negated),)]
+
+    def _one_clause(
+        self, parts: Sequence[Condition], *, negated: bool
+    ) -> Clause | None:
+        """Return `x is a or b` as one clause, if it is that and a maximum."""
+        asked = [*_plain_questions(parts)]
+        if self.block.disjunction != "maximum" or None in asked:
+            return None
+        ways = [way for one in asked if one for way in self._asked(one, negated=False)]
+        clauses = [way[0] for way in ways]
+        if len({clause.variable for clause in clauses}) > 1:
+            return None
+        terms = dict.fromkeys(term for clause in clauses for term in clause.terms)
+        return Clause(clauses[0].variable, tuple(terms), negated)
+
+    def _check_joint(self, word: Literal["and", "or"], *, negated: bool) -> None:
+        """Raise unless a joint is a minimum, maximum or product where that is exact."""
+        block = self.block
+        norm = block.conjunction if word == "and" else block.disjunction
+        exact = {"and": ("minimum", "product"), "or": ("maximum",)}[word]
+        if norm not in exact:
+            decline("FTD01", f"its {word!r} is the {norm}, which has no exact method")
+        if word == "and" and negated and norm == "product":
+            decline("FTD07", "it negates a product, which has no exact method")
+        if word == "or" and negated and self.conjunction == "product":
+            decline("FTD07", "it negates an 'or' within rules that multiply")
+        if word == "and" and not negated and NORMS[norm] != self.conjunction:
+            text = f"its 'and' is the {norm}, and that of most rules is another"
+            decline("FTD01", text)
+
+    def _joined(
+        self, parts: Sequence[Condition], *, is_union: bool, negated: bool
+    ) -> list[Way]:
+        found = [*(_NEVER if is_union else _ALWAYS)]
+        for part in parts:
+            ways = self.ways(part, negated=negated)
+            count = len(found) + len(ways) if is_union else len(found) * len(ways)
+            if count > MOST_WAYS:
+                decline("FTD05", f"it can hold in more than {MOST_WAYS} ways")
+            if is_union:
+                found += ways
+            else:
+                pairs = itertools.product(found, ways)
+                found = [self._both(one, other) for one, other in pairs]
+            found = [*dict.fromkeys(found)]
+        return found
+
+    def _both(self, one: Way, other: Way) -> Way:
+        """Return clauses of both; a minimum does not change by asking twice."""
+        both = (*one, *other)
+        return tuple(dict.fromkeys(both)) if self.conjunction == "min" else both
+
+
+def _plain_questions(parts: Iterable[Condition]) -> Iterator[Is | None]:
+    """Yield the questions that parts join by or alone; None for anything else."""
+    for part in parts:
+        match part:
+            case Or(parts=inner):
+                yield from _plain_questions(inner)
+            case Is(hedges=(), label=str()):
+                yield part
+            case _:
+                yield None
