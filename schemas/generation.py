@@ -1,6 +1,4 @@
-"""The JSON Schemas of our YAML files, from the records that the reader uses.
-
-Those of what `--json` prints are made by `of_result`: see `fuzzytree.report.schemas`.
+"""The JSON Schemas of YAML files and of what `--json` prints, from their records.
 
 `python -m fuzzytree.schemas.generation` rewrites the files beside this module.
 """
@@ -10,6 +8,8 @@ from __future__ import annotations
 import importlib
 import inspect as python
 import json
+import re
+import typing
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -23,13 +23,23 @@ from fuzzytree.formats.yaml.layout import Record
 
 FILES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "rulebase.schema.json": "fuzzytree.formats.yaml.layout:RuleBaseFile",
-        "tree.schema.json": "fuzzytree.formats.yaml.layout:TreeFile",
-        "system.schema.json": "fuzzytree.formats.yaml.layout:SystemFile",
+        "audit.schema.json": "fuzzytree.auditing.findings.records:Audit",
+        "bench.schema.json": "fuzzytree.benchmarking.records:Study",
         "board.schema.json": "fuzzytree.tactile.board_files.layout:BoardFile",
+        "check.schema.json": "fuzzytree.model.agreement:Agreement",
+        "diff.schema.json": "fuzzytree.auditing.diff.difference_records:Difference",
+        "learn.schema.json": "fuzzytree.api.holdout:Summary",
+        "needs.schema.json": "fuzzytree.benchmarking.savings:Report",
+        "rulebase.schema.json": "fuzzytree.formats.yaml.layout:RuleBaseFile",
+        "stability.schema.json": "fuzzytree.checking.stability.results:Stability",
+        "system.schema.json": "fuzzytree.formats.yaml.layout:SystemFile",
+        "tree.schema.json": "fuzzytree.formats.yaml.layout:TreeFile",
     }
 )
 """Each file's name and the record that it describes, as MODULE:CLASS."""
+
+_DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
+_REFERENCE: Final = re.compile(r"[,;]?\s+(?:\(|see\s+)`fuzzytree\.[\w.]+`\)?")
 
 Json = dict[str, "Json"] | list["Json"] | str | float | int | bool | None
 Definitions = dict[str, Json]
@@ -42,73 +52,75 @@ def generate(name: str) -> bytes:
         >>> json.loads(generate("tree.schema.json"))["title"]
         'A fuzzy decision tree of fuzzytree.'
     """
-    kind = record(FILES[name])
-    if not issubclass(kind, Record):
-        raise TypeError(f"{FILES[name]} is no record of a YAML file")
-    definitions: Definitions = {}
-    _define(kind, definitions)
-    whole = definitions.pop(kind.__name__)
-    head: Definitions = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": python.cleandoc(kind.__doc__ or "").partition("\n")[0],
-    }
-    if isinstance(whole, dict):
-        del whole["description"]
-        head |= whole
-    head["$defs"] = {key: definitions[key] for key in sorted(definitions)}
-    return (json.dumps(head, indent=2, ensure_ascii=False) + "\n").encode()
-
-
-def record(name: str) -> type[msgspec.Struct]:
-    """Return the record that MODULE:CLASS names.
-
-    Example:
-        >>> record("fuzzytree.formats.yaml.layout:TreeFile").__name__
-        'TreeFile'
-    """
-    module, _, kind = name.partition(":")
-    found: type[msgspec.Struct] = getattr(importlib.import_module(module), kind)
-    return found
-
-
-def of_result(kind: type[msgspec.Struct], **added: Json) -> bytes:
-    """Return the JSON Schema (draft 2020-12) of a result as its `to_json` writes it.
-
-    Args:
-        kind: The record: every field of it is always written, and nothing else.
-        added: Schemas of what `to_json` writes beside the fields.
-
-    Example:
-        >>> class Sum(msgspec.Struct):
-        ...     "What two numbers make."
-        ...
-        ...     total: int
-        >>> json.loads(of_result(Sum, ok={"type": "boolean"}))["required"]
-        ['ok', 'total']
-    """
-    found: dict[str, dict[str, Json]] = msgspec.json.schema(kind)["$defs"]
-    for name, one in found.items():
-        properties = one["properties"]
-        own = properties if isinstance(properties, dict) else {}
-        one["properties"] = {**added, **own} if name == kind.__name__ else own
-        one["required"] = [*added, *own] if name == kind.__name__ else [*own]
-        one["additionalProperties"] = False
-        one["description"] = python.cleandoc(str(one["description"]))
-    whole = found.pop(kind.__name__)
-    head: Definitions = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **whole,
-        "title": str(whole["description"]).partition("\n")[0],
-    }
-    if found:
-        head["$defs"] = {name: found[name] for name in sorted(found)}
-    return (json.dumps(head, indent=2, ensure_ascii=False) + "\n").encode()
+    kind = _record(FILES[name])
+    return _text(_of_file(kind)) if issubclass(kind, Record) else of_result(kind)
 
 
 def write_all(folder: Path) -> None:
     """Write every schema into a folder."""
     for name in FILES:
         (folder / name).write_bytes(generate(name))
+
+
+def _record(name: str) -> type[msgspec.Struct]:
+    module, _, kind = name.partition(":")
+    found: type[msgspec.Struct] = getattr(importlib.import_module(module), kind)
+    return found
+
+
+def _of_file(kind: type[Record]) -> Definitions:
+    definitions: Definitions = {}
+    _define(kind, definitions)
+    whole = definitions.pop(kind.__name__)
+    head: Definitions = {
+        "$schema": _DRAFT,
+        "title": python.cleandoc(kind.__doc__ or "").partition("\n")[0],
+    }
+    if isinstance(whole, dict):
+        del whole["description"]
+        head |= whole
+    return {**head, "$defs": {key: definitions[key] for key in sorted(definitions)}}
+
+
+def of_result(kind: type[msgspec.Struct]) -> bytes:
+    """Return the JSON Schema (draft 2020-12) of a result as its `to_json` writes it.
+
+    Args:
+        kind: The record: every field of it is always written, and nothing else.
+    """
+    schemas: dict[str, dict[str, Json]] = msgspec.json.schema(kind)["$defs"]
+    for name, one in schemas.items():
+        properties = one["properties"]
+        own = properties if isinstance(properties, dict) else {}
+        if name == kind.__name__:
+            own = _added(kind) | own
+        one["properties"], one["required"] = own, [*own]
+        one["additionalProperties"] = False
+        text = _REFERENCE.sub("", python.cleandoc(str(one["description"])))
+        one["description"] = text
+    whole = schemas.pop(kind.__name__)
+    title = str(whole["description"]).partition("\n")[0]
+    head: Definitions = {"$schema": _DRAFT, **whole, "title": title}
+    if schemas:
+        head["$defs"] = {name: schemas[name] for name in sorted(schemas)}
+    return _text(head)
+
+
+def _text(schema: Definitions) -> bytes:
+    return (json.dumps(schema, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def _added(kind: type[msgspec.Struct]) -> Definitions:
+    """Return the schemas of what `to_json` writes before the fields of a record."""
+    found: Definitions = {}
+    if constant := getattr(kind, "FORMAT", None):
+        found |= {"format": {"const": constant}, "version": {"type": "string"}}
+    if hasattr(kind, "ok"):
+        found["ok"] = {"type": "boolean"}
+    if isinstance(verdict := getattr(kind, "verdict", None), property):
+        known = typing.get_type_hints(verdict.fget)["return"]
+        found["verdict"] = {"enum": [*typing.get_args(known)]}
+    return found
 
 
 def _define(kind: type[Record], definitions: Definitions) -> None:
@@ -167,20 +179,20 @@ def _schema(kind: inspect.Type, definitions: Definitions) -> Definitions:
         case inspect.VarTupleType():
             item = _schema(kind.item_type, definitions)
             sizes = {"minItems": kind.min_length, "maxItems": kind.max_length}
-            return {"type": "array", "items": item, **_given(sizes)}
+            return {"type": "array", "items": item, **_limits(sizes)}
         case inspect.StrType():
             sizes = {"minLength": kind.min_length, "maxLength": kind.max_length}
             pattern: Definitions = {"pattern": kind.pattern} if kind.pattern else {}
-            return {"type": "string", **_given(sizes), **pattern}
+            return {"type": "string", **_limits(sizes), **pattern}
         case inspect.IntType():
             return {
                 "type": "integer",
-                **_given({"minimum": kind.ge, "maximum": kind.le}),
+                **_limits({"minimum": kind.ge, "maximum": kind.le}),
             }
         case inspect.FloatType():
             return {
                 "type": "number",
-                **_given({"minimum": kind.ge, "maximum": kind.le}),
+                **_limits({"minimum": kind.ge, "maximum": kind.le}),
             }
         case inspect.LiteralType():
             return {"enum": [*kind.values]}
@@ -188,7 +200,7 @@ def _schema(kind: inspect.Type, definitions: Definitions) -> Definitions:
             raise TypeError(f"no rule for {kind}")
 
 
-def _given(limits: Mapping[str, float | None]) -> Definitions:
+def _limits(limits: Mapping[str, float | None]) -> Definitions:
     return {key: limit for key, limit in limits.items() if limit is not None}
 
 
