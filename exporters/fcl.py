@@ -14,9 +14,11 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_checklist import check_list
 from fuzzytree.exporters.fcl_dialects import WORDS, Dialect, Words
-from fuzzytree.exporters.fcl_losses import accu_of, has_accu, losses_of
 from fuzzytree.exporters.fcl_rules import (
+    accu_of,
     block_lines,
+    has_accu,
+    losses_of,
     names_of_rules,
     norm_losses,
     uses,
@@ -29,7 +31,7 @@ from fuzzytree.exporters.fcl_terms import (
     term_text,
     unspeakable,
 )
-from fuzzytree.exporters.fll_rules import speakable
+from fuzzytree.exporters.fll_text import speakable
 from fuzzytree.formats.fcl.fcl_dialects import MARK
 from fuzzytree.formats.fcl.fcl_reader import FACTS, places, read
 from fuzzytree.model.contracts import Format, Loss, Written

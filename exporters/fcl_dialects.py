@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import msgspec
 
-from fuzzytree.exporters.fll_terms import KNOWN
+from fuzzytree.exporters.fll_text import KNOWN
 from fuzzytree.model.system import (
     FUNCTIONS,
     Arc,

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_dialects import Words
-from fuzzytree.exporters.fll_terms import degree_text, number_text, weighted_type
+from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (

@@ -15,11 +15,14 @@ import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.fll_rules import has_not, hedge_losses, rule_text, speakable
-from fuzzytree.exporters.fll_terms import (
+from fuzzytree.exporters.fll_text import (
     KNOWN,
     degree_text,
+    has_not,
+    hedge_losses,
     number_text,
+    rule_text,
+    speakable,
     weighted_type,
 )
 from fuzzytree.formats.fll.fll_differences import differences

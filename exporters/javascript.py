@@ -15,7 +15,8 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Literal, assert_never
 
-from fuzzytree.exporters.js_functions import (
+from fuzzytree.exporters.js_system import system_parts
+from fuzzytree.exporters.js_text import (
     AS_MODULE,
     AS_SCRIPT,
     AXES,
@@ -26,9 +27,11 @@ from fuzzytree.exporters.js_functions import (
     START,
     TEST,
     TREE,
+    filled,
+    literal,
+    table,
+    text_of,
 )
-from fuzzytree.exporters.js_system import system_parts
-from fuzzytree.exporters.js_text import filled, literal, table, text_of
 from fuzzytree.model.contracts import Document, Format, Model, Written
 from fuzzytree.model.rulebase import (
     LR,

@@ -1,17 +1,19 @@
-"""A fuzzy system as JavaScript: its program, straight on, and a self-test."""
+"""A fuzzy system as JavaScript: the statements of its program, and a self-test."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from fuzzytree.exporters.js_steps import Steps
-from fuzzytree.exporters.js_text import literal, table, text_of
+from fuzzytree.exporters.js_text import literal, number_text, table, text_of
 from fuzzytree.model.system import FuzzySystem, SystemInput, SystemOutput
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import Row, system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds
+from fuzzytree.semantics.programs.evaluate import still_results
+from fuzzytree.semantics.programs.operations import OVER_SAMPLES
+from fuzzytree.semantics.programs.steps import Program, Step
 from fuzzytree.semantics.programs.systems import from_system
 
 _EXAMPLES = 64
@@ -96,3 +98,220 @@ def _bounds(system: FuzzySystem, rows: Sequence[Row]) -> list[list[float]]:
     values = lines.reshape(len(program.inputs), len(rows)).astype(np.float64)
     found: list[list[float]] = error_bounds(program, values).T.tolist()
     return [bounds[: len(system.outputs)] for bounds in found]
+
+
+_SIGNS: Mapping[str, str] = {
+    "add": "+",
+    "subtract": "-",
+    "multiply": "*",
+    "divide": "/",
+    "remainder": "%",
+    "less": "<",
+    "at_most": "<=",
+    "equal": "===",
+    "and": "&&",
+    "or": "||",
+}
+
+_LIBRARY: Mapping[str, str] = {
+    "absolute": "Math.abs",
+    "square_root": "Math.sqrt",
+    "exponential": "Math.exp",
+    "logarithm": "Math.log",
+    "logarithm_10": "Math.log10",
+    "logarithm_1p": "Math.log1p",
+    "sine": "Math.sin",
+    "cosine": "Math.cos",
+    "tangent": "Math.tan",
+    "arc_sine": "Math.asin",
+    "arc_cosine": "Math.acos",
+    "arc_tangent": "Math.atan",
+    "hyperbolic_sine": "Math.sinh",
+    "hyperbolic_cosine": "Math.cosh",
+    "hyperbolic_tangent": "Math.tanh",
+    "area_sine": "Math.asinh",
+    "area_cosine": "Math.acosh",
+    "area_tangent": "Math.atanh",
+    "arc_tangent_2": "Math.atan2",
+    "is_finite": "Number.isFinite",
+}
+
+HELPERS: Mapping[str, str] = {
+    "minimum": """
+function minimum(a, b) {
+  return a < b || a !== a ? a : b;
+}
+""",
+    "maximum": """
+function maximum(a, b) {
+  return a > b || a !== a ? a : b;
+}
+""",
+    "floor": """
+/* The largest whole number up to a; never -0. */
+function floor(a) {
+  return Math.floor(a) + 0;
+}
+""",
+    "ceiling": """
+/* The smallest whole number from a on; never -0. */
+function ceiling(a) {
+  return Math.ceil(a) + 0;
+}
+""",
+    "round": """
+/* The nearest whole number, of two equally near ones the even; never -0. */
+function round(a) {
+  const low = Math.floor(a), rest = a - low;
+  if (!(rest >= 0.5)) return Number.isFinite(a) ? low + 0 : a;
+  return rest > 0.5 || low % 2 !== 0 ? low + 1 : low;
+}
+""",
+    "power": """
+/* Powers as in C: of 1 and -1 also to exponents that are infinite or no number. */
+function power(a, b) {
+  if (a === 1 || (a === -1 && Math.abs(b) === Infinity)) return 1;
+  return Math.pow(a, b);
+}
+""",
+    "below": """
+/* How many numbers of a rising table are below a. */
+function below(table, a) {
+  let low = 0, high = table.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (table[middle] < a) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+""",
+    "pick": """
+/* The number of a table at a place, its first one if there is none. */
+function pick(table, place) {
+  return table[place >= 0 && place < table.length ? Math.trunc(place) : 0];
+}
+""",
+    "samples": """
+/* One number for each of many samples. */
+function samples(count, make) {
+  const found = new Float64Array(count);
+  for (let i = 0; i < count; i += 1) found[i] = make(i);
+  return found;
+}
+""",
+    "total": """
+/* The sum by halves: the second half is added to the first until one is left. */
+function total(numbers) {
+  let size = 1;
+  while (size < numbers.length) size *= 2;
+  const sums = new Float64Array(size);
+  sums.set(numbers);
+  while (size > 1) {
+    size /= 2;
+    for (let i = 0; i < size; i += 1) sums[i] += sums[i + size];
+  }
+  return sums[0];
+}
+""",
+    "running": """
+/* The sums of the numbers up to each. */
+function running(numbers) {
+  const sums = Float64Array.from(numbers);
+  for (let i = 1; i < sums.length; i += 1) sums[i] = sums[i - 1] + numbers[i];
+  return sums;
+}
+""",
+    "last": """
+function last(numbers) {
+  return numbers[numbers.length - 1];
+}
+""",
+    "highest": """
+function highest(numbers) {
+  return numbers.reduce((a, b) => maximum(a, b));
+}
+""",
+    "lowest": """
+function lowest(numbers) {
+  return numbers.reduce((a, b) => minimum(a, b));
+}
+""",
+}
+"""Functions that a program may need, by name; `needed` says which."""
+
+_USES = {"highest": "maximum", "lowest": "minimum"}
+
+
+class Steps:
+    """A program as text: first `body`, then `tables` and `needs` are known.
+
+    Attributes:
+        needs: The names of the helpers.
+        tables: The name of each table, by its numbers as text.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.still = still_results(program)
+        self.needs: set[str] = set()
+        self.tables: dict[str, str] = {}
+
+    def body(self) -> Iterator[str]:
+        """Yield a statement for each step that an input enters."""
+        for place, step in enumerate(self.program.steps):
+            if self.still[place] is None:
+                yield f"  const v{place} = {self._made(step)};\n"
+
+    def value(self, place: int) -> str:
+        """Return a step's result as an expression; of samples, the i-th."""
+        found = self.still[place]
+        if found is None:
+            name = f"v{place}"
+        elif isinstance(found, list):
+            name = self._table([float(one) for one in found])
+        elif isinstance(found, bool):
+            return literal(found)
+        else:
+            text = number_text(found)
+            return f"({text})" if text.startswith("-") else text
+        return f"{name}[i]" if self.program.steps[place].samples else name
+
+    def helpers(self) -> Iterator[str]:
+        """Yield the functions that the body needs."""
+        needs = self.needs | {_USES[name] for name in self.needs if name in _USES}
+        yield from (text for name, text in HELPERS.items() if name in needs)
+
+    def _table(self, numbers: list[float]) -> str:
+        return self.tables.setdefault(literal(numbers), f"TABLE_{len(self.tables)}")
+
+    def _made(self, step: Step) -> str:
+        if step.operation in OVER_SAMPLES or step.operation == "running":
+            (argument,) = step.arguments
+            self.needs.add(step.operation)
+            return f"{step.operation}(v{argument})"
+        made = self._expression(step)
+        if not step.samples:
+            return made
+        self.needs.add("samples")
+        return f"samples({step.samples}, (i) => {made})"
+
+    def _expression(self, step: Step) -> str:
+        operation = step.operation
+        given = [self.value(argument) for argument in step.arguments]
+        if operation == "input":
+            return f"x[{self.program.inputs.index(step.name)}]"
+        if operation in _SIGNS:
+            return f"{given[0]} {_SIGNS[operation]} {given[1]}"
+        if operation == "where":
+            return f"{given[0]} ? {given[1]} : {given[2]}"
+        if operation in ("not", "negate"):
+            return f"{'!' if operation == 'not' else '-'}{given[0]}"
+        if operation in _LIBRARY:
+            return f"{_LIBRARY[operation]}({given[0]}" + (
+                f", {given[1]})" if len(given) > 1 else ")"
+            )
+        self.needs.add(operation)
+        if step.table:
+            return f"{operation}({self._table(list(step.table))}, {given[0]})"
+        return f"{operation}({', '.join(given)})"

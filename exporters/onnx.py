@@ -130,7 +130,7 @@ def write(
         return write_system(
             model, opset=opset, ir=ir, outputs=outputs, facts=facts, verify=verify
         )
-    from fuzzytree.exporters.onnx_numbers import NUMBERS
+    from fuzzytree.exporters.onnx_ends import NUMBERS
     from fuzzytree.numerics.narrowing import losses
 
     lost = losses(model, dtype)
@@ -141,7 +141,7 @@ def write(
     )
     content: bytes = made.SerializeToString(deterministic=True)
     if verify:
-        from fuzzytree.exporters.onnx_proof import prove
+        from fuzzytree.exporters.onnx_session import prove
 
         is_exact = dtype == "float64" or (dtype == "mixed" and _is_tree(model))
         prove(
@@ -252,8 +252,8 @@ def _model_proto(
     import numpy as np
     from onnx import TensorProto, helper
 
+    from fuzzytree.exporters.onnx_ends import NUMBERS
     from fuzzytree.exporters.onnx_graph import DOMAIN, TREES, Sheet
-    from fuzzytree.exporters.onnx_numbers import NUMBERS
 
     numbers = NUMBERS[dtype]
     sheet = Sheet(opset, is_readable=readable)
@@ -304,8 +304,8 @@ def _fill(
     plain: bool,
 ) -> None:
     """Add all nodes of a graph to a sheet."""
-    from fuzzytree.exporters import onnx_outputs
-    from fuzzytree.exporters.onnx_numbers import NUMBERS
+    from fuzzytree.exporters import onnx_ends
+    from fuzzytree.exporters.onnx_ends import NUMBERS
 
     numbers = NUMBERS[dtype]
     if isinstance(model, FuzzyTree):
@@ -313,12 +313,12 @@ def _fill(
 
         is_plain = plain or needs_plain(model)
         frame = tree_graph(sheet, model, numbers, columns, is_plain=is_plain)
-        onnx_outputs.add_tree_outputs(sheet, model, frame, outputs, numbers)
+        onnx_ends.add_tree_outputs(sheet, model, frame, outputs, numbers)
     else:
         from fuzzytree.exporters.onnx_rules import rules_graph
 
         frame, strengths = rules_graph(sheet, model, numbers, columns)
-        onnx_outputs.add_rule_outputs(sheet, model, frame, strengths, outputs, numbers)
+        onnx_ends.add_rule_outputs(sheet, model, frame, strengths, outputs, numbers)
 
 
 def _rule_count(model: Model) -> int:

@@ -12,6 +12,8 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
+
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.onnx import write
 from fuzzytree.exporters.onnx_graph import DOMAIN, TREES
@@ -203,3 +205,42 @@ def _short(value: object) -> str:
 def _bytes(message: onnx.NodeProto | onnx.TensorProto) -> bytes:
     content: bytes = message.SerializeToString(deterministic=True)
     return content
+
+
+class Contents(msgspec.Struct, frozen=True):
+    """The size of a graph.
+
+    Attributes:
+        bytes: Of the file.
+        operators: How many nodes there are of each operator, by name.
+        constants: How many constants there are.
+    """
+
+    bytes: int
+    operators: dict[str, int]
+    constants: int
+
+    @property
+    def nodes(self) -> int:
+        """The number of nodes."""
+        return sum(self.operators.values())
+
+
+def contents(content: bytes) -> Contents:
+    """Count what an ONNX file consists of; nodes within functions count once.
+
+    Example:
+        >>> from fuzzytree.exporters.onnx import write
+        >>> from fuzzytree.testing import random_tree
+        >>> written = write(random_tree(1), verify=False).content
+        >>> contents(written).operators["TreeEnsemble"]
+        1
+    """
+    import onnx
+
+    graph = onnx.load_model_from_string(content)
+    bodies = [graph.graph.node, *(function.node for function in graph.functions)]
+    counted = Counter(node.op_type for body in bodies for node in body)
+    return Contents(
+        len(content), dict(sorted(counted.items())), len(graph.graph.initializer)
+    )

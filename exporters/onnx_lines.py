@@ -17,8 +17,8 @@ import msgspec
 import numpy as np
 from onnx import helper
 
+from fuzzytree.exporters.onnx_ends import Numbers
 from fuzzytree.exporters.onnx_graph import Sheet
-from fuzzytree.exporters.onnx_numbers import Numbers
 from fuzzytree.model.rulebase import Points
 from fuzzytree.numerics.segments import Segments, segments
 

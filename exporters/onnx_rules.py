@@ -22,10 +22,9 @@ import msgspec
 import numpy as np
 from onnx import helper
 
-from fuzzytree.exporters.onnx_axes import Axes, axes, column, is_known, scalar
+from fuzzytree.exporters.onnx_ends import Axes, Numbers, axes, column, is_known, scalar
 from fuzzytree.exporters.onnx_graph import Sheet, Table
 from fuzzytree.exporters.onnx_lines import Polyline, is_chained, polylines
-from fuzzytree.exporters.onnx_numbers import Numbers
 from fuzzytree.model.rulebase import (
     LR,
     Clause,

@@ -114,8 +114,7 @@ def _model_proto(
 def _fill(
     sheet: Sheet, system: FuzzySystem, program: Program, outputs: Sequence[Output]
 ) -> None:
-    from fuzzytree.exporters.onnx_steps import add_steps, np_to_onnx
-    from fuzzytree.exporters.onnx_wide import is_wide
+    from fuzzytree.exporters.onnx_steps import add_steps, is_wide, np_to_onnx
 
     count, rules = len(system.outputs), len(system.rules)
     if is_wide(program):
@@ -133,8 +132,7 @@ def _fill(
 def _fill_wide(
     sheet: Sheet, system: FuzzySystem, program: Program, outputs: Sequence[Output]
 ) -> None:
-    from fuzzytree.exporters.onnx_steps import np_to_onnx
-    from fuzzytree.exporters.onnx_wide import Blocks
+    from fuzzytree.exporters.onnx_steps import Blocks, np_to_onnx
 
     blocks = Blocks(sheet, program, system.columns)
     places = [result.step for result in program.results]
@@ -196,7 +194,7 @@ def _facts(
 
 def _rows_at_once(system: FuzzySystem, program: Program) -> int:
     """Return how many rows are best run together, so that they stay in the cache."""
-    from fuzzytree.exporters.onnx_wide import is_wide
+    from fuzzytree.exporters.onnx_steps import is_wide
 
     samples = [
         one.defuzzifier.samples

@@ -14,9 +14,8 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
-from fuzzytree.exporters.onnx_axes import Axes, axes, flat_guard, is_known
+from fuzzytree.exporters.onnx_ends import Axes, Numbers, axes, flat_guard, is_known
 from fuzzytree.exporters.onnx_graph import TREES, Constant, Sheet
-from fuzzytree.exporters.onnx_numbers import Numbers
 from fuzzytree.model.tree import FuzzyTree, Node
 from fuzzytree.numerics.narrowing import rounded
 

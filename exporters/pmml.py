@@ -17,18 +17,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from fuzzytree.exporters.pmml_shapes import Functions, norm_continuous
-from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
-from fuzzytree.exporters.pmml_xml import (
+from fuzzytree.exporters.pmml_elements import (
     Element,
+    Functions,
     apply,
     constant,
     derived,
     element,
     joined,
+    norm_continuous,
     ref,
     text_of,
 )
+from fuzzytree.exporters.pmml_system import MOST_FIELDS, SystemFields
 from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.model.losses import refusal
 from fuzzytree.model.naming import unlike

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Mapping
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.pmml_xml import Element, apply, constant, element, ref
+from fuzzytree.exporters.pmml_elements import Element, apply, constant, element, ref
 from fuzzytree.model.naming import unlike
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.programs.operations import (

@@ -11,8 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, get_args
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.sql_degrees import Degrees
-from fuzzytree.exporters.sql_dialects import Query
+from fuzzytree.exporters.sql_expressions import Degrees, Query
 from fuzzytree.model.contracts import Format, Model, Written
 from fuzzytree.model.rulebase import Clause, RuleBase, fingerprint, sentence, shapes_of
 from fuzzytree.model.tree import FuzzyTree, Node

@@ -11,9 +11,17 @@ from collections.abc import Iterator
 from typing import Final
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.yaml_parts import named_shape, numbers, range_ends, summand
 from fuzzytree.exporters.yaml_system import entries_of, losses_of
-from fuzzytree.exporters.yaml_text import Entry, Noted, Short, joined
+from fuzzytree.exporters.yaml_text import (
+    Entry,
+    Noted,
+    Short,
+    joined,
+    named_shape,
+    numbers,
+    range_ends,
+    summand,
+)
 from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml import layout
 from fuzzytree.formats.yaml.clauses import Vocabulary, readings, vocabulary_of

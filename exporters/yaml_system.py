@@ -6,8 +6,15 @@ import math
 from collections.abc import Iterator
 from typing import assert_never
 
-from fuzzytree.exporters.yaml_parts import named_shape, numbers, range_ends, summand
-from fuzzytree.exporters.yaml_text import Entry, Noted, Short
+from fuzzytree.exporters.yaml_text import (
+    Entry,
+    Noted,
+    Short,
+    named_shape,
+    numbers,
+    range_ends,
+    summand,
+)
 from fuzzytree.formats.formulas import FormulaError, parse, text_of
 from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.formats.yaml import layout

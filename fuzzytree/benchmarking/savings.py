@@ -19,7 +19,7 @@ from fuzzytree.checking.dependencies import DTYPES, Needs, needs, prove
 from fuzzytree.errors import FuzzyTreeError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format
 from fuzzytree.exporters.onnx import write as write_onnx
-from fuzzytree.exporters.onnx_contents import contents
+from fuzzytree.exporters.onnx_compare import contents
 from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import Variable, summary

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.c import FORMAT, write
-from fuzzytree.exporters.c_axes import lines_of
-from fuzzytree.exporters.c_examples import digest_of
-from fuzzytree.exporters.c_expected import axis_values, leaf, strengths
+from fuzzytree.exporters.c import FORMAT, lines_of, write
+from fuzzytree.exporters.c_selftest import axis_values, digest_of, leaf, strengths
 from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark

@@ -17,7 +17,7 @@ import onnxruntime
 import pytest
 
 from fuzzytree.errors import DisagreementError, LossError, MissingExtraError
-from fuzzytree.exporters import find_format, onnx_outputs
+from fuzzytree.exporters import find_format, onnx_ends
 from fuzzytree.exporters.onnx import FORMAT, IRS, OPSETS, Output, write
 from fuzzytree.exporters.onnx_graph import Sheet
 from fuzzytree.model.contracts import Dtype, Model
@@ -421,7 +421,7 @@ def test_a_file_with_another_answer_is_not_written(
     def wrong(sheet: Sheet, inputs: list[str], named: str) -> str:
         return sheet.node("ArgMin", inputs[0], axis=0, keepdims=0, named=named)
 
-    monkeypatch.setattr(onnx_outputs, "_winner", wrong)
+    monkeypatch.setattr(onnx_ends, "_winner", wrong)
     with pytest.raises(DisagreementError) as caught:
         write(lr_rules())
     assert str(caught.value) == (

@@ -11,11 +11,10 @@ import pytest
 
 from fuzzytree.checking.converting import read
 from fuzzytree.errors import DisagreementError, LossError, ReadError
-from fuzzytree.exporters import onnx_steps, onnx_wide
+from fuzzytree.exporters import onnx_steps
 from fuzzytree.exporters.onnx import OPSETS, Output, write
-from fuzzytree.exporters.onnx_compare import differences
-from fuzzytree.exporters.onnx_contents import contents
-from fuzzytree.exporters.onnx_wide import is_wide
+from fuzzytree.exporters.onnx_compare import contents, differences
+from fuzzytree.exporters.onnx_steps import is_wide
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.system import (
     And,
@@ -261,6 +260,6 @@ def test_wide_nodes_give_the_answers_of_single_ones(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     system = random_system(seed, formulas="none")
-    monkeypatch.setattr(onnx_wide, "MOST_SINGLE", 0)
-    monkeypatch.setattr(onnx_wide, "_SHORTEST_CHAIN", 3)
+    monkeypatch.setattr(onnx_steps, "MOST_SINGLE", 0)
+    monkeypatch.setattr(onnx_steps, "_SHORTEST_CHAIN", 3)
     write(system, outputs=ALL)  # it is verified

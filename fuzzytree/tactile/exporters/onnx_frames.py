@@ -31,7 +31,7 @@ from fuzzytree.tactile.sensor import Sensor, offsets
 if TYPE_CHECKING:
     import onnx
 
-    from fuzzytree.exporters.onnx_axes import Axes
+    from fuzzytree.exporters.onnx_ends import Axes
     from fuzzytree.exporters.onnx_graph import Sheet
 
 Output = Literal["label", "state", "rule", "features", "strengths"]
@@ -236,8 +236,7 @@ def _fill(
     plain: bool,
 ) -> None:
     """Add all nodes of a graph to a sheet."""
-    from fuzzytree.exporters.onnx_axes import is_known, scalar
-    from fuzzytree.exporters.onnx_numbers import NUMBERS
+    from fuzzytree.exporters.onnx_ends import NUMBERS, is_known, scalar
     from fuzzytree.exporters.onnx_steps import add_steps
 
     with sheet.about("sums"):
@@ -260,7 +259,7 @@ def _fill(
             sheet, model, numbers, model.inputs, is_plain=is_plain, named="winner"
         )
     else:
-        from fuzzytree.exporters.onnx_outputs import add_winner
+        from fuzzytree.exporters.onnx_ends import add_winner
         from fuzzytree.exporters.onnx_rules import rules_graph
 
         axes, strengths = rules_graph(sheet, model, numbers, model.inputs)
@@ -279,7 +278,7 @@ def _fill(
 
 def _sums(sheet: Sheet, made: FrameProgram) -> list[str]:
     """Add the sums as the sheet's source, shape (frames, sums); return their names."""
-    from fuzzytree.exporters.onnx_axes import scalar
+    from fuzzytree.exporters.onnx_ends import scalar
     from fuzzytree.exporters.onnx_steps import np_to_onnx
 
     sensor = made.sensor
@@ -354,8 +353,7 @@ def _flat(sheet: Sheet, truth: str) -> str:
 
 def _is_answer(sheet: Sheet, model: Model, axes: Axes) -> str:
     """Return whether the model knows an answer to the features."""
-    from fuzzytree.exporters.onnx_axes import is_known
-    from fuzzytree.exporters.onnx_numbers import NUMBERS
+    from fuzzytree.exporters.onnx_ends import NUMBERS, is_known
 
     semantics = model.semantics
     if isinstance(model, RuleBase) and semantics.uncovered is not None:
@@ -365,7 +363,7 @@ def _is_answer(sheet: Sheet, model: Model, axes: Axes) -> str:
 
 def _is_strong(sheet: Sheet, strengths: str, reject: float) -> str:
     """Return whether the rule that decides is as strong as the floor, or is none."""
-    from fuzzytree.exporters.onnx_axes import scalar
+    from fuzzytree.exporters.onnx_ends import scalar
     from fuzzytree.exporters.onnx_steps import reduced
 
     with sheet.about("strongest"):
@@ -404,7 +402,7 @@ def _ends(
 
 def _all_strengths(sheet: Sheet, model: Model, strengths: str, finite: str) -> None:
     """Add the strengths of all rules, 0 where nothing presses."""
-    from fuzzytree.exporters.onnx_axes import scalar
+    from fuzzytree.exporters.onnx_ends import scalar
 
     count = len(model.rules) if isinstance(model, RuleBase) else 0
     ends = [sheet.numbers([end], "end") for end in (1, 1 + count)]
