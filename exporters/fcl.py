@@ -5,10 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Final
+from collections.abc import Iterable, Iterator
 
-import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
@@ -32,11 +30,12 @@ from fuzzytree.exporters.fcl_terms import (
     unspeakable,
 )
 from fuzzytree.exporters.fll_text import speakable
+from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
 from fuzzytree.formats.fcl.fcl_dialects import MARK
 from fuzzytree.formats.fcl.fcl_reader import FACTS, places, read
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import Names, changes_text
+from fuzzytree.model.naming import Names
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem, Or, SystemInput, SystemOutput
 from fuzzytree.semantics.conversion import (
@@ -52,8 +51,6 @@ from fuzzytree.semantics.conversion import (
 from fuzzytree.semantics.conversion.scores import Always
 
 __all__ = ["FORMAT", "check_list", "write"]
-
-_TITLE: Final = "Written by fuzzytree."
 
 
 def write(
@@ -128,7 +125,7 @@ def write(
     comments = [one for one in (MARK + dialect, facts) if one]
     if checklist:
         comments += [f" {line}" for line in check_list(system).splitlines()]
-    comments.append(f" {_TITLE}")
+    comments.append(f" {TITLE}")
     lines = [*(_comment(one, words) for one in comments), *_text(system, names, words)]
     remarks += _remarks(system, names, words)
     text = "\n".join(lines) + "\n"
@@ -149,29 +146,14 @@ def _comment(text: str, words: Words) -> str:
     return f"//{text}"
 
 
-class _Names(msgspec.Struct, frozen=True):
-    """The names in a file: of variables, blocks, and of the labels of each variable."""
+class _FclNames(FileNames, frozen=True):
+    """The names in a file, with those of its function block and blocks of rules."""
 
-    system: str
-    variables: Names
-    labels: Mapping[str, Names]
-    blocks: tuple[str, ...]
-
-    def speak(self, variable: str, label: str | None) -> tuple[str, str]:
-        """Return the words for a variable and one of its labels."""
-        term = "any" if label is None else self.labels[variable][label]
-        return self.variables[variable], term
-
-    def changed(self) -> dict[str, str]:
-        """Return the names that are others in the file."""
-        found: dict[str, str] = {}
-        for names in self.labels.values():
-            found.update(names.changed)
-        variables = self.variables.changed
-        return {**variables, **found, **variables}
+    title: str = ""
+    blocks: tuple[str, ...] = ()
 
 
-def _naming(system: FuzzySystem, words: Words) -> _Names:
+def _naming(system: FuzzySystem, words: Words) -> _FclNames:
     def named(names: list[str], taken: Iterable[str] = ()) -> Names:
         return Names.of(
             names,
@@ -183,8 +165,8 @@ def _naming(system: FuzzySystem, words: Words) -> _Names:
 
     blocks = [one.name or f"block_{k}" for k, one in enumerate(system.blocks, 1)]
     variables = named([one.name for one in system.variables])
-    return _Names(
-        system=named([system.name], variables.accepted.values())[system.name],
+    return _FclNames(
+        title=named([system.name], variables.accepted.values())[system.name],
         variables=variables,
         labels={
             one.name: named([label.name for label in one.labels])
@@ -229,15 +211,13 @@ def _refused(system: FuzzySystem, words: Words) -> FuzzySystem:
                 reasons.append(f"rule block {k}: {error}")
     if any(rule.when is None for rule in system.rules) and not system.inputs:
         reasons.append("a rule without a condition needs an input that it can ask")
-    if reasons:
-        listed = "\n".join(f"  {one}" for one in reasons)
-        raise LossError(f"cannot write {system.name} as fcl:\n{listed}")
+    refuse(system.name, "fcl", reasons)
     return replace(system, blocks=tuple(blocks))
 
 
-def _text(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
+def _text(system: FuzzySystem, names: _FclNames, words: Words) -> Iterator[str]:
     """Yield the lines of a file."""
-    yield f"FUNCTION_BLOCK {names.system}"
+    yield f"FUNCTION_BLOCK {names.title}"
     yield "VAR_INPUT"
     for one in system.inputs:
         yield f"  {names.variables[one.name]} : REAL;"
@@ -263,7 +243,7 @@ def _text(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
         outputs = {one.output for rule in block.rules for one in rule.then}
         norm = accu_of(system, outputs, words) if has_accu(words) else None
         accu = "" if norm is None else words.accus[norm]
-        yield from block_lines(block, name, words, names.speak, always, accu)
+        yield from block_lines(block, name, words, names.words, always, accu)
     yield "END_FUNCTION_BLOCK"
 
 
@@ -278,7 +258,7 @@ def _range(variable: SystemInput | SystemOutput, words: Words) -> Iterator[str]:
 
 
 def _terms(
-    variable: SystemInput | SystemOutput, names: _Names, words: Words
+    variable: SystemInput | SystemOutput, names: _FclNames, words: Words
 ) -> Iterator[str]:
     for label in variable.labels:
         name = names.labels[variable.name][label.name]
@@ -286,7 +266,7 @@ def _terms(
         yield f"  TERM {name} := {text};"
 
 
-def _defuzzify(output: SystemOutput, names: _Names, words: Words) -> Iterator[str]:
+def _defuzzify(output: SystemOutput, names: _FclNames, words: Words) -> Iterator[str]:
     yield f"DEFUZZIFY {names.variables[output.name]}"
     yield from _terms(output, names, words)
     yield f"  METHOD : {words.methods[output.defuzzifier.method]};"
@@ -302,11 +282,9 @@ def _defuzzify(output: SystemOutput, names: _Names, words: Words) -> Iterator[st
     yield "END_DEFUZZIFY"
 
 
-def _remarks(system: FuzzySystem, names: _Names, words: Words) -> Iterator[str]:
+def _remarks(system: FuzzySystem, names: _FclNames, words: Words) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
-    inputs = [one.name for one in system.inputs]
-    if text := changes_text(names.changed(), inputs):
-        yield text
+    yield from names.remarks(system)
     if any(one.unit for one in system.variables) or system.note:
         yield "units and the note of the system have no place"
     if names_of_rules(system.rules):

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_dialects import Words
 from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
+from fuzzytree.exporters.fuzzy_files import refuse, with_labels
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
@@ -162,15 +163,12 @@ def as_points(
             try:
                 labels.append(_pointed(label, variable, words, tolerance, losses))
             except LossError as error:
-                reasons.append(f"  {where}: {error}")
+                reasons.append(f"{where}: {error}")
         return tuple(labels)
 
-    inputs = tuple(replace(one, labels=changed(one)) for one in system.inputs)
-    outputs = tuple(replace(one, labels=changed(one)) for one in system.outputs)
-    if reasons:
-        listed = "\n".join(reasons)
-        raise LossError(f"cannot write {system.name} as fcl:\n{listed}")
-    return replace(system, inputs=inputs, outputs=outputs), losses
+    system = with_labels(system, changed)
+    refuse(system.name, "fcl", reasons)
+    return system, losses
 
 
 def _pointed(
@@ -225,7 +223,4 @@ def plain_linear(system: FuzzySystem) -> FuzzySystem:
         total = Call("+", (total, Number(label.curve.offset)))
         return replace(label, curve=Formula(total))
 
-    outputs = tuple(
-        replace(one, labels=tuple(map(formula, one.labels))) for one in system.outputs
-    )
-    return replace(system, outputs=outputs)
+    return with_labels(system, lambda one: map(formula, one.labels))

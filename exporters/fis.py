@@ -11,11 +11,16 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, Literal
 
-from msgspec.structs import replace
-
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
 from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
+from fuzzytree.exporters.fuzzy_files import (
+    TITLE,
+    FileNames,
+    inverse,
+    refuse,
+    without_heights,
+)
 from fuzzytree.formats.fis.fis_reader import (
     DEFAULTS,
     DIALECT,
@@ -36,18 +41,15 @@ from fuzzytree.formats.fis.fis_words import (
 from fuzzytree.formats.fll.fll_differences import fuzzylite_losses
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import Names, changes_text
-from fuzzytree.model.rulebase import Points, RuleBase
+from fuzzytree.model.naming import Names
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import (
     Activation,
     FuzzySystem,
     Label,
-    Linear,
-    Singleton,
     SNorm,
     SystemInput,
     SystemOutput,
-    TNorm,
 )
 from fuzzytree.semantics.conversion import (
     FACTS,
@@ -70,7 +72,6 @@ _MATLAB_NORMS: Final = frozenset({"min", "prod", "max", "probor", "sum"})
 _FUZZYLITE_NORMS: Final = frozenset(
     {"nilpotent_minimum", "nilpotent_maximum", "normalized_sum"}
 )
-_TITLE: Final = "Written by fuzzytree."
 
 
 def write(
@@ -109,7 +110,7 @@ def write(
         raise ValueError(f"no dialect {dialect!r}; there is {', '.join(DIALECTS)}")
     losses: list[Loss] = []
     remarks: list[str] = []
-    comments = [_TITLE, f"{DIALECT}{dialect}"]
+    comments = [TITLE, f"{DIALECT}{dialect}"]
     if isinstance(model, RuleBase):
         rules, lost = pointed(model, tolerance)
         system = as_system(rules, always="term")
@@ -121,7 +122,11 @@ def write(
         system = model
     system, lost = flattened(system)
     losses += lost
-    system, lost = with_known_curves(_scaled(system, losses), dialect, tolerance)
+    if any(one.height != 1.0 for v in system.variables for one in v.labels):
+        system, lost = pointed(system, 1e-6)
+        losses += lost
+        system = without_heights(system, "FIS", losses)
+    system, lost = with_known_curves(system, dialect, tolerance)
     losses += [*lost, *_losses(system, dialect)]
     if isinstance(model, FuzzySystem):  # of scores, a rule always fires
         losses += _default_losses(system, dialect)
@@ -132,78 +137,21 @@ def write(
         losses += _private_losses(terms, dialect)
     if losses and not allow_loss:
         raise refusal(model.name, "fis", losses)
-    names = _Naming(system, terms)
-    remarks += names.remarks
+    names = _naming(system, terms)
+    remarks += names.remarks(system)
     text = _text(system, (terms, lines), (comments, names), dialect, remarks)
-    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed)
+    return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
 
 
-class _Naming:
-    """The names of variables and terms in a file."""
-
-    def __init__(self, system: FuzzySystem, terms: Terms) -> None:
-        variables = [one.name for one in system.variables]
-        self.variables = Names.of(variables, reserved=_RESERVED)
-        self.labels = {
-            name: Names.of([one.name for one in labels], reserved=_RESERVED)
-            for name, labels in _all_labels(system, terms).items()
-        }
-        self.system = Names.of([system.name])[system.name]
-        self.changed = {
-            **self.variables.changed,
-            **Names.of([system.name]).changed,
-            **{
-                k: v for names in self.labels.values() for k, v in names.changed.items()
-            },
-            **self.variables.changed,
-        }
-        text = changes_text(self.changed, [one.name for one in system.inputs])
-        self.remarks = [text] if text else []
-
-
-def _all_labels(system: FuzzySystem, terms: Terms) -> dict[str, Sequence[Label]]:
-    return {**terms.labels, **{one.name: one.labels for one in system.outputs}}
-
-
-def _scaled(system: FuzzySystem, losses: list[Loss]) -> FuzzySystem:
-    """Return a system whose terms all have the height 1."""
-    weighted = {o.name for o in system.outputs if o.defuzzifier.is_weighted}
-
-    def changed(variable: str, label: Label) -> Label:
-        curve = label.curve
-        if isinstance(curve, Singleton | Linear) and variable in weighted:
-            return replace(label, height=1.0)  # it is a number and no degree
-        if label.height == 1.0:
-            return label
-        if isinstance(curve, Points):
-            degrees = tuple(label.height * degree for degree in curve.degrees)
-            losses.append(
-                Loss(
-                    f"term {label.name!r} of {variable!r}",
-                    f"its height {label.height!r} is in its points, which are rounded",
-                    2.0**-52,
-                )
-            )
-            return Label(label.name, Points(curve.values, degrees))
-        raise LossError(
-            f"term {label.name!r} of {variable!r} has the height {label.height!r}, "
-            "and FIS knows none"
-        )
-
-    if all(one.height == 1.0 for v in system.variables for one in v.labels):
-        return system
-    system, lost = pointed(system, 1e-6)
-    losses.extend(lost)
-    return replace(
-        system,
-        inputs=tuple(
-            replace(v, labels=tuple(changed(v.name, one) for one in v.labels))
-            for v in system.inputs
-        ),
-        outputs=tuple(
-            replace(v, labels=tuple(changed(v.name, one) for one in v.labels))
-            for v in system.outputs
-        ),
+def _naming(system: FuzzySystem, terms: Terms) -> FileNames:
+    labels = {**terms.labels, **{one.name: one.labels for one in system.outputs}}
+    return FileNames(
+        Names.of([one.name for one in system.variables], reserved=_RESERVED),
+        {
+            name: Names.of([one.name for one in own], reserved=_RESERVED)
+            for name, own in labels.items()
+        },
+        Names.of([system.name]),
     )
 
 
@@ -220,24 +168,22 @@ def _lines(system: FuzzySystem, terms: Terms) -> list[Line]:
         try:
             lines += lines_of(rule, block, terms, number)
         except LossError as error:
-            reasons.append(f"  rule {number}: {error}")
+            reasons.append(f"rule {number}: {error}")
     is_weighted = system.outputs[0].defuzzifier.is_weighted
     for output in system.outputs:
         if output.defuzzifier.is_weighted != is_weighted:
             reasons.append(
-                f"  output {output.name!r}: a file is Mamdani or Sugeno as a whole, "
+                f"output {output.name!r}: a file is Mamdani or Sugeno as a whole, "
                 "and the first output is the other"
             )
             continue
         for label in output.labels:
             if _term(output, label, terms.dialect) is None:
                 reasons.append(
-                    f"  term {label.name!r} of {output.name!r}: {terms.dialect} has no "
+                    f"term {label.name!r} of {output.name!r}: {terms.dialect} has no "
                     "such conclusion"
                 )
-    if reasons:
-        listed = "\n".join(reasons)
-        raise LossError(f"cannot write {system.name} as fis:\n{listed}")
+    refuse(system.name, "fis", reasons)
     return lines
 
 
@@ -325,18 +271,14 @@ def _methods(system: FuzzySystem, dialect: Dialect) -> dict[str, str]:
     aggregation = output.aggregation or ("sum" if is_weighted else "maximum")
     methods = {meant: word for word, meant in METHODS.items()}
     return {
-        "AndMethod": _t_norm(block.conjunction or "minimum"),
+        "AndMethod": inverse(TNORMS, block.conjunction or "minimum"),
         "OrMethod": _s_norm(block.disjunction or "maximum", dialect),
-        "ImpMethod": _t_norm(
-            block.implication or ("product" if is_weighted else "minimum")
+        "ImpMethod": inverse(
+            TNORMS, block.implication or ("product" if is_weighted else "minimum")
         ),
         "AggMethod": _s_norm(aggregation, dialect),
         "DefuzzMethod": methods[output.defuzzifier.method],
     }
-
-
-def _t_norm(norm: TNorm) -> str:
-    return next(word for word, meant in TNORMS.items() if meant == norm)
 
 
 def _s_norm(norm: SNorm, dialect: Dialect) -> str:
@@ -365,7 +307,7 @@ def _term(
 def _text(
     system: FuzzySystem,
     rules: tuple[Terms, list[Line]],
-    said: tuple[list[str], _Naming],
+    said: tuple[list[str], FileNames],
     dialect: Dialect,
     remarks: list[str],
 ) -> str:
@@ -373,7 +315,7 @@ def _text(
     comments, names = said
     is_weighted = system.outputs[0].defuzzifier.is_weighted
     head = {
-        "Name": f"'{names.system}'",
+        "Name": f"'{names.system[system.name]}'",
         "Type": "'sugeno'" if is_weighted else "'mamdani'",
         "Version": "2.0",
         "NumInputs": str(len(system.inputs)),
@@ -412,7 +354,7 @@ def _variable(
     title: str,
     one: SystemInput | SystemOutput,
     about: tuple[Sequence[Label], Sequence[tuple[str, str] | None]],
-    names: _Naming,
+    names: FileNames,
 ) -> list[str]:
     labels, found = about
     low, high = _range(one, found)

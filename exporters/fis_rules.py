@@ -13,6 +13,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import LossError
+from fuzzytree.exporters.fuzzy_files import operands
 from fuzzytree.formats.fis.fis_words import CONCLUDING_HEDGES, HEDGES, Dialect
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.naming import unlike
@@ -202,7 +203,7 @@ def _asked(condition: Condition | None, terms: Terms) -> dict[str, str]:
         return {} if terms.dialect == "matlab" else terms.everywhere()
     is_or = isinstance(condition, Or)
     groups: dict[str, list[Condition]] = {}
-    parts = _flat(condition, terms)
+    parts = [_simple(one) for one in operands(condition, terms.system.blocks[0])]
     if terms.dialect != "fuzzylite":
         plain = [part for part in parts if not _always_holds(part)]
         if not plain or (is_or and len(plain) < len(parts)):
@@ -230,25 +231,6 @@ def _asked(condition: Condition | None, terms: Terms) -> dict[str, str]:
 
 def _always_holds(part: Condition) -> bool:
     return isinstance(part, Is) and part.hedges == ("any",)
-
-
-def _flat(condition: Condition, terms: Terms) -> list[Condition]:
-    """Return what is joined; an and within an and joins its own parts."""
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            block = terms.system.blocks[0]
-            is_or = isinstance(condition, Or)
-            norm = block.disjunction if is_or else block.conjunction
-            found: list[Condition] = []
-            for place, part in enumerate(parts):
-                is_open = place == 0 or norm in ("minimum", "maximum")
-                if isinstance(part, type(condition)) and is_open:
-                    found += _flat(part, terms)
-                else:
-                    found.append(_simple(part))
-            return found
-        case _:
-            return [_simple(condition)]
 
 
 def _simple(condition: Condition) -> Condition:

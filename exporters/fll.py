@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-import msgspec
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
@@ -25,6 +24,7 @@ from fuzzytree.exporters.fll_text import (
     speakable,
     weighted_type,
 )
+from fuzzytree.exporters.fuzzy_files import TITLE, FileNames, refuse
 from fuzzytree.formats.fll.fll_differences import differences
 from fuzzytree.formats.fll.fll_reader import places, read
 from fuzzytree.formats.fll.fll_rules import RULE_WORDS
@@ -32,7 +32,7 @@ from fuzzytree.formats.fll.fll_words import ACTIVATIONS, METHODS, S_NORMS, T_NOR
 from fuzzytree.formats.text_files import LONGEST_NAME
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import Names, changes_text
+from fuzzytree.model.naming import Names
 from fuzzytree.model.rulebase import LR, Band, Points, RuleBase
 from fuzzytree.model.system import (
     FUNCTIONS,
@@ -66,7 +66,6 @@ _ONE: Final = SystemOutput(
 )
 _ALWAYS: Final = RuleBlock((SystemRule(None, (Conclusion("y", "one"),)),))
 _FINEST: Final = 1e-3
-_TITLE: Final = "Written by fuzzytree."
 
 
 def write(
@@ -127,34 +126,14 @@ def write(
     if losses and not allow_loss:
         raise refusal(model.name, "fll", losses)
     names = _naming(system)
-    comments = [f"# {one}" for one in (_TITLE, facts) if one]
+    comments = [f"# {one}" for one in (TITLE, facts) if one]
     text = "\n".join([*comments, *_text(system, names)]) + "\n"
     remarks += [*_remarks(system, names), *differences(system)]
     return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
 
 
-class _Names(msgspec.Struct, frozen=True):
-    """The names in a file: of variables, and of the labels of each."""
-
-    variables: Names
-    labels: Mapping[str, Names]
-
-    def speak(self, variable: str, label: str | None) -> tuple[str, str]:
-        """Return the words for a variable and one of its labels."""
-        term = "" if label is None else self.labels[variable][label]
-        return self.variables[variable], term
-
-    def changed(self) -> dict[str, str]:
-        """Return the names that are others in the file."""
-        found: dict[str, str] = {}
-        for names in self.labels.values():
-            found.update(names.changed)
-        variables = self.variables.changed
-        return {**variables, **found, **variables}
-
-
-def _naming(system: FuzzySystem) -> _Names:
-    return _Names(
+def _naming(system: FuzzySystem) -> FileNames:
+    return FileNames(
         _accepted([one.name for one in system.variables]),
         {
             one.name: _accepted([label.name for label in one.labels])
@@ -219,16 +198,14 @@ def _speakable(system: FuzzySystem) -> tuple[RuleBlock, ...]:
         try:
             blocks.append(speakable(block))
         except LossError as error:
-            reasons.append(f"  {error}")
+            reasons.append(str(error))
     for variable in system.variables:
         for label in variable.labels:
             if _term_text(variable, label, {}) is None:
                 where = f"term {label.name!r} of {variable.name!r}"
                 kind = type(label.curve).__name__
-                reasons.append(f"  {where}: FLL has no {kind} there")
-    if reasons:
-        listed = "\n".join(reasons)
-        raise LossError(f"cannot write {system.name} as fll:\n{listed}")
+                reasons.append(f"{where}: FLL has no {kind} there")
+    refuse(system.name, "fll", reasons)
     return tuple(blocks)
 
 
@@ -240,7 +217,7 @@ def _term_text(
     return degree_text(label, names)
 
 
-def _text(system: FuzzySystem, names: _Names) -> Iterator[str]:
+def _text(system: FuzzySystem, names: FileNames) -> Iterator[str]:
     """Yield the lines of a file."""
     yield f"Engine: {_line(system.name)}".rstrip()
     if system.note:
@@ -269,7 +246,7 @@ def _text(system: FuzzySystem, names: _Names) -> Iterator[str]:
         yield f"  implication: {_T_WORDS[block.implication]}"
         yield f"  activation: {_activation(block.activation)}"
         for rule in block.rules:
-            yield f"  rule: {rule_text(rule, names.speak, always)}"
+            yield f"  rule: {rule_text(rule, names.words, always)}"
 
 
 def _common(variable: SystemInput | SystemOutput) -> Iterator[str]:
@@ -280,7 +257,7 @@ def _common(variable: SystemInput | SystemOutput) -> Iterator[str]:
     yield f"  lock-range: {str(variable.clips).lower()}"
 
 
-def _terms(variable: SystemInput | SystemOutput, names: _Names) -> Iterator[str]:
+def _terms(variable: SystemInput | SystemOutput, names: FileNames) -> Iterator[str]:
     for label in variable.labels:
         name = names.labels[variable.name][label.name]
         yield f"  term: {name} {_term_text(variable, label, names.variables.accepted)}"
@@ -317,11 +294,9 @@ def _line(text: str) -> str:
     return " ".join(kept.replace("#", "no.").split())
 
 
-def _remarks(system: FuzzySystem, names: _Names) -> Iterator[str]:
+def _remarks(system: FuzzySystem, names: FileNames) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
-    inputs = [one.name for one in system.inputs]
-    if text := changes_text(names.changed(), inputs):
-        yield text
+    yield from names.remarks(system)
     texts = [system.name, system.note, *(block.name for block in system.blocks)]
     if any(_line(text) != text for text in texts):
         yield "names of the system and of blocks, and its note, became single lines"

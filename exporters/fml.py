@@ -9,14 +9,12 @@ them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
-from msgspec.structs import replace
-
-from fuzzytree.errors import LossError
 from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
+from fuzzytree.exporters.fuzzy_files import FileNames, inverse, without_heights
 from fuzzytree.formats.fml.fml_reader import places, reading
 from fuzzytree.formats.fml.fml_words import (
     FAR,
@@ -28,7 +26,7 @@ from fuzzytree.formats.fml.fml_words import (
 )
 from fuzzytree.model.contracts import Format, Loss, Written
 from fuzzytree.model.losses import refusal
-from fuzzytree.model.naming import DIGITS, LETTERS, Names, changes_text
+from fuzzytree.model.naming import DIGITS, LETTERS, Names
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.model.system import (
     Activation,
@@ -113,38 +111,31 @@ def write(
     losses += found.losses
     if losses and not allow_loss:
         raise refusal(model.name, "fml", losses)
-    names = _Naming(system, found)
-    remarks += names.remarks
+    names = _naming(system, found)
+    remarks += names.remarks(system)
     lines = _lines(system, found, names, facts)
     content = ("\n".join(lines) + "\n").encode("utf-8")
-    return Written(content, tuple(losses), tuple(remarks), names.changed)
+    return Written(content, tuple(losses), tuple(remarks), names.changed())
 
 
-class _Naming:
+class _Ids(FileNames, frozen=True):
     """The IDs of a document."""
-
-    def __init__(self, system: FuzzySystem, rules: Rules) -> None:
-        asked = [one.name for one in system.variables]
-        self.variables = _ids(asked)
-        taken = self.variables.accepted.values()
-        self.system = _ids([system.name], taken)[system.name]
-        self.labels: dict[str, Names] = {}
-        for one in system.variables:
-            known = [label.name for label in one.labels]
-            known += [made.name for made in rules.made.get(one.name, ())]
-            self.labels[one.name] = _ids(known)
-        self.changed = {**self.variables.changed}
-        if self.system != system.name:
-            self.changed[system.name] = self.system
-        for names in self.labels.values():
-            self.changed |= names.changed
-        self.changed |= self.variables.changed
-        text = changes_text(self.changed, [one.name for one in system.inputs])
-        self.remarks = [text] if text else []
 
     def term(self, variable: str, label: str) -> str:
         """Return the ID of a term."""
         return f"{self.variables[variable]}.{self.labels[variable][label]}"
+
+
+def _naming(system: FuzzySystem, rules: Rules) -> _Ids:
+    variables = _ids(one.name for one in system.variables)
+    labels = {
+        one.name: _ids(
+            label.name for label in (*one.labels, *rules.made.get(one.name, ()))
+        )
+        for one in system.variables
+    }
+    title = _ids([system.name], variables.accepted.values())
+    return _Ids(variables, labels, title)
 
 
 def _ids(names: Iterable[str], taken: Iterable[str] = ()) -> Names:
@@ -172,28 +163,10 @@ def _with_known_curves(
     if is_one_sided and not has_heights:
         allowed = (*allowed, TwoGaussians)
     system, lost = pointed(system, tolerance, allowed=allowed)
-    if not has_heights:
-        return system, lost
     losses = [*lost]
-
-    def changed(one: SystemInput | SystemOutput) -> tuple[Label, ...]:
-        return tuple(_scaled(one.name, label, losses) for label in one.labels)
-
-    inputs = tuple(replace(one, labels=changed(one)) for one in system.inputs)
-    outputs = tuple(replace(one, labels=changed(one)) for one in system.outputs)
-    return replace(system, inputs=inputs, outputs=outputs), tuple(losses)
-
-
-def _scaled(variable: str, label: Label, losses: list[Loss]) -> Label:
-    if label.height == 1.0 or isinstance(label.curve, Singleton | Linear):
-        return replace(label, height=1.0)
-    where = f"term {label.name!r} of {variable!r}"
-    if not isinstance(label.curve, Points):
-        raise LossError(f"{where} has the height {label.height!r}; FML knows none")
-    what = f"its height {label.height!r} is in its points, which are rounded"
-    losses.append(Loss(where, what, 2.0**-52))
-    degrees = tuple(label.height * degree for degree in label.curve.degrees)
-    return Label(label.name, Points(label.curve.values, degrees))
+    if has_heights:
+        system = without_heights(system, "FML", losses)
+    return system, tuple(losses)
 
 
 def _losses(system: FuzzySystem) -> Iterator[Loss]:
@@ -236,13 +209,11 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
                 )
 
 
-def _lines(
-    system: FuzzySystem, rules: Rules, names: _Naming, facts: str
-) -> Iterator[str]:
+def _lines(system: FuzzySystem, rules: Rules, names: _Ids, facts: str) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     if facts:
         yield f"<!-- {FACTS}{facts} -->"
-    yield f'<fuzzySystem xmlns="{NAMESPACE}" name="{names.system}">'
+    yield f'<fuzzySystem xmlns="{NAMESPACE}" name="{names.system[system.name]}">'
     yield "  <knowledgeBase>"
     for one in system.inputs:
         yield from _input(one, rules, names)
@@ -265,19 +236,15 @@ def _lines(
 def _norms(block: RuleBlock) -> str:
     return (
         f' andMethod="{_t(block.conjunction)}" '
-        f'orMethod="{_word(SNORMS, block.disjunction, "MAX")}"'
+        f'orMethod="{inverse(SNORMS, block.disjunction, "MAX")}"'
     )
 
 
 def _t(norm: str | None) -> str:
-    return _word(TNORMS, norm, "MIN")
+    return inverse(TNORMS, norm, "MIN")
 
 
-def _word(known: Mapping[str, str], meant: str | None, default: str) -> str:
-    return next((word for word, one in known.items() if one == meant), default)
-
-
-def _input(one: SystemInput, rules: Rules, names: _Naming) -> Iterator[str]:
+def _input(one: SystemInput, rules: Rules, names: _Ids) -> Iterator[str]:
     yield (f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="input">')
     for label in one.labels:
         yield from _term("fuzzyTerm", one.name, label, names)
@@ -294,7 +261,7 @@ def _input(one: SystemInput, rules: Rules, names: _Naming) -> Iterator[str]:
     yield "    </fuzzyVariable>"
 
 
-def _head(one: SystemInput | SystemOutput, names: _Naming) -> str:
+def _head(one: SystemInput | SystemOutput, names: _Ids) -> str:
     scale = (
         f" scale={quoteattr(one.unit)}" if one.unit.isprintable() and one.unit else ""
     )
@@ -322,12 +289,12 @@ def _range(one: SystemInput | SystemOutput) -> tuple[float, float]:
     return (low, high) if low < high else (low - 1.0, low + 1.0)
 
 
-def _output(one: SystemOutput, names: _Naming) -> Iterator[str]:
+def _output(one: SystemOutput, names: _Ids) -> Iterator[str]:
     default = math.nan if one.default is None else one.default
     last = f' defaultValue="{_float(default)}">'
     if not one.defuzzifier.is_weighted:
-        method = _word(METHODS, one.defuzzifier.method, "COG")
-        join = _word(SNORMS, one.aggregation, "MAX")
+        method = inverse(METHODS, one.defuzzifier.method, "COG")
+        join = inverse(SNORMS, one.aggregation, "MAX")
         yield (
             f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="output"'
             f' accumulation="{join}" defuzzifier="{method}"{last}'
@@ -356,7 +323,7 @@ def _is_tsk(one: SystemOutput) -> bool:
     return all(isinstance(label.curve, Singleton | Linear) for label in one.labels)
 
 
-def _tsk_term(variable: str, label: Label, names: _Naming) -> Iterator[str]:
+def _tsk_term(variable: str, label: Label, names: _Ids) -> Iterator[str]:
     numbers: tuple[float, ...] = ()
     match label.curve:
         case Singleton(value=value):
@@ -371,7 +338,7 @@ def _tsk_term(variable: str, label: Label, names: _Naming) -> Iterator[str]:
     yield "      </tskTerm>"
 
 
-def _term(kind: str, variable: str, label: Label, names: _Naming) -> Iterator[str]:
+def _term(kind: str, variable: str, label: Label, names: _Ids) -> Iterator[str]:
     yield f'      <{kind} name="{names.term(variable, label.name)}">'
     found = _shape(label.curve)
     if found is not None:
@@ -417,7 +384,7 @@ def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
 
 
 def _rule(
-    rule: Rule, number: int, about: tuple[bool, str], names: _Naming
+    rule: Rule, number: int, about: tuple[bool, str], names: _Ids
 ) -> Iterator[str]:
     is_tsk, norms = about
     tag = "tskRule" if is_tsk else "rule"
@@ -444,7 +411,7 @@ def _rule(
 
 
 def _clause(
-    tag: str, given: str, named: tuple[str, str], names: _Naming, indent: int
+    tag: str, given: str, named: tuple[str, str], names: _Ids, indent: int
 ) -> Iterable[str]:
     pad = " " * indent
     yield f"{pad}<{tag}{given}>"

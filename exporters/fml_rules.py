@@ -12,6 +12,7 @@ from typing import Final
 import msgspec
 
 from fuzzytree.errors import LossError
+from fuzzytree.exporters.fuzzy_files import inverse, operands, refuse
 from fuzzytree.formats.fml.fml_words import MODIFIERS, SNORMS, TNORMS
 from fuzzytree.model.contracts import Loss
 from fuzzytree.model.naming import unlike
@@ -108,7 +109,7 @@ def rules_of(system: FuzzySystem) -> Rules:
             try:
                 several = _placed(rule, block, system, kinds, (rules.made, taken))
             except LossError as error:
-                reasons.append(f"  rule {number}: {error}")
+                reasons.append(f"rule {number}: {error}")
                 continue
             if len(several) > len({kind for kind, _ in several}):
                 count = len(several)
@@ -118,17 +119,15 @@ def rules_of(system: FuzzySystem) -> Rules:
                 found.setdefault(kind, []).append(one)
         bases += [(kind, block, tuple(several)) for kind, several in found.items()]
     reasons += [
-        f"  output {name!r}: its terms are of several kinds, and FML has one for each"
+        f"output {name!r}: its terms are of several kinds, and FML has one for each"
         for name, kind in kinds.items()
         if kind == "mixed"
     ]
     if len(system.variables) < 2:
-        reasons.append("  FML needs at least two variables")
+        reasons.append("FML needs at least two variables")
     if not any(several for _, _, several in bases) and not reasons:
-        reasons.append("  FML needs at least one rule")
-    if reasons:
-        listed = "\n".join(reasons)
-        raise LossError(f"cannot write {system.name} as fml:\n{listed}")
+        reasons.append("FML needs at least one rule")
+    refuse(system.name, "fml", reasons)
     return Rules(tuple(bases), rules.made, rules.losses)
 
 
@@ -177,29 +176,13 @@ def _rules(
         raise LossError("FML has no hedges of conclusions")
     is_or = isinstance(rule.when, Or)
     asked: list[Clause] = []
-    for part in _flat(rule.when, block):
+    for part in operands(rule.when, block):
         asked.append(_clause(part, block, kinds, known))
     for kind in dict.fromkeys(kinds[one.output] for one in rule.then):
         concluded = tuple(
             (one.output, one.label) for one in rule.then if kinds[one.output] == kind
         )
         yield kind, Rule(tuple(asked), concluded, rule.weight, is_or)
-
-
-def _flat(condition: Condition, block: RuleBlock) -> list[Condition]:
-    """Return what is joined; an and within an and joins its own parts."""
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            is_or = isinstance(condition, Or)
-            norm = block.disjunction if is_or else block.conjunction
-            found: list[Condition] = []
-            for place, part in enumerate(parts):
-                is_open = place == 0 or norm in ("minimum", "maximum")
-                is_same = isinstance(part, type(condition))
-                found += _flat(part, block) if is_same and is_open else [part]
-            return found
-        case _:
-            return [condition]
 
 
 def _clause(
@@ -266,8 +249,8 @@ def _made(
     is_or = isinstance(condition, Or)
     norms = SNORMS if is_or else TNORMS
     meant = block.disjunction if is_or else block.conjunction
-    norm = next((word for word, one in norms.items() if one == meant), None)
-    if norm is None:
+    norm = inverse(norms, meant)
+    if not norm:
         raise LossError(f"FML has no {meant}")
     word = "or" if is_or else "and"
     if len(parts) == 1:

@@ -1,0 +1,128 @@
+"""What the writers of FCL, FLL, FIS and FML share: names, refusals and rewriting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+import msgspec
+from msgspec.structs import replace
+
+from fuzzytree.errors import LossError
+from fuzzytree.model.contracts import Loss
+from fuzzytree.model.naming import Names, changes_text
+from fuzzytree.model.rulebase import Points
+from fuzzytree.model.system import (
+    And,
+    Condition,
+    FuzzySystem,
+    Label,
+    Linear,
+    Or,
+    RuleBlock,
+    Singleton,
+    SystemInput,
+    SystemOutput,
+)
+
+TITLE = "Written by fuzzytree."
+
+
+class FileNames(msgspec.Struct, frozen=True):
+    """The names in a file.
+
+    Attributes:
+        variables: Of inputs and outputs.
+        labels: Of the terms of each variable.
+        system: Of the system, where the file has a place for it.
+    """
+
+    variables: Names
+    labels: Mapping[str, Names]
+    system: Names = Names({})
+
+    def words(self, variable: str, label: str | None) -> tuple[str, str]:
+        """Return the words for a variable and one of its terms, `any` for none."""
+        term = "any" if label is None else self.labels[variable][label]
+        return self.variables[variable], term
+
+    def changed(self) -> dict[str, str]:
+        """Return the file's name for each name that is another in the file."""
+        variables = self.variables.changed
+        changed = {**variables, **self.system.changed}
+        for names in self.labels.values():
+            changed |= names.changed
+        return changed | variables
+
+    def remarks(self, system: FuzzySystem) -> list[str]:
+        """Return a remark on the changed names, if there are any."""
+        text = changes_text(self.changed(), [one.name for one in system.inputs])
+        return [text] if text else []
+
+
+def refuse(name: str, to: str, reasons: Iterable[str]) -> None:
+    """Refuse a model if there are reasons.
+
+    Raises:
+        LossError: With all of them.
+    """
+    listed = "".join(f"\n  {reason}" for reason in reasons)
+    if listed:
+        raise LossError(f"cannot write {name} as {to}:{listed}")
+
+
+def with_labels(
+    system: FuzzySystem,
+    change: Callable[[SystemInput | SystemOutput], Iterable[Label]],
+) -> FuzzySystem:
+    """Return a system whose variables have other terms."""
+    inputs = tuple(replace(v, labels=tuple(change(v))) for v in system.inputs)
+    outputs = tuple(replace(v, labels=tuple(change(v))) for v in system.outputs)
+    return replace(system, inputs=inputs, outputs=outputs)
+
+
+def without_heights(system: FuzzySystem, to: str, losses: list[Loss]) -> FuzzySystem:
+    """Return a system whose terms all have the height 1.
+
+    A height is multiplied into the degrees of points; a number of a weighted output
+    has none.
+
+    Raises:
+        LossError: If a term with another height is not a list of points.
+    """
+
+    def scaled(variable: SystemInput | SystemOutput, label: Label) -> Label:
+        is_number = isinstance(variable, SystemOutput) and (
+            variable.defuzzifier.is_weighted
+            and isinstance(label.curve, Singleton | Linear)
+        )
+        if label.height == 1.0 or is_number:
+            return replace(label, height=1.0)
+        where = f"term {label.name!r} of {variable.name!r}"
+        if not isinstance(label.curve, Points):
+            raise LossError(
+                f"{where} has the height {label.height!r}, and {to} has no heights"
+            )
+        what = f"its height {label.height!r} is in its points, which are rounded"
+        losses.append(Loss(where, what, 2.0**-52))
+        degrees = tuple(label.height * degree for degree in label.curve.degrees)
+        return Label(label.name, Points(label.curve.values, degrees))
+
+    return with_labels(system, lambda v: [scaled(v, one) for one in v.labels])
+
+
+def operands(condition: Condition, block: RuleBlock) -> list[Condition]:
+    """Return the operands of a condition; an and within an and adds its own."""
+    if not isinstance(condition, And | Or):
+        return [condition]
+    norm = block.disjunction if isinstance(condition, Or) else block.conjunction
+    parts: list[Condition] = []
+    for place, part in enumerate(condition.parts):
+        is_open = place == 0 or norm in ("minimum", "maximum")
+        is_same = isinstance(part, type(condition))
+        parts += operands(part, block) if is_same and is_open else [part]
+    return parts
+
+
+def inverse(words: Mapping[str, str], meaning: str | None, default: str = "") -> str:
+    """Return the first word of a table with a meaning."""
+    return next((word for word, known in words.items() if known == meaning), default)
