@@ -12,7 +12,8 @@ import importlib
 import io
 import os
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from types import MappingProxyType
 
 import click
 
@@ -21,27 +22,27 @@ from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
 from fuzzytree.model.interrupts import noticed
 
-VERBS = (
-    "learn",
-    "show",
-    "export",
-    "convert",
-    "run",
-    "check",
-    "audit",
-    "diff",
-    "explain",
-    "recheck",
-    "bench",
-    "needs",
-    "stability",
-    "tactile",
-    "formats",
-    "doctor",
+VERBS: Mapping[str, str] = MappingProxyType(
+    {
+        "learn": "fuzzytree.cli.learn",
+        "show": "fuzzytree.cli.show",
+        "export": "fuzzytree.cli.export",
+        "convert": "fuzzytree.cli.convert",
+        "run": "fuzzytree.cli.run",
+        "check": "fuzzytree.cli.check",
+        "audit": "fuzzytree.cli.audit",
+        "diff": "fuzzytree.cli.diff",
+        "explain": "fuzzytree.cli.explain",
+        "recheck": "fuzzytree.cli.recheck",
+        "bench": "fuzzytree.cli.bench",
+        "needs": "fuzzytree.cli.needs",
+        "stability": "fuzzytree.cli.stability",
+        "tactile": "fuzzytree.tactile.cli",
+        "formats": "fuzzytree.cli.formats",
+        "doctor": "fuzzytree.cli.doctor",
+    }
 )
-"""Each verb is the `command` of the module `fuzzytree.cli.VERB`, or of its room."""
-
-_ROOMS = {"tactile": "fuzzytree.tactile.cli"}
+"""The module whose `command` each verb is, in the order of the help."""
 
 
 class Verbs(click.Group):
@@ -55,9 +56,7 @@ class Verbs(click.Group):
         """Return a verb, or None if there is none of that name."""
         if cmd_name not in VERBS:
             return None
-        module = importlib.import_module(
-            _ROOMS.get(cmd_name, f"fuzzytree.cli.{cmd_name}")
-        )
+        module = importlib.import_module(VERBS[cmd_name])
         command: click.Command = module.command
         return command
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -471,14 +471,18 @@ def _decoded(content: bytes, name: str) -> onnx.ModelProto:
         raise ReadError(text) from error
 
 
+_OTHER_INPUTS: Mapping[str, str] = {
+    "frames": "frames of a sensor, not rows; `fuzzytree tactile check` checks it",
+}
+"""Graphs of the project that do not take rows: their kind, and a sentence."""
+
+
 def _facts(proto: onnx.ModelProto, name: str) -> Facts:
     """Return the metadata, which must be complete and of a known version."""
     texts = texts_of(proto, name)
-    if texts.get("carrier") == "frames":
-        raise ReadError(
-            f"{name}: the file takes frames of a sensor, and rows are asked for; "
-            "`fuzzytree tactile check` asks it"
-        )
+    other = _OTHER_INPUTS.get(texts.get("carrier", ""))
+    if other is not None:
+        raise ReadError(f"{name}: the file takes {other}")
     records = {"columns", "inputs", "units", "classes", "rules", "outputs", "semantics"}
     records |= {"names", "chunk"}
     try:

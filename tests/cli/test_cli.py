@@ -31,7 +31,7 @@ def _python(*words: str, **more: object) -> subprocess.CompletedProcess[str]:
     [
         "import fuzzytree; dir(fuzzytree)",
         "from fuzzytree.cli import main\n"
-        f"for words in [], *([verb] for verb in {VERBS!r}):\n"
+        f"for words in [], *([verb] for verb in {tuple(VERBS)!r}):\n"
         "    assert main([*words, '--help']) == 0",
     ],
     ids=["import", "help"],

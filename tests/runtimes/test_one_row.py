@@ -10,31 +10,7 @@ import pytest
 from fuzzytree.runtimes.one_row import load, row_runner
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
-from fuzzytree.tactile.features.names import FEATURES
-from fuzzytree.tactile.runtimes.frames import FramePlan
-from fuzzytree.tactile.sensor import Sensor
 from fuzzytree.testing import random_tree
-
-NAMES = (
-    *FEATURES,
-    *("log S7", "S10 / force", "cell r3 c5", "block r1 c0 of 2x2 / force"),
-)
-
-
-def test_the_features_of_one_frame_have_the_bits_of_those_of_many() -> None:
-    sensor = Sensor(7, 9, full=1023, threshold=3)
-    random = np.random.default_rng(7)
-    frames = random.integers(0, 1200, (60, 7, 9))
-    frames[random.random(frames.shape) < 0.6] = 0
-    frames[:5] = 0
-    frames[3, 2, 4] = 1023  # a single cell
-    frames[4] = 1023  # all of them
-    plan = FramePlan(sensor, NAMES)
-    many = plan(frames)
-    for number, frame in enumerate(frames):
-        one = plan(frame)
-        assert one.values.tobytes() == many.values[:, number].tobytes()
-        assert one.is_pressed.tolist() == [bool(many.is_pressed[number])]
 
 
 def program(operation: str) -> Program:

@@ -137,8 +137,8 @@ def test_a_graph_of_frames_is_no_graph_of_rows() -> None:
     with pytest.raises(ReadError) as caught:
         open_onnx(content, "frames.onnx")
     assert str(caught.value) == (
-        "frames.onnx: the file takes frames of a sensor, and rows are asked for; "
-        "`fuzzytree tactile check` asks it"
+        "frames.onnx: the file takes frames of a sensor, not rows; "
+        "`fuzzytree tactile check` checks it"
     )
 
 

@@ -52,3 +52,25 @@ def test_frames_of_any_whole_type_are_the_same_frames() -> None:
     for kind in (np.uint8, np.int16, np.uint16, np.int32, np.uint64):
         found = features_of(sensor, frame.astype(kind), ["S1", "S3"])
         assert found.values.tobytes() == wanted
+
+
+ONE_NAMES = (
+    *FEATURES,
+    *("log S7", "S10 / force", "cell r3 c5", "block r1 c0 of 2x2 / force"),
+)
+
+
+def test_the_features_of_one_frame_have_the_bits_of_those_of_many() -> None:
+    sensor = Sensor(7, 9, full=1023, threshold=3)
+    random = np.random.default_rng(7)
+    frames = random.integers(0, 1200, (60, 7, 9))
+    frames[random.random(frames.shape) < 0.6] = 0
+    frames[:5] = 0
+    frames[3, 2, 4] = 1023  # a single cell
+    frames[4] = 1023  # all of them
+    plan = FramePlan(sensor, ONE_NAMES)
+    many = plan(frames)
+    for number, frame in enumerate(frames):
+        one = plan(frame)
+        assert one.values.tobytes() == many.values[:, number].tobytes()
+        assert one.is_pressed.tolist() == [bool(many.is_pressed[number])]
