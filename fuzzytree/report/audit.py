@@ -135,8 +135,9 @@ def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[
     states = Counter(state_word(one.state) for one in audit.answers)
     told = [f"{states[word]} {word}" for word in STATES if states[word]]
     yield f"{counted(len(audit.answers), 'question')}: {', '.join(told) or 'none'}"
-    if audit.unasked:
-        yield f"not examined, or not to the end: {counted(len(audit.unasked), 'item')}"
+    missed = [text for text in audit.unasked if "left out by the user" not in text]
+    if missed:
+        yield f"not examined, or not to the end: {counted(len(missed), 'code')}"
     limits = counted(len(audit.limits), "thing")
     yield (
         f"this audit does not establish {limits}; --verbose lists them, with the "
