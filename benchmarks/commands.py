@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from fuzzytree.cli.talk import say
+from fuzzytree.cli.console import say
 from fuzzytree.errors import FuzzyTreeError
 
 

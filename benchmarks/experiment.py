@@ -22,7 +22,7 @@ from experiment_simulated import IDEAL, TABLE_3, paper_task
 from experiment_study import Outcome, experiment
 from experiment_tasks import KNOWN, Task, file_task, known_task
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     json_option,

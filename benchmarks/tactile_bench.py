@@ -14,7 +14,7 @@ from commands import run
 from tactile_timing import FramesStudy, Point, time_frames
 
 from fuzzytree.benchmarking.records import Timing
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     json_option,

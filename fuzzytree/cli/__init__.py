@@ -1,7 +1,7 @@
-"""The command line: one module per verb, loaded when its verb is asked for.
+"""The command line: one module per verb, loaded when its verb is used.
 
-Data goes to stdout and talk to stderr. Exit codes: 0 fine; 1 it ran and found
-something; 2 it could not run; 130 interrupted; 141 nobody reads the output any more.
+Data goes to stdout, messages go to stderr. Exit codes: 0 fine; 1 it ran and found
+something; 2 it could not run; 130 interrupted; 141 the reader of the output is gone.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from types import MappingProxyType
 
 import click
 
-from fuzzytree.cli.talk import say
+from fuzzytree.cli.console import say
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.files import reason
 from fuzzytree.model.interrupts import noticed
@@ -46,10 +46,10 @@ VERBS: Mapping[str, str] = MappingProxyType(
 
 
 class Verbs(click.Group):
-    """A group that imports a verb's module when the verb is asked for."""
+    """A group that imports a verb's module when the verb is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which one needs them."""
+        """Return the verbs in the order of their usual use."""
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -124,11 +124,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(_error_text(error, words[0] if words else ""))
         return 2
     except OSError as error:
-        say(f"cannot go on: {reason(error)}")
+        say(f"cannot continue: {reason(error)}")
         _forget_stdout()
         return 2
     except MemoryError:
-        say("cannot go on: there is not enough memory")
+        say("cannot continue: there is not enough memory")
         return 2
     except (KeyboardInterrupt, click.Abort):
         say("interrupted; files are as they were")
@@ -138,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def _interruptible() -> Generator[None]:
-    """Tell a Ctrl-C as one, though a library that was interrupted raised another error.
+    """Report a Ctrl-C as one, although an interrupted library raised another error.
 
     An extension module that is being imported does so.
     """
@@ -153,7 +153,7 @@ def _interruptible() -> Generator[None]:
 
 
 def _error_text(error: FuzzyTreeError, verb: str) -> str:
-    """Return a message with what it asks for in the words of the command line."""
+    """Return a message that names options of the command line."""
     text = str(error).replace("pass dialect=", "pass --dialect ")
     text = text.replace("pass scores=", "pass --set scores=")
     text = text.replace("pass missing='drop'", "pass --missing drop")
@@ -176,7 +176,7 @@ def _usage_text(error: click.ClickException) -> str:
 
 
 def _forget_stdout() -> None:
-    """Keep Python from flushing what nobody can take any more, and complaining."""
+    """Keep Python from flushing to a closed stream, which would be an error."""
     with contextlib.suppress(OSError):  # tests have a stdout without a number
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

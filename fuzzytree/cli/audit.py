@@ -1,4 +1,4 @@
-"""`fuzzytree audit`: what is odd in a rule base, proved or shown at a point?"""
+"""`fuzzytree audit`: faults of a rule base, proved or shown at a point."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fuzzytree.cli.audit_options import (
     table_of,
     with_options,
 )
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     allow_loss_option,
     answer_styled,
     delimiter_option,
@@ -54,7 +54,7 @@ For example:
 
 @click.command(
     "audit",
-    short_help="Find what is odd in a rule base, and prove it.",
+    short_help="Find faults of a rule base, with proofs.",
     epilog=_EXAMPLES,
 )
 @click.argument("model", metavar="MODEL")
@@ -62,16 +62,22 @@ For example:
 @click.option(
     "--config",
     metavar="FILE",
-    help="Options from a file; fuzzytree-audit.yaml, if it is here.",
+    help="File with options; by default fuzzytree-audit.yaml of the current folder.",
 )
-@click.option("--baseline", metavar="FILE", help="Accept the findings in this file.")
 @click.option(
-    "--write-baseline", metavar="FILE", help="Write all that is found, for --baseline."
+    "--baseline",
+    metavar="FILE",
+    help="File of accepted findings, which do not fail the audit.",
+)
+@click.option(
+    "--write-baseline",
+    metavar="FILE",
+    help="File to write all findings to, for --baseline.",
 )
 @click.option(
     "--fail-on",
     type=click.Choice(["error", "warning", "info", "never"]),
-    help="Exit 1 from this severity on; from warning, unless given.",
+    help="Least severity that makes the exit code 1; warning by default.",
 )
 @click.option(
     "--output-format",
@@ -79,18 +85,28 @@ For example:
     type=click.Choice(["text", "json", "sarif", "github"]),
     default="text",
     show_default=True,
-    help="How it is told: to people, programs, code hosts.",
+    help="Format of the result: for people, programs or code hosts.",
 )
 @click.option(
-    "--all", "is_whole", is_flag=True, help="Tell also what is no finding, one by one."
+    "--all",
+    "is_whole",
+    is_flag=True,
+    help="List every answer, also those that are no findings.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write there, and not to stdout.")
-@click.option("--page", metavar="FILE", help="Write a page for a browser as well.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="File to write the result to, in place of stdout.",
+)
+@click.option(
+    "--page", metavar="FILE", help="HTML file to write the audit to, in addition."
+)
 @click.option(
     "--results",
     metavar="FILE",
     multiple=True,
-    help="Show what `check --json` or `stability --json` found, too (repeat).",
+    help="Result of `check --json` or `stability --json` to include (repeat).",
 )
 @delimiter_option
 @allow_loss_option
@@ -124,14 +140,14 @@ def command(
     budget: float | None,
     settings: tuple[str, ...],
 ) -> int:
-    """Ask MODEL, any file that can be read, for rules that never win, gaps, conflicts.
+    """Find rules that never win, gaps and conflicts in MODEL, any readable file.
 
-    Each answer is PROVED on all of the domain, shown by a WITNESS, a BRACKET around a
-    number, SAMPLED or DECLINED; `fuzzytree explain CODE` tells what a finding means and
-    what to do. Ctrl-C keeps what is proved.
+    Each answer is PROVED on the whole domain, shown by a WITNESS, enclosed by a
+    BRACKET, SAMPLED or DECLINED; `fuzzytree explain CODE` explains a finding and its
+    remedy. Ctrl-C keeps what is proved so far.
 
-    Exit 0 if nothing fails, 1 if something is found that is not accepted, 2 if it could
-    not run, 130 if interrupted.
+    Exit 0 without findings, 1 with findings that are not accepted, 2 if the audit
+    cannot run, 130 if interrupted.
     """
     from fuzzytree.api import verbs
     from fuzzytree.auditing.findings.baselines import baseline_of, gone, read_baseline
@@ -147,11 +163,11 @@ def command(
     read = [one for one in (model, data, config, *results) if one is not None]
     places = [one for one in (output, page, write_baseline) if one is not None]
     check_places(places, read)
-    asked = Options(within, spreads, limits, row, select, ignore, budget, settings)
+    options = Options(within, spreads, limits, row, select, ignore, budget, settings)
     known = configured(config, quiet=quiet)
     path = baseline or known.baseline
     accepted: Mapping[str, str] = {} if path is None else read_baseline(path)
-    with wrong_options(), progress_bar(quiet=quiet) as tell:
+    with wrong_options(), progress_bar(quiet=quiet) as show:
         material = verbs.material(
             model,
             data=table_of(data),
@@ -168,10 +184,10 @@ def command(
             row=row_of(row),
             select=codes_of(select) or known.select,
             ignore=codes_of(ignore) or known.ignore,
-            settings=settings_of(asked, known),
+            settings=settings_of(options, known),
             accepted=accepted,
-            repeat=repeating(model, data, target, config, asked),
-            progress=tell,
+            repeat=repeating(model, data, target, config, options),
+            progress=show,
         )
     form = "json" if as_json else form
     known_ids = accepted if path else None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 import msgspec
 
-from fuzzytree.cli.talk import say, setting, standard_input
+from fuzzytree.cli.console import say, setting, standard_input
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.findings.configuration import Configuration
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Options(msgspec.Struct, frozen=True):
-    """The options of the command line, as they were written.
+    """The options of the command line, before they are parsed.
 
     Attributes:
         within: `model` or `data`.
@@ -44,57 +44,69 @@ class Options(msgspec.Struct, frozen=True):
 
 _OPTIONS = (
     click.option(
-        "--data", metavar="TABLE", help="Rows of your own; `-` is standard input."
+        "--data",
+        metavar="TABLE",
+        help="Table of rows that the audit counts; `-` is standard input.",
     ),
     click.option(
-        "--target", metavar="COLUMN", help="The column of TABLE that has the classes."
+        "--target",
+        metavar="COLUMN",
+        help="Column of TABLE that holds the class of each row.",
     ),
     click.option(
         "--within",
         type=click.Choice(["model", "data"]),
         default="model",
         show_default=True,
-        help="Ask on the model's ranges, or on those of TABLE.",
+        help="Domain of the audit: the ranges of the model, or those of TABLE.",
     ),
     click.option(
         "--spreads",
         type=float,
         metavar="K",
-        help="Ask up to K spreads around the fitted sets.",
+        help="Extend the domain by K spreads around the fitted sets.",
     ),
     click.option(
         "--limits",
         metavar="NAME=LOW:HIGH",
         multiple=True,
-        help="Ask about these values of a variable (repeat).",
+        help="Range of values of a variable in the audit (repeat).",
     ),
     click.option(
-        "--row", metavar="NAME=VALUE,...", help="How far is another decision from here?"
+        "--row",
+        metavar="NAME=VALUE,...",
+        help="Row for which to find the nearest row of another class.",
     ),
     click.option(
-        "--select", metavar="CODES", multiple=True, help="Ask these only, as FT1,FT301."
+        "--select",
+        metavar="CODES",
+        multiple=True,
+        help="Codes to examine, such as FT1,FT301; all by default.",
     ),
     click.option(
-        "--ignore", metavar="CODES", multiple=True, help="Leave these out, as FT5."
+        "--ignore",
+        metavar="CODES",
+        multiple=True,
+        help="Codes to leave out, such as FT5.",
     ),
     click.option(
         "--budget",
         type=float,
         metavar="SECONDS",
-        help="End the work within these; 60.",
+        help="Time limit of the audit in seconds; 60 by default.",
     ),
     click.option(
         "--set",
         "settings",
         metavar="NAME=VALUE",
         multiple=True,
-        help="epsilon, margin, lead, level, overlap: what is small; rows, seed.",
+        help="Threshold (epsilon, margin, lead, level, overlap), or rows, seed.",
     ),
 )
 
 
 def with_options(function: Callable[..., int]) -> Callable[..., int]:
-    """Give a command the options that say what is asked, and where."""
+    """Give a command the options that choose the questions and the domain."""
     for option in reversed(_OPTIONS):
         function = option(function)
     return function
@@ -163,7 +175,7 @@ def _number(text: str, whole: str, *, option: str = "--limits") -> float:
         raise click.UsageError(what) from None
 
 
-def settings_of(asked: Options, known: Configuration) -> Settings:
+def settings_of(options: Options, known: Configuration) -> Settings:
     """Return the settings of the configuration with those of the command line.
 
     Raises:
@@ -171,9 +183,9 @@ def settings_of(asked: Options, known: Configuration) -> Settings:
     """
     from fuzzytree.auditing.findings.configuration import changed, check_settings
 
-    found = changed(known.settings, dict(map(setting, asked.settings)))
-    if asked.budget is not None:
-        found = msgspec.structs.replace(found, budget_s=asked.budget)
+    found = changed(known.settings, dict(map(setting, options.settings)))
+    if options.budget is not None:
+        found = msgspec.structs.replace(found, budget_s=options.budget)
         check_settings(found)
     return found
 
@@ -190,21 +202,21 @@ def repeating(
     data: str | None,
     target: str | None,
     config: str | None,
-    asked: Options,
+    options: Options,
 ) -> str:
-    """Return the command that asks the same, but for the choice of codes."""
+    """Return the command that repeats an audit, without its choice of codes."""
     words = ["fuzzytree", "audit", model]
     for name, value in (
         ("--data", data),
         ("--target", target),
         ("--config", config),
-        ("--spreads", asked.spreads),
-        ("--budget", asked.budget),
-        ("--row", asked.row),
+        ("--spreads", options.spreads),
+        ("--budget", options.budget),
+        ("--row", options.row),
     ):
         said = value if isinstance(value, str) else repr(value).removesuffix(".0")
         words += [] if value is None else [name, said]
-    words += [] if asked.within == "model" else ["--within", asked.within]
-    for name, values in (("--limits", asked.limits), ("--set", asked.settings)):
+    words += [] if options.within == "model" else ["--within", options.within]
+    for name, values in (("--limits", options.limits), ("--set", options.settings)):
         words += [word for value in values for word in (name, value)]
     return shlex.join(words)

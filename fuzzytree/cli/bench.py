@@ -1,4 +1,4 @@
-"""`fuzzytree bench`: what each way of running a model costs, and how exact it is."""
+"""`fuzzytree bench`: run time and error of each way of running a model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     delimiter_option,
@@ -35,7 +35,9 @@ INTERRUPTED = 130
 @click.command("bench", short_help="Measure error against run time.")
 @click.argument("model", metavar="MODEL")
 @click.option(
-    "--data", metavar="TABLE", help="Rows of your own; made of the model if none."
+    "--data",
+    metavar="TABLE",
+    help="Table of rows to measure on; rows from the model's ranges by default.",
 )
 @click.option(
     "--rows",
@@ -44,7 +46,7 @@ INTERRUPTED = 130
     multiple=True,
     default=(1, 1_000, 1_000_000),
     show_default=True,
-    help="Rows in a call.",
+    help="Rows in one call (repeat).",
 )
 @click.option(
     "--threads",
@@ -53,46 +55,51 @@ INTERRUPTED = 130
     multiple=True,
     default=(1, 2),
     show_default=True,
-    help="Threads that a candidate may use.",
+    help="Threads that a candidate may use (repeat).",
 )
 @click.option(
     "--only",
     metavar="NAME",
     multiple=True,
-    help="Measure these only: native, 'raw rules', peer, ...",
+    help="Candidates to measure, such as native, 'raw rules', peer (repeat).",
 )
-@click.option("--skip", metavar="NAME", multiple=True, help="Leave these out.")
+@click.option(
+    "--skip", metavar="NAME", multiple=True, help="Candidates to leave out (repeat)."
+)
 @click.option(
     "--budget",
     metavar="SECONDS",
     type=float,
     default=300.0,
     show_default=True,
-    help="About how long it may take.",
+    help="Approximate time limit in seconds.",
 )
 @click.option(
     "--error",
     metavar="E",
     type=float,
-    help="The largest error of a strength to allow in the advice.",
+    help="Largest error of a strength that the advice may accept.",
 )
 @click.option(
     "--seed",
     type=int,
     default=0,
     show_default=True,
-    help="Of made rows and of the order of the rounds.",
+    help="Random seed for generated rows and the order of rounds.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the study there, as JSON.")
+@click.option("-o", "--output", metavar="FILE", help="JSON file to write the study to.")
 @click.option(
     "--plot",
     "plots",
     metavar="FILE",
     multiple=True,
-    help="Draw the study for most rows, as .svg or .png.",
+    help="Picture of the study, as .svg or .png (repeat).",
 )
 @click.option(
-    "--full", "is_full", is_flag=True, help="List variants that are beaten, too."
+    "--full",
+    "is_full",
+    is_flag=True,
+    help="List variants that are slower and less exact, too.",
 )
 @delimiter_option
 @verbose_option
@@ -118,10 +125,10 @@ def command(
 ) -> int:
     """Measure error against run time for every way of running MODEL, a YAML file.
 
-    Runtimes, number types, approximations and programs of others answer the same
-    rows, in interleaved rounds; their errors are those against exact arithmetic. What
-    cannot be run is listed with its reason. Ctrl-C ends it early, keeps what was
-    measured, and exits with 130; exit 1 if an error is larger than certified.
+    Runtimes, number types, approximations and third-party libraries predict the same
+    rows in interleaved rounds; errors are those against exact arithmetic. Ctrl-C ends
+    the study early, keeps its results, and exits with 130; exit 1 if an error is
+    larger than its certified bound.
     """
     from fuzzytree.api import verbs
     from fuzzytree.report.bench import study_lines
@@ -129,7 +136,7 @@ def command(
     _check_places(output, plots)
     with (
         wrong_options(),
-        progress_bar(quiet=quiet) as tell,
+        progress_bar(quiet=quiet) as show,
         contextlib.redirect_stdout(sys.stderr),  # libraries of others may print
     ):
         found = verbs.bench(
@@ -143,7 +150,7 @@ def command(
             error=error,
             budget_s=budget,
             seed=seed,
-            progress=tell,
+            progress=show,
         )
     lines = study_lines(found, is_verbose=verbose, is_full=is_full)
     if not found.points:  # a file of an earlier study is worth more

@@ -1,4 +1,4 @@
-"""`fuzzytree check`: is everything that was made of a model still that model?"""
+"""`fuzzytree check`: compare all representations and files of a model."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     allow_loss_option,
     answer_result,
     data_option,
@@ -22,7 +22,9 @@ from fuzzytree.cli.talk import (
 )
 
 
-@click.command("check", short_help="Compare a model with all that is made of it.")
+@click.command(
+    "check", short_help="Compare a model with its rules, runtimes and files."
+)
 @click.argument("model", metavar="MODEL")
 @click.argument("files", metavar="[FILES]...", nargs=-1)
 @data_option
@@ -30,15 +32,20 @@ from fuzzytree.cli.talk import (
 @click.option(
     "--limit",
     type=click.IntRange(min=1),
-    help="The most probes; 20000 if none, and 2000 for a fuzzy system.",
+    help="Largest number of probes; 20000 by default, 2000 for a fuzzy system.",
 )
-@click.option("--rows", "is_full", is_flag=True, help="Tell rows that may differ, too.")
+@click.option(
+    "--rows",
+    "is_full",
+    is_flag=True,
+    help="List rows that differ by an allowed amount, too.",
+)
 @delimiter_option
 @rows_only_option
 @click.option(
     "--run-code",
     is_flag=True,
-    help="Run a program even if its text is not what is written now.",
+    help="Run a program file although its text differs from a new one.",
 )
 @allow_loss_option
 @verbose_option
@@ -59,11 +66,11 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compare MODEL, any file that can be read, with FILES made of it.
+    """Compare MODEL, any readable file, with FILES that were exported from it.
 
-    The tree, its rules, each runtime and each file answer the same rows; so do a fuzzy
+    The tree, its rules, each runtime and each file predict the same rows; so do a fuzzy
     system, each runtime and each file. Exit 1 if two of them disagree. A program (C,
-    Python, JavaScript, SQL, PMML) runs if its text is what is written now.
+    Python, JavaScript, SQL, PMML) runs only if its text equals a new export.
     """
     from fuzzytree.api import verbs
     from fuzzytree.report import text

@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from fuzzytree.cli.carriers import (
-    as_option,
-    conjunction_option,
-    terms_option,
-    wanted_format,
-)
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
     json_option,
@@ -31,6 +25,12 @@ from fuzzytree.cli.talk import (
     verbose_option,
     wrong_options,
 )
+from fuzzytree.cli.representation import (
+    as_option,
+    conjunction_option,
+    terms_option,
+    wanted_format,
+)
 from fuzzytree.errors import LossError
 from fuzzytree.files import LIMIT, write_atomically
 from fuzzytree.model.contracts import Document, Format, ModelKind, Reading, Written
@@ -42,29 +42,38 @@ if TYPE_CHECKING:
     from fuzzytree.numerics.bounds import Certificate
 
 
-@click.command("convert", short_help="Bring a model from one format to another.")
+@click.command("convert", short_help="Convert a model from one format to another.")
 @click.argument("source", metavar="IN")
 @click.argument("output", metavar="OUT")
-@click.option("--from", "read_as", metavar="FORMAT", help="If not IN's suffix says.")
-@click.option("--to", metavar="FORMAT", help="If not OUT's suffix says.")
+@click.option(
+    "--from",
+    "read_as",
+    metavar="FORMAT",
+    help="Format of IN; from its suffix by default.",
+)
+@click.option(
+    "--to", metavar="FORMAT", help="Format of OUT; from its suffix by default."
+)
 @as_option
 @terms_option
 @conjunction_option
-@click.option("--dialect", metavar="NAME", help="Of the format that is written.")
+@click.option("--dialect", metavar="NAME", help="Dialect of the format of OUT.")
 @click.option(
     "--tolerance",
     metavar="NUMBER",
-    help="The largest error of a degree where a curve becomes points.",
+    help="Largest error of a degree where a curve becomes points.",
 )
 @click.option(
     "--set",
     "settings",
     metavar="NAME=VALUE",
     multiple=True,
-    help="An option of the writer; `fuzzytree formats --format NAME` lists them.",
+    help="Option of the writer (repeat); `fuzzytree formats --format NAME` lists them.",
 )
 @click.option(
-    "--allow-loss", is_flag=True, help="Read and write what is lost as near as can be."
+    "--allow-loss",
+    is_flag=True,
+    help="Write the file although the conversion loses information.",
 )
 @verbose_option
 @json_option
@@ -85,10 +94,10 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Bring the model of file IN to file OUT, whose suffixes name the formats.
+    """Convert the model of file IN to file OUT; their suffixes name the formats.
 
-    `-` is standard input or output. What has no place in the model or in OUT is
-    listed, and nothing is written unless allowed: exit 1.
+    `-` is standard input or output. A conversion that would lose information is
+    refused with a list of the losses, unless --allow-loss is given: exit 1.
     """
     if output == "-" and to is None:
         raise click.UsageError("`-` has no suffix; name the format with --to")
@@ -153,7 +162,7 @@ def read_source(source: str, read_as: str | None) -> tuple[Reading, str]:
 
 
 class Choice(msgspec.Struct, frozen=True):
-    """The form of a model that was asked for."""
+    """The representation of a model to write."""
 
     representation: ModelKind | None = None
     kind: Kind | None = None
@@ -192,11 +201,11 @@ def carry(
         quiet: Whether to print nothing but errors.
     """
     from fuzzytree.checking.converting import export, kind_of, proved
-    from fuzzytree.cli.carriers import carried
+    from fuzzytree.cli.representation import represented
     from fuzzytree.model.losses import loss_text
     from fuzzytree.report import systems
 
-    model = carried(
+    model = represented(
         found.model,
         form,
         representation=choice.representation,

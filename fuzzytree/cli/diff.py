@@ -1,4 +1,4 @@
-"""`fuzzytree diff`: what has changed from one model to another, and who notices?"""
+"""`fuzzytree diff`: what has changed from one model to another."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import click
 
 from fuzzytree.cli.audit_options import limits_of
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     allow_loss_option,
     answer_result,
     delimiter_option,
@@ -20,22 +20,27 @@ from fuzzytree.cli.talk import (
 )
 
 
-@click.command("diff", short_help="What changed between two models, and who notices?")
+@click.command(
+    "diff",
+    short_help="Compare two models: changed rules, and rows classified differently.",
+)
 @click.argument("old", metavar="OLD")
 @click.argument("new", metavar="NEW")
-@click.option("--data", metavar="TABLE", help="Rows of your own, answered by both.")
+@click.option(
+    "--data", metavar="TABLE", help="Table of rows that both models classify."
+)
 @click.option(
     "--limits",
     metavar="NAME=LOW:HIGH",
     multiple=True,
-    help="Compare on these values of an input (repeat).",
+    help="Range of values of an input to compare on (repeat).",
 )
 @click.option(
     "--budget",
     type=float,
     default=60.0,
     metavar="SECONDS",
-    help="Leave open what is not decided by then; 60.",
+    help="Time limit of the proofs in seconds; 60 by default.",
 )
 @delimiter_option
 @allow_loss_option
@@ -54,16 +59,16 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compare the model in NEW with the one in OLD, in any formats that can be read.
+    """Compare the model in NEW with the one in OLD, two files of any readable format.
 
-    Rules and terms are told apart by what they say, and not by their order. Decisions
-    are proved equal, or a point is shown at which they differ. Exit 1 if a decision
-    changes, or another change breaks who calls the model.
+    Rules and terms are matched by their content, not by their order. Decisions are
+    proved equal, or a point is shown at which they differ. Exit 1 if a decision
+    changes, or if programs that call the model must change.
     """
     from fuzzytree.api import verbs
     from fuzzytree.report.diff import diff_lines
 
-    with wrong_options(), progress_bar(quiet=quiet) as tell:
+    with wrong_options(), progress_bar(quiet=quiet) as show:
         found = verbs.diff(
             old,
             new,
@@ -72,7 +77,7 @@ def command(
             limits=limits_of(limits),
             budget_s=budget,
             allow_loss=allow_loss,
-            progress=tell,
+            progress=show,
         )
     is_silent = quiet and found.verdict == "equal" and found.ok
     lines = diff_lines(found, is_verbose=verbose)

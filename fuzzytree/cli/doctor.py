@@ -11,7 +11,7 @@ from types import MappingProxyType
 import click
 
 import fuzzytree
-from fuzzytree.cli.talk import answer, answer_json, json_option, verbose_option
+from fuzzytree.cli.console import answer, answer_json, json_option, verbose_option
 from fuzzytree.errors import FuzzyTreeError, install_hint
 
 CORE = ("numpy", "pyarrow", "msgspec", "PyYAML", "click", "rich", "narwhals", "lark")

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import click
 
-from fuzzytree.cli.talk import answer, answer_json, json_option, verbose_option
+from fuzzytree.cli.console import answer, answer_json, json_option, verbose_option
 
 
-@click.command("explain", short_help="Say what a code of an audit means.")
+@click.command("explain", short_help="Explain a code of an audit.")
 @click.argument("code", metavar="[CODE]", required=False)
 @verbose_option
 @json_option
 def command(code: str | None, verbose: bool, as_json: bool) -> None:
-    """Say what CODE means, why it matters, and what to do; list all codes without.
+    """Explain what CODE means, why it matters, and what to do; list all codes without.
 
-    CODE is a code such as FT101, the id of a finding such as FT101-1a2b3c4d, or how
-    codes begin, such as FT1: those are listed.
+    CODE is a code such as FT101, the id of a finding such as FT101-1a2b3c4d, or the
+    beginning of codes to list, such as FT1.
     """
     from fuzzytree.auditing.findings.codes import CODES
     from fuzzytree.model.rulebase import name_choice

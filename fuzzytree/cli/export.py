@@ -4,46 +4,65 @@ from __future__ import annotations
 
 import click
 
-from fuzzytree.cli.carriers import (
+from fuzzytree.cli.console import (
+    json_option,
+    quiet_option,
+    verbose_option,
+    wrong_options,
+)
+from fuzzytree.cli.convert import Choice, carry, read_source
+from fuzzytree.cli.representation import (
     as_option,
     conjunction_option,
     terms_option,
     wanted_format,
 )
-from fuzzytree.cli.convert import Choice, carry, read_source
-from fuzzytree.cli.talk import json_option, quiet_option, verbose_option, wrong_options
 from fuzzytree.model.contracts import ModelKind
 from fuzzytree.model.rulebase import Conjunction, Kind
 
 
 @click.command("export", short_help="Write a model in another format.")
 @click.argument("model", metavar="MODEL")
-@click.option("-o", "--output", required=True, metavar="FILE", help="`-` is stdout.")
-@click.option("--to", metavar="FORMAT", help="The format, if not FILE's suffix says.")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="FILE",
+    help="File to write; `-` is stdout.",
+)
+@click.option(
+    "--to", metavar="FORMAT", help="Format of FILE; from its suffix by default."
+)
 @as_option
 @terms_option
 @conjunction_option
 @click.option(
     "--dtype",
     type=click.Choice(["float64", "mixed", "float32"]),
-    help="onnx: the number type of the degrees.",
+    help="onnx: number type of the degrees.",
 )
-@click.option("--opset", type=int, help="onnx: the version of the operators.")
-@click.option("--ir", type=int, help="onnx: the version of the file.")
+@click.option("--opset", type=int, help="onnx: version of the operators, 12 to 26.")
+@click.option("--ir", type=int, help="onnx: version of the file format, 4 to 13.")
 @click.option(
     "--signature",
     type=click.Choice(["needed", "all"]),
-    help="onnx: the columns that are inputs.",
+    help="onnx: columns that are inputs of the graph.",
 )
 @click.option(
     "--outputs",
     metavar="NAMES",
-    help="onnx: some of label,rule,status,strengths, with commas.",
+    help="onnx: outputs of the graph, of label,rule,status,strengths.",
 )
-@click.option("--readable", is_flag=True, help="onnx: with functions of our own.")
-@click.option("--plain", is_flag=True, help="onnx: a tree without ai.onnx.ml.")
 @click.option(
-    "--allow-loss", is_flag=True, help="Write what is lost as near as it can."
+    "--readable", is_flag=True, help="onnx: write functions with readable names."
+)
+@click.option(
+    "--plain", is_flag=True, help="onnx: write a tree without operators of ai.onnx.ml."
+)
+@click.option(
+    "--allow-loss",
+    is_flag=True,
+    help="Write the file although the format loses information.",
 )
 @verbose_option
 @json_option
@@ -69,8 +88,8 @@ def command(
 ) -> int:
     """Write a model in another format, which FILE's suffix names.
 
-    It is `convert` with the options of onnx by name. What the format cannot hold is
-    listed, and nothing is written unless allowed: exit 1.
+    It is `convert` with the options of onnx by name. An export that would lose
+    information is refused with a list of the losses, unless allowed: exit 1.
     """
     from fuzzytree.model.options import check_names
 

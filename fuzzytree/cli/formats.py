@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     json_option,
@@ -23,7 +23,12 @@ if TYPE_CHECKING:
 
 
 @click.command("formats", short_help="List formats and runtimes.")
-@click.option("--format", "name", metavar="NAME", help="Everything about one format.")
+@click.option(
+    "--format",
+    "name",
+    metavar="NAME",
+    help="Format to describe with its options and limits.",
+)
 @verbose_option
 @json_option
 def command(name: str | None, verbose: bool, as_json: bool) -> None:

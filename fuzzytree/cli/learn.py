@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from fuzzytree.cli.carriers import (
-    as_option,
-    carried,
-    conjunction_option,
-    terms_option,
-    wanted_format,
-)
-from fuzzytree.cli.convert import next_check
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
     delimiter_option,
@@ -29,6 +21,14 @@ from fuzzytree.cli.talk import (
     table_source,
     verbose_option,
     wrong_options,
+)
+from fuzzytree.cli.convert import next_check
+from fuzzytree.cli.representation import (
+    as_option,
+    conjunction_option,
+    represented,
+    terms_option,
+    wanted_format,
 )
 from fuzzytree.files import check_place, read_bounded, write_atomically
 from fuzzytree.model.contracts import Document, Format, ModelKind
@@ -48,58 +48,75 @@ _SETTINGS = (
         type=click.Choice(["default", "paper"]),
         default="default",
         show_default=True,
-        help="`paper` is the paper's learner to the letter.",
+        help="Learner: the default one, or that of the paper exactly.",
     ),
     click.option(
-        "--alpha", type=float, help="Weight of means in the distance, 0 to 1."
+        "--alpha",
+        type=float,
+        help="Weight of the means in the distance of patterns, 0 to 1.",
     ),
-    click.option("--l-max", type=float, help="The paper's L_MAX."),
-    click.option("--points", type=int, help="n of the 2n + 1 points on a set, 1 to 8."),
     click.option(
-        "--separate-sides", is_flag=True, default=None, help="Fit L and R apart."
+        "--l-max",
+        type=float,
+        help="Parameter L_MAX of the paper: largest ratio of distances.",
+    ),
+    click.option(
+        "--points",
+        type=int,
+        help="Number n of the 2n + 1 points on a fitted set, 1 to 8.",
+    ),
+    click.option(
+        "--separate-sides",
+        is_flag=True,
+        default=None,
+        help="Fit the two sides of a set separately.",
     ),
     click.option(
         "--patterns",
         "patterns_per_class",
         metavar="NUMBER|auto",
-        help="Patterns for each class; auto chooses class by class.",
+        help="Number of patterns of each class; auto chooses it per class.",
     ),
-    click.option("--shrinkage", type=float, help="Of off-diagonal scatter, 0 to 1."),
-    click.option("--entry", type=float, help="What a further input must gain."),
+    click.option(
+        "--shrinkage", type=float, help="Shrinkage of the off-diagonal scatter, 0 to 1."
+    ),
+    click.option("--entry", type=float, help="Gain that a further input must bring."),
     click.option(
         "--cost",
         "costs",
         metavar="COLUMN=COST",
         multiple=True,
-        help="What a column costs to compute (repeat).",
+        help="Cost of computing a column (repeat).",
     ),
     click.option(
         "--validate",
         "choices",
         type=click.Choice(["alpha", "l_max", "shrinkage", "entry"]),
         multiple=True,
-        help="Choose this by inner validation (repeat).",
+        help="Setting to choose by inner cross-validation (repeat).",
     ),
     click.option(
-        "--rows-per-class", type=int, help="Kept for clusters and validation."
+        "--rows-per-class",
+        type=int,
+        help="Largest number of rows per class that the learner keeps.",
     ),
     click.option(
         "--seed",
         type=int,
         default=0,
         show_default=True,
-        help="Random seed of all folds.",
+        help="Random seed for the cross-validation folds.",
     ),
     click.option(
         "--keep-reversals",
         is_flag=True,
         default=None,
-        help="Give far tails back to a wide set.",
+        help="Let a wide set take back the far tails of others.",
     ),
     click.option(
         "--missing",
         type=click.Choice(["drop", "refuse"]),
-        help="Rows with missing values.",
+        help="Rows with missing values: drop them, or refuse the table.",
     ),
 )
 """An option for each field of `fuzzytree.learning.Settings`."""
@@ -113,23 +130,43 @@ def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
 
 @click.command("learn", short_help="Learn a tree from a table.")
 @click.argument("table", metavar="TABLE")
-@click.option("--target", required=True, metavar="COLUMN", help="The classes.")
-@click.option("-o", "--output", required=True, metavar="FILE", help="`-` is stdout.")
-@click.option("--name", metavar="TEXT", help="Of the tree; TABLE's unless given.")
 @click.option(
-    "--ignore", metavar="COLUMN", multiple=True, help="Leave a column out (repeat)."
+    "--target",
+    required=True,
+    metavar="COLUMN",
+    help="Column that holds the class of each row.",
+)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    metavar="FILE",
+    help="File to write; `-` is stdout.",
+)
+@click.option(
+    "--name", metavar="TEXT", help="Name of the tree; the name of TABLE by default."
+)
+@click.option(
+    "--ignore",
+    metavar="COLUMN",
+    multiple=True,
+    help="Column that is no input (repeat).",
 )
 @click.option(
     "--unit",
     "units",
     metavar="COLUMN=UNIT",
     multiple=True,
-    help="The unit of a column (repeat).",
+    help="Unit of a column (repeat).",
 )
 @as_option
 @terms_option
 @conjunction_option
-@click.option("--no-test", is_flag=True, help="Learn only, without cross-validation.")
+@click.option(
+    "--no-test",
+    is_flag=True,
+    help="Learn without measuring the cross-validated accuracy.",
+)
 @delimiter_option
 @verbose_option
 @json_option
@@ -203,7 +240,7 @@ def command(
         rows.insert(0, ("accuracy", f"{tested.mean:.3f}" if tested else "-", said))
     width = max(map(len, (output, *(thing for _, thing, _ in rows))))
     say_rows(*rows, width=width, quiet=is_silent)
-    model = carried(
+    model = represented(
         learnt.tree,
         form,
         representation=representation,
@@ -256,7 +293,7 @@ def _written_rows(
 
 
 def _settings(chosen: Mapping[str, object]) -> Settings:
-    """Return the settings of the options that were given."""
+    """Return the settings of the options on the command line."""
     from fuzzytree.learning import Settings
 
     given = {name: value for name, value in chosen.items() if value is not None}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     data_option,
@@ -27,31 +27,34 @@ if TYPE_CHECKING:
     from fuzzytree.model.tree import Use
 
 
-@click.command("needs", short_help="Tell what a model needs, and leave out the rest.")
+@click.command("needs", short_help="Report what a model needs, and leave out the rest.")
 @click.argument("model", metavar="MODEL")
 @data_option
 @click.option(
-    "-o", "--output", metavar="FILE", help="Write the pruned model, if it is proved."
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="File to write the simplified model to, if its equality is proved.",
 )
 @click.option(
     "--for",
     "uses",
     type=click.Choice(["tree", "relative", "raw"]),
     multiple=True,
-    help="What a tree serves; its path and its relative rules if none.",
+    help="Use of a tree (repeat); its path and its relative rules by default.",
 )
 @click.option(
     "--drop",
     type=click.Choice(["inputs", "rules"]),
     multiple=True,
-    help="Leave out inputs that nothing asks, or rules that never fire, too.",
+    help="Also leave out inputs that nothing tests, or rules that never fire (repeat).",
 )
 @click.option(
     "--time",
     "seconds",
     type=click.FloatRange(min=0.0, min_open=True),
     metavar="SECONDS",
-    help="Measure for so long what opening, answering and reading cost.",
+    help="Time in seconds for measuring loading, prediction and reading.",
 )
 @delimiter_option
 @verbose_option
@@ -69,10 +72,10 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Tell what MODEL, a YAML file, needs, and what leaving out the rest saves.
+    """Report what MODEL, a YAML file, needs, and what leaving out the rest saves.
 
-    The pruned model is held against MODEL, by proof and by running both. Exit 1 if
-    they differ in a way that was not asked for; nothing is written then.
+    The simplified model is compared with MODEL, by proof and by running both. Exit 1
+    if they differ in a way that no option allows; nothing is written then.
     """
     from pathlib import Path
 
@@ -94,8 +97,8 @@ def command(
     if output is not None:
         check_place(output)
     rows = verbs.rows_of(table_source(data), first, delimiter=delimiter)
-    with progress_bar(quiet=quiet) as tell:
-        told = savings.report(
+    with progress_bar(quiet=quiet) as show:
+        report = savings.report(
             first,
             found,
             uses=wanted,
@@ -103,19 +106,19 @@ def command(
             table=None if data == "-" else data,
             delimiter=delimiter,
             seconds=seconds or 0.0,
-            tell=tell,
+            tell=show,
         )
     if as_json:
-        answer_json(told.to_json())
+        answer_json(report.to_json())
     else:
-        answer("\n".join(report_lines(told, is_verbose=verbose)))
-    if not told.ok:
-        wrong = sum(c.verdict == "DISAGREES" for c in told.proof.comparisons)
-        say(f"the pruned model differs in {wrong} ways; nothing is written")
+        answer("\n".join(report_lines(report, is_verbose=verbose)))
+    if not report.ok:
+        wrong = sum(c.verdict == "DISAGREES" for c in report.proof.comparisons)
+        say(f"the simplified model differs in {wrong} ways; nothing is written")
         return 1
     if output is not None:
         verbs.save(found.model, output)
-        after = f"not for all rows the answers of {model}"
+        after = f"predicts some rows differently from {model}"
         if found.is_same:
             files = [
                 (one, find_format(Path(one).suffix).name) for one in (model, output)

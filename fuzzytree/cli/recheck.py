@@ -1,13 +1,13 @@
-"""`fuzzytree recheck`: does an audit hold, seen without what made it?"""
+"""`fuzzytree recheck`: check an audit by independent code."""
 
 from __future__ import annotations
 
 import click
 
-from fuzzytree.cli.talk import answer
+from fuzzytree.cli.console import answer
 
 
-@click.command("recheck", short_help="Check an audit again, on its own.")
+@click.command("recheck", short_help="Check an audit independently.")
 @click.argument("audit", metavar="AUDIT")
 @click.argument("model", metavar="MODEL")
 def command(audit: str, model: str) -> int:

@@ -1,4 +1,4 @@
-"""`fuzzytree run`: the answers to the rows of a table, piece by piece."""
+"""`fuzzytree run`: predictions for the rows of a table, piece by piece."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     allow_loss_option,
     delimiter_option,
     quiet_option,
@@ -41,35 +41,43 @@ Columns = dict[str, Sequence[object]]
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a cell begins
 
 
-@click.command("run", short_help="Answer the rows of a table.")
+@click.command("run", short_help="Predict the rows of a table.")
 @click.argument("model", metavar="MODEL")
 @click.argument("table", metavar="TABLE")
 @click.option(
-    "-o", "--output", default="-", metavar="FILE", help="CSV; stdout if none."
+    "-o",
+    "--output",
+    default="-",
+    metavar="FILE",
+    help="CSV file to write; stdout by default.",
 )
 @click.option(
     "--strengths",
     type=click.Choice(["class", "rule"]),
-    help="Add a column of strengths for each class or rule.",
-)
-@click.option("--why", is_flag=True, help="Add the rule that won, with its degrees.")
-@click.option(
-    "--keep", is_flag=True, help="Add the columns of TABLE, before the others."
+    help="Add a column with the firing strength of each class or rule.",
 )
 @click.option(
-    "--runtime", metavar="NAME", help="What executes the model; native if none."
+    "--why", is_flag=True, help="Add the winning rule, with its degrees of membership."
+)
+@click.option(
+    "--keep", is_flag=True, help="Add the columns of TABLE before the others."
+)
+@click.option(
+    "--runtime",
+    metavar="NAME",
+    help="Runtime that executes the model; native by default.",
 )
 @delimiter_option
 @click.option(
     "--json",
     "as_json",
     is_flag=True,
-    help="Write JSON lines, not CSV; null for nothing.",
+    help="Write JSON lines in place of CSV; null for an empty cell.",
 )
 @click.option(
     "--safe-csv",
     is_flag=True,
-    help="Put an apostrophe before text that a spreadsheet takes for a formula.",
+    help="Put an apostrophe before text that a spreadsheet reads as a formula.",
 )
 @allow_loss_option
 @quiet_option
@@ -87,11 +95,11 @@ def command(
     allow_loss: bool,
     quiet: bool,
 ) -> None:
-    """Answer the rows of TABLE: a class, a rule number and a status for each.
+    """Predict the rows of TABLE: a class, a rule number and a status for each.
 
-    A fuzzy system answers a number for each output, and a status. MODEL is a file in
-    any format that can be read, or ONNX; TABLE is CSV or Parquet, or `-` for standard
-    input. Columns are found by name. Rule numbers count from 1; 0 is no rule.
+    A fuzzy system predicts a number for each output, and a status. MODEL is a readable
+    file or ONNX; TABLE is CSV or Parquet, or `-` for standard input. Columns are
+    matched by name. Rule numbers count from 1; 0 is no rule.
     """
     from fuzzytree.api import verbs
 
@@ -122,7 +130,7 @@ def command(
                 _add(columns, {"why": reason(batch, answers)}, name)
             write(columns)
             tally.add(batch, answers)
-    tally.tell(output, quiet=quiet)
+    tally.report(output, quiet=quiet)
 
 
 def _answered(answers: Answers | Outputs, strengths: By | None, model: str) -> Columns:
@@ -134,7 +142,7 @@ def _answered(answers: Answers | Outputs, strengths: By | None, model: str) -> C
         return answers.columns(strengths)
     except ValueError as error:
         raise click.UsageError(
-            f"--strengths {strengths}: {model} does not tell them; "
+            f"--strengths {strengths}: {model} does not report them; "
             "export it with --outputs label,rule,status,strengths, "
             "or run the YAML file"
         ) from error
@@ -173,7 +181,7 @@ def _reasons(
 
     if isinstance(model, OnnxModel):
         raise click.UsageError(
-            f"--why: {path} does not hold the rules in words; run the YAML file"
+            f"--why: {path} does not contain the rules as text; run the YAML file"
         )
     rules = rules_from_tree(model) if isinstance(model, FuzzyTree) else model
 
@@ -288,8 +296,8 @@ class _Tally:
         for status in range(4):
             self.statuses[status] = self.statuses.get(status, 0) + answers.count(status)
 
-    def tell(self, output: str, *, quiet: bool) -> None:
-        """Say on stderr what was answered and what was out of the ordinary."""
+    def report(self, output: str, *, quiet: bool) -> None:
+        """Report on stderr what was predicted and what was unusual."""
         from fuzzytree.report.text import counted, number
 
         counts = [f"{name} {count}" for name, count in self.classes.items()]

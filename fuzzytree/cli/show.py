@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     json_option,
@@ -23,14 +23,16 @@ if TYPE_CHECKING:
 
 @click.command("show", short_help="Show a model and its rules.")
 @click.argument("model", metavar="MODEL")
-@click.option("--picture", metavar="FILE", help="Draw the tree as well (.svg, .png).")
+@click.option(
+    "--picture", metavar="FILE", help="Picture of the tree to write, as .svg or .png."
+)
 @json_option
 @quiet_option
 def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None:
-    """Show a tree, a rule base or a fuzzy system, with the numbers behind the words.
+    """Show a tree, a rule base or a fuzzy system, with the numbers of its terms.
 
-    MODEL is a file in any format that can be read, or ONNX. What a model cannot hold
-    of the file is told on stderr.
+    MODEL is a readable file, or ONNX. Parts of the file that a model cannot represent
+    are reported on stderr.
     """
     from pathlib import Path
 
@@ -42,7 +44,7 @@ def command(model: str, picture: str | None, as_json: bool, quiet: bool) -> None
         check_place(picture)
     if Path(model).suffix.lower() == ".onnx":
         if picture is not None:
-            raise click.UsageError(f"--picture: {model} holds no tree, but a graph")
+            raise click.UsageError(f"--picture: {model} contains a graph and no tree")
         opened = verbs.opened(model)
         assert isinstance(opened, OnnxModel)
         facts = text.onnx_facts(opened)

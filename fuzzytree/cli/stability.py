@@ -1,4 +1,4 @@
-"""`fuzzytree stability`: is a model numerically stable, and what would float32 cost?"""
+"""`fuzzytree stability`: numerical stability, and the price of float32."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer_result,
     data_option,
     delimiter_option,
@@ -20,19 +20,17 @@ from fuzzytree.cli.talk import (
 )
 
 
-@click.command("stability", short_help="Is a model numerically stable?")
+@click.command("stability", short_help="Check that a model is numerically stable.")
 @click.argument("model", metavar="MODEL")
 @data_option
 @click.option(
     "--only",
     metavar="CODE",
     multiple=True,
-    help="Apply these criteria only, such as N3; all if none.",
+    help="Check to apply, such as N3 (repeat); all by default.",
 )
 @runtimes_option
-@click.option(
-    "--rows", "is_full", is_flag=True, help="Tell all that was left out, too."
-)
+@click.option("--rows", "is_full", is_flag=True, help="The same as --verbose.")
 @delimiter_option
 @verbose_option
 @json_option
@@ -48,23 +46,23 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Apply the criteria N1 to N10 to MODEL, a YAML file with a tree or a rule base.
+    """Apply the stability checks N1 to N10 to MODEL, a YAML file.
 
-    They ask for equal bits in other units, orders and batches, for exact edges, for
-    errors within the certified bounds, and for curves that can be evaluated. Each
-    input is told with what float32 would cost it. Exit 1 if a criterion fails.
+    They require equal bits in other units, orders and batches, exact edges, errors
+    within the certified bounds, and curves that can be evaluated; the price of float32
+    is reported for each input. Exit 1 if a check fails.
     """
     from fuzzytree.api import verbs
     from fuzzytree.report.stability import stability_lines
 
-    with wrong_options(), progress_bar(quiet=quiet) as tell:
+    with wrong_options(), progress_bar(quiet=quiet) as show:
         found = verbs.stability(
             model,
             data=table_source(data),
             delimiter=delimiter,
             only=only,
             runtimes=runtimes or None,
-            progress=tell,
+            progress=show,
         )
     is_failed = any(one.verdict == "FAILS" for one in found.criteria)
     lines = stability_lines(found, is_verbose=verbose or is_full)

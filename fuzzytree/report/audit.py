@@ -24,7 +24,7 @@ from fuzzytree.report.text import aligned, counted, number
 
 WIDTH: Final = 100
 MOST_FINDINGS: Final = 200
-"""That are told one by one."""
+"""The most that are listed one by one."""
 
 _MOST_SHORT = 8  # findings, unless all are printed
 _MOST_EVIDENCE = 2  # of them that are printed with their evidence
@@ -55,7 +55,7 @@ ORIGINS: Mapping[str, str] = {
 
 _Paint = Callable[[str, str], str]
 _SUMMARY = (
-    *("code", "question", "asked", "found"),
+    *("code", "question", "count", "found"),
     *map(str.lower, STATES),
 )
 
@@ -133,8 +133,8 @@ def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[
     given = [o for o in audit.answers if (o.code, o.subject) == ("FT204", "row")]
     yield from _brief("the row of --row", given, paint)
     states = Counter(state_word(one.state) for one in audit.answers)
-    told = [f"{states[word]} {word}" for word in STATES if states[word]]
-    yield f"{counted(len(audit.answers), 'question')}: {', '.join(told) or 'none'}"
+    counts = [f"{states[word]} {word}" for word in STATES if states[word]]
+    yield f"{counted(len(audit.answers), 'question')}: {', '.join(counts) or 'none'}"
     missed = [text for text in audit.unasked if "left out by the user" not in text]
     if missed:
         yield f"not examined, or not to the end: {counted(len(missed), 'code')}"
@@ -146,7 +146,7 @@ def _short(audit: Audit, findings: Sequence[Answer], paint: _Paint) -> Iterator[
 
 
 def summary_lines(audit: Audit) -> Iterator[str]:
-    """Yield how many questions of each code were asked, and how each is known."""
+    """Yield how many questions each code has, and how each answer is known."""
     rows: list[Sequence[str]] = [_SUMMARY]
     codes = dict.fromkeys(answer.code for answer in audit.answers)
     for code in codes:
@@ -170,15 +170,15 @@ def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
     if audit.accepted:
         said += f" beside {len(audit.accepted)} accepted"
     if audit.was_interrupted:
-        said += "; interrupted: what is proved is kept, the rest is not asked"
+        said += "; interrupted: what is proved is kept, the rest is not examined"
     elif not audit.is_complete:
-        said += "; not complete: the budget is spent (--budget SECONDS)"
+        said += "; incomplete: the budget is spent (--budget SECONDS)"
     if gone:
         ids = counted(len(gone), "accepted finding")
         said += f"; {ids} no longer found, which --write-baseline forgets"
     if found:
         gravest = min(found, key=lambda one: [*SEVERITIES].index(one.severity))
-        said += f"; `fuzzytree explain {gravest.code}` tells what to do"
+        said += f"; `fuzzytree explain {gravest.code}` explains the gravest"
     elif audit.is_complete:
         said += f"; {_asked_text(audit)}"
     return said
@@ -398,7 +398,7 @@ def _first(answers: Sequence[Answer]) -> Iterator[Answer]:
 
 
 def _declined(audit: Audit, *, is_whole: bool) -> Iterator[str]:
-    """Yield what was declined and why; the findings among it were told before."""
+    """Yield the declined questions that are no findings, and why."""
     states = [(one, one.state) for one in audit.answers if not one.is_finding]
     texts = [
         f"{answer.code} {answer.subject}: "
@@ -432,10 +432,10 @@ def gathered(unasked: Sequence[str]) -> Iterator[str]:
 
 
 def _asked_text(audit: Audit) -> str:
-    """Return how many questions were asked, and how many are open or declined."""
+    """Return how many questions were examined, and how many are open or declined."""
     if not audit.answers:
-        return "nothing in this model to ask it of"
-    asked = f"{counted(len(audit.answers), 'question')} asked"
+        return "no question applies to this model"
+    count = counted(len(audit.answers), "question")
     kinds = {"open": Bracket, "declined": Declined}
     counts = {
         word: sum(isinstance(one.state, kind) for one in audit.answers)
@@ -444,13 +444,11 @@ def _asked_text(audit: Audit) -> str:
     declined = [o.state.code for o in audit.answers if isinstance(o.state, Declined)]
     if counts["declined"] == len(audit.answers):
         return (
-            f"{asked}, and every one declined: nothing is known; "
-            f"`fuzzytree explain {declined[0]}` tells what to do"
+            f"{count}, all declined: nothing is known; "
+            f"`fuzzytree explain {declined[0]}` explains why"
         )
-    told = [f"{count} {word}" for word, count in counts.items() if count]
-    if not told:
-        return f"{asked} and answered"
-    return f"{asked}, {' and '.join(told).replace(' ', ' of them ', 1)}"
+    others = [f"{n} {word}" for word, n in counts.items() if n]
+    return f"{count}, {' and '.join(others)}" if others else f"{count} answered"
 
 
 def _item(text: str) -> Iterator[str]:

@@ -26,7 +26,7 @@ from fuzzytree.report.svg_regions import bar_picture, map_picture, span_text, wi
 from fuzzytree.report.text import counted, number
 
 MOST_FINDINGS = 300
-"""That are told one by one."""
+"""The most that are listed one by one."""
 
 MOST_PICTURED = 30
 """That have pictures: the first, and the gravest stand first."""
@@ -38,7 +38,7 @@ MOST_WHOLE = 3
 """Of a code that are shown whole; of the others all but errors are folded."""
 
 MOST_FACTS = 8
-"""Of a code, beside the findings, that are told."""
+"""The most facts of a code, beside its findings."""
 
 _SHORT = 16  # characters of a fraction that a reader may want to see
 _PLAIN = re.compile(r"[A-Za-z0-9-]{1,60}")
@@ -72,9 +72,9 @@ def findings_section(
     if not findings:
         return tag("p", "There is no finding.")
     names = anchors(findings)
-    told = [*zip(findings, names, strict=True)][:MOST_FINDINGS]
+    shown = [*zip(findings, names, strict=True)][:MOST_FINDINGS]
     groups: dict[tuple[Severity, str], list[Markup]] = {}
-    for place, (answer, name) in enumerate(told):
+    for place, (answer, name) in enumerate(shown):
         known = answer.id in accepted
         drawn: Drawn = "nothing" if place >= MOST_PICTURED else "bars"
         if place < MOST_MAPPED:
@@ -85,13 +85,13 @@ def findings_section(
             _finding(answer, name, scene, drawn, is_known=known, is_whole=is_whole)
         )
     parts = [_group(code, shown) for (_, code), shown in groups.items()]
-    more = len(findings) - len(told)
+    more = len(findings) - len(shown)
     if more > 0:
         said = f"{counted(more, 'more finding')}: the JSON has all of them"
         parts.append(tag("p", said, class_="left-out"))
-    if len(told) > MOST_MAPPED:
+    if len(shown) > MOST_MAPPED:
         said = f"Only the first {MOST_MAPPED} findings have maps"
-        if len(told) > MOST_PICTURED:
+        if len(shown) > MOST_PICTURED:
             said += f", and the first {MOST_PICTURED} pictures of variables"
         parts.append(tag("p", said, class_="left-out"))
     return joined(parts)
@@ -262,7 +262,7 @@ Drawn = Literal["nothing", "bars", "maps"]
 
 
 class Scene(NamedTuple):
-    """What findings are told and drawn with.
+    """What the text and pictures of findings are made from.
 
     Attributes:
         axes: Every variable, by name.
@@ -396,11 +396,11 @@ def _mapped(
     shown: Sequence[Axis], rules: RuleBase, whose: str, scene: Scene
 ) -> list[Axis]:
     """Return the variables that a map may show; of one who differs, all if two."""
-    asked = dict.fromkeys(clause.variable for r in rules.rules for clause in r.when)
+    tested = dict.fromkeys(clause.variable for r in rules.rules for clause in r.when)
     found = {axis.name: axis for axis in shown}
-    if whose and len(asked) == 2:
-        found |= {name: scene.axes[name] for name in asked if name in scene.axes}
-    return [axis for axis in found.values() if axis.name in asked]
+    if whose and len(tested) == 2:
+        found |= {name: scene.axes[name] for name in tested if name in scene.axes}
+    return [axis for axis in found.values() if axis.name in tested]
 
 
 def _maps(
@@ -412,9 +412,9 @@ def _maps(
     rules: RuleBase,
 ) -> Iterator[Markup]:
     """Yield maps of the decision on the two variables that a region limits most."""
-    asked = {clause.variable for rule in rules.rules for clause in rule.when}
+    tested = {clause.variable for rule in rules.rules for clause in rule.when}
     drawn = sorted(shown, key=lambda axis: _share(axis, region.get(axis.name)))
-    if len(drawn) < 2 or asked - values.keys():
+    if len(drawn) < 2 or tested - values.keys():
         return
     if len(rules.rules) > _MOST_MAP_RULES:
         said = f"not drawn: a map of more than {_MOST_MAP_RULES} rules"
@@ -427,7 +427,7 @@ def _maps(
         said = (
             f"What {whose or 'the rules'} decide{'s' * (whose == 'the tree')} {where}"
         )
-        others = len(asked - {across.name, down.name})
+        others = len(tested - {across.name, down.name})
         if others:
             said += f", with {counted(others, 'other variable')} as at the witness"
         if across.parts or down.parts:

@@ -34,7 +34,7 @@ Audited = FuzzyTree | RuleBase | FuzzySystem
 MOST_RULES = 1000
 MOST_VARIABLES = 60
 _MOST_LINES = 400  # of a tree as an outline
-_MOST_TERMS = 40  # of a variable that are told in words
+_MOST_TERMS = 40  # of a variable that are described in words
 _MOST_PARTS = 12  # of a combination that are written
 
 
@@ -200,7 +200,7 @@ def rules_section(
 
     Args:
         viewed: The rules as they are audited.
-        answers: All answers; those of FT701 tell about rows.
+        answers: All answers; those of FT701 are about rows.
         links: The findings about each rule, by its number.
     """
     notes = [*_notes(viewed)]
@@ -208,15 +208,15 @@ def rules_section(
         return joined(notes)
     rules = viewed.rules.rules
     is_supported = any(rule.support is not None for rule in rules)
-    told = {k: answer for answer in answers for k in _of_rows(answer)}
-    names = [*dict.fromkeys(m.name for one in told.values() for m in one.measures)]
-    is_shared = any(isinstance(one.state, Sampled) for one in told.values())
+    supported = {k: answer for answer in answers for k in _of_rows(answer)}
+    names = [*dict.fromkeys(m.name for one in supported.values() for m in one.measures)]
+    is_shared = any(isinstance(one.state, Sampled) for one in supported.values())
     head = ["rule", "sentence", *(["training rows"] if is_supported else []), *names]
     head += [*(["confidence"] if is_shared else []), "findings"]
     rows: list[list[Content]] = []
     for k, rule in enumerate(rules[:MOST_RULES], 1):
         said = sentence_of(rule, viewed.rules)
-        answer = told.get(k)
+        answer = supported.get(k)
         name = viewed.places[k - 1] if viewed.places else str(k)
         row: list[Content] = [tag("span", name, id=f"rule-{k}"), said]
         if is_supported:
@@ -235,7 +235,7 @@ def _notes(viewed: View) -> Iterator[Markup]:
     """Yield what a reader must know of rules that are not in the table."""
     system, rules = viewed.system, viewed.rules
     if rules is None:
-        said = "None of the rules has an exact counterpart; why is told below"
+        said = "None of the rules has an exact counterpart; the reasons are below"
         yield tag("p", said, class_="left-out")
     elif len(rules.rules) > MOST_RULES:
         more = counted(len(rules.rules) - MOST_RULES, "more rule")
@@ -244,7 +244,7 @@ def _notes(viewed: View) -> Iterator[Markup]:
         return
     if rules is not None:
         said = "These are the system's conditions as they are audited: one that says "
-        yield tag("p", f"{said}'or' is asked as several rules", class_="caption")
+        yield tag("p", f"{said}'or' is examined as several rules", class_="caption")
     known = set(viewed.numbers)
     weights = [
         f"rule {k} by {rule.weight!r}"

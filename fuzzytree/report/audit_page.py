@@ -175,7 +175,7 @@ def _sections(
     facts = facts_section(audit.answers)
     if facts is not None:
         yield "facts", "What else is known", facts
-    yield "questions", "Everything that was asked", _questions(audit)
+    yield "questions", "All questions", _questions(audit)
     if agreement is not None:
         yield "agreement", "Agreement", agreement_section(agreement)
     if stability is not None:
@@ -258,20 +258,20 @@ def _questions(audit: Audit) -> Markup:
         found = sum(answer.is_finding for answer in answers)
         states = [str(n) if n else "·" for n in known_as(answers).values()]
         rows.append((code, title, str(len(answers)), str(found), *states))
-    head = ("code", "question", "asked", "findings", *map(str.lower, STATES))
+    head = ("code", "question", "count", "findings", *map(str.lower, STATES))
     right = tuple(range(2, len(head)))
     summary = table(head, rows, caption="Questions by code", right=right, sorts=True)
     parts: list[Content] = [summary]
     if audit.unasked:
-        parts += [tag("h3", "Not asked"), listed(gathered(audit.unasked))]
+        parts += [tag("h3", "Not examined"), listed(gathered(audit.unasked))]
     declined = [one for one in audit.answers if isinstance(one.state, Declined)]
     if declined:
         lines = (f"{one.subject}: {state_note(one.state)}" for one in declined)
-        told: list[Content] = [*dict.fromkeys(lines)]
-        if len(told) > _MOST_DECLINED:
-            more = len(told) - _MOST_DECLINED
-            told[_MOST_DECLINED:] = [f"and {more} more, of which the JSON tells"]
-        parts += [tag("h3", "Declined"), listed(told)]
+        listing: list[Content] = [*dict.fromkeys(lines)]
+        if len(listing) > _MOST_DECLINED:
+            more = len(listing) - _MOST_DECLINED
+            listing[_MOST_DECLINED:] = [f"and {more} more in the JSON"]
+        parts += [tag("h3", "Declined"), listed(listing)]
     each: list[Sequence[Content]] = [
         (
             answer.code,
@@ -286,8 +286,8 @@ def _questions(audit: Audit) -> Markup:
     said = f"Every question, {len(audit.answers)} in all"
     if len(audit.answers) > MOST_QUESTIONS:
         said += f"; the first {MOST_QUESTIONS} are here, the JSON has all"
-    listing = table(head, each, caption="Every question with its answer", sorts=True)
-    parts.append(folded(said, listing))
+    whole = table(head, each, caption="Every question with its answer", sorts=True)
+    parts.append(folded(said, whole))
     return joined(parts)
 
 
@@ -325,7 +325,7 @@ def _repeat(audit: Audit) -> Markup:
         )
         for side in audit.domain.sides[:MOST_QUESTIONS]
     ]
-    caption = "The domain: everything was asked here and nowhere else"
+    caption = "The domain: the audit covers these ranges and no others"
     return joined(
         [
             tag("dl", *pairs, class_="facts-list"),
@@ -335,7 +335,7 @@ def _repeat(audit: Audit) -> Markup:
 
 
 def _command(answers: Sequence[Answer]) -> str:
-    """Return the command that asked all of this: what all the answers' have in common.
+    """Return the command of the audit: what the commands of all answers share.
 
     The command of an answer is that of the audit with `--select` and its code.
     """
@@ -356,11 +356,11 @@ def verdict(audit: Audit) -> Markup:
     if accepted:
         said += f"; {counted(accepted, 'other')} {'is' if accepted == 1 else 'are'} "
         said += "accepted"
-    asked = counted(len(audit.answers), "question")
-    whole = f"The audit is complete: {asked} asked, all of them answered or declined"
+    questions = counted(len(audit.answers), "question")
+    whole = f"The audit is complete: {questions}, all answered or declined"
     if not audit.is_complete:
         by = "by hand" if audit.was_interrupted else "by its budget"
-        whole = f"The audit was cut short {by}: {asked} asked, others were not"
+        whole = f"The audit was cut short {by}: {questions} examined, others were not"
     shown = [
         tag("li", state_badge(word), tag("b", str(states[word])), f" {meaning}")
         for word, meaning in STATES.items()
@@ -380,12 +380,14 @@ def _result(
 ) -> tuple[str, str]:
     """Return a sign and a sentence: what was found, and what that is worth."""
     counts = {one: sum(f.severity == one for f in findings) for one in SEVERITIES}
-    told = [counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]]
-    if told:
+    listing = [
+        counted(counts[one], SEVERITIES[one]) for one in SEVERITIES if counts[one]
+    ]
+    if listing:
         worst = next(one for one in SEVERITIES if counts[one])
         verb = "was" if len(findings) == 1 else "were"
-        others = ", ".join(told[:-1])
-        return worst, f"{others}{' and ' if others else ''}{told[-1]} {verb} found"
+        others = ", ".join(listing[:-1])
+        return worst, f"{others}{' and ' if others else ''}{listing[-1]} {verb} found"
     whole, declined = sum(states.values()), states["DECLINED"]
     if declined and declined == whole:
         return "declined", "Nothing was decided: every question was declined"
@@ -402,10 +404,10 @@ def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | Non
         findings: Those that are not accepted.
         named: All, in the order of the page.
     """
-    told = {id(one) for one in findings if one.severity != "info"}
+    listing = {id(one) for one in findings if one.severity != "info"}
     urgent: dict[tuple[str, str], list[tuple[Answer, str]]] = {}
     for one, name in zip(named, anchors(named), strict=True):
-        if id(one) in told:
+        if id(one) in listing:
             urgent.setdefault((one.code, one.sentence), []).append((one, name))
     if not urgent:
         return None
@@ -432,7 +434,7 @@ def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | Non
 
 
 _MOST_CALM = 12  # comparisons that agree and are not folded
-_MOST_TOLD = 200  # sentences
+_MOST_LISTED = 200  # sentences
 
 
 def agreement_section(found: Agreement) -> Markup:
@@ -478,10 +480,10 @@ def stability_section(found: Stability) -> Markup:
     )
 
 
-def _folded(name: str, told: list[str] | tuple[str, ...]) -> Markup | None:
-    if not told:
+def _folded(name: str, listing: list[str] | tuple[str, ...]) -> Markup | None:
+    if not listing:
         return None
-    shown: list[Content] = [*told[:_MOST_TOLD]]
-    if len(told) > _MOST_TOLD:
-        shown.append(f"and {len(told) - _MOST_TOLD} more")
-    return folded(f"{name} ({len(told)})", listed(shown))
+    shown: list[Content] = [*listing[:_MOST_LISTED]]
+    if len(listing) > _MOST_LISTED:
+        shown.append(f"and {len(listing) - _MOST_LISTED} more")
+    return folded(f"{name} ({len(listing)})", listed(shown))

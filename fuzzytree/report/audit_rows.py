@@ -80,11 +80,11 @@ def passing(tree: FuzzyTree, data: Data) -> Passing:
             leaves.append(counts)
             continue
         nodes.append(counts)
-        asked = tree.nodes[node - 1]
-        interval = np.searchsorted(asked.cuts, data.axes[asked.variable][rows])
-        owner = np.array(asked.owners)[interval]
-        for place in reversed(range(len(asked.branches))):
-            todo.append((asked.branches[place].node, rows[owner == place]))
+        tested = tree.nodes[node - 1]
+        interval = np.searchsorted(tested.cuts, data.axes[tested.variable][rows])
+        owner = np.array(tested.owners)[interval]
+        for place in reversed(range(len(tested.branches))):
+            todo.append((tested.branches[place].node, rows[owner == place]))
     return Passing(tuple(nodes), tuple(leaves), int((~known).sum()))
 
 

@@ -248,8 +248,8 @@ def as_in_file(audit: Audit) -> Audit:
 def _claim_in_file(claim: Claim, numbers: Sequence[int]) -> Claim:
     """Return a claim by the numbers in the file; two ways of one rule are one."""
     rules, rivals = (
-        tuple(dict.fromkeys(numbers[n - 1] for n in asked))
-        for asked in (claim.rules, claim.rivals)
+        tuple(dict.fromkeys(numbers[n - 1] for n in numbered))
+        for numbered in (claim.rules, claim.rivals)
     )
     return msgspec.structs.replace(claim, rules=rules, rivals=rivals)
 

@@ -33,7 +33,7 @@ Timed = dict[str, tuple[Point, Timing]]
 
 _WIDTH = 96  # of a line of words
 _LEGEND = (
-    "* nobody is both faster and more exact; +- the 95 % interval of the median;",
+    "* no candidate is both faster and more exact; +- the 95 % interval of the median;",
     f"speed: times as fast as {DEFAULT}; floor x: as long as reading the columns;",
     "error: the largest of a strength, observed; certified: the bound of it;",
     "flips: other classes than exact arithmetic gives, at edges: on rows aimed there",
@@ -152,13 +152,13 @@ def _table(
         for timing in point.timings
         if (timing.rows, timing.threads) == (rows, threads)
     }
-    asked: dict[Question, None] = {}
+    questions: dict[Question, None] = {}
     for point, timing in timed.values():
         if point.kind == "floor":
             yield (f"  {point.name}", *_time_cells(timing, timed))
         else:
-            asked[point.question] = None
-    for question in asked:
+            questions[point.question] = None
+    for question in questions:
         best = _best(found, question, rows, threads)
         yield from _rows(question, timed, best, is_full=is_full)
 
@@ -166,7 +166,7 @@ def _table(
 def _rows(
     question: Question, timed: Timed, best: Sequence[str], *, is_full: bool
 ) -> Iterator[tuple[str, ...]]:
-    """Yield the cells of one question; beaten variants as a count, unless asked for."""
+    """Yield the cells of one question; beaten variants are counted or listed."""
     yield (question,)
     beaten = 0
     for point, timing in sorted(timed.values(), key=lambda one: one[1].median_ns):
@@ -237,7 +237,8 @@ def _grouped(omissions: Iterable[Omission]) -> Iterator[str]:
             who.setdefault(one.name, [])
     for why, who in found.items():
         names = [
-            f"{k} ({', '.join(asked)})" if asked else k for k, asked in who.items()
+            f"{k} ({', '.join(questions)})" if questions else k
+            for k, questions in who.items()
         ]
         yield f"{', '.join(names)}: {why}"
 

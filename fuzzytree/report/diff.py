@@ -83,14 +83,14 @@ def verdict_text(found: Difference) -> str:
 
 def _counts_text(changes: Sequence[Change]) -> str:
     grades = [change.grade for change in changes]
-    told = [
+    counts = [
         f"{grades.count(grade)} {grade}"
         for grade in ("breaking", "non-breaking", "cosmetic")
         if grade in grades
     ]
-    if not told:
+    if not counts:
         return "nothing else has changed"
-    return f"{counted(len(grades), 'change')}: {', '.join(told)}"
+    return f"{counted(len(grades), 'change')}: {', '.join(counts)}"
 
 
 def _model_text(title: str, model: Compared) -> str:

@@ -21,10 +21,10 @@ from fuzzytree.semantics.inference.curves import curve_degree
 LETTER = 0.58
 """How wide a letter of a picture is on average, in sizes of its font."""
 
-_STEPS = 72  # at which a curve is looked at, beside its corners
+_STEPS = 72  # at which a curve is evaluated, beside its corners
 _CORNERS = 160  # of one curve that are drawn exactly
 _KEPT = 1024  # degrees of one curve
-_FLAT = 0.04  # points of a picture that nobody sees
+_FLAT = 0.04  # points of a picture below what is visible
 
 
 class Scale(NamedTuple):
@@ -36,7 +36,7 @@ class Scale(NamedTuple):
     end: float
 
     def at(self, value: float) -> float:
-        """Return the point of a value, held between the ends.
+        """Return the point of a value, clamped to the ends.
 
         Example:
             >>> Scale(0.0, 4.0, 100.0, 200.0).at(1.0)
@@ -151,7 +151,7 @@ def curve_of(name: str, shape: Shape) -> Curve:
         (0.0, 1.0)
     """
 
-    @lru_cache(maxsize=_KEPT)  # pictures of findings ask for the same values again
+    @lru_cache(maxsize=_KEPT)  # pictures of findings use the same values again
     def degree(value: float) -> float:
         return float(exact_degree(shape, Fraction(value)))
 
@@ -266,7 +266,7 @@ def ticks(low: float, high: float, most: int = 4) -> list[float]:
 
 
 def tick_words(values: Sequence[float]) -> list[str]:
-    """Return values with as few digits, three at least, as tell them apart.
+    """Return values with as few digits, three at least, as distinguish them.
 
     Example:
         >>> tick_words([1000.25, 1000.5])
@@ -303,7 +303,7 @@ def svg(
         width: In points of its own.
         height: The same.
         title: What it shows, in a few words.
-        desc: The same in a sentence, for who does not see it.
+        desc: The same in a sentence, for readers who cannot see it.
         children: What is drawn.
         name: A word that only this picture of the page has.
     """

@@ -12,8 +12,8 @@ from fuzzytree.report.text import aligned, counted
 
 def explanation_lines(code: Code) -> Iterator[str]:
     """Yield what a code means, why it matters, a case, and what to do."""
-    asked = "" if code.decision == "any" else ", asked where the strongest rule decides"
-    yield f"{code.code}  {code.title} ({code.severity}{asked})"
+    where = "" if code.decision == "any" else ", where the strongest rule decides"
+    yield f"{code.code}  {code.title} ({code.severity}{where})"
     for title, text in (
         ("what", code.what),
         ("why", code.why),

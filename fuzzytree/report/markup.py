@@ -27,7 +27,7 @@ Attribute = str | float | bool | None
 
 
 def text(words: str) -> Markup:
-    r"""Return words as markup: signs that nobody sees are spelt, long texts are cut.
+    r"""Return words as markup: invisible characters escaped, long texts cut.
 
     Example:
         >>> text("soft <b>" + chr(27))

@@ -173,7 +173,7 @@ _IN_PROPERTIES = {**_IN_TEXT, ":": "%3A", ",": "%2C"}
 def annotation_lines(audit: Audit) -> Iterator[str]:
     """Yield a workflow command for each finding that no baseline accepts.
 
-    A last one tells that an audit is not complete, or that it knows nothing.
+    A last one reports that an audit is incomplete, or that all was declined.
     """
     for answer in audit.open_findings:
         yield _annotation(answer, audit)

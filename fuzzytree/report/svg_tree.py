@@ -13,7 +13,7 @@ from fuzzytree.report.markup import Markup, tag
 from fuzzytree.report.text import counted, number
 
 MOST_LEAVES = 120
-"""Of a tree that is drawn; a larger one is told as an outline."""
+"""Of a tree that is drawn; a larger one is printed as an outline."""
 
 WIDE, HIGH = 176.0, 52.0
 """Of a box, in points."""
@@ -80,7 +80,7 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
         wide,
         high,
         f"The tree {tree.name}: {nodes}, {leaves}",
-        "From left to right: each box asks one variable, each branch takes a part of "
+        "From left to right: each box tests one variable, each branch takes a part of "
         "its values, and each rounded box is a class; the same as an outline follows",
         *drawn,
         name="tree",
@@ -102,13 +102,13 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
         node, leaf, branch, above = todo.pop()
         level = above.level + 1 if above else 0
         if node is not None:
-            asked = tree.nodes[node - 1]
-            cuts = ", ".join(map(number, asked.cuts))
-            box = Box(level, f"{asked.variable}?", f"cut at {cuts}", branch)
+            tested = tree.nodes[node - 1]
+            cuts = ", ".join(map(number, tested.cuts))
+            box = Box(level, f"{tested.variable}?", f"cut at {cuts}", branch)
             box.counts = rows.nodes[node - 1] if rows else ()
             todo += [
-                (one.node, one.leaf, _branch_words(asked, place), box)
-                for place, one in reversed([*enumerate(asked.branches)])
+                (one.node, one.leaf, _branch_words(tested, place), box)
+                for place, one in reversed([*enumerate(tested.branches)])
             ]
         else:
             position = leaf or 1
@@ -120,8 +120,8 @@ def boxes_of(tree: FuzzyTree, rows: Passing | None) -> list[Box]:
                 box.counts = tuple(
                     end.support * (code == box.code) for code in codes.values()
                 )
-            told = counted(sum(box.counts), "row") if box.counts else ""
-            box.note = f"rule {position}" + (f", {told}" if told else "")
+            reached = counted(sum(box.counts), "row") if box.counts else ""
+            box.note = f"rule {position}" + (f", {reached}" if reached else "")
         box.above = above
         if above:
             above.below.append(box)
@@ -183,7 +183,7 @@ def _drawn(box: Box) -> Markup:
     is_leaf = box.code is not None
     mark = class_mark(box.code or 0) if is_leaf else ""
     room = (WIDE - 20.0) / (LETTER * 13.0)
-    said = [box.branch, box.title, box.note, _told(box.counts)]
+    said = [box.branch, box.title, box.note, _counts_text(box.counts)]
     return tag(
         "g",
         tag("title", "; ".join(filter(None, said))),
@@ -203,7 +203,7 @@ def _drawn(box: Box) -> Markup:
     )
 
 
-def _told(counts: Counts) -> str:
+def _counts_text(counts: Counts) -> str:
     return f"rows by class: {', '.join(map(str, counts))}" if counts else ""
 
 

@@ -138,7 +138,7 @@ def head_lines(model: FuzzyTree | RuleBase) -> Iterator[str]:
 
 
 def depth(tree: FuzzyTree) -> int:
-    """Return how many nodes the longest path of a tree asks."""
+    """Return how many nodes the longest path of a tree has."""
     depths = [0] * (len(tree.nodes) + 1)
     for position in range(len(tree.nodes), 0, -1):
         below = [depths[b.node] for b in tree.nodes[position - 1].branches if b.node]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.words import SIZE, short
+from fuzzytree.report.plots.sheet import SIZE, short
 
 if TYPE_CHECKING:
     import numpy.typing as npt

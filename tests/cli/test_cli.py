@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fuzzytree.cli import VERBS, main, run
-from fuzzytree.cli.talk import progress_bar
+from fuzzytree.cli.console import progress_bar
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -132,7 +132,7 @@ def test_a_reader_who_leaves_early_sees_no_traceback(folder: Path) -> None:
 
 def test_a_full_standard_output_is_one_sentence(folder: Path) -> None:
     code, _, err = _shell("fuzzytree show grip.yaml > /dev/full", folder)
-    assert (code, err) == (2, "cannot go on: no space left on device\n")
+    assert (code, err) == (2, "cannot continue: no space left on device\n")
 
 
 def test_a_terminal_without_lines_to_draw_gets_escapes(folder: Path) -> None:
@@ -145,7 +145,7 @@ def test_a_terminal_without_lines_to_draw_gets_escapes(folder: Path) -> None:
 def test_a_bar_appears_only_on_a_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fuzzytree.cli.talk._PATIENCE_S", 0.0)
+    monkeypatch.setattr("fuzzytree.cli.console._PATIENCE_S", 0.0)
     with progress_bar() as tell:
         tell("learning", 0.5)
     assert capsys.readouterr().err == ""
@@ -158,7 +158,7 @@ def test_a_bar_waits_half_a_second(
     with progress_bar() as tell:
         tell("learning", 0.5)
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr("fuzzytree.cli.talk._PATIENCE_S", 0.0)
+    monkeypatch.setattr("fuzzytree.cli.console._PATIENCE_S", 0.0)
     monkeypatch.setenv("TERM", "xterm")
     with progress_bar() as tell:
         tell("learning [/b]\x1b[2J", 0.5)
@@ -184,5 +184,5 @@ def test_too_little_memory_is_one_sentence(
     assert call("show", "grip.yaml") == (
         2,
         "",
-        "cannot go on: there is not enough memory\n",
+        "cannot continue: there is not enough memory\n",
     )

@@ -52,7 +52,7 @@ def test_the_packages_are_those_of_the_project() -> None:
 
     assert names(project["dependencies"]) == {name.lower() for name in CORE}
     extras = project["optional-dependencies"]
-    assert set(EXTRAS) == set(extras) - {"all", "dev"}
+    assert set(EXTRAS) == set(extras) - {"all", "dev", "docs"}
     for extra, packages in EXTRAS.items():
         assert names(extras[extra]) == set(packages)
 

@@ -81,7 +81,7 @@ def test_what_is_dropped_on_request_is_said(call: Call) -> None:
     code, out, err = call("needs", "wide.yaml", "--drop", "inputs", "-o", "less.yaml")
     assert code == 0
     assert "differs by design" in out
-    assert err == "wrote    less.yaml not for all rows the answers of wide.yaml\n"
+    assert err == "wrote    less.yaml predicts some rows differently from wide.yaml\n"
 
 
 def test_json_tells_the_same_facts(call: Call) -> None:
@@ -123,7 +123,7 @@ def test_a_pruned_model_that_differs_is_not_written(
     code, out, err = call("needs", "grip.yaml", "-o", "left.yaml")
     assert code == 1
     assert "node 1 is another node" in out
-    assert err == "the pruned model differs in 3 ways; nothing is written\n"
+    assert err == "the simplified model differs in 3 ways; nothing is written\n"
     assert not Path("left.yaml").exists()
 
 

@@ -107,7 +107,7 @@ def test_a_file_without_strengths_cannot_tell_them(call: Call) -> None:
     code, _, err = call("run", "grip.onnx", "grasps.csv", "--strengths", "class")
     assert code == 2
     assert err == (
-        "--strengths class: grip.onnx does not tell them; export it with "
+        "--strengths class: grip.onnx does not report them; export it with "
         "--outputs label,rule,status,strengths, or run the YAML file\n"
         "  fuzzytree run --help lists the options\n"
     )
@@ -128,7 +128,7 @@ def test_why_needs_the_rules(call: Call) -> None:
     code, _, err = call("run", "grip.onnx", "grasps.csv", "--why")
     assert code == 2
     assert err == (
-        "--why: grip.onnx does not hold the rules in words; run the YAML file\n"
+        "--why: grip.onnx does not contain the rules as text; run the YAML file\n"
         "  fuzzytree run --help lists the options\n"
     )
 

@@ -150,7 +150,7 @@ def test_what_has_no_tree_has_no_picture(call: Call) -> None:
     assert err.startswith("--picture: grip is no tree; rules have none to draw\n")
     code, _, err = call("show", "grip.onnx", "--picture", "no.svg")
     assert code == 2
-    assert err.startswith("--picture: grip.onnx holds no tree, but a graph\n")
+    assert err.startswith("--picture: grip.onnx contains a graph and no tree\n")
     assert not Path("no.svg").exists()
 
 

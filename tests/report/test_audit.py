@@ -18,9 +18,9 @@ from fuzzytree.report.audit import (
 from tests.report.audits import LINES, every_state
 
 WHOLE = """\
-2 findings: 1 error, 1 warning beside 1 accepted; not complete: the budget is spent \
+2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is spent \
 (--budget
-  SECONDS); `fuzzytree explain FT101` tells what to do
+  SECONDS); `fuzzytree explain FT101` explains the gravest
 grip: audited as rules; AND is min, the strongest rule decides
 rows     4 of grasps.csv
 domain
@@ -47,7 +47,7 @@ grip.yaml: FT202 warning: rules 1 and 2 are equally strong on a part of the doma
 
 1 answer is no finding; --all lists each
 
-code   question      asked  found  proved  witness  bracket  sampled  declined
+code   question      count  found  proved  witness  bracket  sampled  declined
 FT101  dead rule     1      1      1       -        -        -        -
 FT202  ambiguity     1      1      -       1        -        -        -
 FT301  coverage gap  1      1      -       -        1        -        -
@@ -181,27 +181,25 @@ def test_findings_beyond_the_most_are_counted() -> None:
 def test_the_verdict_counts_and_says_what_next() -> None:
     audit = every_state()
     assert verdict_text(audit, ["FT101-0"]) == (
-        "2 findings: 1 error, 1 warning beside 1 accepted; not complete: the budget is "
+        "2 findings: 1 error, 1 warning beside 1 accepted; incomplete: the budget is "
         "spent (--budget SECONDS); 1 accepted finding no longer found, which "
-        "--write-baseline forgets; `fuzzytree explain FT101` tells what to do"
+        "--write-baseline forgets; `fuzzytree explain FT101` explains the gravest"
     )
     calm = replace(audit, answers=audit.answers[3:], accepted=(), is_complete=True)
-    assert verdict_text(calm) == "nothing found; 2 questions asked, 1 of them declined"
+    assert verdict_text(calm) == "nothing found; 2 questions, 1 declined"
     bare = replace(calm, answers=())
-    assert verdict_text(bare) == "nothing found; nothing in this model to ask it of"
+    assert verdict_text(bare) == "nothing found; no question applies to this model"
     none = replace(calm, answers=calm.answers[:1])
     assert verdict_text(none) == (
-        "nothing found; 1 question asked, and every one declined: nothing is known; "
-        "`fuzzytree explain FTD02` tells what to do"
+        "nothing found; 1 question, all declined: nothing is known; "
+        "`fuzzytree explain FTD02` explains why"
     )
     bracket = replace(audit.answers[2], is_finding=False)
     unsure = replace(calm, answers=(bracket, *calm.answers))
-    assert verdict_text(unsure) == (
-        "nothing found; 3 questions asked, 1 of them open and 1 declined"
-    )
+    assert verdict_text(unsure) == ("nothing found; 3 questions, 1 open and 1 declined")
     sure = replace(calm, answers=calm.answers[1:])
-    assert verdict_text(sure) == "nothing found; 1 question asked and answered"
+    assert verdict_text(sure) == "nothing found; 1 question answered"
     cut = replace(calm, unasked=("FT101 dead rule: cut short: interrupted",))
     assert verdict_text(replace(cut, is_complete=False)) == (
-        "nothing found; interrupted: what is proved is kept, the rest is not asked"
+        "nothing found; interrupted: what is proved is kept, the rest is not examined"
     )

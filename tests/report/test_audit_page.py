@@ -82,7 +82,7 @@ def shown(model: RuleBase | None = None, **fields: Any) -> Outline:
 def test_the_verdict_counts_findings_by_severity() -> None:
     text = shown().text
     assert "1 error, 1 warning and 2 notes were found" in text
-    assert "The audit is complete: 10 questions asked" in text
+    assert "The audit is complete: 10 questions, all" in text
 
 
 def test_an_audit_without_findings_says_so() -> None:
@@ -114,7 +114,7 @@ def test_an_audit_that_found_nothing_so_far_does_not_look_calm() -> None:
 def test_an_audit_that_was_cut_short_says_so_and_what_was_not_asked() -> None:
     unasked = ("FT501 complexity: not asked: the budget of 1 s is spent",)
     text = shown(is_complete=False, unasked=unasked).text
-    assert "The audit was cut short by its budget: 10 questions asked" in text
+    assert "The audit was cut short by its budget: 10 questions examined" in text
     assert unasked[0] in text
     by_hand = ("FT501 complexity: not asked: interrupted",)
     text = shown(is_complete=False, unasked=by_hand).text
@@ -377,7 +377,7 @@ def test_a_code_of_two_severities_has_two_groups_and_no_id_twice() -> None:
 
 def test_what_was_not_asked_is_gathered_by_its_reason() -> None:
     unasked = ("FT102 marginal rule: left out", "FT103 redundant rule: left out")
-    assert "Not asked FT102, FT103: left out" in shown(unasked=unasked).text
+    assert "Not examined FT102, FT103: left out" in shown(unasked=unasked).text
 
 
 def test_what_is_too_much_is_left_out_and_counted(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from fuzzytree.benchmarking.front import error_of
 from fuzzytree.benchmarking.records import Kind, Point, Question, Study, Timing
 from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.words import SIZE
+from fuzzytree.report.plots.sheet import SIZE
 from fuzzytree.report.text import counted
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.report.plots.saving import style
-from fuzzytree.report.plots.words import LINE, MARGIN, SIZE, TITLE, WORD, Sheet, short
+from fuzzytree.report.plots.sheet import LINE, MARGIN, SIZE, TITLE, WORD, Sheet, short
 from fuzzytree.report.svg_tree import EDGE, HIGH, WIDE, Box, boxes_of, placed
 from fuzzytree.report.text import counted
 

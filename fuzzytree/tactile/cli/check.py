@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     json_option,

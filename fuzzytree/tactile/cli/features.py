@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer_bytes,
     answer_json,
     json_option,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer_json,
     json_option,
     quiet_option,

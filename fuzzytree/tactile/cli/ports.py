@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from fuzzytree.cli.talk import answer, answer_json, json_option, say
+from fuzzytree.cli.console import answer, answer_json, json_option, say
 
 
 @click.command("ports", short_help="List the serial ports.")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_bytes,
     answer_json,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from fuzzytree.cli.talk import answer_json, json_option, quiet_option, say, say_rows
+from fuzzytree.cli.console import answer_json, json_option, quiet_option, say, say_rows
 from fuzzytree.errors import PortError, WriteError
 from fuzzytree.files import check_place
 from fuzzytree.tactile.cli.ending import told_to_end

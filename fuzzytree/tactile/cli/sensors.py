@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fuzzytree.cli.talk import say_rows, wrong_options
+from fuzzytree.cli.console import say_rows, wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import Model

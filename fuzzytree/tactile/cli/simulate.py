@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fuzzytree.cli.talk import (
+from fuzzytree.cli.console import (
     answer,
     answer_json,
     json_option,

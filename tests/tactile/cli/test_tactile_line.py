@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzytree.cli.talk import say
+from fuzzytree.cli.console import say
 from fuzzytree.tactile.board_files.reader import load_board
 from fuzzytree.tactile.board_files.writer import board_text
 from fuzzytree.tactile.boards import Board, Marker, Start

@@ -1,4 +1,4 @@
-"""The options that say which form of a model a file gets."""
+"""The options that choose the representation and the format of a file."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ as_option = click.option(
     "--as",
     "representation",
     type=click.Choice(["tree", "rules", "system"]),
-    help="Write the tree, rules made from it, or the system that decides alike.",
+    help="Representation to write: the tree, its rules, or the equivalent system.",
 )
 terms_option = click.option(
     "--terms",
     "kind",
     type=click.Choice(["relative", "raw"]),
-    help="Rules that equal the tree (the default), or the paper's own.",
+    help="Rules that equal the tree (the default), or those of the paper.",
 )
 conjunction_option = click.option(
     "--conjunction",
     type=click.Choice(["min", "product"]),
-    help="The AND of the rules.",
+    help="AND operator of the rules; min by default.",
 )
 
 
 def wanted_format(output: str, to: str | None) -> Format:
-    """Return the format of an output file: the one asked for, or of its suffix.
+    """Return the format of an output file: the named one, or that of its suffix.
 
     Standard output has none: it gets YAML.
 
@@ -48,7 +48,7 @@ def wanted_format(output: str, to: str | None) -> Format:
         raise click.UsageError(f"{error}{hint}") from error
 
 
-def carried(
+def represented(
     model: Document,
     form: Format,
     *,
@@ -56,7 +56,7 @@ def carried(
     kind: Kind | None,
     conjunction: Conjunction | None,
 ) -> Document:
-    """Return the form of a model that was asked for; see `converting.formed`.
+    """Return a model in the wanted representation; see `converting.formed`.
 
     Raises:
         click.UsageError: If the model cannot be had in that form.

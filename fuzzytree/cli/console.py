@@ -1,4 +1,4 @@
-"""What the verbs say on stderr, and what they answer on stdout."""
+"""Output of the verbs: results on stdout, messages on stderr; shared options."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ Name = TypeVar("Name", str, str | None)
 _PATIENCE_S = 0.5  # before a bar appears
 _MOST_LINES = 8  # of a list on stderr, unless all are printed
 
-quiet_option = click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+quiet_option = click.option("--quiet", is_flag=True, help="Print errors only.")
 json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print the facts as JSON to stdout."
+    "--json", "as_json", is_flag=True, help="Print the whole result as JSON to stdout."
 )
 verbose_option = click.option(
     "--verbose", is_flag=True, help="Print every part of the result, not only counts."
@@ -32,30 +32,32 @@ verbose_option = click.option(
 delimiter_option = click.option(
     "--delimiter",
     metavar="CHARACTER",
-    help="Between the cells of a CSV file, if its first line does not tell.",
+    help="Character between the cells of a CSV file; by default from its first line.",
 )
 
 allow_loss_option = click.option(
     "--allow-loss",
     is_flag=True,
-    help="Read what a model cannot hold as near as it can.",
+    help="Read a file that a model cannot represent exactly, with the nearest values.",
 )
 
 rows_only_option = click.option(
     "--rows-only",
     is_flag=True,
-    help="Accept a file whose rows agree though its content is not as written now.",
+    help="Accept a file that predicts the same although its content differs.",
 )
 
 data_option = click.option(
-    "--data", metavar="TABLE", help="Rows of your own, beside the probes."
+    "--data",
+    metavar="TABLE",
+    help="Table of rows to use in addition to the generated probes.",
 )
 runtimes_option = click.option(
     "--runtime",
     "runtimes",
     metavar="NAME",
     multiple=True,
-    help="Run these only; all that are installed if none.",
+    help="Runtime to use (repeat); all installed runtimes by default.",
 )
 
 
@@ -140,7 +142,7 @@ def standard_input() -> BinaryIO:
     """Return standard input, if something comes from it.
 
     Raises:
-        click.UsageError: If it is a terminal, at which nobody types a file.
+        click.UsageError: If it is a terminal.
     """
     if sys.stdin.buffer.isatty():
         raise click.UsageError(
@@ -167,7 +169,7 @@ def setting(text: str) -> tuple[str, str]:
 
 @contextlib.contextmanager
 def wrong_options() -> Generator[None]:
-    """Tell a value that an option cannot have as a mistake in the command."""
+    """Report a value that an option cannot have as a usage error."""
     try:
         yield
     except ValueError as error:
@@ -178,7 +180,7 @@ def wrong_options() -> Generator[None]:
 
 @contextlib.contextmanager
 def progress_bar(*, quiet: bool = False) -> Generator[Callable[[str, float], None]]:
-    """Give a function that is told what is being done, and how far it is in [0, 1].
+    """Give a function that shows the current work and its share in [0, 1].
 
     A bar appears on stderr, only on a terminal, and only after half a second.
     """
@@ -188,7 +190,7 @@ def progress_bar(*, quiet: bool = False) -> Generator[Callable[[str, float], Non
     begin = time.monotonic()
     bars: list[Progress] = []
 
-    def tell(text: str, share: float) -> None:
+    def show(text: str, share: float) -> None:
         if not bars:
             if time.monotonic() - begin < _PATIENCE_S:
                 return
@@ -197,7 +199,7 @@ def progress_bar(*, quiet: bool = False) -> Generator[Callable[[str, float], Non
         bars[0].update(bars[0].task_ids[0], description=shown, completed=share)
 
     try:
-        yield tell
+        yield show
     finally:
         for bar in bars:
             bar.stop()
