@@ -13,10 +13,12 @@ import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import click
 import pytest
 
 import fuzzytree
 from fuzzytree.auditing.findings.codes import CODES
+from fuzzytree.cli import program
 from fuzzytree.exporters import all_formats
 from fuzzytree.runtimes import all_runtimes
 
@@ -77,6 +79,22 @@ def _resolves(name: str) -> bool:
             found = getattr(found, part)
         return True
     return False
+
+
+def test_every_command_that_a_page_shows_exists_with_its_options() -> None:
+    shown = r"(?<![\w./-])fuzzytree ((?:tactile )?[a-z]+)\b([^`|\n]*)"
+    for page in PAGES:
+        for names, rest in re.findall(shown, page.read_text("utf-8")):
+            command: click.Command | None = program
+            for name in names.split():
+                if isinstance(command, click.Group):
+                    command = command.get_command(click.Context(command), name)
+            if command is None:  # prose, but not behind `tactile`
+                assert " " not in names, f"{page.name}: {names}"
+                continue
+            known = {option for one in command.params for option in one.opts}
+            for option in re.findall(r" (--[a-z][\w-]+)", rest):
+                assert option in known, f"{page.name}: {names} {option}"
 
 
 def test_the_pages_use_the_words_of_the_glossary() -> None:
