@@ -63,6 +63,7 @@ def package(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.heavy
 def test_a_format_is_added_by_a_package(package: Path) -> None:
     _declare(package)
     done = _run("-c", TRY, folder=package, path=_paths(package))

@@ -415,7 +415,7 @@ def test_the_committed_page_tells_the_committed_numbers() -> None:
     assert page(claims) == (folder / "claims.md").read_text("utf-8")
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", ["speed", "agreement"])
 def test_the_committed_picture_shows_the_committed_numbers(name: str) -> None:
     folder = ROOT / "docs" / "explanation"

@@ -192,6 +192,7 @@ def test_a_file_without_losses_reads_as_a_system_of_equal_answers(
         )
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_random_systems_are_written_alike_or_refused_with_reasons(
     dialect: Dialect,

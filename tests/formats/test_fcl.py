@@ -545,6 +545,7 @@ def _error(text: str) -> str | None:
     return None
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("text", [STANDARD, FUZZYLITE, JFUZZYLOGIC, PYIT2FLS])
 def test_a_damaged_file_is_read_or_refused_with_a_reason(text: str) -> None:
     chance = random.Random(7)

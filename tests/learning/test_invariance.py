@@ -134,7 +134,7 @@ def labels_of(tree: FuzzyTree, values: FloatArray) -> list[str | None]:
     ]
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", TABLES)
 def test_a_column_times_a_power_of_two_gives_the_tree_in_that_unit(
@@ -165,7 +165,7 @@ def test_a_unit_near_the_ends_of_the_floats_keeps_the_questions_of_one_column(
     assert found == in_units(base, units)
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.one_in(8)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("name", TABLES)
 def test_neither_order_nor_chunks_nor_merging_change_a_bit(

@@ -56,6 +56,7 @@ def _no_buffer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sampling, "_BUFFER", 0)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.usefixtures("_no_buffer")
 @pytest.mark.parametrize("name", TABLES)
 @pytest.mark.parametrize("most", [1, 2, 7, 40, 150, 2000])

@@ -356,6 +356,7 @@ def test_other_numbers_are_converted(runtime: Runtime, model: Model) -> None:
         assert_same_answers(run(whole.astype(kind)), expected)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", range(4))
 def test_relative_rules_answer_like_the_tree_in_every_native_runtime(seed: int) -> None:
     tree = random_tree(seed, leaves=60, inputs=5)

@@ -173,6 +173,7 @@ def test_relative_rules_decide_as_the_tree_in_every_type(seed: int) -> None:
         assert np.array_equal(rules.status, path.status)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("seed", [3, 5])
 def test_optimising_a_graph_changes_no_bit(seed: int) -> None:
     for model in random_models(seed):

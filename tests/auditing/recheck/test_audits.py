@@ -236,6 +236,7 @@ def told(seeds: range) -> tuple[int, list[str]]:
     return count, missed
 
 
+@pytest.mark.heavy
 def test_edits_are_told_with_a_new_digest_too() -> None:
     count, missed = told(range(12))
     assert missed == []

@@ -85,6 +85,7 @@ def edits(finding: Facts) -> Iterator[tuple[str, Facts]]:
         yield "region", edited(state=state | {"region": wide}, region=wide)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("planted", PLANTED, ids=lambda one: one.code)
 def test_a_planted_defect_holds_and_each_edit_of_it_is_told(planted: Planted) -> None:
     facts, content = audit_of(planted)
