@@ -16,7 +16,7 @@ from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import Row, system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.steps import Program
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 
 _ROWS = 100
 _PROBES = 400

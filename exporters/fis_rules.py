@@ -34,8 +34,8 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.numerics import pointwise
 from fuzzytree.numerics.pointwise import Lines
-from fuzzytree.semantics.conversion.shapes import shape_of
-from fuzzytree.semantics.conversion.splitting import split
+from fuzzytree.semantics.conversion.points import shape_of
+from fuzzytree.semantics.conversion.rule_forms import split
 
 EVERYWHERE: Final = Points((0.0,), (1.0,))
 

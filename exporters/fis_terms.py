@@ -32,7 +32,7 @@ from fuzzytree.model.system import (
     TwoGaussians,
 )
 from fuzzytree.semantics.conversion import pointed
-from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.conversion.points import shape_of
 
 Term = tuple[str, str]
 """A kind such as `trimf`, and its numbers as text."""

@@ -54,7 +54,7 @@ from fuzzytree.semantics.conversion import (
     pointed,
     refuse_singletons,
 )
-from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.conversion.points import shape_of
 
 _ALLOWED: Final = (Trapezoid, Gaussian, SCurve, Singleton)
 _FLOAT32: Final = (

@@ -33,7 +33,7 @@ from fuzzytree.model.system import (
     SystemRule,
     questions,
 )
-from fuzzytree.semantics.conversion.splitting import split
+from fuzzytree.semantics.conversion.rule_forms import split
 
 Clause = tuple[str, str, str]
 """A variable, a term, and a modifier, which may be empty."""

@@ -14,7 +14,7 @@ from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.evaluate import still_results
 from fuzzytree.semantics.programs.operations import OVER_SAMPLES
 from fuzzytree.semantics.programs.steps import Program, Step
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 
 _EXAMPLES = 64
 

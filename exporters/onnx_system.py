@@ -15,7 +15,7 @@ from fuzzytree.errors import DisagreementError, LossError
 from fuzzytree.model.contracts import Written
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.system import FuzzySystem
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 
 if TYPE_CHECKING:
     import numpy as np

@@ -25,7 +25,7 @@ from fuzzytree.semantics.programs.operations import (
     OPERATIONS,
 )
 from fuzzytree.semantics.programs.steps import Program, Step
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 
 MOST_FIELDS = 20_000
 """The most derived fields of a file: engines look each other's values up one by one."""

@@ -9,8 +9,8 @@ from msgspec.structs import replace
 from fuzzytree.exporters.st_text import Numbers, remark, table
 from fuzzytree.model.rulebase import RuleBase, sentence
 from fuzzytree.semantics.programs.evaluate import still_results
-from fuzzytree.semantics.programs.rules import from_rules
-from fuzzytree.semantics.programs.shapes import BELOW_ONE
+from fuzzytree.semantics.programs.membership import BELOW_ONE
+from fuzzytree.semantics.programs.rule_program import from_rules
 from fuzzytree.semantics.programs.steps import Step
 
 _SIGNS: Mapping[str, str] = {

@@ -32,7 +32,7 @@ from fuzzytree.model.naming import Names
 from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint
 from fuzzytree.model.system import Formula, FuzzySystem, SystemInput, SystemOutput
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 
 _OUTPUTS = ("class_number", "rule", "status", "strengths")
 _LOCALS = (

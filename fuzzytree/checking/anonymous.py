@@ -47,7 +47,7 @@ from fuzzytree.model.system import (
     joints,
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node, Sets
-from fuzzytree.semantics.conversion.shapes import shape_of, stepped
+from fuzzytree.semantics.conversion.points import shape_of, stepped
 
 Names = Mapping[str, str]
 Labels = Mapping[str, Names]

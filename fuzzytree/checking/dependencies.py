@@ -34,7 +34,7 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.model.tree import FuzzyTree, Use
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.axes import axis_lines, plan_axes
-from fuzzytree.semantics.cells import free_axes
+from fuzzytree.semantics.crisp_regions import free_axes
 from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.simplification import (
     Pruned,

@@ -29,8 +29,7 @@ from fuzzytree.model.system import (
     questions,
 )
 from fuzzytree.semantics.conversion import Scores, as_system
-from fuzzytree.semantics.conversion.points import EXACT
-from fuzzytree.semantics.conversion.straight import straightened
+from fuzzytree.semantics.conversion.points import EXACT, straightened
 from fuzzytree.semantics.probing import landmarks
 from fuzzytree.semantics.reference import degree
 

@@ -46,7 +46,7 @@ from fuzzytree.runtimes import (
     is_installed,
     needed_by,
 )
-from fuzzytree.semantics import cells
+from fuzzytree.semantics import crisp_regions
 from fuzzytree.semantics.lowering import forms, rules_from_tree
 from fuzzytree.semantics.reference import Status
 from fuzzytree.semantics.simplification import proof_faults, pruned
@@ -136,7 +136,7 @@ def check(
         tuple(f for f in findings if isinstance(f, Comparison)),
         tuple(map(_count, representations)),
         tuple(dict.fromkeys(f for f in findings if isinstance(f, str))),
-        cells.cell_count(model) if isinstance(model, FuzzyTree) else None,
+        crisp_regions.cell_count(model) if isinstance(model, FuzzyTree) else None,
         rows.probes,
         tuple(certificates),
         rows_only,
@@ -157,10 +157,10 @@ def _equivalence(
 ) -> Iterator[Finding]:
     """Show that the relative rules are the tree, and how far the raw rules are not."""
     path, relative, *raw = representations
-    faults = tuple(cells.node_faults(tree))
-    points = sum(map(len, map(cells.node_points, tree.nodes)))
+    faults = tuple(crisp_regions.node_faults(tree))
+    points = sum(map(len, map(crisp_regions.node_points, tree.nodes)))
     yield counted("proof", relative.title, path.title, points, faults)
-    size = cells.grid_size(tree)
+    size = crisp_regions.grid_size(tree)
     if size <= GRID_LIMIT:
         yield _all_cells(tree, relative.title, path.title, size)
     else:
@@ -176,11 +176,11 @@ def _equivalence(
 def _all_cells(
     tree: FuzzyTree, representation: str, against: str, size: int
 ) -> Comparison:
-    free = cells.free_axes(tree)
+    free = crisp_regions.free_axes(tree)
     native = find_runtime("native")
     descend, fire = native.load(free), native.load(rules_from_tree(free))
     faults: list[str] = []
-    for points in cells.grid(tree):
+    for points in crisp_regions.grid(tree):
         path, fired = descend(points), fire(points)
         for row in np.flatnonzero(path.rule != fired.rule).tolist():
             values = zip(free.inputs, points[:, row].tolist(), strict=True)

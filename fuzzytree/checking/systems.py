@@ -28,7 +28,7 @@ from fuzzytree.runtimes import chosen_runtimes, is_installed, needed_by
 from fuzzytree.runtimes.systems import infer_rows, run_system
 from fuzzytree.semantics.probing import Aim, Row, range_rows, system_probes
 from fuzzytree.semantics.programs.bounds import ORIGIN, error_bounds
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.semantics.reference import Status
 
 if TYPE_CHECKING:

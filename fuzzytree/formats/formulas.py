@@ -12,7 +12,6 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from decimal import Decimal
-from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -32,37 +31,33 @@ from fuzzytree.model.system import (
 MOST_CHARACTERS: Final = 20_000
 _LONGEST: Final = 2 * LONGEST_NAME + 2  # a name of quotes, in quotes
 
-_BINARY: Mapping[str, tuple[int, int]] = MappingProxyType(
-    {
-        "or": (1, 2),
-        "and": (3, 4),
-        "+": (5, 6),
-        "-": (5, 6),
-        "*": (7, 8),
-        "/": (7, 8),
-        "%": (7, 8),
-        "^": (12, 11),
-    }
-)
+_BINARY: Mapping[str, tuple[int, int]] = {
+    "or": (1, 2),
+    "and": (3, 4),
+    "+": (5, 6),
+    "-": (5, 6),
+    "*": (7, 8),
+    "/": (7, 8),
+    "%": (7, 8),
+    "^": (12, 11),
+}
 """How closely an operator binds what is to its left and what is to its right."""
 
 _SIGN, _CLOSEST = 10, 13
 _NEGATE, _NOT = "negate", "not"
-_PREFIX: Mapping[str, tuple[str, int]] = MappingProxyType(
-    {
-        "-": (_NEGATE, _SIGN),
-        ".-": (_NEGATE, _SIGN),
-        "+": ("", _SIGN),
-        ".+": ("", _SIGN),
-        "~": (_NEGATE, _CLOSEST),
-        "!": (_NOT, _CLOSEST),
-    }
-)
+_PREFIX: Mapping[str, tuple[str, int]] = {
+    "-": (_NEGATE, _SIGN),
+    ".-": (_NEGATE, _SIGN),
+    "+": ("", _SIGN),
+    ".+": ("", _SIGN),
+    "~": (_NEGATE, _CLOSEST),
+    "!": (_NOT, _CLOSEST),
+}
 """The function of a sign in front, and how closely it binds; no function for plus."""
 
-_CONSTANTS = MappingProxyType({"pi": math.pi, "inf": math.inf, "nan": math.nan})
-_OTHER_NAMES = MappingProxyType({"fabs": "abs", "pow": "^"})
-_SIGNS = MappingProxyType({_NEGATE: "-", _NOT: "!"})
+_CONSTANTS = {"pi": math.pi, "inf": math.inf, "nan": math.nan}
+_OTHER_NAMES = {"fabs": "abs", "pow": "^"}
+_SIGNS = {_NEGATE: "-", _NOT: "!"}
 _CALLED = frozenset({*FUNCTIONS, *_OTHER_NAMES}) - {*_BINARY, *_SIGNS}
 _WORDS = _CALLED | {*_CONSTANTS, *_BINARY, _NOT}
 _PLAIN_NAME = re.compile(r"[^\W0-9](?:[\w.]*\w)?")

@@ -11,7 +11,6 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from fuzzytree.errors import LossError
@@ -44,12 +43,8 @@ from fuzzytree.model.system import (
 )
 
 _SAMPLES = 1000  # simpful's `subdivisions`, unless the caller of inference() gives some
-_AND: Final[Mapping[str, TNorm]] = MappingProxyType(
-    {"AND": "minimum", "AND_p": "product"}
-)
-_OR: Final[Mapping[str, SNorm]] = MappingProxyType(
-    {"OR": "maximum", "OR_p": "algebraic sum"}
-)
+_AND: Final[Mapping[str, TNorm]] = {"AND": "minimum", "AND_p": "product"}
+_OR: Final[Mapping[str, SNorm]] = {"OR": "maximum", "OR_p": "algebraic sum"}
 
 
 def from_simpful(system: object, *, name: str = "simpful system") -> FuzzySystem:
@@ -290,24 +285,22 @@ def _trapezoid(a: float, b: float, c: float, d: float) -> Trapezoid:
     return Trapezoid(left, float(b), float(c), None if c == d else float(d))
 
 
-_CURVES: Final[Mapping[str, Callable[[Any], Curve]]] = MappingProxyType(
-    {
-        "Triangular_MF": lambda one: _trapezoid(one._a, one._b, one._b, one._c),
-        "Trapezoidal_MF": lambda one: _trapezoid(one._a, one._b, one._c, one._d),
-        "Crisp_MF": lambda one: Trapezoid(
-            *map(float, (one._left, one._left, one._right, one._right))
-        ),
-        "Sigmoid_MF": lambda one: Sigmoid(float(one._c), float(one._a)),
-        "InvSigmoid_MF": lambda one: Sigmoid(float(one._c), -float(one._a)),
-        "Gaussian_MF": lambda one: Gaussian(float(one._mu), float(one._sigma)),
-        "InvGaussian_MF": lambda one: Formula(
-            parse(f"1 - exp(-((x - {one._mu!r}) / {one._sigma!r})^2 / 2)")
-        ),
-        "DoubleGaussian_MF": lambda one: TwoGaussians(
-            *map(float, (one._mu1, one._sigma1, one._mu2, one._sigma2))
-        ),
-    }
-)
+_CURVES: Final[Mapping[str, Callable[[Any], Curve]]] = {
+    "Triangular_MF": lambda one: _trapezoid(one._a, one._b, one._b, one._c),
+    "Trapezoidal_MF": lambda one: _trapezoid(one._a, one._b, one._c, one._d),
+    "Crisp_MF": lambda one: Trapezoid(
+        *map(float, (one._left, one._left, one._right, one._right))
+    ),
+    "Sigmoid_MF": lambda one: Sigmoid(float(one._c), float(one._a)),
+    "InvSigmoid_MF": lambda one: Sigmoid(float(one._c), -float(one._a)),
+    "Gaussian_MF": lambda one: Gaussian(float(one._mu), float(one._sigma)),
+    "InvGaussian_MF": lambda one: Formula(
+        parse(f"1 - exp(-((x - {one._mu!r}) / {one._sigma!r})^2 / 2)")
+    ),
+    "DoubleGaussian_MF": lambda one: TwoGaussians(
+        *map(float, (one._mu1, one._sigma1, one._mu2, one._sigma2))
+    ),
+}
 """What each membership function of simpful becomes."""
 
 

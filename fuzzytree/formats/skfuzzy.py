@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import builtins
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -109,14 +108,12 @@ def _condition(found: Any, kinds: set[str]) -> Condition:
 
 
 _Norm = TypeVar("_Norm")
-_AND: Final[Mapping[str, TNorm]] = MappingProxyType(
-    {
-        **dict.fromkeys(("fmin", "minimum", "min"), "minimum"),
-        **dict.fromkeys(("multiply", "accumulation_mult"), "product"),
-    }
-)
-_OR: Final[Mapping[str, SNorm]] = MappingProxyType(
-    dict.fromkeys(("fmax", "maximum", "max", "accumulation_max"), "maximum")
+_AND: Final[Mapping[str, TNorm]] = {
+    **dict.fromkeys(("fmin", "minimum", "min"), "minimum"),
+    **dict.fromkeys(("multiply", "accumulation_mult"), "product"),
+}
+_OR: Final[Mapping[str, SNorm]] = dict.fromkeys(
+    ("fmax", "maximum", "max", "accumulation_max"), "maximum"
 )
 """What functions of numpy, Python and scikit-fuzzy are called here."""
 

@@ -16,7 +16,7 @@ from fuzzytree.model.system import Formula, FuzzySystem, Label, Linear, SystemIn
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.report.markup import Attribute, Content, Markup, tag, trimmed
-from fuzzytree.semantics.inference.curves import curve_degree
+from fuzzytree.semantics.inference.membership import curve_degree
 
 LETTER = 0.58
 """How wide a letter of a picture is on average, in sizes of its font."""

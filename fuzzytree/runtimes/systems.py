@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from fuzzytree.model.contracts import SystemOutcome, SystemRun
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.inference import infer
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray

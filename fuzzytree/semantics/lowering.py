@@ -11,7 +11,6 @@ strength 1, wins alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from types import MappingProxyType
 from typing import Literal
 
 import msgspec
@@ -31,9 +30,11 @@ from fuzzytree.model.tree import Branch, FuzzyTree, Use
 Form = Literal["tree", "relative rules", "raw rules", "rules"]
 """What can be made of a model, as people call it."""
 
-TITLES: Mapping[Use, Form] = MappingProxyType(
-    {"tree": "tree", "relative": "relative rules", "raw": "raw rules"}
-)
+TITLES: Mapping[Use, Form] = {
+    "tree": "tree",
+    "relative": "relative rules",
+    "raw": "raw rules",
+}
 """The form of a tree that serves each use."""
 
 

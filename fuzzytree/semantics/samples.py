@@ -7,7 +7,6 @@ conformance suite reads and writes them as well.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 from msgspec.structs import replace
 
@@ -375,44 +374,42 @@ def _mixed_rules() -> RuleBase:
     return rules_from_tree(_mixed_tree())
 
 
-SAMPLES: Mapping[str, Callable[[], Document]] = MappingProxyType(
-    {
-        "tree": _tree,
-        "tree with combined features": _mixed_tree,
-        "relative rules": _relative,
-        "raw rules (LR curves)": _raw,
-        "rules with combined features": _mixed_rules,
-        "point lists": _of_points,
-        "vertical edges": _stepped,
-        "AND as product": _product,
-        "several terms in a clause": _several_terms,
-        "negated clauses": _negated,
-        "a rule that always holds": _always,
-        "answers where no rule fires": _defaults,
-        "Sugeno, numbers": _sugeno,
-        "Sugeno, linear": _linear,
-        "Sugeno, formulas": _formula,
-        "weighted sum": _weighted_sum,
-        "Tsukamoto": _monotone,
-        "Mamdani, centroid": _mamdani,
-        "Mamdani, mean of maximum": _mean_of_maximum,
-        "Mamdani, singletons": _singletons,
-        "number of samples": _fine,
-        "weights of rules": _weights,
-        "hedges": _hedges,
-        "OR": _or,
-        "NOT": _not,
-        "a conclusion without a condition": _unconditional,
-        "gaussian curves": _gaussian,
-        "sigmoid curves": _sigmoid,
-        "S curves": _spline,
-        "several outputs": _several_outputs,
-        "several rule blocks": _several_blocks,
-        "product and algebraic sum": _probabilistic,
-        "Hamacher norms": _hamacher,
-        "the highest rule alone": _highest,
-        "a default answer": _default,
-        "inputs held in their range": _clipped,
-    }
-)
+SAMPLES: Mapping[str, Callable[[], Document]] = {
+    "tree": _tree,
+    "tree with combined features": _mixed_tree,
+    "relative rules": _relative,
+    "raw rules (LR curves)": _raw,
+    "rules with combined features": _mixed_rules,
+    "point lists": _of_points,
+    "vertical edges": _stepped,
+    "AND as product": _product,
+    "several terms in a clause": _several_terms,
+    "negated clauses": _negated,
+    "a rule that always holds": _always,
+    "answers where no rule fires": _defaults,
+    "Sugeno, numbers": _sugeno,
+    "Sugeno, linear": _linear,
+    "Sugeno, formulas": _formula,
+    "weighted sum": _weighted_sum,
+    "Tsukamoto": _monotone,
+    "Mamdani, centroid": _mamdani,
+    "Mamdani, mean of maximum": _mean_of_maximum,
+    "Mamdani, singletons": _singletons,
+    "number of samples": _fine,
+    "weights of rules": _weights,
+    "hedges": _hedges,
+    "OR": _or,
+    "NOT": _not,
+    "a conclusion without a condition": _unconditional,
+    "gaussian curves": _gaussian,
+    "sigmoid curves": _sigmoid,
+    "S curves": _spline,
+    "several outputs": _several_outputs,
+    "several rule blocks": _several_blocks,
+    "product and algebraic sum": _probabilistic,
+    "Hamacher norms": _hamacher,
+    "the highest rule alone": _highest,
+    "a default answer": _default,
+    "inputs held in their range": _clipped,
+}
 """What makes each sample, by what is special about it."""

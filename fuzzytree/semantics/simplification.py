@@ -42,7 +42,7 @@ from fuzzytree.model.rulebase import (
     shapes_of,
 )
 from fuzzytree.model.tree import Branch, FuzzyTree, Sets, Use
-from fuzzytree.semantics.holding import always_holds, never_firing
+from fuzzytree.semantics.satisfiability import always_holds, never_firing
 
 USES: tuple[Use, ...] = ("tree", "relative", "raw")
 

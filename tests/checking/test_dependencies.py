@@ -20,7 +20,15 @@ from fuzzytree.report.needs import report_lines
 from fuzzytree.semantics.lowering import forms, rules_from_tree
 from fuzzytree.semantics.simplification import USES, Pruned, pruned
 from fuzzytree.testing import random_tree
-from tests.semantics.test_pruning import ALL, FORCE, HARD, PATH, SOFT, base, force
+from tests.semantics.test_simplification import (
+    ALL,
+    FORCE,
+    HARD,
+    PATH,
+    SOFT,
+    base,
+    force,
+)
 
 pytestmark = pytest.mark.usefixtures("few_objects")
 

@@ -22,7 +22,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.model.system import FuzzySystem, Is, Label, Trapezoid
 from fuzzytree.semantics.conversion import as_system
-from fuzzytree.semantics.conversion.straight import straightened
+from fuzzytree.semantics.conversion.points import straightened
 from fuzzytree.semantics.samples import samples
 
 RULES = samples()["point lists"]

@@ -33,7 +33,7 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.systems import infer_rows
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.testing import random_rows, random_system
 
 SYSTEM = random_system(3, formulas="none")

@@ -36,7 +36,7 @@ from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import Row, probes, system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.semantics.reference import descend, evaluate
 from fuzzytree.semantics.samples import samples
 from fuzzytree.testing import exporter_models, random_system, random_tree, with_points

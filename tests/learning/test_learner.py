@@ -16,7 +16,7 @@ from fuzzytree.errors import LearningError
 from fuzzytree.learning import Learner, Learnt, Settings, learn_arrays
 from fuzzytree.learning.arrays import FloatArray, IntArray
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.semantics.cells import grid
+from fuzzytree.semantics.crisp_regions import grid
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import descend, evaluate
 

@@ -33,7 +33,7 @@ from fuzzytree.numerics.fitting import lower_curve
 from fuzzytree.numerics.placing import points_of
 from fuzzytree.runtimes import find_runtime
 from fuzzytree.runtimes.native import load
-from fuzzytree.semantics.cells import free_axes, grid, grid_size
+from fuzzytree.semantics.crisp_regions import free_axes, grid, grid_size
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import degree, evaluate
 from fuzzytree.testing import probe_values, probes, random_tree, with_points

@@ -41,7 +41,7 @@ from fuzzytree.runtimes.reference import load as load_reference
 from fuzzytree.runtimes.systems import infer_rows
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.programs.bounds import error_bounds
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.semantics.reference import descend, evaluate
 from fuzzytree.testing import probe_values, random_rows, random_system, random_tree
 

@@ -27,7 +27,7 @@ from fuzzytree.runtimes.systems import infer_rows, run_system
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import system_probes
 from fuzzytree.semantics.programs.bounds import error_bounds
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.testing import random_rows, random_system
 
 RUNTIMES = [

@@ -31,7 +31,7 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.programs.evaluate import evaluate
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 
 SHAPES = {
     "singletonShape": 'param1="{}"',

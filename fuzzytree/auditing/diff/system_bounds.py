@@ -32,7 +32,7 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.numerics.exact import exact_degree
 from fuzzytree.semantics.conversion import joined_outputs
-from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.conversion.points import shape_of
 
 _ONE = Fraction(1)
 _Operation = Callable[[Fraction, Fraction], Fraction]

@@ -32,7 +32,7 @@ from fuzzytree.model.system import (
     questions,
 )
 from fuzzytree.semantics.conversion import joined_outputs
-from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.conversion.points import shape_of
 
 _STEPPED = {
     *("drastic product", "nilpotent minimum", "drastic sum", "nilpotent maximum")

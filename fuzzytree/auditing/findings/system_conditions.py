@@ -49,7 +49,7 @@ from fuzzytree.model.system import (
     questions,
 )
 from fuzzytree.model.system import Label as SystemLabel
-from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.conversion.points import shape_of
 
 
 class Terms:

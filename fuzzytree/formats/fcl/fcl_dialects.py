@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
 from typing import Final, Literal, NamedTuple, TypeVar
 
 from lark import Token
@@ -35,93 +34,79 @@ Dialect = Literal["portable", "iec", "fuzzylite", "jfuzzylogic", "pyit2fls"]
 MARK: Final = " FCL, dialect "
 """How a file that was written here begins, behind `//` or `(*`."""
 
-SHOWN: Mapping[Dialect, str] = MappingProxyType(
-    {
-        "portable": "portable",
-        "iec": "IEC 61131-7",
-        "fuzzylite": "fuzzylite",
-        "jfuzzylogic": "jFuzzyLogic",
-        "pyit2fls": "PyIT2FLS",
-    }
-)
+SHOWN: Mapping[Dialect, str] = {
+    "portable": "portable",
+    "iec": "IEC 61131-7",
+    "fuzzylite": "fuzzylite",
+    "jfuzzylogic": "jFuzzyLogic",
+    "pyit2fls": "PyIT2FLS",
+}
 
-DEFUZZIFIERS: Mapping[Dialect, Defuzzifier] = MappingProxyType(
-    {
-        "portable": Defuzzifier("centroid", 1000),
-        "iec": Defuzzifier("centroid", 1000),
-        "fuzzylite": Defuzzifier("centroid", 100),
-        "jfuzzylogic": Defuzzifier("centroid", 1000),
-        "pyit2fls": Defuzzifier("centroid", 100, "ends"),
-    }
-)
+DEFUZZIFIERS: Mapping[Dialect, Defuzzifier] = {
+    "portable": Defuzzifier("centroid", 1000),
+    "iec": Defuzzifier("centroid", 1000),
+    "fuzzylite": Defuzzifier("centroid", 100),
+    "jfuzzylogic": Defuzzifier("centroid", 1000),
+    "pyit2fls": Defuzzifier("centroid", 100, "ends"),
+}
 """At how many values an engine of each dialect looks; a file does not say it."""
 
-T_WORDS: Mapping[str, TNorm] = MappingProxyType(
-    {
-        "MIN": "minimum",
-        "PROD": "product",
-        "BDIF": "bounded difference",
-        "DPROD": "drastic product",
-        "DMIN": "drastic product",
-        "EPROD": "einstein product",
-        "HPROD": "hamacher product",
-        "HAMACHER": "hamacher product",
-        "NMIN": "nilpotent minimum",
-        "NIPMIN": "nilpotent minimum",
-        **{name.upper(): norm for name, norm in T_NORMS.items()},
-    }
-)
-S_WORDS: Mapping[str, SNorm] = MappingProxyType(
-    {
-        "MAX": "maximum",
-        "ASUM": "algebraic sum",
-        "PROBOR": "algebraic sum",
-        "BSUM": "bounded sum",
-        "NSUM": "normalized sum",
-        "DSUM": "drastic sum",
-        "DMAX": "drastic sum",
-        "ESUM": "einstein sum",
-        "EINSTEIN": "einstein sum",
-        "HSUM": "hamacher sum",
-        "NMAX": "nilpotent maximum",
-        "NIPMAX": "nilpotent maximum",
-        "SUM": "sum",
-        **{name.upper(): norm for name, norm in S_NORMS.items()},
-    }
-)
-METHOD_WORDS: Mapping[str, Method] = MappingProxyType(
-    {
-        "COG": "centroid",
-        "COGS": "weighted average",
-        "COGF": "weighted average",
-        "COGSS": "weighted sum",
-        "COA": "bisector",
-        "BIS": "bisector",
-        "LM": "smallest of maximum",
-        "SOM": "smallest of maximum",
-        "RM": "largest of maximum",
-        "LOM": "largest of maximum",
-        "MM": "mean of maximum",
-        "MOM": "mean of maximum",
-        **{name.upper(): method for name, method in METHODS.items()},
-    }
-)
-PAIRS: Mapping[TNorm, SNorm] = MappingProxyType(
-    {
-        "minimum": "maximum",
-        "product": "algebraic sum",
-        "bounded difference": "bounded sum",
-        "drastic product": "drastic sum",
-        "nilpotent minimum": "nilpotent maximum",
-        "einstein product": "einstein sum",
-        "hamacher product": "hamacher sum",
-    }
-)
+T_WORDS: Mapping[str, TNorm] = {
+    "MIN": "minimum",
+    "PROD": "product",
+    "BDIF": "bounded difference",
+    "DPROD": "drastic product",
+    "DMIN": "drastic product",
+    "EPROD": "einstein product",
+    "HPROD": "hamacher product",
+    "HAMACHER": "hamacher product",
+    "NMIN": "nilpotent minimum",
+    "NIPMIN": "nilpotent minimum",
+    **{name.upper(): norm for name, norm in T_NORMS.items()},
+}
+S_WORDS: Mapping[str, SNorm] = {
+    "MAX": "maximum",
+    "ASUM": "algebraic sum",
+    "PROBOR": "algebraic sum",
+    "BSUM": "bounded sum",
+    "NSUM": "normalized sum",
+    "DSUM": "drastic sum",
+    "DMAX": "drastic sum",
+    "ESUM": "einstein sum",
+    "EINSTEIN": "einstein sum",
+    "HSUM": "hamacher sum",
+    "NMAX": "nilpotent maximum",
+    "NIPMAX": "nilpotent maximum",
+    "SUM": "sum",
+    **{name.upper(): norm for name, norm in S_NORMS.items()},
+}
+METHOD_WORDS: Mapping[str, Method] = {
+    "COG": "centroid",
+    "COGS": "weighted average",
+    "COGF": "weighted average",
+    "COGSS": "weighted sum",
+    "COA": "bisector",
+    "BIS": "bisector",
+    "LM": "smallest of maximum",
+    "SOM": "smallest of maximum",
+    "RM": "largest of maximum",
+    "LOM": "largest of maximum",
+    "MM": "mean of maximum",
+    "MOM": "mean of maximum",
+    **{name.upper(): method for name, method in METHODS.items()},
+}
+PAIRS: Mapping[TNorm, SNorm] = {
+    "minimum": "maximum",
+    "product": "algebraic sum",
+    "bounded difference": "bounded sum",
+    "drastic product": "drastic sum",
+    "nilpotent minimum": "nilpotent maximum",
+    "einstein product": "einstein sum",
+    "hamacher product": "hamacher sum",
+}
 """The OR that an AND brings with it."""
 
-JFUZZYLOGIC_PAIRS: Mapping[TNorm, SNorm] = MappingProxyType(
-    {**PAIRS, "hamacher product": "einstein sum"}
-)
+JFUZZYLOGIC_PAIRS: Mapping[TNorm, SNorm] = {**PAIRS, "hamacher product": "einstein sum"}
 
 _OF_JFUZZYLOGIC = frozenset(
     {"TRIAN", "TRAPE", "GAUSS", "GAUSS2", "GBELL", "SIGM", "DSIGM", "COSINE"}
@@ -221,7 +206,7 @@ def _evidence(text: FclText) -> Iterator[Evidence]:
         yield Evidence("fuzzylite", "its first line", 1)
 
 
-_COMMENTS: Mapping[str, Dialect] = MappingProxyType({"(*": "iec", "/*": "jfuzzylogic"})
+_COMMENTS: Mapping[str, Dialect] = {"(*": "iec", "/*": "jfuzzylogic"}
 
 
 def _of_shape(word: Token) -> Iterator[Evidence]:

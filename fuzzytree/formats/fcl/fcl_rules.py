@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -47,16 +46,14 @@ from fuzzytree.model.system import (
 )
 from fuzzytree.model.system import Condition as Meant
 
-_HEDGES: Mapping[str, Hedge] = MappingProxyType(
-    {
-        "any": "any",
-        "not": "not",
-        "very": "very",
-        "somewhat": "somewhat",
-        "extremely": "extremely",
-        "seldom": "seldom",
-    }
-)
+_HEDGES: Mapping[str, Hedge] = {
+    "any": "any",
+    "not": "not",
+    "very": "very",
+    "somewhat": "somewhat",
+    "extremely": "extremely",
+    "seldom": "seldom",
+}
 
 
 class Scope(msgspec.Struct, frozen=True):

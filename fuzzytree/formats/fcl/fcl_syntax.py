@@ -14,7 +14,6 @@ import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
-from types import MappingProxyType
 from typing import Any, Final, Literal
 
 import msgspec
@@ -539,15 +538,13 @@ def _wanted(accepted: Iterable[str]) -> str:
     return " or ".join(filter(None, (", ".join(shown[:-1]), shown[-1]))) or "nothing"
 
 
-_ALLOWED: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "VAR_INPUT": (),
-        "VAR_OUTPUT": (),
-        "FUZZIFY": ("ENABLED",),
-        "DEFUZZIFY": ("METHOD", "ACCU", "DEFAULT", "ENABLED", "LOCK"),
-        "RULEBLOCK": ("AND", "OR", "ACT", "ACCU", "ENABLED"),
-    }
-)
+_ALLOWED: Mapping[str, tuple[str, ...]] = {
+    "VAR_INPUT": (),
+    "VAR_OUTPUT": (),
+    "FUZZIFY": ("ENABLED",),
+    "DEFUZZIFY": ("METHOD", "ACCU", "DEFAULT", "ENABLED", "LOCK"),
+    "RULEBLOCK": ("AND", "OR", "ACT", "ACCU", "ENABLED"),
+}
 """What the settings of each kind of block are."""
 
 

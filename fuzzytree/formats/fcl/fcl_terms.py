@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -100,7 +99,7 @@ def _checked(token: Token, name: str, curve: Curve, where: Place) -> Term:
     return Term(Label(name, curve), "")
 
 
-_FUNCTIONS = MappingProxyType({"LN": "log", "LOG": "log10"})
+_FUNCTIONS = {"LN": "log", "LOG": "log10"}
 """Functions of jFuzzyLogic that fuzzylite calls otherwise."""
 
 
@@ -149,23 +148,19 @@ def _two_gaussians(n: Sequence[float]) -> Curve:
     return TwoGaussians(*n)
 
 
-_SHAPES: Final[Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]]] = (
-    MappingProxyType(
-        {
-            "TRIAN": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
-            "TRAPE": (4, lambda n: Trapezoid(*n)),
-            "GAUSS": (2, lambda n: Gaussian(*n)),
-            "GAUSS2": (4, _two_gaussians),
-            "GBELL": (3, lambda n: Bell(n[2], n[0], n[1])),
-            "SIGM": (2, lambda n: Sigmoid(n[1], n[0])),
-            "DSIGM": (
-                4,
-                lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
-            ),
-            "COSINE": (2, lambda n: Cosine(n[1], 2.0 * n[0])),
-        }
-    )
-)
+_SHAPES: Final[Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]]] = {
+    "TRIAN": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
+    "TRAPE": (4, lambda n: Trapezoid(*n)),
+    "GAUSS": (2, lambda n: Gaussian(*n)),
+    "GAUSS2": (4, _two_gaussians),
+    "GBELL": (3, lambda n: Bell(n[2], n[0], n[1])),
+    "SIGM": (2, lambda n: Sigmoid(n[1], n[0])),
+    "DSIGM": (
+        4,
+        lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
+    ),
+    "COSINE": (2, lambda n: Cosine(n[1], 2.0 * n[0])),
+}
 
 
 def extent(curve: Curve) -> tuple[float, float] | None:

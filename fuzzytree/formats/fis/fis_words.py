@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final, Literal, get_args
 
 import msgspec
@@ -41,43 +40,37 @@ DIALECTS: Final[tuple[Dialect, ...]] = get_args(Dialect)
 FAR: Final = 1e300
 """Corners beyond it stand for none: a trapezoid has no way to say `1 up to here`."""
 
-TNORMS: Final[Mapping[str, TNorm]] = MappingProxyType(
-    {
-        "min": "minimum",
-        "prod": "product",
-        "algebraic_product": "product",
-        "bounded_difference": "bounded difference",
-        "drastic_product": "drastic product",
-        "einstein_product": "einstein product",
-        "hamacher_product": "hamacher product",
-        "nilpotent_minimum": "nilpotent minimum",
-    }
-)
-SNORMS: Final[Mapping[str, SNorm]] = MappingProxyType(
-    {
-        "max": "maximum",
-        "probor": "algebraic sum",
-        "algebraic_sum": "algebraic sum",
-        "bounded_sum": "bounded sum",
-        "drastic_sum": "drastic sum",
-        "einstein_sum": "einstein sum",
-        "hamacher_sum": "hamacher sum",
-        "nilpotent_maximum": "nilpotent maximum",
-        "normalized_sum": "normalized sum",
-        "sum": "sum",
-    }
-)
-METHODS: Final = MappingProxyType(
-    {
-        "centroid": "centroid",
-        "bisector": "bisector",
-        "som": "smallest of maximum",
-        "lom": "largest of maximum",
-        "mom": "mean of maximum",
-        "wtaver": "weighted average",
-        "wtsum": "weighted sum",
-    }
-)
+TNORMS: Final[Mapping[str, TNorm]] = {
+    "min": "minimum",
+    "prod": "product",
+    "algebraic_product": "product",
+    "bounded_difference": "bounded difference",
+    "drastic_product": "drastic product",
+    "einstein_product": "einstein product",
+    "hamacher_product": "hamacher product",
+    "nilpotent_minimum": "nilpotent minimum",
+}
+SNORMS: Final[Mapping[str, SNorm]] = {
+    "max": "maximum",
+    "probor": "algebraic sum",
+    "algebraic_sum": "algebraic sum",
+    "bounded_sum": "bounded sum",
+    "drastic_sum": "drastic sum",
+    "einstein_sum": "einstein sum",
+    "hamacher_sum": "hamacher sum",
+    "nilpotent_maximum": "nilpotent maximum",
+    "normalized_sum": "normalized sum",
+    "sum": "sum",
+}
+METHODS: Final = {
+    "centroid": "centroid",
+    "bisector": "bisector",
+    "som": "smallest of maximum",
+    "lom": "largest of maximum",
+    "mom": "mean of maximum",
+    "wtaver": "weighted average",
+    "wtsum": "weighted sum",
+}
 
 _BASIC_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
     0: (),
@@ -85,30 +78,26 @@ _BASIC_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
     20: ("very",),
     40: ("very very",),
 }
-HEDGES: Final[Mapping[Dialect, Mapping[int, tuple[Hedge, ...]]]] = MappingProxyType(
-    {
-        "matlab": {0: ()},
-        "octave": {**_BASIC_HEDGES, 10: (), 30: ("cubed",)},
-        "fuzzylite": {
-            **_BASIC_HEDGES,
-            1: ("seldom",),
-            30: ("extremely",),
-            99: ("any",),
-        },
-    }
-)
+HEDGES: Final[Mapping[Dialect, Mapping[int, tuple[Hedge, ...]]]] = {
+    "matlab": {0: ()},
+    "octave": {**_BASIC_HEDGES, 10: (), 30: ("cubed",)},
+    "fuzzylite": {
+        **_BASIC_HEDGES,
+        1: ("seldom",),
+        30: ("extremely",),
+        99: ("any",),
+    },
+}
 """What the hundredths of a term's number do to its degree."""
 
-CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = MappingProxyType(
-    {
-        0: (),
-        10: (),
-        5: ("very",),
-        20: ("somewhat",),
-        30: ("cube root",),
-        40: ("somewhat", "somewhat"),
-    }
-)
+CONCLUDING_HEDGES: Final[Mapping[int, tuple[Hedge, ...]]] = {
+    0: (),
+    10: (),
+    5: ("very",),
+    20: ("somewhat",),
+    30: ("cube root",),
+    40: ("somewhat", "somewhat"),
+}
 """The same behind the comma of a Sugeno rule in Octave, which takes the root there."""
 
 
@@ -161,44 +150,42 @@ def _falling(start: float, end: float) -> Curve:
     return Binary((start + end) / 2, is_above=False)
 
 
-KINDS: Final[Mapping[str, Kind]] = MappingProxyType(
-    {
-        "trimf": Kind("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
-        "trapmf": Kind("a b c d", lambda n: trapezoid(*n)),
-        "linzmf": Kind("a b", lambda n: _ramp(n[1], n[0])),
-        "linsmf": Kind("a b", lambda n: _ramp(*n)),
-        "gaussmf": Kind("deviation mean", lambda n: Gaussian(n[1], abs(n[0]))),
-        "gauss2mf": Kind(
-            "deviation mean deviation mean",
-            lambda n: TwoGaussians(n[1], abs(n[0]), n[3], abs(n[2])),
-        ),
-        "gbellmf": Kind("width slope center", lambda n: Bell(n[2], abs(n[0]), n[1])),
-        "sigmf": Kind("slope inflection", lambda n: Sigmoid(n[1], n[0])),
-        "dsigmf": Kind(
-            "slope inflection slope inflection",
-            lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
-        ),
-        "psigmf": Kind(
-            "slope inflection slope inflection",
-            lambda n: SigmoidProduct(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
-        ),
-        "smf": Kind("start end", lambda n: _rising(*n)),
-        "zmf": Kind("start end", lambda n: _falling(*n)),
-        "pimf": Kind("a b c d", lambda n: PiCurve(*n)),
-        "rampmf": Kind("start end", lambda n: _ramp(*n), is_private=True),
-        "rectmf": Kind(
-            "start end", lambda n: Trapezoid(n[0], n[0], n[1], n[1]), is_private=True
-        ),
-        "cosinemf": Kind("center width", lambda n: Cosine(*n), is_private=True),
-        "spikemf": Kind("center width", lambda n: Spike(*n), is_private=True),
-        "concavemf": Kind("inflection end", lambda n: Concave(*n), is_private=True),
-        "binarymf": Kind(
-            "start direction",
-            lambda n: Binary(n[0], is_above=n[1] > n[0]),
-            is_private=True,
-        ),
-    }
-)
+KINDS: Final[Mapping[str, Kind]] = {
+    "trimf": Kind("a b c", lambda n: trapezoid(n[0], n[1], n[1], n[2])),
+    "trapmf": Kind("a b c d", lambda n: trapezoid(*n)),
+    "linzmf": Kind("a b", lambda n: _ramp(n[1], n[0])),
+    "linsmf": Kind("a b", lambda n: _ramp(*n)),
+    "gaussmf": Kind("deviation mean", lambda n: Gaussian(n[1], abs(n[0]))),
+    "gauss2mf": Kind(
+        "deviation mean deviation mean",
+        lambda n: TwoGaussians(n[1], abs(n[0]), n[3], abs(n[2])),
+    ),
+    "gbellmf": Kind("width slope center", lambda n: Bell(n[2], abs(n[0]), n[1])),
+    "sigmf": Kind("slope inflection", lambda n: Sigmoid(n[1], n[0])),
+    "dsigmf": Kind(
+        "slope inflection slope inflection",
+        lambda n: SigmoidDifference(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
+    ),
+    "psigmf": Kind(
+        "slope inflection slope inflection",
+        lambda n: SigmoidProduct(Sigmoid(n[1], n[0]), Sigmoid(n[3], n[2])),
+    ),
+    "smf": Kind("start end", lambda n: _rising(*n)),
+    "zmf": Kind("start end", lambda n: _falling(*n)),
+    "pimf": Kind("a b c d", lambda n: PiCurve(*n)),
+    "rampmf": Kind("start end", lambda n: _ramp(*n), is_private=True),
+    "rectmf": Kind(
+        "start end", lambda n: Trapezoid(n[0], n[0], n[1], n[1]), is_private=True
+    ),
+    "cosinemf": Kind("center width", lambda n: Cosine(*n), is_private=True),
+    "spikemf": Kind("center width", lambda n: Spike(*n), is_private=True),
+    "concavemf": Kind("inflection end", lambda n: Concave(*n), is_private=True),
+    "binarymf": Kind(
+        "start direction",
+        lambda n: Binary(n[0], is_above=n[1] > n[0]),
+        is_private=True,
+    ),
+}
 """The curves with a fixed number of parameters, by their name in a file."""
 
 OTHER_KINDS: Final = ("discretemf", "constant", "linear", "function")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -22,16 +21,14 @@ from fuzzytree.model.system import (
     SystemRule,
 )
 
-HEDGES: Mapping[str, Hedge] = MappingProxyType(
-    {
-        "any": "any",
-        "not": "not",
-        "very": "very",
-        "somewhat": "somewhat",
-        "extremely": "extremely",
-        "seldom": "seldom",
-    }
-)
+HEDGES: Mapping[str, Hedge] = {
+    "any": "any",
+    "not": "not",
+    "very": "very",
+    "somewhat": "somewhat",
+    "extremely": "extremely",
+    "seldom": "seldom",
+}
 """The hedges that fuzzylite knows, by their words."""
 
 RULE_WORDS: Final = ("if", "is", "then", "and", "or", "with", *HEDGES)

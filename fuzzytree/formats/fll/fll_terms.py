@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -40,7 +39,7 @@ from fuzzytree.model.system import (
     TwoGaussians,
     curve_mistakes,
 )
-from fuzzytree.semantics.conversion.shapes import stepped
+from fuzzytree.semantics.conversion.points import stepped
 
 _FURTHEST: Final = 1e308  # an end that no value comes near
 
@@ -280,34 +279,30 @@ def _sigmoids(numbers: Sequence[float]) -> tuple[Sigmoid, Sigmoid]:
     return Sigmoid(left, rising), Sigmoid(right, falling)
 
 
-_CLASSES: Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]] = (
-    MappingProxyType(
-        {
-            "Arc": (2, lambda n: Arc(*n)),
-            "Bell": (3, lambda n: Bell(n[0], abs(n[1]), n[2])),
-            "Binary": (2, _binary),
-            "Concave": (2, lambda n: Concave(*n)),
-            "Cosine": (2, lambda n: Cosine(*n)),
-            "Gaussian": (2, lambda n: Gaussian(n[0], abs(n[1]))),
-            "GaussianProduct": (
-                4,
-                lambda n: TwoGaussians(n[0], abs(n[1]), n[2], abs(n[3])),
-            ),
-            "PiShape": (4, lambda n: PiCurve(*n)),
-            "Ramp": (2, _ramp),
-            "Rectangle": (2, _rectangle),
-            "SemiEllipse": (2, lambda n: SemiEllipse(*sorted(n))),
-            "Sigmoid": (2, lambda n: Sigmoid(*n)),
-            "SigmoidDifference": (4, lambda n: SigmoidDifference(*_sigmoids(n))),
-            "SigmoidProduct": (4, lambda n: SigmoidProduct(*_sigmoids(n))),
-            "Spike": (2, lambda n: Spike(n[0], abs(n[1]))),
-            "SShape": (2, _s_shape),
-            "Trapezoid": (4, _trapezoid),
-            "Triangle": (3, lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
-            "ZShape": (2, _z_shape),
-        }
-    )
-)
+_CLASSES: Mapping[str, tuple[int, Callable[[Sequence[float]], Curve]]] = {
+    "Arc": (2, lambda n: Arc(*n)),
+    "Bell": (3, lambda n: Bell(n[0], abs(n[1]), n[2])),
+    "Binary": (2, _binary),
+    "Concave": (2, lambda n: Concave(*n)),
+    "Cosine": (2, lambda n: Cosine(*n)),
+    "Gaussian": (2, lambda n: Gaussian(n[0], abs(n[1]))),
+    "GaussianProduct": (
+        4,
+        lambda n: TwoGaussians(n[0], abs(n[1]), n[2], abs(n[3])),
+    ),
+    "PiShape": (4, lambda n: PiCurve(*n)),
+    "Ramp": (2, _ramp),
+    "Rectangle": (2, _rectangle),
+    "SemiEllipse": (2, lambda n: SemiEllipse(*sorted(n))),
+    "Sigmoid": (2, lambda n: Sigmoid(*n)),
+    "SigmoidDifference": (4, lambda n: SigmoidDifference(*_sigmoids(n))),
+    "SigmoidProduct": (4, lambda n: SigmoidProduct(*_sigmoids(n))),
+    "Spike": (2, lambda n: Spike(n[0], abs(n[1]))),
+    "SShape": (2, _s_shape),
+    "Trapezoid": (4, _trapezoid),
+    "Triangle": (3, lambda n: _trapezoid((n[0], n[1], n[1], n[2]))),
+    "ZShape": (2, _z_shape),
+}
 CLASSES: Final = ("Constant", "Discrete", "Function", "Linear", *_CLASSES)
 """The classes of terms, by their names in files."""
 

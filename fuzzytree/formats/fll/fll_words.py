@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Final, Literal, TypeVar
 
 import msgspec
@@ -22,20 +21,18 @@ from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import name_choice
 from fuzzytree.model.system import Activation, Defuzzifier, SNorm, TNorm
 
-KEYS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "Engine": ("description",),
-        "InputVariable": ("description", "enabled", "range", "lock-range", "term"),
-        "OutputVariable": (
-            *("description", "enabled", "range", "lock-range", "aggregation"),
-            *("defuzzifier", "default", "lock-previous", "term"),
-        ),
-        "RuleBlock": (
-            *("description", "enabled", "conjunction", "disjunction", "implication"),
-            *("activation", "rule"),
-        ),
-    }
-)
+KEYS: Mapping[str, tuple[str, ...]] = {
+    "Engine": ("description",),
+    "InputVariable": ("description", "enabled", "range", "lock-range", "term"),
+    "OutputVariable": (
+        *("description", "enabled", "range", "lock-range", "aggregation"),
+        *("defuzzifier", "default", "lock-previous", "term"),
+    ),
+    "RuleBlock": (
+        *("description", "enabled", "conjunction", "disjunction", "implication"),
+        *("activation", "rule"),
+    ),
+}
 """What each kind of section may say."""
 
 T = TypeVar("T")
@@ -47,30 +44,26 @@ MOST_WORDS: Final = 20_000
 
 _REPEATED = frozenset({"term", "rule"})
 
-T_NORMS: Mapping[str, TNorm] = MappingProxyType(
-    {
-        "Minimum": "minimum",
-        "AlgebraicProduct": "product",
-        "BoundedDifference": "bounded difference",
-        "DrasticProduct": "drastic product",
-        "EinsteinProduct": "einstein product",
-        "HamacherProduct": "hamacher product",
-        "NilpotentMinimum": "nilpotent minimum",
-    }
-)
-S_NORMS: Mapping[str, SNorm] = MappingProxyType(
-    {
-        "Maximum": "maximum",
-        "AlgebraicSum": "algebraic sum",
-        "BoundedSum": "bounded sum",
-        "DrasticSum": "drastic sum",
-        "EinsteinSum": "einstein sum",
-        "HamacherSum": "hamacher sum",
-        "NilpotentMaximum": "nilpotent maximum",
-        "NormalizedSum": "normalized sum",
-        "UnboundedSum": "sum",
-    }
-)
+T_NORMS: Mapping[str, TNorm] = {
+    "Minimum": "minimum",
+    "AlgebraicProduct": "product",
+    "BoundedDifference": "bounded difference",
+    "DrasticProduct": "drastic product",
+    "EinsteinProduct": "einstein product",
+    "HamacherProduct": "hamacher product",
+    "NilpotentMinimum": "nilpotent minimum",
+}
+S_NORMS: Mapping[str, SNorm] = {
+    "Maximum": "maximum",
+    "AlgebraicSum": "algebraic sum",
+    "BoundedSum": "bounded sum",
+    "DrasticSum": "drastic sum",
+    "EinsteinSum": "einstein sum",
+    "HamacherSum": "hamacher sum",
+    "NilpotentMaximum": "nilpotent maximum",
+    "NormalizedSum": "normalized sum",
+    "UnboundedSum": "sum",
+}
 
 Method = Literal[
     "centroid",
@@ -81,17 +74,15 @@ Method = Literal[
     "weighted average",
     "weighted sum",
 ]
-METHODS: Mapping[str, Method] = MappingProxyType(
-    {
-        "Centroid": "centroid",
-        "Bisector": "bisector",
-        "SmallestOfMaximum": "smallest of maximum",
-        "LargestOfMaximum": "largest of maximum",
-        "MeanOfMaximum": "mean of maximum",
-        "WeightedAverage": "weighted average",
-        "WeightedSum": "weighted sum",
-    }
-)
+METHODS: Mapping[str, Method] = {
+    "Centroid": "centroid",
+    "Bisector": "bisector",
+    "SmallestOfMaximum": "smallest of maximum",
+    "LargestOfMaximum": "largest of maximum",
+    "MeanOfMaximum": "mean of maximum",
+    "WeightedAverage": "weighted average",
+    "WeightedSum": "weighted sum",
+}
 TYPES: Final = ("Automatic", "TakagiSugeno", "Tsukamoto")
 """What a weighted defuzzifier may be told to do with terms."""
 
@@ -101,21 +92,24 @@ SAMPLES: Final = 1000
 Choice = Literal[
     "general", "first", "last", "highest", "lowest", "proportional", "threshold"
 ]
-ACTIVATIONS: Mapping[str, Choice] = MappingProxyType(
-    {
-        "General": "general",
-        "First": "first",
-        "Last": "last",
-        "Highest": "highest",
-        "Lowest": "lowest",
-        "Proportional": "proportional",
-        "Threshold": "threshold",
-    }
-)
+ACTIVATIONS: Mapping[str, Choice] = {
+    "General": "general",
+    "First": "first",
+    "Last": "last",
+    "Highest": "highest",
+    "Lowest": "lowest",
+    "Proportional": "proportional",
+    "Threshold": "threshold",
+}
 Relation = Literal["<", "<=", "==", "!=", ">=", ">"]
-RELATIONS: Mapping[str, Relation] = MappingProxyType(
-    {"<": "<", "<=": "<=", "==": "==", "!=": "!=", ">=": ">=", ">": ">"}
-)
+RELATIONS: Mapping[str, Relation] = {
+    "<": "<",
+    "<=": "<=",
+    "==": "==",
+    "!=": "!=",
+    ">=": ">=",
+    ">": ">",
+}
 
 
 class Notes(msgspec.Struct, frozen=True):
@@ -330,17 +324,15 @@ def activation(entry: Entry | None, notes: Notes) -> Activation:
     return Activation(method, count, threshold)
 
 
-_WANTED: Mapping[Choice, str] = MappingProxyType(
-    {
-        "general": "nothing",
-        "proportional": "nothing",
-        "first": "a number of rules and a threshold",
-        "last": "a number of rules and a threshold",
-        "highest": "a number of rules",
-        "lowest": "a number of rules",
-        "threshold": "a relation and a threshold",
-    }
-)
+_WANTED: Mapping[Choice, str] = {
+    "general": "nothing",
+    "proportional": "nothing",
+    "first": "a number of rules and a threshold",
+    "last": "a number of rules and a threshold",
+    "highest": "a number of rules",
+    "lowest": "a number of rules",
+    "threshold": "a relation and a threshold",
+}
 
 
 def _threshold(word: Word, notes: Notes) -> float:

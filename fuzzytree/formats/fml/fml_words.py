@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final, Literal
 
 import msgspec
@@ -32,30 +31,26 @@ NAMESPACE: Final = "http://www.ieee1855.org"
 FAR: Final = 1e300
 """The flat side of a right or left gaussian ends beyond all values."""
 
-TNORMS: Final[Mapping[str, TNorm]] = MappingProxyType(
-    {
-        "MIN": "minimum",
-        "PROD": "product",
-        "BSUM": "bounded difference",  # so the published schema; BDIF in the text
-        "BDIF": "bounded difference",
-        "DRS": "drastic product",
-        "DRP": "drastic product",
-        "EPROD": "einstein product",
-        "HPROD": "hamacher product",
-        "NILMIN": "nilpotent minimum",
-    }
-)
-SNORMS: Final[Mapping[str, SNorm]] = MappingProxyType(
-    {
-        "MAX": "maximum",
-        "PROBOR": "algebraic sum",
-        "BSUM": "bounded sum",
-        "DRS": "drastic sum",
-        "ESUM": "einstein sum",
-        "HSUM": "hamacher sum",
-        "NILMAX": "nilpotent maximum",
-    }
-)
+TNORMS: Final[Mapping[str, TNorm]] = {
+    "MIN": "minimum",
+    "PROD": "product",
+    "BSUM": "bounded difference",  # so the published schema; BDIF in the text
+    "BDIF": "bounded difference",
+    "DRS": "drastic product",
+    "DRP": "drastic product",
+    "EPROD": "einstein product",
+    "HPROD": "hamacher product",
+    "NILMIN": "nilpotent minimum",
+}
+SNORMS: Final[Mapping[str, SNorm]] = {
+    "MAX": "maximum",
+    "PROBOR": "algebraic sum",
+    "BSUM": "bounded sum",
+    "DRS": "drastic sum",
+    "ESUM": "einstein sum",
+    "HSUM": "hamacher sum",
+    "NILMAX": "nilpotent maximum",
+}
 METHODS: Final[
     Mapping[
         str,
@@ -67,31 +62,27 @@ METHODS: Final[
             "mean of maximum",
         ],
     ]
-] = MappingProxyType(
-    {
-        "COG": "centroid",
-        "COA": "bisector",
-        "LM": "smallest of maximum",
-        "RM": "largest of maximum",
-        "MOM": "mean of maximum",
-    }
-)
+] = {
+    "COG": "centroid",
+    "COA": "bisector",
+    "LM": "smallest of maximum",
+    "RM": "largest of maximum",
+    "MOM": "mean of maximum",
+}
 USUAL: Final = Defuzzifier("centroid", 1000, "middle")
 """FML says nothing of samples; its reference implementation takes 1000."""
 
-MODIFIERS: Final[Mapping[str, Hedge]] = MappingProxyType(
-    {
-        "any": "any",
-        "not": "not",
-        "very": "very",
-        "somewhat": "somewhat",
-        "seldom": "seldom",
-        "plus": "plus",
-        "extremely": "cubed",
-        "intensify": "extremely",
-        "more_or_less": "cube root",
-    }
-)
+MODIFIERS: Final[Mapping[str, Hedge]] = {
+    "any": "any",
+    "not": "not",
+    "very": "very",
+    "somewhat": "somewhat",
+    "seldom": "seldom",
+    "plus": "plus",
+    "extremely": "cubed",
+    "intensify": "extremely",
+    "more_or_less": "cube root",
+}
 """The modifiers with a meaning here; above, below, norm and slightly have none."""
 
 OTHER_MODIFIERS: Final = ("above", "below", "norm", "slightly")
@@ -99,22 +90,20 @@ OTHER_MODIFIERS: Final = ("above", "below", "norm", "slightly")
 
 _Make = Callable[[Sequence[float]], Curve]
 
-SHAPES: Final[Mapping[str, tuple[int, _Make]]] = MappingProxyType(
-    {
-        "rightLinearShape": (2, lambda n: Points((n[0], n[1]), (0.0, 1.0))),
-        "leftLinearShape": (2, lambda n: Points((n[0], n[1]), (1.0, 0.0))),
-        "piShape": (2, lambda n: PiCurve(n[0], n[1], n[1], n[1] + abs(n[1] - n[0]))),
-        "triangularShape": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
-        "trapezoidShape": (4, lambda n: Trapezoid(n[0], n[1], n[2], n[3])),
-        "gaussianShape": (2, lambda n: Gaussian(n[0], abs(n[1]))),
-        "rightGaussianShape": (2, lambda n: TwoGaussians(n[0], abs(n[1]), FAR, 1.0)),
-        "leftGaussianShape": (2, lambda n: TwoGaussians(-FAR, 1.0, n[0], abs(n[1]))),
-        "singletonShape": (1, lambda n: Singleton(n[0])),
-        "rectangularShape": (2, lambda n: Trapezoid(n[0], n[0], n[1], n[1])),
-        "sShape": (2, lambda n: SCurve(n[0], n[1])),
-        "zShape": (2, lambda n: SCurve(n[1], n[0])),
-    }
-)
+SHAPES: Final[Mapping[str, tuple[int, _Make]]] = {
+    "rightLinearShape": (2, lambda n: Points((n[0], n[1]), (0.0, 1.0))),
+    "leftLinearShape": (2, lambda n: Points((n[0], n[1]), (1.0, 0.0))),
+    "piShape": (2, lambda n: PiCurve(n[0], n[1], n[1], n[1] + abs(n[1] - n[0]))),
+    "triangularShape": (3, lambda n: Trapezoid(n[0], n[1], n[1], n[2])),
+    "trapezoidShape": (4, lambda n: Trapezoid(n[0], n[1], n[2], n[3])),
+    "gaussianShape": (2, lambda n: Gaussian(n[0], abs(n[1]))),
+    "rightGaussianShape": (2, lambda n: TwoGaussians(n[0], abs(n[1]), FAR, 1.0)),
+    "leftGaussianShape": (2, lambda n: TwoGaussians(-FAR, 1.0, n[0], abs(n[1]))),
+    "singletonShape": (1, lambda n: Singleton(n[0])),
+    "rectangularShape": (2, lambda n: Trapezoid(n[0], n[0], n[1], n[1])),
+    "sShape": (2, lambda n: SCurve(n[0], n[1])),
+    "zShape": (2, lambda n: SCurve(n[1], n[0])),
+}
 POINTS: Final = ("pointSetShape", "pointSetMonotonicShape")
 CIRCULAR: Final = "circularDefinition"
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final, get_args
 
 import msgspec
@@ -29,9 +28,9 @@ from fuzzytree.model.system import (
 )
 
 ALWAYS: Final = "always"
-HEDGES: Final[Mapping[str, Hedge]] = MappingProxyType(
-    {hedge.replace(" ", "-"): hedge for hedge in get_args(Hedge)}
-)
+HEDGES: Final[Mapping[str, Hedge]] = {
+    hedge.replace(" ", "-"): hedge for hedge in get_args(Hedge)
+}
 _KEYWORDS: Final = frozenset(["is", "and", "or", "not", ALWAYS, *HEDGES])
 _TOKEN: Final = re.compile(
     r"""

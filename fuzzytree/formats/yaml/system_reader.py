@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any, Final
 
 from fuzzytree.errors import InvalidModelError
@@ -210,32 +209,30 @@ def _sigmoid(one: layout.SigmoidCurve) -> Sigmoid:
     return Sigmoid(one.inflection, one.slope)
 
 
-_CURVES: Final[Mapping[str, Callable[[Any], Curve]]] = MappingProxyType(
-    {
-        "trapezoid": _trapezoid,
-        "triangle": lambda one: Trapezoid(one[0], one[1], one[1], one[2]),
-        "gaussian": lambda one: Gaussian(one.mean, one.deviation),
-        "two_gaussians": lambda one: TwoGaussians(
-            one.left, one.left_deviation, one.right, one.right_deviation
-        ),
-        "bell": lambda one: Bell(one.center, one.width, one.slope),
-        "sigmoid": _sigmoid,
-        "sigmoid_difference": lambda one: SigmoidDifference(*map(_sigmoid, one)),
-        "sigmoid_product": lambda one: SigmoidProduct(*map(_sigmoid, one)),
-        "s": lambda one: SCurve(one.start, one.end),
-        "pi": lambda one: PiCurve(*one),
-        "cosine": lambda one: Cosine(one.center, one.width),
-        "concave": lambda one: Concave(one.inflection, one.end),
-        "spike": lambda one: Spike(one.center, one.width),
-        "arc": lambda one: Arc(one.start, one.end),
-        "semi_ellipse": lambda one: SemiEllipse(one.start, one.end),
-        "at_least": lambda one: Binary(one, is_above=True),
-        "at_most": lambda one: Binary(one, is_above=False),
-        "singleton": Singleton,
-        "linear": lambda one: Linear(one.weights, one.offset),
-        "formula": lambda one: Formula(Number(0.0)),  # until it is parsed
-    }
-)
+_CURVES: Final[Mapping[str, Callable[[Any], Curve]]] = {
+    "trapezoid": _trapezoid,
+    "triangle": lambda one: Trapezoid(one[0], one[1], one[1], one[2]),
+    "gaussian": lambda one: Gaussian(one.mean, one.deviation),
+    "two_gaussians": lambda one: TwoGaussians(
+        one.left, one.left_deviation, one.right, one.right_deviation
+    ),
+    "bell": lambda one: Bell(one.center, one.width, one.slope),
+    "sigmoid": _sigmoid,
+    "sigmoid_difference": lambda one: SigmoidDifference(*map(_sigmoid, one)),
+    "sigmoid_product": lambda one: SigmoidProduct(*map(_sigmoid, one)),
+    "s": lambda one: SCurve(one.start, one.end),
+    "pi": lambda one: PiCurve(*one),
+    "cosine": lambda one: Cosine(one.center, one.width),
+    "concave": lambda one: Concave(one.inflection, one.end),
+    "spike": lambda one: Spike(one.center, one.width),
+    "arc": lambda one: Arc(one.start, one.end),
+    "semi_ellipse": lambda one: SemiEllipse(one.start, one.end),
+    "at_least": lambda one: Binary(one, is_above=True),
+    "at_most": lambda one: Binary(one, is_above=False),
+    "singleton": Singleton,
+    "linear": lambda one: Linear(one.weights, one.offset),
+    "formula": lambda one: Formula(Number(0.0)),  # until it is parsed
+}
 """What each field of `LabelOfVariable` becomes; the layout has checked its form."""
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from fuzzytree.semantics.conversion.facts import FACTS, as_rules, as_written, facts_of
-from fuzzytree.semantics.conversion.joining import (
+from fuzzytree.semantics.conversion.points import check_tolerance, pointed
+from fuzzytree.semantics.conversion.rule_forms import (
     joined_by_number,
     joined_outputs,
     number_losses,
 )
-from fuzzytree.semantics.conversion.points import check_tolerance, pointed
 from fuzzytree.semantics.conversion.scores import (
     Always,
     Scores,

@@ -38,8 +38,8 @@ from fuzzytree.model.system import (
     RuleBlock,
     questions,
 )
+from fuzzytree.semantics.conversion.points import shape_of
 from fuzzytree.semantics.conversion.scores import Always, Scores, as_system, flattened
-from fuzzytree.semantics.conversion.shapes import shape_of
 
 _UNSAFE = {character: f"\\u{ord(character):04x}" for character in "*/<>&#%'`$\x7f"}
 

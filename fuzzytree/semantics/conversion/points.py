@@ -1,21 +1,21 @@
 """Points in the place of the curves that a format lacks, with certified bounds.
 
 Shapes of rule bases are placed by `fuzzytree.numerics.placing`; trapezoids, singletons
-and steps are points already (`fuzzytree.semantics.conversion.shapes`). The other curves
-are cut into *pieces*, and points are put on each of them, as far apart as the tolerance
-allows:
+and steps are points already (`shape_of`). The other curves are divided into *pieces*
+(`conversion.point_plans`), and points are put on each of them, as far apart as the
+tolerance allows:
 
 - On a piece that bends to one side only, the curve lies between its chord and its
   tangents. With tangents at both ends and in the middle, the chord is furthest from the
   outermost of them where two tangents meet. (An upright tangent meets at its own end.)
-- Products and differences of sigmoids bend as they like. There a chord is at most
+- Products and differences of sigmoids may bend to either side. There a chord is at most
   `max |f''| h^2 / 8` away, and f'' is enclosed over the stretch by interval arithmetic
   of the sigmoids' own derivatives, whose extremes are known.
 - Where a curve goes on for ever towards 0 or 1, the outermost point stands where it is
   as near as the tolerance; the degree stays what it is there.
 
 `_slack` covers rounding: degrees and slopes are good to a few units of 2^-52 times what
-their exponents amplify, and where pieces meet at a rounded place, the few doubles of
+their exponents amplify, and where pieces meet at a rounded value, the few doubles of
 another bend change a chord by no more than the curve's steepness times their width.
 """
 
@@ -23,21 +23,34 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple, TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple, TypeVar, get_args
 
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Loss
-from fuzzytree.model.rulebase import MOST_POINTS, Band, Points, RuleBase, Term
-from fuzzytree.model.system import Curve, FuzzySystem, Label
+from fuzzytree.model.rulebase import (
+    LR,
+    MOST_POINTS,
+    Band,
+    Points,
+    RuleBase,
+    Shape,
+    Term,
+)
+from fuzzytree.model.system import (
+    Binary,
+    Curve,
+    FuzzySystem,
+    Label,
+    Singleton,
+    Trapezoid,
+)
 from fuzzytree.numerics.curves import BELOW_ONE
 from fuzzytree.numerics.placing import points_of
-from fuzzytree.semantics.conversion.bends import plan_of
-from fuzzytree.semantics.conversion.pieces import Piece, Plan
-from fuzzytree.semantics.conversion.shapes import shape_of
-from fuzzytree.semantics.inference.curves import curve_degree
+from fuzzytree.semantics.conversion.point_plans import Piece, Plan, plan_of
+from fuzzytree.semantics.inference.membership import curve_degree
 
 EXACT = 2.0**-52
 """Bounds up to this are no loss: rounding alone makes as much."""
@@ -324,3 +337,103 @@ def _furthest(
         following = math.nextafter(start, math.inf)
         return following, 0.0  # no double lies between
     return good, found
+
+
+_Pairs = list[tuple[float, float]]
+
+
+def shape_of(curve: Curve) -> Shape | None:
+    """Return a shape with the degrees of a curve, the same bits at every double.
+
+    A step of points has its first degree at the value itself. Where a curve is 1 at its
+    left edge already, the step stands one double below.
+
+    Returns:
+        The shape, or None if none has these degrees.
+
+    Example:
+        >>> shape_of(Trapezoid(0.0, 1.0, 1.0, 3.0))
+        Points(values=(0.0, 1.0, 3.0), degrees=(0.0, 1.0, 0.0))
+    """
+    match curve:
+        case Band() | LR() | Points():
+            return curve
+        case Trapezoid(a=a, b=b, c=c, d=d):
+            left = [(b, 1.0)] if a is None else _rise(a, b)
+            right = [(c, 1.0)] if d is None else _fall(c, d)
+            if a is None:
+                left = []
+            elif d is None:
+                right = []
+            return _points_of(left, right)
+        case Singleton(value=value):
+            return _points_of(_rise(value, value), _fall(value, value))
+        case Binary(start=start, is_above=is_above):
+            return _points_of(
+                _rise(start, start) if is_above else _fall(start, start), []
+            )
+        case _:
+            return None
+
+
+def stepped(values: Iterable[float]) -> tuple[float, ...]:
+    """Return the values of points; of two neighbouring doubles the first comes twice.
+
+    No double lies between such two, so a step at the first has the same degrees. A
+    value that comes twice already stays.
+
+    Example:
+        >>> import math
+        >>> stepped((0.0, 1.0, math.nextafter(1.0, 2.0), 2.0))
+        (0.0, 1.0, 1.0, 2.0)
+    """
+    found: list[float] = []
+    for value in values:
+        is_second = len(found) > 1 and found[-1] == found[-2]
+        is_next = bool(found) and value == math.nextafter(found[-1], math.inf)
+        found.append(found[-1] if is_next and not is_second else value)
+    return tuple(found)
+
+
+def _rise(start: float, end: float) -> _Pairs:
+    if start < end:
+        return [(start, 0.0), (end, 1.0)]
+    before = math.nextafter(end, -math.inf)
+    if math.isinf(before):
+        return [(end, 1.0)]
+    return [(before, 0.0), (before, 1.0)]
+
+
+def _fall(start: float, end: float) -> _Pairs:
+    return [(start, 1.0), (end, 0.0)]
+
+
+def _points_of(left: _Pairs, right: _Pairs) -> Points:
+    if left and right and left[-1] == right[0]:
+        right = right[1:]
+    values, degrees = zip(*left, *right, strict=True)
+    return Points(values, degrees)
+
+
+_COARSE = 0.01  # lines become the same points for every tolerance
+
+
+def straightened(model: D) -> D | None:
+    """Return a model whose straight flanks are points, if that loses nothing.
+
+    The points are within 2^-52 of the degrees. Where another curve would be lost, or
+    there is nothing to change, it is None.
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Flank, Rule, Term, Variable
+        >>> ramp = Term("low", Band(high=1.0, right=Flank(1.0, 3.0)))
+        >>> rules = RuleBase("a", ("x",), (Variable("p", (ramp,)),), (Rule((), "x"),))
+        >>> straightened(rules).variables[0].terms[0].shape.values
+        (1.0, 1.0, 3.0)
+    """
+    others = tuple(kind for kind in get_args(Curve) if kind not in (Band, LR))
+    try:
+        found, losses = pointed(model, _COARSE, allowed=others)
+    except LossError:
+        return None
+    return None if losses or found == model else found

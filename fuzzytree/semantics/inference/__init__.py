@@ -40,8 +40,8 @@ from fuzzytree.model.system import (
     is_drawn_by_lines,
     sampled_values,
 )
-from fuzzytree.semantics.inference.curves import curve_degree, value_at
 from fuzzytree.semantics.inference.formulas import maximum, quotient, value_of
+from fuzzytree.semantics.inference.membership import curve_degree, value_at
 from fuzzytree.semantics.inference.norms import (
     RELATIONS,
     S_NORMS,

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Final
 
 from fuzzytree.model.system import Call, Expression, Name, Number
@@ -170,53 +169,49 @@ def _same(a: float, b: float) -> bool:
     return a == b or (a != a and b != b)
 
 
-UNARY: Final[Mapping[str, Callable[[float], float]]] = MappingProxyType(
-    {
-        "negate": lambda a: -a,
-        "not": lambda a: float(a == 0.0),
-        "abs": abs,
-        "sqrt": square_root,
-        "exp": exponential,
-        "log": logarithm,
-        "log10": lambda a: _or_pole(math.log10, a, 0.0),
-        "log1p": lambda a: _or_pole(math.log1p, a, -1.0),
-        "sin": _or_nan(math.sin),
-        "cos": _or_nan(math.cos),
-        "tan": _or_nan(math.tan),
-        "asin": _or_nan(math.asin),
-        "acos": _or_nan(math.acos),
-        "atan": math.atan,
-        "sinh": _hyperbolic_sine,
-        "cosh": _hyperbolic_cosine,
-        "tanh": math.tanh,
-        "asinh": math.asinh,
-        "acosh": _or_nan(math.acosh),
-        "atanh": _area_tangent,
-        "floor": _rounded(math.floor),
-        "ceil": _rounded(math.ceil),
-        "round": _rounded(round),
-    }
-)
+UNARY: Final[Mapping[str, Callable[[float], float]]] = {
+    "negate": lambda a: -a,
+    "not": lambda a: float(a == 0.0),
+    "abs": abs,
+    "sqrt": square_root,
+    "exp": exponential,
+    "log": logarithm,
+    "log10": lambda a: _or_pole(math.log10, a, 0.0),
+    "log1p": lambda a: _or_pole(math.log1p, a, -1.0),
+    "sin": _or_nan(math.sin),
+    "cos": _or_nan(math.cos),
+    "tan": _or_nan(math.tan),
+    "asin": _or_nan(math.asin),
+    "acos": _or_nan(math.acos),
+    "atan": math.atan,
+    "sinh": _hyperbolic_sine,
+    "cosh": _hyperbolic_cosine,
+    "tanh": math.tanh,
+    "asinh": math.asinh,
+    "acosh": _or_nan(math.acosh),
+    "atanh": _area_tangent,
+    "floor": _rounded(math.floor),
+    "ceil": _rounded(math.ceil),
+    "round": _rounded(round),
+}
 
-BINARY: Final[Mapping[str, Callable[[float, float], float]]] = MappingProxyType(
-    {
-        "+": lambda a, b: a + b,
-        "-": lambda a, b: a - b,
-        "*": lambda a, b: a * b,
-        "/": quotient,
-        "%": _modulo,
-        "^": power,
-        "and": lambda a, b: float(a != 0.0 and b != 0.0),
-        "or": lambda a, b: float(a != 0.0 or b != 0.0),
-        "lt": lambda a, b: float(a < b),
-        "le": lambda a, b: float(a <= b or _same(a, b)),
-        "gt": lambda a, b: float(a > b),
-        "ge": lambda a, b: float(a >= b or _same(a, b)),
-        "eq": lambda a, b: float(_same(a, b)),
-        "neq": lambda a, b: float(not _same(a, b)),
-        "min": minimum,
-        "max": maximum,
-        "atan2": math.atan2,
-        "fmod": _fmod,
-    }
-)
+BINARY: Final[Mapping[str, Callable[[float, float], float]]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": quotient,
+    "%": _modulo,
+    "^": power,
+    "and": lambda a, b: float(a != 0.0 and b != 0.0),
+    "or": lambda a, b: float(a != 0.0 or b != 0.0),
+    "lt": lambda a, b: float(a < b),
+    "le": lambda a, b: float(a <= b or _same(a, b)),
+    "gt": lambda a, b: float(a > b),
+    "ge": lambda a, b: float(a >= b or _same(a, b)),
+    "eq": lambda a, b: float(_same(a, b)),
+    "neq": lambda a, b: float(not _same(a, b)),
+    "min": minimum,
+    "max": maximum,
+    "atan2": math.atan2,
+    "fmod": _fmod,
+}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 
 from fuzzytree.model.system import Hedge, SNorm, TNorm
@@ -43,21 +42,19 @@ def _seldom(d: float) -> float:
     return 1.0 - square_root(0.5 * (1.0 - d))
 
 
-_HEDGES: Final[Mapping[Hedge, Callable[[float], float]]] = MappingProxyType(
-    {
-        "any": lambda d: 1.0,
-        "not": lambda d: 1.0 - d,
-        "very": lambda d: d * d,
-        "somewhat": square_root,
-        "extremely": _extremely,
-        "seldom": _seldom,
-        "cubed": lambda d: d * d * d,
-        "very very": lambda d: (d * d) * (d * d),
-        "plus": lambda d: power(d, 1.25),
-        "minus": lambda d: power(d, 0.75),
-        "cube root": lambda d: power(d, 1.0 / 3.0),
-    }
-)
+_HEDGES: Final[Mapping[Hedge, Callable[[float], float]]] = {
+    "any": lambda d: 1.0,
+    "not": lambda d: 1.0 - d,
+    "very": lambda d: d * d,
+    "somewhat": square_root,
+    "extremely": _extremely,
+    "seldom": _seldom,
+    "cubed": lambda d: d * d * d,
+    "very very": lambda d: (d * d) * (d * d),
+    "plus": lambda d: power(d, 1.25),
+    "minus": lambda d: power(d, 0.75),
+    "cube root": lambda d: power(d, 1.0 / 3.0),
+}
 
 
 def t_norm(name: TNorm, a: float, b: float) -> float:
@@ -89,39 +86,33 @@ def _hamacher_sum(a: float, b: float) -> float:
     return 1.0 if product == 1.0 else quotient(a + b - 2.0 * product, 1.0 - product)
 
 
-T_NORMS: Final[Mapping[TNorm, Callable[[float, float], float]]] = MappingProxyType(
-    {
-        "minimum": minimum,
-        "product": lambda a, b: a * b,
-        "bounded difference": lambda a, b: maximum(0.0, a + b - 1.0),
-        "drastic product": lambda a, b: minimum(a, b) if maximum(a, b) == 1.0 else 0.0,
-        "einstein product": lambda a, b: quotient(a * b, 2.0 - (a + b - a * b)),
-        "hamacher product": _hamacher_product,
-        "nilpotent minimum": lambda a, b: minimum(a, b) if a + b > 1.0 else 0.0,
-    }
-)
+T_NORMS: Final[Mapping[TNorm, Callable[[float, float], float]]] = {
+    "minimum": minimum,
+    "product": lambda a, b: a * b,
+    "bounded difference": lambda a, b: maximum(0.0, a + b - 1.0),
+    "drastic product": lambda a, b: minimum(a, b) if maximum(a, b) == 1.0 else 0.0,
+    "einstein product": lambda a, b: quotient(a * b, 2.0 - (a + b - a * b)),
+    "hamacher product": _hamacher_product,
+    "nilpotent minimum": lambda a, b: minimum(a, b) if a + b > 1.0 else 0.0,
+}
 
-S_NORMS: Final[Mapping[SNorm, Callable[[float, float], float]]] = MappingProxyType(
-    {
-        "maximum": maximum,
-        "algebraic sum": lambda a, b: a + b - a * b,
-        "bounded sum": lambda a, b: minimum(1.0, a + b),
-        "drastic sum": lambda a, b: maximum(a, b) if minimum(a, b) == 0.0 else 1.0,
-        "einstein sum": lambda a, b: quotient(a + b, 1.0 + a * b),
-        "hamacher sum": _hamacher_sum,
-        "nilpotent maximum": lambda a, b: maximum(a, b) if a + b < 1.0 else 1.0,
-        "normalized sum": lambda a, b: quotient(a + b, maximum(1.0, a + b)),
-        "sum": lambda a, b: a + b,
-    }
-)
+S_NORMS: Final[Mapping[SNorm, Callable[[float, float], float]]] = {
+    "maximum": maximum,
+    "algebraic sum": lambda a, b: a + b - a * b,
+    "bounded sum": lambda a, b: minimum(1.0, a + b),
+    "drastic sum": lambda a, b: maximum(a, b) if minimum(a, b) == 0.0 else 1.0,
+    "einstein sum": lambda a, b: quotient(a + b, 1.0 + a * b),
+    "hamacher sum": _hamacher_sum,
+    "nilpotent maximum": lambda a, b: maximum(a, b) if a + b < 1.0 else 1.0,
+    "normalized sum": lambda a, b: quotient(a + b, maximum(1.0, a + b)),
+    "sum": lambda a, b: a + b,
+}
 
-RELATIONS: Final[Mapping[str, Callable[[float, float], bool]]] = MappingProxyType(
-    {
-        "<": lambda a, b: a < b,
-        "<=": lambda a, b: a <= b,
-        "==": lambda a, b: a == b,
-        "!=": lambda a, b: a != b,
-        ">=": lambda a, b: a >= b,
-        ">": lambda a, b: a > b,
-    }
-)
+RELATIONS: Final[Mapping[str, Callable[[float, float], bool]]] = {
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+    ">=": lambda a, b: a >= b,
+    ">": lambda a, b: a > b,
+}

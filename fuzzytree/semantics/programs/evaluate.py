@@ -48,7 +48,7 @@ def evaluate(program: Program, row: Mapping[str, float]) -> Numbers:
         KeyError: If an input has no value.
 
     Example:
-        >>> from fuzzytree.semantics.programs.rules import from_rules
+        >>> from fuzzytree.semantics.programs.rule_program import from_rules
         >>> from fuzzytree.model.rulebase import (
         ...     Band, Clause, Flank, Rule, RuleBase, Term, Variable
         ... )

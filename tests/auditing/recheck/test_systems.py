@@ -42,7 +42,7 @@ from fuzzytree.model.system import (
     Trapezoid,
 )
 from fuzzytree.semantics.inference import infer, norms
-from fuzzytree.semantics.inference.curves import curve_degree
+from fuzzytree.semantics.inference.membership import curve_degree
 from fuzzytree.testing import random_system
 
 CLOSE = 1e-12

@@ -28,7 +28,7 @@ from fuzzytree.semantics.programs import evaluate
 from fuzzytree.semantics.programs.bounds import error_bounds
 from fuzzytree.semantics.programs.operations import INEXACT, NUMERIC
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.semantics.random_systems import random_rows
 from fuzzytree.testing import random_system
 

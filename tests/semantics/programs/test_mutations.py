@@ -23,7 +23,7 @@ from fuzzytree.model.system import (
     Trapezoid,
 )
 from fuzzytree.runtimes import systems as runtimes
-from fuzzytree.semantics.programs import systems
+from fuzzytree.semantics.programs import system_program as systems
 from fuzzytree.semantics.programs.steps import Program, Step
 
 SWAPS = {

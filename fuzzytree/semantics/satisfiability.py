@@ -1,7 +1,7 @@
-"""Where clauses hold: which hold for every value, and which rules can never fire.
+"""Tautologies and contradictions: clauses that are always true, rules that never fire.
 
-What is told is certain, in rounded numbers of every type; what is not told may hold or
-fire all the same.
+What is reported is certain, in rounded numbers of every type; a clause that is not
+reported may be always true all the same, and a rule may never fire.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from fuzzytree.semantics.inference import infer
 from fuzzytree.semantics.probing import SPECIAL
 from fuzzytree.semantics.programs.evaluate import evaluate
 from fuzzytree.semantics.programs.operations import INEXACT
-from fuzzytree.semantics.programs.systems import from_system
+from fuzzytree.semantics.programs.system_program import from_system
 from fuzzytree.testing import random_rows, random_system
 
 RAMP = Label("up", Points((0.0, 1.0), (0.0, 1.0)))

@@ -17,7 +17,7 @@ from fuzzytree.model.rulebase import (
 )
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.programs.evaluate import evaluate
-from fuzzytree.semantics.programs.rules import from_rules
+from fuzzytree.semantics.programs.rule_program import from_rules
 from fuzzytree.semantics.reference import evaluate as refer
 from fuzzytree.testing import probes, random_tree, with_points
 

@@ -1,10 +1,24 @@
-"""How curves of systems bend: the pieces along which points can be placed."""
+"""How curves bend: the pieces along which points can be placed, and chords' errors.
+
+Products and differences of two sigmoids bend to either side. With
+`t = slope (x - inflection)` and `s = 1 / (1 + exp(-t))` a sigmoid's derivatives by t
+are `s' = s (1 - s)`, largest at 0, and `s'' = s' (1 - 2 s)`, whose extremes are at
+`t = +-ln(2 + sqrt(3))`. So each has a range over an interval of t, and
+
+    (s1 s2)'' = k1^2 s1'' s2 + 2 k1 k2 s1' s2' + k2^2 s1 s2''
+    (s1 - s2)'' = k1^2 s1'' - k2^2 s2''
+
+have one over an interval of x, by interval arithmetic. The absolute difference has an
+edge where both are equal, `k1 (x - c1) = k2 (x - c2)`, and is smooth elsewhere.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+from typing import NamedTuple
 
 from fuzzytree.errors import LossError
 from fuzzytree.model.system import (
@@ -23,11 +37,87 @@ from fuzzytree.model.system import (
     Spike,
     TwoGaussians,
 )
-from fuzzytree.semantics.conversion.pieces import Function, Piece, Plan, bent
-from fuzzytree.semantics.conversion.sigmoids import sigmoid_plan
-from fuzzytree.semantics.inference.curves import curve_degree
 from fuzzytree.semantics.inference.formulas import power as raised
 from fuzzytree.semantics.inference.formulas import quotient
+from fuzzytree.semantics.inference.membership import curve_degree
+
+Function = Callable[[float], float]
+Error = Callable[[float, float], float]
+
+
+class Piece(NamedTuple):
+    """A stretch of a curve.
+
+    Attributes:
+        start: Where it starts.
+        end: Where it ends; above `start`.
+        error: How far the chord between two of its values can be from the curve.
+    """
+
+    start: float
+    end: float
+    error: Error
+
+
+class Plan(NamedTuple):
+    """How points can be placed along a curve.
+
+    Attributes:
+        parts: Pieces, and points that must be there, from left to right; the curve is
+            constant between two that do not meet.
+        tail: How far it can be from its outermost points' degrees beyond them.
+        slack: What rounding can add to any error.
+        first: The degree of the first point, if it is known better than computed.
+        last: The degree of the last one.
+    """
+
+    parts: tuple[Piece | tuple[float, float], ...]
+    tail: float = 0.0
+    slack: float = 0.0
+    first: float | None = None
+    last: float | None = None
+
+
+def bent(value: Function, slope: Function) -> Error:
+    """Return the error of chords of a curve that bends to one side only.
+
+    Args:
+        value: The curve.
+        slope: Its slope within the piece; an infinity at an upright end.
+
+    Example:
+        >>> bent(lambda x: x * x, lambda x: 2.0 * x)(0.0, 1.0)
+        0.25
+    """
+
+    def error(a: float, b: float) -> float:
+        middle = a + (b - a) / 2
+        if not a < middle < b:
+            return 0.0  # no double lies between
+        at_a, at_m, at_b = value(a), value(middle), value(b)
+        rise = slope(middle)
+        chord = (at_b - at_a) / (b - a)
+
+        def apart(x: float) -> float:
+            return abs((at_a + chord * (x - a)) - (at_m + rise * (x - middle)))
+
+        left = _meeting(a, at_a, slope(a), middle, at_m, rise)
+        right = _meeting(b, at_b, slope(b), middle, at_m, rise)
+        return max(apart(left), apart(right))
+
+    return error
+
+
+def _meeting(
+    end: float, at_end: float, outer: float, middle: float, at_m: float, rise: float
+) -> float:
+    """Return where the tangent at an end meets that in the middle, between the two."""
+    if math.isinf(outer) or outer == rise:
+        return end
+    chord = (at_m - at_end) / (middle - end)
+    share = (rise - chord) / (rise - outer)
+    return end + (middle - end) * min(max(share, 0.0), 1.0)
+
 
 _TAIL = 0.99  # tails end a little below the tolerance, so that rounding has room
 
@@ -284,3 +374,109 @@ def _semi_ellipse(curve: SemiEllipse) -> Plan:
 
     knots = [start, start + width / 2.0, end]
     return Plan(tuple(_pieces(curve, knots, slope)), 0.0, _slack(width, knots))
+
+
+_EXTREME = math.log(2.0 + math.sqrt(3.0))
+
+
+class _Range(NamedTuple):
+    low: float
+    high: float
+
+    def times(self, other: _Range) -> _Range:
+        products = [a * b for a in self for b in other]
+        return _Range(min(products), max(products))
+
+    def scaled(self, factor: float) -> _Range:
+        ends = self.low * factor, self.high * factor
+        return _Range(min(ends), max(ends))
+
+    def plus(self, other: _Range) -> _Range:
+        return _Range(self.low + other.low, self.high + other.high)
+
+
+def sigmoid_plan(curve: SigmoidDifference | SigmoidProduct, tolerance: float) -> Plan:
+    """Return how points can be placed along two sigmoids.
+
+    Where each sigmoid is within an eighth of the tolerance of 0 or 1, and so on for
+    ever, product and difference are within a half of it of what they are there.
+    """
+    pair = [one for one in (curve.first, curve.second) if one.slope != 0.0]
+    if not pair:
+        x = curve.first.inflection
+        return Plan(((x, curve_degree(curve, x)),))
+    reach = math.log(8.0 / tolerance)
+    start = min(one.inflection - reach / abs(one.slope) for one in pair)
+    end = max(one.inflection + reach / abs(one.slope) for one in pair)
+    knots = {start, end, *(one.inflection for one in pair)}
+    if isinstance(curve, SigmoidDifference):
+        edge = _crossing(curve.first, curve.second)
+        if edge is not None and start < edge < end:
+            knots.add(edge)
+    error = _error(curve)
+    places = sorted(knots)
+    parts = [Piece(a, b, error) for a, b in itertools.pairwise(places)]
+    steepness = sum(abs(one.slope) for one in pair) / 4.0
+    slack = 2.0**-44 + 16.0 * math.ulp(max(map(abs, places))) * steepness
+    return Plan(tuple(parts), tolerance / 2.0, slack)
+
+
+def _crossing(first: Sigmoid, second: Sigmoid) -> float | None:
+    """Return where two sigmoids are equal, rounded once."""
+    k, m = Fraction(first.slope), Fraction(second.slope)
+    if k == m:
+        return None
+    place = (k * Fraction(first.inflection) - m * Fraction(second.inflection)) / (k - m)
+    try:
+        return float(place)
+    except OverflowError:
+        return None
+
+
+def _error(curve: SigmoidDifference | SigmoidProduct) -> Error:
+    first, second = curve.first, curve.second
+    k, m = first.slope, second.slope
+
+    def error(a: float, b: float) -> float:
+        value_1, slope_1, bend_1 = _ranges(first, a, b)
+        value_2, slope_2, bend_2 = _ranges(second, a, b)
+        if isinstance(curve, SigmoidDifference):
+            found = bend_1.scaled(k * k).plus(bend_2.scaled(-m * m))
+        else:
+            found = (
+                bend_1.times(value_2)
+                .scaled(k * k)
+                .plus(slope_1.times(slope_2).scaled(2.0 * k * m))
+                .plus(value_1.times(bend_2).scaled(m * m))
+            )
+        width = b - a
+        return max(-found.low, found.high) * width * width / 8.0
+
+    return error
+
+
+def _ranges(one: Sigmoid, a: float, b: float) -> tuple[_Range, _Range, _Range]:
+    """Return the ranges of s, s' and s'' between two values of x."""
+    ends = sorted(one.slope * (x - one.inflection) for x in (a, b))
+    low, high = _sigmoids(ends[0]), _sigmoids(ends[1])
+    slopes, bends = [low[1], high[1]], [low[2], high[2]]
+    if ends[0] < 0.0 < ends[1]:
+        slopes.append(0.25)
+    for extreme in (-_EXTREME, _EXTREME):
+        if ends[0] < extreme < ends[1]:
+            bends.append(_sigmoids(extreme)[2])
+    return (
+        _Range(low[0], high[0]),
+        _Range(min(slopes), max(slopes)),
+        _Range(min(bends), max(bends)),
+    )
+
+
+def _sigmoids(t: float) -> tuple[float, float, float]:
+    """Return s, s' and s'' at t."""
+    small = math.exp(-abs(t))
+    below = small / (1.0 + small)
+    above = 1.0 / (1.0 + small)
+    slope = below * above
+    bend = slope * (above - below)
+    return (above, slope, -bend) if t > 0 else (below, slope, bend)

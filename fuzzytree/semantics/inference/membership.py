@@ -1,4 +1,4 @@
-"""The curves of a fuzzy system: the degree at a value, and back."""
+"""The membership functions of a fuzzy system: the degree at a value, and back."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""The crisp cells of a tree: every input decides like one of finitely many points.
+"""The crisp regions of a tree: finitely many points decide the class of every input.
 
-The cuts on a variable part its axis into intervals, open below and closed above, and
-the tree decides alike on all of an interval. Taking the axes as free coordinates, a
-product of intervals is a cell; what holds on one point of each cell, and on each edge
-and the floats beside it, holds on every input.
+The cuts on a variable divide its axis into intervals, open below and closed above, and
+the tree takes the same branch on all of an interval. With the axes as free coordinates,
+a product of intervals is a region; what is true at one point of each region, and at
+each cut and the floats beside it, is true for every input.
 """
 
 from __future__ import annotations

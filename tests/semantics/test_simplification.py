@@ -26,8 +26,8 @@ from fuzzytree.model.rulebase import (
     Variable,
 )
 from fuzzytree.model.tree import FuzzyTree, Use
-from fuzzytree.semantics.holding import always_holds, never_firing
 from fuzzytree.semantics.lowering import rules_from_tree
+from fuzzytree.semantics.satisfiability import always_holds, never_firing
 from fuzzytree.semantics.simplification import (
     USES,
     Pruned,

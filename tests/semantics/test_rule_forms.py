@@ -23,7 +23,7 @@ from fuzzytree.model.system import (
     SystemOutput,
     SystemRule,
 )
-from fuzzytree.semantics.conversion.splitting import MOST_RULES, alternatives, split
+from fuzzytree.semantics.conversion.rule_forms import MOST_RULES, alternatives, split
 from fuzzytree.semantics.inference import infer
 
 TERMS = (Label("low", Gaussian(0.0, 0.4)), Label("high", Gaussian(1.0, 0.3)))

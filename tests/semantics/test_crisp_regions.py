@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from fuzzytree.model.rulebase import Band, Flank, Semantics, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
-from fuzzytree.semantics.cells import (
+from fuzzytree.semantics.crisp_regions import (
     axis_points,
     cell_count,
     free_axes,

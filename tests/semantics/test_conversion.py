@@ -49,7 +49,7 @@ from fuzzytree.semantics.conversion import (
     flattened,
     winner,
 )
-from fuzzytree.semantics.conversion.shapes import shape_of
+from fuzzytree.semantics.conversion.points import shape_of
 from fuzzytree.semantics.inference import curve_degree, infer
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.probing import probes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, shapes_of
-from fuzzytree.semantics.programs.shapes import axis, degree
+from fuzzytree.semantics.programs.membership import axis, shape_degree
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
 
 DECIDED, TIE, UNCOVERED, MISSING = 0.0, 1.0, 2.0, 3.0
@@ -71,7 +71,9 @@ def _strengths(make: Maker, rules: RuleBase, axes: dict[str, int]) -> list[int]:
     def clause_degree(clause: Clause) -> int:
         if clause not in degrees:
             x = axes[clause.variable]
-            terms = [degree(make, shapes[clause.variable, t], x) for t in clause.terms]
+            terms = [
+                shape_degree(make, shapes[clause.variable, t], x) for t in clause.terms
+            ]
             highest = make.chain("maximum", terms)
             if clause.negated:
                 highest = make("subtract", make.constant(1.0), highest)
