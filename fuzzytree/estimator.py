@@ -13,7 +13,7 @@ from fuzzytree.errors import MissingExtraError, install_hint
 from fuzzytree.learning import Learner, LearningReport, Settings
 from fuzzytree.model.rulebase import label_type_of
 from fuzzytree.model.tree import FuzzyTree, with_label_type
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes import baseline
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import Status
 from fuzzytree.tables import numbers_only
@@ -325,6 +325,6 @@ def _prepared(tree: FuzzyTree) -> Callable[[ModelKind], Run]:
     @functools.cache
     def run(representation: ModelKind) -> Run:
         model = tree if representation == "tree" else rules_from_tree(tree)
-        return find_runtime("native").load(model)
+        return baseline().load(model)
 
     return run

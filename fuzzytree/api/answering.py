@@ -24,7 +24,7 @@ from fuzzytree.model.contracts import (
 )
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
-from fuzzytree.runtimes import find_runtime, is_installed, needed_by
+from fuzzytree.runtimes import baseline, find_runtime, is_installed, needed_by
 from fuzzytree.runtimes.answers import Answers, answers_of, joined
 from fuzzytree.runtimes.onnxruntime import OnnxModel, open_onnx
 from fuzzytree.runtimes.outputs import Outputs, joined_outputs
@@ -204,7 +204,7 @@ def answering(
         return _answering_onnx(model, runtime, with_strengths=with_strengths)
     if isinstance(model, FuzzySystem):
         return _answering_system(model, runtime, with_strengths=with_strengths)
-    execute = _loaded(model, runtime or "native")
+    execute = _loaded(model, runtime or baseline().name)
     if isinstance(model, RuleBase):
         ends = [rule.then for rule in model.rules]
     else:
@@ -225,7 +225,7 @@ def answering(
 def _answering_system(
     system: FuzzySystem, runtime: str | None, *, with_strengths: bool
 ) -> Answering:
-    name = runtime or "native"
+    name = runtime or baseline().name
     found = _runtime(name, system)
     if found.load_system is None:
         raise LossError(f"cannot run {system.name} in {name}: it runs no systems")

@@ -16,7 +16,7 @@ import numpy as np
 
 from fuzzytree.learning import LearningReport, Settings, learn_arrays
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes import baseline
 from fuzzytree.tables import Table
 
 if TYPE_CHECKING:
@@ -214,4 +214,4 @@ def _answered(tree: FuzzyTree, table: Table, rows: IntArray) -> IntArray:
     values: FloatArray = table.values[np.ix_(chosen, rows)]
     code = {label: k for k, label in enumerate(table.classes)}
     ends = np.array([-1, *(code[leaf.label] for leaf in tree.leaves)], np.int64)
-    return ends[find_runtime("native").load(tree)(values).rule]
+    return ends[baseline().load(tree)(values).rule]

@@ -18,12 +18,10 @@ from fuzzytree.benchmarking.records import (
     Omission,
     Question,
 )
-from fuzzytree.exporters.python import write as write_python
-from fuzzytree.model.contracts import Dtype, Model, Outcome, Runtime
+from fuzzytree.model.contracts import Dtype, Model, Outcome, Prepared, Runtime
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.runtimes import all_runtimes, is_installed, needed_by
 from fuzzytree.runtimes.answers import answers_of
-from fuzzytree.runtimes.onnxruntime import Prepared, prepare
 from fuzzytree.semantics.lowering import forms
 
 if TYPE_CHECKING:
@@ -31,19 +29,11 @@ if TYPE_CHECKING:
 
     from fuzzytree.model.contracts import FloatArray
 
-DEFAULT = "native"
-"""The runtime that `fuzzytree run` uses: what the others are compared with."""
-
 Bounds = Callable[[RuleBase, Dtype], Bound | None]
 """The certified error of a rule base's strengths in a number type, if there is one."""
 
 _BLOCK_NUMBERS = 1 << 25  # strengths that a call of the native runtime makes at once
 _BLOCK = 1 << 16
-_SESSIONS: Mapping[str, Mapping[str, bool]] = {
-    "onnxruntime readable": {"readable": True},
-    "onnxruntime plain": {"plain": True},
-}
-_SESSION_NOTE = "the session's call alone; the table is laid out before"
 
 
 @functools.lru_cache(maxsize=1)
@@ -121,20 +111,15 @@ def _candidate(
     bounds: Bounds,
     layouts: Layouts,
 ) -> Candidate:
-    is_session = runtime.name.startswith("onnxruntime")
-    if is_session:
-        load = partial(load_session, runtime, model, layouts)
-    else:
-        load = partial(load_runtime, runtime, model)
     return Candidate(
         title(runtime.name, question),
         question,
         "runtime",
-        load,
+        partial(load_runtime, runtime, model, layouts),
         bound=partial(_bound, runtime, model, bounds),
-        note=_note(runtime, model),
+        note=runtime.note,
         is_foreign=bool(runtime.modules),
-        is_parallel=is_session,
+        is_parallel=runtime.prepare is not None,
     )
 
 
@@ -152,20 +137,17 @@ def _bound(runtime: Runtime, model: Model, bounds: Bounds) -> Bound | None:
     return certified[0] + more, f"{certified[1]}, and {origin}"
 
 
-def _note(runtime: Runtime, model: Model) -> str:
-    if runtime.name in ("reference", "python"):
-        return "one row after another"
-    if runtime.name == "best-first":
-        return "the winner without the strengths of the others"
-    return _SESSION_NOTE if runtime.name.startswith("onnxruntime") else ""
+def load_runtime(
+    runtime: Runtime, model: Model, layouts: Layouts, threads: int
+) -> Loaded:
+    """Prepare a model in a runtime of the table.
 
-
-def load_runtime(runtime: Runtime, model: Model, threads: int) -> Loaded:
-    """Prepare a model in a runtime of the table; it takes the rows as they are.
-
-    The rows of a rule base go through in blocks, whose strengths are thrown away:
-    those of a million rows and a thousand rules are 8 GB.
+    Of a graph only the session's call is timed. Others take the rows as they are;
+    those of a rule base go through in blocks, whose strengths are thrown away: a
+    million rows and a thousand rules would make 8 GB of them.
     """
+    if runtime.prepare is not None:
+        return session_of(runtime.prepare(model, threads=threads), model, layouts)
     run = runtime.load(model)
     block = _BLOCK
     if isinstance(model, RuleBase):
@@ -178,22 +160,13 @@ def load_runtime(runtime: Runtime, model: Model, threads: int) -> Loaded:
         parts = [values[:, start : start + block] for start in starts]
         return partial(_each, run, parts)
 
-    size = len(write_python(model).content) if runtime.name == "python" else None
+    size = None if runtime.size is None else runtime.size(model)
     return Loaded(partial(_found, run, model), call, size)
 
 
 def _each(run: Callable[[FloatArray], object], parts: Sequence[FloatArray]) -> None:
     for part in parts:
         run(part)
-
-
-def load_session(
-    runtime: Runtime, model: Model, layouts: Layouts, threads: int
-) -> Loaded:
-    """Prepare a model as a graph in onnxruntime; only the session's call is timed."""
-    options = _SESSIONS.get(runtime.name, {})
-    prepared = prepare(model, dtype=runtime.dtype, threads=threads, **options)
-    return session_of(prepared, model, layouts)
 
 
 def session_of(prepared: Prepared, model: Model, layouts: Layouts) -> Loaded:

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from fuzzytree.benchmarking.candidates import DEFAULT, title
+from fuzzytree.benchmarking.candidates import title
 from fuzzytree.benchmarking.clock import CONFIDENCE, times_faster
 from fuzzytree.benchmarking.records import Front, Point, Question, Timing
+from fuzzytree.runtimes import baseline
 
 _LEVELS = (0.0, *(10.0**power for power in range(-16, 1)))
 
@@ -174,7 +175,7 @@ def _choice(known: Sequence[Entry], question: Question, level: float) -> Entry:
 
 
 def _default(known: Sequence[Entry], question: Question) -> Entry | None:
-    name = title(DEFAULT, question)
+    name = title(baseline().name, question)
     return next((one for one in known if one.name == name), None)
 
 

@@ -24,7 +24,7 @@ from fuzzytree.model.agreement import Agreement
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import Variable, summary
 from fuzzytree.model.tree import Use
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes import baseline
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.semantics.lowering import forms
 from fuzzytree.semantics.probing import probe_values
@@ -327,7 +327,7 @@ def _calls(
     stage: str, title: str, model: Model, rows: FloatArray, omissions: list[str]
 ) -> Iterator[tuple[int, _Key, Call]]:
     """Yield the calls of one representation, each with its number of rows."""
-    runs = {"native": find_runtime("native").load(model)}
+    runs = {"native": baseline().load(model)}
     try:
         content = write_onnx(model, verify=False).content
         runs["onnxruntime"] = open_onnx(content, title).run

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fuzzytree.benchmarking import trial
-from fuzzytree.benchmarking.candidates import DEFAULT, questions, title
+from fuzzytree.benchmarking.candidates import questions, title
 from fuzzytree.benchmarking.clock import (
     SURE,
     Call,
@@ -38,6 +38,7 @@ from fuzzytree.model.contracts import Model
 from fuzzytree.model.interrupts import noticed
 from fuzzytree.model.naming import as_names
 from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.runtimes import baseline
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
@@ -482,7 +483,7 @@ def _rank(one: Candidate) -> int:
 
 
 def _is_measure(one: Candidate) -> bool:
-    return one.kind == "floor" or one.name == title(DEFAULT, one.question)
+    return one.kind == "floor" or one.name == title(baseline().name, one.question)
 
 
 def _part(tell: Tell, first: float, last: float) -> Tell:

@@ -15,21 +15,17 @@ from fuzzytree.benchmarking.candidates import (
     Bounds,
     Layouts,
     load_runtime,
-    load_session,
     questions,
     title,
 )
 from fuzzytree.benchmarking.records import Bound, Candidate, Loaded, Omission, Question
-from fuzzytree.model.contracts import Model
+from fuzzytree.model.contracts import Model, Runtime
 from fuzzytree.model.rulebase import LR, Band, RuleBase
 from fuzzytree.numerics.approximation import Approximated, by_degree, by_points
-from fuzzytree.runtimes import find_runtime, is_installed
+from fuzzytree.runtimes import all_runtimes, is_installed
 
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 """Of a degree, where curves become points."""
-
-RUNTIMES = ("native", "onnxruntime float64")
-"""Where each variant runs, in double: what it gives up is its own."""
 
 _MOST_TERMS = 400  # their points take seconds
 
@@ -89,15 +85,15 @@ def variants(
             continue
         for what, make in _makers(rules).items():
             approximate = partial(known.get, question, what, make, rules)
-            for name in RUNTIMES:
-                if is_installed(find_runtime(name)):
-                    load = partial(_load, name, approximate, bounds, layouts)
+            for runtime in all_runtimes():
+                if runtime.in_variants and is_installed(runtime):
+                    load = partial(_load, runtime, approximate, bounds, layouts)
                     one = Candidate(
-                        title(f"{name}, {what}", question),
+                        title(f"{runtime.name}, {what}", question),
                         question,
                         "variant",
                         load,
-                        is_parallel=name != "native",
+                        is_parallel=runtime.prepare is not None,
                     )
                     found.append(one)
     return found, omitted
@@ -134,17 +130,14 @@ def _largest_degree(rules: RuleBase) -> int:
 
 
 def _load(
-    name: str,
+    runtime: Runtime,
     approximate: Callable[[], Approximated],
     bounds: Bounds,
     layouts: Layouts,
     threads: int,
 ) -> Loaded:
-    runtime, found = find_runtime(name), approximate()
-    if name == "native":
-        loaded = load_runtime(runtime, found.model, threads)
-    else:
-        loaded = load_session(runtime, found.model, layouts, threads)
+    found = approximate()
+    loaded = load_runtime(runtime, found.model, layouts, threads)
 
     def bound() -> Bound | None:
         certified = bounds(found.model, runtime.dtype)

@@ -10,7 +10,7 @@ well aimed) and *calls* (ways of calling that break programs).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import msgspec
 import numpy as np
@@ -40,12 +40,7 @@ from fuzzytree.model.rulebase import Kind, RuleBase, fingerprint
 from fuzzytree.model.tree import FuzzyTree, Use
 from fuzzytree.numerics.bounds import open_paths, strength_bounds
 from fuzzytree.numerics.oracle import decide
-from fuzzytree.runtimes import (
-    chosen_runtimes,
-    find_runtime,
-    is_installed,
-    needed_by,
-)
+from fuzzytree.runtimes import baseline, chosen_runtimes, is_installed, needed_by
 from fuzzytree.semantics import crisp_regions
 from fuzzytree.semantics.lowering import forms, rules_from_tree
 from fuzzytree.semantics.reference import Status
@@ -60,12 +55,6 @@ GRID_LIMIT = 1 << 21
 
 _FLOAT32_TREE = "equal answers but within float32 rounding of a cut"
 _SLOW_STEPS = 3_000_000  # degrees that a slow runtime is asked for in one comparison
-_NATIVE: Mapping[Dtype, str] = {
-    "float64": "native",
-    "mixed": "native mixed",
-    "float32": "native float32",
-}
-
 _SERVICES: Mapping[Use, str] = {
     "tree": "path",
     "relative": "relative rules",
@@ -144,7 +133,7 @@ def check(
 
 
 def _native(title: str, model: Model, rows: Rows) -> Answers:
-    return Answers(title, model, find_runtime("native").load(model)(rows.values))
+    return Answers(title, model, baseline().load(model)(rows.values))
 
 
 def _representations(model: Model, rows: Rows) -> tuple[Answers, ...]:
@@ -177,7 +166,7 @@ def _all_cells(
     tree: FuzzyTree, representation: str, against: str, size: int
 ) -> Comparison:
     free = crisp_regions.free_axes(tree)
-    native = find_runtime("native")
+    native = baseline()
     descend, fire = native.load(free), native.load(rules_from_tree(free))
     faults: list[str] = []
     for points in crisp_regions.grid(tree):
@@ -194,7 +183,7 @@ def _runtimes(
 ) -> Iterator[Finding]:
     """Run one representation in every runtime that can, against the native one."""
     kind = "rules" if isinstance(representation.model, RuleBase) else "tree"
-    bases: dict[str, Answers] = {"native": representation}
+    bases: dict[Dtype, Answers] = {"float64": representation}
     for runtime in runtimes:
         if kind not in runtime.runs:
             continue
@@ -214,7 +203,7 @@ def _runtimes(
         checkpoint()
         found = Answers(title, representation.model, run(some.values))
         checkpoint()
-        if runtime.name != "native":
+        if not (runtime.is_baseline and runtime.dtype == "float64"):
             base = _base(runtime, representation, bases, rows)
             yield _held(runtime, found, base.part(share), some)
         yield _calls(title, run, some)
@@ -230,11 +219,11 @@ def _certificates(
     kind = "rules" if isinstance(representation.model, RuleBase) else "tree"
     ran = {r.dtype for r in runtimes if kind in r.runs and r.bound is None}
     truth = decide(representation.model, rows.values, with_strengths=False)
-    for dtype, name in _NATIVE.items():
+    for dtype in get_args(Dtype):
         if dtype not in ran:
             continue
         try:
-            run = find_runtime(name).load(representation.model)
+            run = baseline(dtype).load(representation.model)
         except LossError:  # told among what was not examined
             continue
         title = f"{representation.title} in {dtype}"
@@ -243,19 +232,18 @@ def _certificates(
 
 
 def _base(
-    runtime: Runtime, representation: Answers, bases: dict[str, Answers], rows: Rows
+    runtime: Runtime, representation: Answers, bases: dict[Dtype, Answers], rows: Rows
 ) -> Answers:
     """Return what a runtime is held against: the native one of its number type."""
-    name = _NATIVE[runtime.dtype]
     is_rules = isinstance(representation.model, RuleBase)
-    if runtime.bound is not None or runtime.name == name or not is_rules:
+    if runtime.bound is not None or runtime.is_baseline or not is_rules:
         return representation
-    if name not in bases:
-        run = find_runtime(name).load(representation.model)
-        bases[name] = Answers(
-            f"{name}: {representation.title}", representation.model, run(rows.values)
-        )
-    return bases[name]
+    if runtime.dtype not in bases:
+        base = baseline(runtime.dtype)
+        run = base.load(representation.model)
+        title = f"{base.name}: {representation.title}"
+        bases[runtime.dtype] = Answers(title, representation.model, run(rows.values))
+    return bases[runtime.dtype]
 
 
 def _held(runtime: Runtime, found: Answers, base: Answers, rows: Rows) -> Comparison:
@@ -271,7 +259,7 @@ def _held(runtime: Runtime, found: Answers, base: Answers, rows: Rows) -> Compar
             return compare_excused(
                 found, base, rows, excused=excused, origin=_FLOAT32_TREE
             )
-    elif runtime.name in _NATIVE.values():
+    elif runtime.is_baseline:
         allowed, origin = strength_bounds(model, runtime.dtype, rows.values)
         allowed += strength_bounds(model, "float64", rows.values)[0]  # of the base
         return compare_within(found, base, rows, allowed=allowed, origin=origin)
@@ -446,7 +434,7 @@ def _onnx_rows(
     """Compare a file's answers with the native ones, then its labels."""
     held = expected or model
     is_rules = isinstance(held, RuleBase)
-    native = find_runtime(_NATIVE[other.dtype] if is_rules else "native")
+    native = baseline(other.dtype if is_rules else "float64")
     base = Answers("the model", held, native.load(held)(rows.values))
     excused: BoolArray = np.full(rows.numbers.shape, fill_value=False)
     is_rounded = isinstance(held, FuzzyTree) and other.dtype == "float32"

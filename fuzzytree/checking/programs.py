@@ -31,7 +31,7 @@ from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.bounds import open_paths
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes import baseline
 from fuzzytree.runtimes.written import ENGINES, Options
 from fuzzytree.semantics.lowering import forms, rules_from_tree
 
@@ -181,9 +181,9 @@ def _run(
     """Run a program, and compare its answers with those of the form it was made of."""
     model = cast("Model", text.form)  # no system: see `_why_not`
     some = rows.part(slice(None, None, -(-len(rows.numbers) // _MOST_ROWS)))
-    is_single = text.options == _FLOAT32
-    dtype = "native float32" if is_single and isinstance(model, RuleBase) else "native"
-    base = Answers("the model", model, find_runtime(dtype).load(model)(some.values))
+    is_single = text.options == _FLOAT32 and isinstance(model, RuleBase)
+    native = baseline("float32" if is_single else "float64")
+    base = Answers("the model", model, native.load(model)(some.values))
     try:
         result = ENGINES[program.format](
             program.content, model, text.options, some.values

@@ -249,7 +249,7 @@ def _runtime(subject: _Subject, runtime: Runtime) -> Iterator[Finding]:
         return
     share = _share(subject) if runtime.is_slow else slice(None)
     some = subject.rows.part(share)
-    if runtime.name not in ("native", "reference"):
+    if not (runtime.is_baseline or runtime.is_definition):
         found, right = run(some.values), subject.native.part(share)
         yield from _compared(runtime.name, "native", found, right, subject, some)
     yield _calls(runtime.name, run, some, subject)

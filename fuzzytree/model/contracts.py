@@ -192,6 +192,25 @@ SystemRun = Callable[["FloatArray"], SystemOutcome]
 """Numbers for values of shape (columns, rows), in the order of the system's columns."""
 
 
+class Prepared(msgspec.Struct, frozen=True):
+    """A model as a graph in a session.
+
+    Attributes:
+        run: Answers to values of shape (inputs, rows).
+        table: The same values as the graph takes them, shape (rows, columns).
+        call: The answers to such a table and nothing else: some rows at a time, as
+            `run` does, and thrown away.
+        content: The graph as a file.
+        dtype: The number type of the table.
+    """
+
+    run: Run
+    table: Callable[[FloatArray], npt.NDArray[np.generic]]
+    call: Callable[[npt.NDArray[np.generic]], None]
+    content: bytes
+    dtype: Dtype
+
+
 class SystemLoader(Protocol):
     """Prepares a fuzzy system for many rows."""
 
@@ -219,6 +238,15 @@ class Runtime(msgspec.Struct, frozen=True):
         modules: The modules that must be importable.
         programs: The programs of which one must be installed.
         is_slow: Whether rows cost so much that a check gives it only a share of them.
+        is_baseline: Whether the other runtimes of its number type are compared with it.
+        is_definition: Whether it evaluates the definition, row by row, and so is the
+            one that a baseline is compared with.
+        in_audits: Whether an audit compares it.
+        in_variants: Whether a benchmark also measures it on approximated curves.
+        prepare: Makes a graph of a model, for a number of threads, so that a benchmark
+            times the call of the graph alone; None if it runs no graph.
+        size: The bytes of the file or code that runs, for a model, if there is one.
+        note: What a reader of a benchmark must know about it.
     """
 
     name: str
@@ -232,3 +260,10 @@ class Runtime(msgspec.Struct, frozen=True):
     modules: tuple[str, ...] = ()
     programs: tuple[str, ...] = ()
     is_slow: bool = False
+    is_baseline: bool = False
+    is_definition: bool = False
+    in_audits: bool = False
+    in_variants: bool = False
+    prepare: Callable[..., Prepared] | None = None
+    size: Callable[[Model], int] | None = None
+    note: str = ""

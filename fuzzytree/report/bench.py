@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import get_args
 
-from fuzzytree.benchmarking.candidates import DEFAULT, title
+from fuzzytree.benchmarking.candidates import title
 from fuzzytree.benchmarking.clock import CONFIDENCE, times_faster
 from fuzzytree.benchmarking.floors import READING
 from fuzzytree.benchmarking.records import (
@@ -18,6 +18,7 @@ from fuzzytree.benchmarking.records import (
     Timing,
 )
 from fuzzytree.report.text import aligned, counted, digits, duration
+from fuzzytree.runtimes import baseline
 
 _HEAD = (
     *("time a row", "+-", "speed", "floor x"),
@@ -34,7 +35,7 @@ Timed = dict[str, tuple[Point, Timing]]
 _WIDTH = 96  # of a line of words
 _LEGEND = (
     "* no candidate is both faster and more exact; +- the 95 % interval of the median;",
-    f"speed: times as fast as {DEFAULT}; floor x: as long as reading the columns;",
+    "speed: times as fast as the default runtime; floor x: as reading the columns;",
     "error: the largest of a strength, observed; certified: the bound of it;",
     "flips: other classes than exact arithmetic gives, at edges: on rows aimed there",
 )
@@ -201,7 +202,7 @@ def _time_cells(
     middle = timing.median_ns
     reach = max(timing.high_ns - middle, middle - timing.low_ns) / middle
     sure = "" if timing.confidence >= CONFIDENCE else f" at {timing.confidence:.0%}"
-    base = timed.get(title(DEFAULT, question)) if question else None
+    base = timed.get(title(baseline().name, question)) if question else None
     ratio = times_faster(base[1], timing) if base else None
     floor = timed.get(READING)
     return (

@@ -14,7 +14,7 @@ import shutil
 from collections.abc import Sequence
 
 from fuzzytree.errors import install_hint
-from fuzzytree.model.contracts import Runtime
+from fuzzytree.model.contracts import Dtype, Runtime
 from fuzzytree.model.naming import as_names
 
 TABLE = (
@@ -47,6 +47,17 @@ def find_runtime(name: str) -> Runtime:
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     raise ValueError(f"no runtime {name!r}; there is {', '.join(known)}{hint}")
+
+
+def baseline(dtype: Dtype = "float64") -> Runtime:
+    """Return the runtime with which the others of a number type are compared.
+
+    Example:
+        >>> baseline("float32").name
+        'native float32'
+    """
+    every = (runtime for module in TABLE for runtime in _runtimes_of(module))
+    return next(one for one in every if one.is_baseline and one.dtype == dtype)
 
 
 def chosen_runtimes(names: Sequence[str] | None) -> tuple[Runtime, ...]:

@@ -51,9 +51,22 @@ def load_best_first(model: Model) -> Run:
 _FLOAT32 = "numbers beyond float32, and different numbers that become one in it"
 
 RUNTIMES = (
-    Runtime("native", ("tree", "rules", "system"), load, load_system=run_system),
     Runtime(
-        "native mixed", ("tree", "rules"), partial(load, dtype="mixed"), dtype="mixed"
+        "native",
+        ("tree", "rules", "system"),
+        load,
+        load_system=run_system,
+        is_baseline=True,
+        in_audits=True,
+        in_variants=True,
+    ),
+    Runtime(
+        "native mixed",
+        ("tree", "rules"),
+        partial(load, dtype="mixed"),
+        dtype="mixed",
+        is_baseline=True,
+        in_audits=True,
     ),
     Runtime(
         "native float32",
@@ -61,6 +74,14 @@ RUNTIMES = (
         partial(load, dtype="float32"),
         dtype="float32",
         cannot=(_FLOAT32,),
+        is_baseline=True,
+        in_audits=True,
     ),
-    Runtime("best-first", ("rules",), load_best_first, cannot=("strengths of rules",)),
+    Runtime(
+        "best-first",
+        ("rules",),
+        load_best_first,
+        cannot=("strengths of rules",),
+        note="the winner without the strengths of the others",
+    ),
 )

@@ -20,6 +20,7 @@ from fuzzytree.model.contracts import (
     Model,
     ModelKind,
     Outcome,
+    Prepared,
     Run,
     Runtime,
     SystemOutcome,
@@ -143,37 +144,6 @@ def open_onnx(content: bytes, name: str) -> OnnxModel:
         if is_system
         else None,
     )
-
-
-class Prepared(msgspec.Struct, frozen=True):
-    """A model as a graph in a session.
-
-    Attributes:
-        run: Answers to values of shape (inputs, rows).
-        table: The same values as the graph takes them, shape (rows, columns).
-        call: The answers to such a table and nothing else: some rows at a time, as
-            `run` does, and thrown away.
-        content: The graph as a file.
-        dtype: The number type of the table.
-    """
-
-    run: Run
-    table: Callable[[FloatArray], npt.NDArray[np.generic]]
-    call: Callable[[npt.NDArray[np.generic]], None]
-    content: bytes
-    dtype: Dtype
-
-
-def load(
-    model: Model, *, dtype: Dtype, readable: bool = False, plain: bool = False
-) -> Run:
-    """Write a model as ONNX, in memory, and return what runs it.
-
-    Raises:
-        LossError: If the number type or the kind of graph cannot hold the model.
-        MissingExtraError: If onnx or onnxruntime is not installed.
-    """
-    return prepare(model, dtype=dtype, readable=readable, plain=plain).run
 
 
 def prepare(
@@ -551,16 +521,22 @@ def _runtime(
     *cannot: str,
     readable: bool = False,
     plain: bool = False,
+    in_audits: bool = False,
 ) -> Runtime:
+    make = functools.partial(prepare, dtype=dtype, readable=readable, plain=plain)
     return Runtime(
         load_system=load_system if "system" in runs else None,
         name=f"onnxruntime {name}",
         runs=runs,
-        load=functools.partial(load, dtype=dtype, readable=readable, plain=plain),
+        load=lambda model: make(model).run,
         dtype=dtype,
         cannot=cannot,
         extra="onnx",
         modules=("onnx", "onnxruntime"),
+        in_audits=in_audits,
+        in_variants=in_audits and dtype == "float64",
+        prepare=make,
+        note="the session's call alone; the table is laid out before",
     )
 
 
@@ -570,9 +546,9 @@ _SINGLE = (
 )
 
 RUNTIMES = (
-    _runtime("float64", ("tree", "rules", "system"), "float64"),
-    _runtime("mixed", ("tree", "rules"), "mixed"),
-    _runtime("float32", ("tree", "rules"), "float32", *_SINGLE),
+    _runtime("float64", ("tree", "rules", "system"), "float64", in_audits=True),
+    _runtime("mixed", ("tree", "rules"), "mixed", in_audits=True),
+    _runtime("float32", ("tree", "rules"), "float32", *_SINGLE, in_audits=True),
     _runtime("readable", ("rules",), "float64", readable=True),
     _runtime("plain", ("tree",), "float64", plain=True),
 )

@@ -58,4 +58,13 @@ def _answer_of(content: bytes) -> Callable[[Sequence[float]], Given]:
     return answer
 
 
-RUNTIMES = (Runtime("python", ("tree", "rules"), load, is_slow=True),)
+RUNTIMES = (
+    Runtime(
+        "python",
+        ("tree", "rules"),
+        load,
+        is_slow=True,
+        size=lambda model: len(write(model).content),
+        note="one row after another",
+    ),
+)

@@ -47,5 +47,7 @@ RUNTIMES = (
         load,
         load_system=infer_rows,
         is_slow=True,
+        is_definition=True,
+        note="one row after another",
     ),
 )

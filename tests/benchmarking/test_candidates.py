@@ -84,7 +84,7 @@ def test_all_rows_of_a_rule_base_are_timed_block_by_block() -> None:
 
         return run
 
-    loaded = load_runtime(Runtime("counted", ("rules",), counted), rules, 1)
+    loaded = load_runtime(Runtime("counted", ("rules",), counted), rules, Layouts(), 1)
     loaded.call(np.zeros((len(rules.inputs), 200_000)))()
     assert len(seen) == 4
     assert sum(rows for _, rows in seen) == 200_000

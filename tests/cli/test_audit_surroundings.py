@@ -94,8 +94,8 @@ def test_a_model_and_a_table_may_be_pipes_for_each_is_read_once(call: Call) -> N
     for source, pipe in (("grip.yaml", "pipe.yaml"), ("grasps.csv", "pipe.csv")):
         os.mkfifo(pipe)
         threading.Thread(target=feed, args=(source, pipe), daemon=True).start()
-    words = ("--data", "pipe.csv", "--target", "grip", "--page", "page.html")
-    words += ("--verbose", "--select", "FT501,FT701")
+    words = ["--data", "pipe.csv", "--target", "grip", "--page", "page.html"]
+    words += ["--verbose", "--select", "FT501,FT701"]
     code, out, _ = call("audit", "pipe.yaml", *words)
     assert code == 0
     assert "\nrows     4 of pipe.csv\n" in out

@@ -20,7 +20,7 @@ from fuzzytree.checking.stability.transforms import scaled
 from fuzzytree.errors import FuzzyTreeError
 from fuzzytree.model.rulebase import LR
 from fuzzytree.model.tree import FuzzyTree
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes import baseline
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import axis_values, degree
 
@@ -216,7 +216,7 @@ def rational_counts(values: Sequence[float], n: int, *, delta: int = 1) -> list[
 def _answers(tree: FuzzyTree, values: FloatArray) -> IntArray:
     """Return the class number of each row, -1 for none."""
     columns = [int(name.removeprefix("x")) - 1 for name in tree.inputs]
-    found = find_runtime("native").load(tree)(values[:, columns].T)
+    found = baseline().load(tree)(values[:, columns].T)
     numbers = [-1, *(tree.classes.index(leaf.label) for leaf in tree.leaves)]
     return np.array(numbers, np.int64)[found.rule]
 
@@ -225,7 +225,7 @@ def _weak_rows(tree: FuzzyTree, values: FloatArray) -> Iterator[str]:
     """Yield training rows without a rule of strength 1, and sets that miss a value."""
     columns = [int(name.removeprefix("x")) - 1 for name in tree.inputs]
     rows = values[:, columns].T
-    fired = find_runtime("native").load(rules_from_tree(tree))(rows)
+    fired = baseline().load(rules_from_tree(tree))(rows)
     if fired.strengths is None or not (fired.strengths.max(axis=0) == 1.0).all():
         yield "a training row has no rule of strength 1"
     axes = {v.name: v for v in tree.variables}

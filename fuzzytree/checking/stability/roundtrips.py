@@ -14,7 +14,7 @@ from fuzzytree.errors import LossError, MissingExtraError, ReadError
 from fuzzytree.model.contracts import Dtype, Format, Model, Outcome, Run, Written
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
-from fuzzytree.runtimes import find_runtime
+from fuzzytree.runtimes import baseline
 from fuzzytree.runtimes.onnxruntime import open_onnx
 from fuzzytree.runtimes.python import load_content
 from fuzzytree.semantics.conversion.points import EXACT
@@ -23,11 +23,6 @@ from fuzzytree.semantics.lowering import forms
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import FloatArray
 
-_NATIVE: dict[Dtype, str] = {
-    "float64": "native",
-    "mixed": "native mixed",
-    "float32": "native float32",
-}
 _ADVICE = "keep the YAML file as the model, and do not ship the file that failed"
 
 
@@ -93,7 +88,7 @@ def _tried(
             options["outputs"] = told if isinstance(form, RuleBase) else told[:3]
         try:
             run = opener(write(form, **options).content, form)
-            base = find_runtime(_NATIVE[dtype]).load(form)
+            base = baseline(dtype).load(form)
         except LossError as error:
             skipped.append(f"{title}: {first_line(error)}")
             continue
@@ -117,7 +112,7 @@ def _read_again(
     if back != form and isinstance(form, RuleBase) and is_alike(form, back):
         return _straight(title, back, form, values)
     if back != form:
-        native = find_runtime("native").load
+        native = baseline().load
         if back.inputs != form.inputs or type(back) is not type(form):
             return 1, 1.0, f"{title}: another model comes back"
         count, gap, fault = _compared(title, native(back)(values), native(form)(values))
@@ -135,7 +130,7 @@ def _straight(
 
     Each degree moved by at most 2^-52, so strengths may by as much for each clause.
     """
-    native = find_runtime("native").load
+    native = baseline().load
     found, expected = native(back)(values), native(form)(values)
     gap = float(strength_gap(found, expected).max(initial=0.0))
     clauses = max((len(rule.when) for rule in form.rules), default=0)
