@@ -172,8 +172,8 @@ def test_a_baseline_accepts_what_it_holds_and_tells_what_is_gone(call: Call) -> 
     assert code == 0
     assert "1 accepted finding of the baseline" in out
     assert out.startswith("nothing found beside 1 accepted; 2 questions answered\n")
-    words = ("--baseline", "known.json", "--select", "FT101")
-    code, out, err = call("audit", "grip.yaml", *words)
+    selected = ("--baseline", "known.json", "--select", "FT101")
+    code, out, err = call("audit", "grip.yaml", *selected)
     assert code == 0
     (name,) = json.loads(Path("known.json").read_text("utf-8"))["accepted"]
     assert f"gone     {name} leaf 1 (rule 1) is never reached" in err
