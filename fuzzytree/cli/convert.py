@@ -186,19 +186,7 @@ def carry(
 ) -> int:
     """Write a model in another format, and report its proof; return 1 for a refusal.
 
-    Args:
-        found: What was read.
-        source: The file that it was read from.
-        read_as: The format of that file.
-        form: The format to write.
-        output: The file to write; `-` is standard output.
-        choice: The form of the model.
-        options: Of the writer.
-        notes: Lines to print behind those of the file and its proof.
-        allow_loss: Whether to write although something is lost.
-        verbose: Whether to list all losses and remarks, and not only the first.
-        as_json: Whether to print the facts as JSON.
-        quiet: Whether to print nothing but errors.
+    `notes` are lines to print behind those of the file and its proof.
     """
     from fuzzytree.checking.converting import export, kind_of, proved
     from fuzzytree.cli.representation import represented

@@ -268,14 +268,7 @@ def _model_file(output: str, form: Format) -> str:
 def _written_rows(
     model: Document, output: str, form: Format, rest: Sequence[str]
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield lines about the files and the next step; write the model if it has none.
-
-    Args:
-        model: What was written.
-        output: The file that it was written to.
-        form: The format of that file.
-        rest: What the next step says behind the files.
-    """
+    """Yield lines about the files and the next step; write the model if it has none."""
     from fuzzytree.api.verbs import export
 
     files = [(_model_file(output, form), "yaml"), (output, form.name)]

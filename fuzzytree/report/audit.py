@@ -159,12 +159,7 @@ def summary_lines(audit: Audit) -> Iterator[str]:
 
 
 def verdict_text(audit: Audit, gone: Collection[str] = ()) -> str:
-    """Return what an audit found, in a sentence, and what one might do next.
-
-    Args:
-        audit: The audit.
-        gone: Accepted ids that are no longer found.
-    """
+    """Return what an audit found, in a sentence, and what one might do next."""
     found = audit.open_findings
     said = _by_severity(found) if found else "nothing found"
     if audit.accepted:

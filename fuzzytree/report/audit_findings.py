@@ -62,13 +62,7 @@ def gravest_first(findings: Sequence[Answer]) -> list[Answer]:
 def findings_section(
     findings: Sequence[Answer], scene: Scene, accepted: Collection[str] = ()
 ) -> Markup:
-    """Return all findings, the gravest first, those of one code together.
-
-    Args:
-        findings: In this order.
-        scene: What pictures are drawn from.
-        accepted: The ids of those that a baseline accepts.
-    """
+    """Return all findings, the gravest first, those of one code together."""
     if not findings:
         return tag("p", "There is no finding.")
     names = anchors(findings)

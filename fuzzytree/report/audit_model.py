@@ -196,13 +196,7 @@ def _in_words(model: Audited, name: str) -> list[str]:
 def rules_section(
     viewed: View, answers: Sequence[Answer], links: Mapping[int, Sequence[Markup]]
 ) -> Markup:
-    """Return the rules as a table, with what the rows say of each.
-
-    Args:
-        viewed: The rules as they are audited.
-        answers: All answers; those of FT701 are about rows.
-        links: The findings about each rule, by its number.
-    """
+    """Return the rules as a table, with what the rows say of each."""
     notes = [*_notes(viewed)]
     if viewed.rules is None:
         return joined(notes)

@@ -398,12 +398,7 @@ def _result(
 
 
 def _urgent(findings: Sequence[Answer], named: Sequence[Answer]) -> Markup | None:
-    """Return links to the errors and warnings among findings.
-
-    Args:
-        findings: Those that are not accepted.
-        named: All, in the order of the page.
-    """
+    """Return links to the errors and warnings among findings."""
     listing = {id(one) for one in findings if one.severity != "info"}
     urgent: dict[tuple[str, str], list[tuple[Answer, str]]] = {}
     for one, name in zip(named, anchors(named), strict=True):

@@ -189,13 +189,7 @@ def _labelled(label: Label) -> Curve:
 
 
 def polyline(curve: Curve, x: Scale, y: Scale) -> Markup:
-    """Return a curve as the path of a picture, with its corners and steps.
-
-    Args:
-        curve: The curve.
-        x: From values to the picture.
-        y: From degrees to the picture.
-    """
+    """Return a curve as the path of a picture, with its corners and steps."""
     corners = curve.corners_between(x.low, x.high)
     values = {between(x.low, x.high, k / _STEPS) for k in range(_STEPS + 1)}
     for corner in corners:
@@ -297,16 +291,7 @@ def cut(words: str, letters: float) -> str:
 def svg(
     width: float, height: float, title: str, desc: str, *children: Content, name: str
 ) -> Markup:
-    """Return a picture with its title and description.
-
-    Args:
-        width: In points of its own.
-        height: The same.
-        title: What it shows, in a few words.
-        desc: The same in a sentence, for readers who cannot see it.
-        children: What is drawn.
-        name: A word that only this picture of the page has.
-    """
+    """Return a picture with its title and description; sizes are in points."""
     return tag(
         "svg",
         tag("title", title, id=f"{name}-t"),
@@ -328,16 +313,7 @@ def words(
     anchor: str | None = None,
     **attributes: Attribute,
 ) -> Markup:
-    """Return words in a picture.
-
-    Args:
-        x: Where they stand.
-        y: Their base line.
-        said: The words.
-        class_: How they look.
-        anchor: `middle` or `end`, if `x` is not where they begin.
-        attributes: Others.
-    """
+    """Return words in a picture."""
     return tag("text", said, x=x, y=y, class_=class_, text_anchor=anchor, **attributes)
 
 

@@ -127,12 +127,7 @@ def ability_lines(found: Found) -> Iterator[str]:
 
 
 def ability_table(found: Found, *, legend: bool = True) -> str:
-    """Return the same table as Markdown.
-
-    Args:
-        found: The abilities of each format.
-        legend: Whether the meanings of the signs stand below.
-    """
+    """Return the same table as Markdown."""
     head, *rows = _rows(found)
     lines = [head, ["---", *[":-:"] * (len(head) - 1)], *rows]
     table = "".join(f"| {' | '.join(line)} |\n" for line in lines)

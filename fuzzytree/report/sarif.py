@@ -27,10 +27,6 @@ def sarif(audit: Audit, baseline: Mapping[str, str] | None = None) -> str:
     Each code is a rule, each finding a result with its id as a fingerprint. With a
     baseline a result is `unchanged` if it is accepted (and suppressed for that),
     otherwise `new`; what is accepted and no longer found is `absent`.
-
-    Args:
-        audit: The audit.
-        baseline: What accepted findings say, by id.
     """
     audit = as_in_file(audit)
     codes = [*CODES]

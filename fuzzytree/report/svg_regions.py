@@ -89,15 +89,7 @@ def bar_picture(
     name: str,
     named: Collection[str] = (),
 ) -> Markup:
-    """Return a variable with its terms, a part of it, and a point on it.
-
-    Args:
-        axis: The variable.
-        span: Where it holds on this variable; None if that is not known.
-        value: Of a witness.
-        name: A word that only this picture of the page has.
-        named: The terms that it is about.
-    """
+    """Return a variable with its terms, a part of it, and a point on it."""
     x = scale_of(axis, None, _LEFT, _RIGHT)
     y = Scale(0.0, 1.0, _BASE, _TOP)
     parts: list[Markup] = [*outside(axis, x, _TOP - 4, _BASE)]
@@ -186,16 +178,7 @@ def map_picture(
     values: Mapping[str, Fraction],
     name: str,
 ) -> Markup:
-    """Return the classes on two variables, the others being those of a point.
-
-    Args:
-        rules: Which decide.
-        axes: The variable across and the one upwards.
-        window: What is shown of them.
-        region: The part of each variable where something holds.
-        values: Of every variable at the point.
-        name: A word that only this picture of the page has.
-    """
+    """Return the classes on two variables, the others being those of a point."""
     across, down = axes
     left, right, top, base = _MAP
     x = Scale(*window.across, left, right)

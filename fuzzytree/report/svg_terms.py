@@ -54,13 +54,7 @@ def scale_of(axis: Axis, data: Data | None, start: float, end: float) -> Scale:
 
 
 def terms_picture(axis: Axis, data: Data | None, name: str) -> Markup:
-    """Return the terms of a variable, over the histogram of its rows.
-
-    Args:
-        axis: The variable.
-        data: The rows, if there are any.
-        name: A word that only this picture of the page has.
-    """
+    """Return the terms of a variable, over the histogram of its rows."""
     x = scale_of(axis, data, _LEFT, _RIGHT)
     drawn = axis.curves[:MOST_CURVES]
     names = _placed(drawn, x)

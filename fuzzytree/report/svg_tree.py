@@ -63,10 +63,6 @@ def tree_picture(tree: FuzzyTree, rows: Passing | None) -> Markup:
     A box holds a bar: the rows that pass, by their class; without rows the training
     rows of the leaves behind it, by the leaves' class. A branch is the thicker the
     more of them take it.
-
-    Args:
-        tree: At most `MOST_LEAVES` leaves.
-        rows: How rows go through it.
     """
     boxes = boxes_of(tree, rows)
     high = placed(boxes)

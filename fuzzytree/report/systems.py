@@ -117,12 +117,7 @@ def rule_facts(system: FuzzySystem) -> list[dict[str, object]]:
 
 
 def system_reasons(system: FuzzySystem, found: Outputs) -> list[str]:
-    """Return, for each row, the rules that were activated, each with its degree.
-
-    Args:
-        system: The system.
-        found: Its answers to the rows, with activations.
-    """
+    """Return, for each row, the rules that were activated, each with its degree."""
     texts = [rule_text(rule) for rule in system.rules]
     if found.activations is None:
         return [""] * len(found)
@@ -281,10 +276,6 @@ def _label_lines(labels: Sequence[Label], columns: Sequence[str]) -> Iterator[st
 
 def curve_text(curve: Curve, columns: Sequence[str] = ()) -> str:
     """Return a curve in words and numbers.
-
-    Args:
-        curve: The curve.
-        columns: What the weights of a linear conclusion are for.
 
     Example:
         >>> curve_text(Trapezoid(0.0, 1.0, 1.0, 3.0))

@@ -49,10 +49,6 @@ def save(figure: Figure, path: PathLike) -> None:
     The file has no date and no program's name in it, and takes the old one's place
     only when it is whole.
 
-    Args:
-        figure: From a function of this package, or any other.
-        path: Of the file.
-
     Raises:
         ValueError: If the suffix is neither.
         WriteError: If the file cannot be written.

@@ -67,19 +67,7 @@ class Sheet:
         va: Literal["center_baseline", "baseline", "top", "center"] = "center_baseline",
         turn_deg: float = 0.0,
     ) -> None:
-        """Write words; a name with the signs of a formula is no formula.
-
-        Args:
-            x: Where they stand.
-            y: The same.
-            text: The words.
-            size: Of letters, in points.
-            bold: Whether they are.
-            colour: Of letters.
-            ha: Which of their sides stands there.
-            va: The same, of their height.
-            turn_deg: How far they are turned about that point, to the left.
-        """
+        """Write words; a name with the signs of a formula is no formula."""
         self.axes.text(
             x,
             y,
