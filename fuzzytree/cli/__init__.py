@@ -157,10 +157,12 @@ def _error_text(error: FuzzyTreeError, verb: str) -> str:
     text = str(error).replace("pass dialect=", "pass --dialect ")
     text = text.replace("pass scores=", "pass --set scores=")
     text = text.replace("pass missing='drop'", "pass --missing drop")
-    offer = "pass allow_loss=True"
-    if verb in ("run", "check", "convert", "export"):
-        return text.replace(offer, "pass --allow-loss")
-    return text.replace(offer, "use `fuzzytree convert --allow-loss`")
+    command = program.get_command(click.Context(program), verb)
+    options = [name for one in command.params for name in one.opts] if command else []
+    offer = "use `fuzzytree convert --allow-loss`"
+    if "--allow-loss" in options:
+        offer = "pass --allow-loss"
+    return text.replace("pass allow_loss=True", offer)
 
 
 def _usage_text(error: click.ClickException) -> str:

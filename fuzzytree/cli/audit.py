@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from fuzzytree.cli.audit_options import (
-    Options,
     codes_of,
     configured,
     limits_of,
@@ -163,7 +162,6 @@ def command(
     read = [one for one in (model, data, config, *results) if one is not None]
     places = [one for one in (output, page, write_baseline) if one is not None]
     check_places(places, read)
-    options = Options(within, spreads, limits, row, select, ignore, budget, settings)
     known = configured(config, quiet=quiet)
     path = baseline or known.baseline
     accepted: Mapping[str, str] = {} if path is None else read_baseline(path)
@@ -184,9 +182,9 @@ def command(
             row=row_of(row),
             select=codes_of(select) or known.select,
             ignore=codes_of(ignore) or known.ignore,
-            settings=settings_of(options, known),
+            settings=settings_of(settings, budget, known),
             accepted=accepted,
-            repeat=repeating(model, data, target, config, options),
+            repeat=repeating(click.get_current_context()),
             progress=show,
         )
     form = "json" if as_json else form

@@ -6,7 +6,7 @@ import io
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 import msgspec
@@ -16,30 +16,6 @@ from fuzzytree.cli.console import say, setting, standard_input
 if TYPE_CHECKING:
     from fuzzytree.auditing.findings.configuration import Configuration
     from fuzzytree.auditing.findings.records import Settings
-
-
-class Options(msgspec.Struct, frozen=True):
-    """The options of the command line, before they are parsed.
-
-    Attributes:
-        within: `model` or `data`.
-        spreads: So many spreads around the fitted sets, if given.
-        limits: NAME=LOW:HIGH, each.
-        row: NAME=VALUE, joined by commas, if given.
-        select: Beginnings of codes, joined by commas, each.
-        ignore: The same.
-        budget: In seconds, if given.
-        settings: NAME=VALUE, each.
-    """
-
-    within: Literal["model", "data"]
-    spreads: float | None
-    limits: tuple[str, ...]
-    row: str | None
-    select: tuple[str, ...]
-    ignore: tuple[str, ...]
-    budget: float | None
-    settings: tuple[str, ...]
 
 
 _OPTIONS = (
@@ -175,7 +151,9 @@ def _number(text: str, whole: str, *, option: str = "--limits") -> float:
         raise click.UsageError(what) from None
 
 
-def settings_of(options: Options, known: Configuration) -> Settings:
+def settings_of(
+    texts: Sequence[str], budget: float | None, known: Configuration
+) -> Settings:
     """Return the settings of the configuration with those of the command line.
 
     Raises:
@@ -183,9 +161,9 @@ def settings_of(options: Options, known: Configuration) -> Settings:
     """
     from fuzzytree.auditing.findings.configuration import changed, check_settings
 
-    found = changed(known.settings, dict(map(setting, options.settings)))
-    if options.budget is not None:
-        found = msgspec.structs.replace(found, budget_s=options.budget)
+    found = changed(known.settings, dict(map(setting, texts)))
+    if budget is not None:
+        found = msgspec.structs.replace(found, budget_s=budget)
         check_settings(found)
     return found
 
@@ -197,26 +175,21 @@ def table_of(data: str | None) -> str | io.BytesIO | None:
     return io.BytesIO(standard_input().read())
 
 
-def repeating(
-    model: str,
-    data: str | None,
-    target: str | None,
-    config: str | None,
-    options: Options,
-) -> str:
+_REPEATED = (
+    *("data", "target", "config", "spreads", "budget", "row"),
+    *("within", "limits", "settings"),
+)
+"""The parameters that the command of an answer has."""
+
+
+def repeating(context: click.Context) -> str:
     """Return the command that repeats an audit, without its choice of codes."""
-    words = ["fuzzytree", "audit", model]
-    for name, value in (
-        ("--data", data),
-        ("--target", target),
-        ("--config", config),
-        ("--spreads", options.spreads),
-        ("--budget", options.budget),
-        ("--row", options.row),
-    ):
-        said = value if isinstance(value, str) else repr(value).removesuffix(".0")
-        words += [] if value is None else [name, said]
-    words += [] if options.within == "model" else ["--within", options.within]
-    for name, values in (("--limits", options.limits), ("--set", options.settings)):
-        words += [word for value in values for word in (name, value)]
+    words = ["fuzzytree", "audit", context.params["model"]]
+    options = {option.name: option for option in context.command.params}
+    for name in _REPEATED:
+        value, option = context.params[name], options[name].opts[-1]
+        for one in value if isinstance(value, tuple) else (value,):
+            if one is not None and (name, one) != ("within", "model"):
+                said = one if isinstance(one, str) else repr(one).removesuffix(".0")
+                words += [option, said]
     return shlex.join(words)

@@ -19,7 +19,7 @@ from fuzzytree.report.audit_states import (
     state_text,
     state_word,
 )
-from fuzzytree.report.svg_regions import span_text
+from fuzzytree.report.svg_terms import span_text
 from fuzzytree.report.text import aligned, counted, number
 
 WIDTH: Final = 100

@@ -22,7 +22,7 @@ from fuzzytree.report.audit_states import (
 )
 from fuzzytree.report.drawing import Axis
 from fuzzytree.report.markup import Content, Markup, folded, joined, listed, tag, text
-from fuzzytree.report.svg_regions import bar_picture, map_picture, span_text, windows
+from fuzzytree.report.svg_terms import bar_picture, map_picture, span_text, windows
 from fuzzytree.report.text import counted, number
 
 MOST_FINDINGS = 300

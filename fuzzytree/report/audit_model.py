@@ -26,7 +26,7 @@ from fuzzytree.report.markup import (
 )
 from fuzzytree.report.svg_terms import terms_picture
 from fuzzytree.report.svg_tree import MOST_LEAVES, class_mark, tree_picture
-from fuzzytree.report.systems import curve_text, rule_text
+from fuzzytree.report.systems import curve_text, rule_text, sum_text
 from fuzzytree.report.text import counted, number, shape_text, tree_lines
 
 Audited = FuzzyTree | RuleBase | FuzzySystem
@@ -167,15 +167,9 @@ def _unit(unit: str) -> str:
 
 
 def _sum(axis: Axis) -> str:
-    parts = [
-        f"{number(one.weight)} · ({one.input} - {number(one.centre)})"
-        if one.centre
-        else f"{number(one.weight)} · {one.input}"
-        for one in axis.parts[:_MOST_PARTS]
-    ]
     more = len(axis.parts) - _MOST_PARTS
     after = f" + {counted(more, 'more input')}" if more > 0 else ""
-    return f"{axis.name} = {' + '.join(parts)}{after}"
+    return f"{axis.name} = {sum_text(axis.parts[:_MOST_PARTS])}{after}"
 
 
 def _in_words(model: Audited, name: str) -> list[str]:

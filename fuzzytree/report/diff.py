@@ -11,7 +11,7 @@ from fuzzytree.auditing.engine.states import Bracket, Coordinate, Witness
 from fuzzytree.auditing.findings.records import Answer, Place
 from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import state_text, state_word
-from fuzzytree.report.svg_regions import span_text
+from fuzzytree.report.svg_terms import span_text
 from fuzzytree.report.text import counted
 
 WIDTH: Final = 100

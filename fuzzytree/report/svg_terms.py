@@ -1,10 +1,16 @@
-"""A variable as a picture of the page: its terms over the rows, within the domain."""
+"""Variables and decisions as pictures: terms over rows, a part of the values, a map."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
+import numpy as np
+
+from fuzzytree.auditing.engine.states import Span
+from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report.audit_rows import Data, histogram
 from fuzzytree.report.drawing import (
     LETTER,
@@ -17,11 +23,17 @@ from fuzzytree.report.drawing import (
     polyline,
     spread,
     svg,
+    tick_words,
+    ticks,
     words,
 )
-from fuzzytree.report.markup import Markup, tag
+from fuzzytree.report.markup import Markup, tag, trimmed
 from fuzzytree.report.svg_tree import class_mark
 from fuzzytree.report.text import number
+from fuzzytree.runtimes.native_rules import fire
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import IntArray
 
 WIDE = 340.0
 MOST_CURVES = 24
@@ -181,3 +193,291 @@ def _top(curve: Curve, x: Scale) -> float:
     highest = max(degrees)
     tops = [v for v, d in zip(values, degrees, strict=True) if d == highest]
     return x.at(between(min(tops), max(tops), 0.5))
+
+
+_HIGH, _TOP, _BASE = 92.0, 22.0, 70.0  # of a bar
+_SLIVER = 3.0  # points: a region is drawn at least so wide
+
+_MAP_HIGH = 288.0
+_MAP = (56.0, 332.0, 8.0, 248.0)  # left, right, top, base
+_CELLS = 48
+_MAP_FONT = 12.0
+
+
+class Window(NamedTuple):
+    """Which part of two axes a map shows."""
+
+    across: tuple[float, float]
+    down: tuple[float, float]
+
+
+def span_text(span: Span, unit: str = "", digits: int = 6) -> str:
+    """Return a side of a region in words.
+
+    Args:
+        span: The side.
+        unit: Of its variable; may be empty.
+        digits: Of its ends; more where they would look alike.
+
+    Example:
+        >>> span_text(Span("force", 0.5, None), "N")
+        'from 0.5 N'
+    """
+    after = f" {unit}" if unit else ""
+    if span.low is not None and span.low == span.high:
+        return f"at {span.low!r}{after}"
+    low, high = _ends_text(span, digits)
+    if low is None and high is None:
+        return "anywhere"
+    if low is None:
+        return f"up to {high}{after}"
+    if high is None:
+        return f"from {low}{after}"
+    return f"{low} to {high}{after}"
+
+
+def _ends_text(span: Span, digits: int) -> tuple[str | None, str | None]:
+    low, high = (
+        None if end is None else f"{end:.{digits}g}" for end in (span.low, span.high)
+    )
+    is_hidden = low is not None and low == high and span.low != span.high
+    return _ends_text(span, digits + 1) if is_hidden else (low, high)
+
+
+def bar_picture(
+    axis: Axis,
+    span: Span | None,
+    value: float | None,
+    name: str,
+    named: Collection[str] = (),
+) -> Markup:
+    """Return a variable with its terms, a part of it, and a point on it."""
+    x = scale_of(axis, None, _LEFT, _RIGHT)
+    y = Scale(0.0, 1.0, _BASE, _TOP)
+    parts: list[Markup] = [*outside(axis, x, _TOP - 4, _BASE)]
+    if span is not None:
+        start, end = _ends(span, x)
+        parts.append(_box(start, end, _TOP - 4, _BASE))
+    for place, curve in enumerate(axis.curves[:MOST_CURVES]):
+        way, dashes = polyline(curve, x, y), DASHES[place % len(DASHES)]
+        look = "curve" if curve.name in named else "curve faint"
+        title = tag("title", curve.name)
+        parts.append(tag("path", title, d=way, class_=look, stroke_dasharray=dashes))
+    parts.append(tag("line", x1=_LEFT, x2=_RIGHT, y1=_BASE, y2=_BASE, class_="axis"))
+    said = span_text(span, axis.unit, 3) if span else ""
+    if value is not None:
+        parts += _pin(x.at(value), _TOP - 4, _BASE)
+        said += f"{'; ' if said else ''}witness {value:.4g}"
+    said = cut(said, 34)
+    room = (_RIGHT - _LEFT - 6.6 * len(said)) / (LETTER * 14.5)
+    parts.append(words(_LEFT, 12.0, cut(axis.name, room), "strong"))
+    parts.append(words(_RIGHT, 12.0, said, "small", "end"))
+    parts += axis_marks(x, _BASE)
+    return svg(WIDE, _HIGH, f"{axis.title}: {said}", said, *parts, name=name)
+
+
+def _ends(span: Span, x: Scale) -> tuple[float, float]:
+    start = x.start if span.low is None else x.at(span.low)
+    end = x.end if span.high is None else x.at(span.high)
+    if abs(end - start) < _SLIVER:
+        middle = (start + end) / 2.0
+        return middle - _SLIVER / 2.0, middle + _SLIVER / 2.0
+    return start, end
+
+
+def _box(start: float, end: float, top: float, base: float) -> Markup:
+    return tag(
+        "rect",
+        x=start,
+        y=top,
+        width=end - start,
+        height=base - top,
+        class_="region",
+    )
+
+
+def _pin(at: float, top: float, base: float) -> Iterator[Markup]:
+    yield tag("line", x1=at, x2=at, y1=top, y2=base, class_="pin")
+    yield tag("path", d=_diamond(at, base), class_="witness")
+
+
+def _diamond(x: float, y: float) -> str:
+    return f"M{x:.1f} {y - 5.5:.1f}l5.5 5.5l-5.5 5.5l-5.5 -5.5z"
+
+
+def windows(
+    across: Axis, down: Axis, region: Mapping[str, Span]
+) -> list[tuple[str, Window]]:
+    """Return what maps show, with a word for it: the domain, and near a sliver.
+
+    There is none if an axis has no domain, or one without width.
+    """
+    whole: list[tuple[float, float]] = []
+    near: list[tuple[float, float]] = []
+    is_sliver = False
+    for axis in (across, down):
+        if axis.low is None or axis.high is None or not axis.low < axis.high:
+            return []
+        low, high = axis.low, axis.high
+        whole.append((low, high))
+        span = region.get(axis.name)
+        start = low if span is None or span.low is None else max(span.low, low)
+        end = high if span is None or span.high is None else min(span.high, high)
+        is_sliver |= 0.0 < end - start < 0.04 * (high - low)
+        room = 1.5 * (end - start)
+        near.append((max(start - room, low), min(end + room, high)))
+    found = [("on the domain", Window(whole[0], whole[1]))]
+    if is_sliver and all(a < b for a, b in near):
+        found.append(("near the region", Window(near[0], near[1])))
+    return found
+
+
+def map_picture(
+    rules: RuleBase,
+    axes: tuple[Axis, Axis],
+    window: Window,
+    region: Mapping[str, Span],
+    values: Mapping[str, Fraction],
+    name: str,
+) -> Markup:
+    """Return the classes on two variables, the others being those of a point."""
+    across, down = axes
+    left, right, top, base = _MAP
+    x = Scale(*window.across, left, right)
+    y = Scale(*window.down, base, top)
+    codes = decisions(
+        rules,
+        (across.name, _middles(window.across)),
+        (down.name, _middles(window.down)),
+        values,
+    )
+    parts = [*_cells(codes)]
+    spans = [region.get(axis.name) or Span(axis.name, None, None) for axis in axes]
+    if any(axis.name in region for axis in axes):
+        start, end = _ends(spans[0], x)
+        low, high = _ends(spans[1], y)
+        parts.append(_box(start, end, min(low, high), max(low, high)))
+    parts += _class_names(codes, rules.classes)
+    point = float(values[across.name]), float(values[down.name])
+    if x.low <= point[0] <= x.high and y.low <= point[1] <= y.high:
+        way = _diamond(x.at(point[0]), y.at(point[1]))
+        parts.append(tag("path", d=way, class_="witness"))
+    parts += axis_marks(x, base)
+    parts += _marks_upwards(y, left)
+    parts.append(words((left + right) / 2, base + 33, across.title, "small", "middle"))
+    turned = f"rotate(-90 11 {(top + base) / 2:.0f})"
+    parts.append(
+        words(11, (top + base) / 2, down.title, "small", "middle", transform=turned)
+    )
+    title = f"The classes on {across.title} and {down.title}"
+    desc = "Each part has the name of its class; the hatched part is the region, the "
+    desc += "diamond the witness; all other variables are those of the witness"
+    return svg(WIDE, _MAP_HIGH, title, desc, *parts, name=name)
+
+
+def decisions(
+    rules: RuleBase,
+    across: tuple[str, Sequence[float]],
+    down: tuple[str, Sequence[float]],
+    others: Mapping[str, Fraction],
+) -> IntArray:
+    """Return the number of the class decided for at each point of a grid, -1 for none.
+
+    The native runtime decides, in double; a combination is a variable like any other.
+
+    Args:
+        rules: The rule base.
+        across: A variable and its values.
+        down: Another variable and its values.
+        others: The value of every other variable that the rules test.
+
+    Returns:
+        Shape (values down, values across).
+
+    Example:
+        >>> from fuzzytree.model.rulebase import Band, Clause, Rule, Term, Variable
+        >>> low = Term("low", Band(high=0.0))
+        >>> axes = Variable("a", (low,)), Variable("b", (low,))
+        >>> both = Rule((Clause("a", ("low",)), Clause("b", ("low",))), "k")
+        >>> rules = RuleBase("r", ("k",), axes, (both,))
+        >>> decisions(rules, ("a", [-1.0, 1.0]), ("b", [-1.0, 1.0]), {}).tolist()
+        [[0, -1], [-1, -1]]
+    """
+    tested = {clause.variable for rule in rules.rules for clause in rule.when}
+    variables = (one for one in rules.variables if one.name in tested)
+    free = tuple(msgspec.structs.replace(one, parts=()) for one in variables)
+    rules = msgspec.structs.replace(rules, variables=free, columns=())
+    columns = {name: float(value) for name, value in others.items()}
+    x, y = np.meshgrid(across[1], down[1])
+    values = np.stack(
+        [
+            x if name == across[0] else y if name == down[0] else x * 0 + columns[name]
+            for name in rules.inputs
+        ]
+    )
+    outcome = fire(rules)(values.reshape(len(rules.inputs), -1))
+    codes = {label: code for code, label in enumerate(rules.classes)}
+    uncovered = rules.semantics.uncovered
+    none = -1 if uncovered is None else codes[uncovered]
+    classes = np.array([none, *(codes[rule.then] for rule in rules.rules)])
+    found: IntArray = classes[outcome.rule].reshape(x.shape)
+    return found
+
+
+def _middles(ends: tuple[float, float]) -> list[float]:
+    return [between(*ends, (k + 0.5) / _CELLS) for k in range(_CELLS)]
+
+
+def _cells(codes: IntArray) -> Iterator[Markup]:
+    """Yield the part of each class as one path, made of runs of cells in a line."""
+    left, right, top, base = _MAP
+    wide, high = (right - left) / _CELLS, (base - top) / _CELLS
+    ways: dict[int, list[str]] = {}
+    for row, line in enumerate(codes.tolist()):
+        start = 0
+        for place in range(1, _CELLS + 1):
+            if place < _CELLS and line[place] == line[start]:
+                continue
+            x, y = left + start * wide, base - (row + 1) * high
+            run = f"M{trimmed(x)} {trimmed(y)}h{trimmed((place - start) * wide)}"
+            run += f"v{trimmed(high)}H{trimmed(x)}z"
+            ways.setdefault(line[start], []).append(run)
+            start = place
+    for code, runs in sorted(ways.items()):
+        mark = "none" if code < 0 else class_mark(code)
+        yield tag("path", d=Markup("".join(runs)), class_=f"cell {mark}")
+
+
+def _class_names(codes: IntArray, classes: tuple[str, ...]) -> Iterator[Markup]:
+    """Yield the name of each class where there is most room for it."""
+    left, right, top, base = _MAP
+    wide, high = (right - left) / _CELLS, (base - top) / _CELLS
+    for code in np.unique(codes).tolist():
+        row, place = _innermost(codes == code)
+        said = cut("no class" if code < 0 else classes[code], 18)
+        half = LETTER * _MAP_FONT * len(said) / 2.0
+        middle = min(max(left + (place + 0.5) * wide, left + half), right - half)
+        yield words(middle, base - (row + 0.5) * high + 4, said, "on-map", "middle")
+
+
+def _innermost(is_here: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> list[int]:
+    """Return a cell of a set that is far from all that is not in it."""
+    kept = np.pad(is_here, 1)
+    while True:
+        inner = kept.copy()
+        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            inner &= np.roll(kept, step, axis)
+        if not inner.any():
+            break
+        kept = inner
+    found = np.argwhere(kept)
+    row, place = found[len(found) // 2].tolist()
+    return [row - 1, place - 1]
+
+
+def _marks_upwards(y: Scale, left: float) -> Iterator[Markup]:
+    values = ticks(y.low, y.high)
+    for value, said in zip(values, tick_words(values), strict=True):
+        at = y.at(value)
+        yield tag("line", x1=left - 4, x2=left, y1=at, y2=at, class_="tick")
+        yield words(left - 6, at + 3.5, cut(said, 5), "small", "end")

@@ -209,7 +209,7 @@ def condition_text(condition: Condition, *, level: int = 0) -> str:
 def _input_lines(one: SystemInput, columns: Sequence[str]) -> Iterator[str]:
     yield one.name + _span(one)
     if one.parts:
-        yield f"  = {_sum_text(one.parts)}"
+        yield f"  = {sum_text(one.parts)}"
     yield from _label_lines(one.labels, columns)
 
 
@@ -252,7 +252,8 @@ def _span(one: SystemInput | SystemOutput) -> str:
     return f"{unit}, {number(one.low)} to {number(one.high)}{clipped}"
 
 
-def _sum_text(parts: Sequence[Part]) -> str:
+def sum_text(parts: Sequence[Part]) -> str:
+    """Return a combination of columns as a sum."""
     terms = [
         f"{number(one.weight)} * ({one.input} - {number(one.centre)})"
         if one.centre

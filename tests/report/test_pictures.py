@@ -38,8 +38,13 @@ from fuzzytree.report.drawing import (
     tick_words,
     ticks,
 )
-from fuzzytree.report.svg_regions import bar_picture, decisions, map_picture, windows
-from fuzzytree.report.svg_terms import terms_picture
+from fuzzytree.report.svg_terms import (
+    bar_picture,
+    decisions,
+    map_picture,
+    terms_picture,
+    windows,
+)
 from fuzzytree.report.svg_tree import tree_picture
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import descend
