@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from fuzzytree.checking.abilities import MEANINGS, Ability
@@ -179,10 +178,11 @@ def detail_lines(
         yield found
         return
     if not is_verbose:
-        counts = Counter(one.outcome for one in found)
+        outcomes = [one.outcome for one in found]
         yield f"{counted(len(found), 'kind')} of models; --verbose lists them"
         yield from aligned(
-            (f"  {count}", name, MEANINGS[name]) for name, count in counts.items()
+            (f"  {outcomes.count(name)}", name, MEANINGS[name])
+            for name in dict.fromkeys(outcomes)
         )
         return
     rows = [(f"  {one.sample}", *_outcome(one)) for one in found]
