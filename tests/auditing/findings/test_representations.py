@@ -55,11 +55,11 @@ def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
     found = [*answers(subject_of(TREE))]
     assert not any(one.is_finding for one in found)
     by_name = {one.subject: one for one in found}
-    assert by_name["carriers, by proof"].sentence == (
-        "2 carriers are equal on every input"
+    assert by_name["representations, by proof"].sentence == (
+        "2 representations are equal on every input"
     )
-    assert isinstance(by_name["carriers, by rows"].state, Proved)
-    assert "onnxruntime float32: raw rules" in by_name["carriers, by rows"].state.how
+    assert isinstance(by_name["representations, by rows"].state, Proved)
+    assert "onnxruntime float32: raw rules" in by_name["representations, by rows"].state.how
     assert {one.code for one in found} == {"FT601", "FT602"}
 
 
@@ -145,7 +145,7 @@ def test_raw_rules_that_differ_from_their_tree_by_design_are_no_finding() -> Non
 def test_a_system_is_compared_in_all_runtimes() -> None:
     found = [*answers(subject_of(system_of(block_of(A_LOW))))]
     assert [one.subject for one in found] == [
-        *("carriers, by rows", "carriers, by calls"),
+        *("representations, by rows", "representations, by calls"),
         *("missing values", "infinite values", "far outside"),
     ]
     assert not any(one.is_finding for one in found)
@@ -236,7 +236,7 @@ def test_a_graph_that_breaks_a_convention_is_found_and_a_right_one_is_not(
     (clean,) = answered(subject, question, graph(rules))
     assert not clean.is_finding
     count = question.values.shape[1]
-    assert clean.sentence == f"{name}: 2 carriers answer {count} probes alike"
+    assert clean.sentence == f"{name}: 2 representations answer {count} probes alike"
     if name in PLANTED:
         (finding,) = answered(subject, question, graph(PLANTED[name]))
         assert finding.is_finding
