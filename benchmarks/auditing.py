@@ -37,7 +37,7 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.duels import wins
 from fuzzytree.auditing.engine.states import State
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.records import Settings
+from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.model.rulebase import (
     Clause,
     Conjunction,
@@ -250,7 +250,9 @@ def whole(name: str, budget_s: float) -> str:
     box = unit_domain(base, -3.0 if "tree" in name else 0.0, 1.0)
     clock = Clock(budget_s, now=time.process_time)
     start, wall = time.process_time(), time.perf_counter()
-    found = audit(base, domain=box, settings=Settings(budget_s=budget_s), clock=clock)
+    found = audit(
+        base, domain=box, settings=AuditSettings(budget_s=budget_s), clock=clock
+    )
     taken, wall = time.process_time() - start, time.perf_counter() - wall
     states = Counter(type(one.state).__name__ for one in found.answers)
     left = sum(": not asked: the budget" in text for text in found.unasked)

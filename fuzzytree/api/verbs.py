@@ -59,9 +59,8 @@ if TYPE_CHECKING:
     from fuzzytree.auditing.diff.difference_records import Difference
     from fuzzytree.auditing.findings.codes import Code
     from fuzzytree.auditing.findings.domains import Within
-    from fuzzytree.auditing.findings.records import Audit, Source
-    from fuzzytree.auditing.findings.records import Settings as AuditSettings
-    from fuzzytree.auditing.findings.subject import Material, Rows
+    from fuzzytree.auditing.findings.records import Audit, AuditSettings, SourceFile
+    from fuzzytree.auditing.findings.subject import AuditRows, Material
     from fuzzytree.auditing.recheck import Report as RecheckReport
     from fuzzytree.benchmarking.records import Study
     from fuzzytree.benchmarking.savings import Report
@@ -661,11 +660,11 @@ def audit(
     from fuzzytree.auditing.findings import audit as auditing
     from fuzzytree.auditing.findings.configuration import check_settings
     from fuzzytree.auditing.findings.domains import domain_of
-    from fuzzytree.auditing.findings.records import Settings
+    from fuzzytree.auditing.findings.records import AuditSettings
     from fuzzytree.auditing.findings.results import with_results
     from fuzzytree.auditing.findings.subject import Material
 
-    chosen = settings or Settings()
+    chosen = settings or AuditSettings()
     check_settings(chosen)
     if not isinstance(model, Material):
         model = material(
@@ -781,11 +780,11 @@ def _bytes_of(path: str | os.PathLike[str]) -> bytes:
     return read_bounded(path)
 
 
-def _source_of(data: object, name: str | None = None) -> Source | None:
+def _source_of(data: object, name: str | None = None) -> SourceFile | None:
     """Return the name and the hash of a table that is a file, None for another."""
     from fuzzytree.auditing.findings.audit import source_of
     from fuzzytree.auditing.findings.locations import writable
-    from fuzzytree.auditing.findings.records import Source
+    from fuzzytree.auditing.findings.records import SourceFile
 
     if isinstance(data, io.BytesIO):
         return source_of(name or "standard input", data.getvalue())
@@ -797,7 +796,7 @@ def _source_of(data: object, name: str | None = None) -> Source | None:
             raise TableError(
                 f"{os.fspath(data)}: cannot be read: {reason(error)}"
             ) from error
-        return Source(writable(os.fspath(data)), digest)
+        return SourceFile(writable(os.fspath(data)), digest)
     return None
 
 
@@ -809,7 +808,7 @@ def audited_rows(
     columns: Sequence[str] | None = None,
     delimiter: str | None = None,
     name: str | None = None,
-) -> Rows | None:
+) -> AuditRows | None:
     """Return the rows of a table for an audit, with their classes; None without one.
 
     Args:
@@ -824,7 +823,7 @@ def audited_rows(
         TableError: If a column is absent or holds text, or the table has no row, or
             none of a class of the model.
     """
-    from fuzzytree.auditing.findings.subject import Rows
+    from fuzzytree.auditing.findings.subject import AuditRows
 
     if data is None:
         return None
@@ -838,7 +837,7 @@ def audited_rows(
     )
     name = found[0].piece.name
     if target is None:
-        return Rows(name, values)
+        return AuditRows(name, values)
     known = found[0].piece.columns
     if target not in known:
         raise TableError(
@@ -854,7 +853,7 @@ def audited_rows(
             f"{name}: no row has in column {target!r} a class of the model; "
             f"{name_choice(str(labels[0]), classes)}"
         )
-    return Rows(name, values, codes)
+    return AuditRows(name, values, codes)
 
 
 def diff(
@@ -900,14 +899,14 @@ def diff(
     """
     from fuzzytree.auditing.diff.decisions import all_inputs
     from fuzzytree.auditing.diff.differences import (
+        check_common_inputs,
         difference,
         joined_domain,
-        refuse_strangers,
     )
     from fuzzytree.auditing.engine.clock import Clock
     from fuzzytree.auditing.findings.locations import ModelFile, model_file
-    from fuzzytree.auditing.findings.records import Settings
-    from fuzzytree.auditing.findings.subject import Rows
+    from fuzzytree.auditing.findings.records import AuditSettings
+    from fuzzytree.auditing.findings.subject import AuditRows
 
     clock = Clock(budget_s, tell=progress)
     models: list[Document] = []
@@ -922,7 +921,7 @@ def diff(
             models.append(as_model(model))
     first, second = models
     titles = [f.name if f else m.name for f, m in zip(files, models, strict=True)]
-    refuse_strangers(first, second, (titles[0], titles[1]))
+    check_common_inputs(first, second, (titles[0], titles[1]))
     data, name = _readable_twice(data)
     source = _source_of(data, name)
     rows = None
@@ -936,7 +935,9 @@ def diff(
                 name=name,
             )
         ]
-        rows = Rows(found[0].piece.name, np.hstack([batch.values for batch in found]))
+        rows = AuditRows(
+            found[0].piece.name, np.hstack([batch.values for batch in found])
+        )
         if not rows.values.shape[1]:
             raise TableError(f"{rows.name} has no rows")
     return difference(
@@ -944,7 +945,7 @@ def diff(
         second,
         domain=joined_domain(first, second, limits or {}, rows),
         rows=rows,
-        settings=settings or Settings(budget_s=budget_s),
+        settings=settings or AuditSettings(budget_s=budget_s),
         clock=clock,
         files=(files[0], files[1]),
         data=source,

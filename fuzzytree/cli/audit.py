@@ -149,7 +149,11 @@ def command(
     cannot run, 130 if interrupted.
     """
     from fuzzytree.api import verbs
-    from fuzzytree.auditing.findings.baselines import baseline_of, gone, read_baseline
+    from fuzzytree.auditing.findings.baselines import (
+        baseline_of,
+        read_baseline,
+        resolved_ids,
+    )
     from fuzzytree.report.audit import audit_lines, verdict_text
 
     if target is not None and data is None:
@@ -189,7 +193,7 @@ def command(
         )
     form = "json" if as_json else form
     known_ids = accepted if path else None
-    lost = [*gone(accepted, found)]
+    lost = [*resolved_ids(accepted, found)]
     if form == "text":
         text = "\n".join(
             audit_lines(

@@ -15,7 +15,7 @@ from fuzzytree.cli.console import say, setting, standard_input
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.findings.configuration import Configuration
-    from fuzzytree.auditing.findings.records import Settings
+    from fuzzytree.auditing.findings.records import AuditSettings
 
 
 _OPTIONS = (
@@ -153,15 +153,15 @@ def _number(text: str, whole: str, *, option: str = "--limits") -> float:
 
 def settings_of(
     texts: Sequence[str], budget: float | None, known: Configuration
-) -> Settings:
+) -> AuditSettings:
     """Return the settings of the configuration with those of the command line.
 
     Raises:
         ValueError: If one is out of its range.
     """
-    from fuzzytree.auditing.findings.configuration import changed, check_settings
+    from fuzzytree.auditing.findings.configuration import check_settings, settings_with
 
-    found = changed(known.settings, dict(map(setting, texts)))
+    found = settings_with(known.settings, dict(map(setting, texts)))
     if budget is not None:
         found = msgspec.structs.replace(found, budget_s=budget)
         check_settings(found)

@@ -9,7 +9,7 @@ from typing import Final
 
 from fuzzytree.auditing.engine.states import Bracket, Coordinate, Declined, Witness
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, Audit, Measure, Place
+from fuzzytree.auditing.findings.records import Answer, Audit, FileLocation, Measure
 from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import (
     SEVERITIES,
@@ -306,13 +306,13 @@ def _measure_text(measure: Measure) -> str:
     return f"{measure.name} {number(measure.value)}{unit}"
 
 
-def _where(place: Place | None, audit: Audit) -> str:
+def _where(place: FileLocation | None, audit: Audit) -> str:
     if place is not None:
         return f"{place.file}:{place.line}:{place.column}"
     return audit.file.name if audit.file else ""
 
 
-def _quoted(place: Place, source: Sequence[str]) -> Iterator[str]:
+def _quoted(place: FileLocation, source: Sequence[str]) -> Iterator[str]:
     """Yield the line of the file that a place is in, and a caret below it."""
     if not 0 < place.line <= len(source):
         return

@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 
 from fuzzytree.auditing.engine.states import Bracket, Span, Witness, point_of
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, Measure, Place, Severity
-from fuzzytree.auditing.findings.views import View
+from fuzzytree.auditing.findings.records import Answer, FileLocation, Measure, Severity
+from fuzzytree.auditing.findings.views import AuditView
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.report.audit_model import MOST_RULES, sentence_of
 from fuzzytree.report.audit_states import (
@@ -196,7 +196,7 @@ def _finding(
     return tag("article", *head, *parts, id=name, class_=f"finding {answer.severity}")
 
 
-def _place(place: Place) -> str:
+def _place(place: FileLocation) -> str:
     return f"{place.file}:{place.line}:{place.column}"
 
 
@@ -226,8 +226,8 @@ def _concerned(answer: Answer, scene: Scene) -> Markup | None:
     return listed(items, class_="concerned") if items else None
 
 
-def _named(number: int, viewed: View, rules: RuleBase) -> Markup:
-    name = viewed.places[number - 1] if viewed.places else f"rule {number}"
+def _named(number: int, viewed: AuditView, rules: RuleBase) -> Markup:
+    name = viewed.rule_names[number - 1] if viewed.rule_names else f"rule {number}"
     href = f"#rule-{number}" if number <= MOST_RULES else None
     said = sentence_of(rules.rules[number - 1], rules)
     return joined([tag("a", name, href=href), text(": "), said])
@@ -264,7 +264,7 @@ class Scene(NamedTuple):
     """
 
     axes: Mapping[str, Axis]
-    viewed: View
+    viewed: AuditView
 
     @property
     def deciding(self) -> RuleBase | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from fuzzytree.auditing.engine.states import Sampled
 from fuzzytree.auditing.findings.records import Answer
-from fuzzytree.auditing.findings.views import View
+from fuzzytree.auditing.findings.views import AuditView
 from fuzzytree.model.rulebase import Rule, RuleBase
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
@@ -188,7 +188,7 @@ def _in_words(model: Audited, name: str) -> list[str]:
 
 
 def rules_section(
-    viewed: View, answers: Sequence[Answer], links: Mapping[int, Sequence[Markup]]
+    viewed: AuditView, answers: Sequence[Answer], links: Mapping[int, Sequence[Markup]]
 ) -> Markup:
     """Return the rules as a table, with what the rows say of each."""
     notes = [*_notes(viewed)]
@@ -205,7 +205,7 @@ def rules_section(
     for k, rule in enumerate(rules[:MOST_RULES], 1):
         said = sentence_of(rule, viewed.rules)
         answer = supported.get(k)
-        name = viewed.places[k - 1] if viewed.places else str(k)
+        name = viewed.rule_names[k - 1] if viewed.rule_names else str(k)
         row: list[Content] = [tag("span", name, id=f"rule-{k}"), said]
         if is_supported:
             row.append("-" if rule.support is None else str(rule.support))
@@ -219,7 +219,7 @@ def rules_section(
     return joined([table(head, rows, caption=caption, right=right, sorts=True), *notes])
 
 
-def _notes(viewed: View) -> Iterator[Markup]:
+def _notes(viewed: AuditView) -> Iterator[Markup]:
     """Yield what a reader must know of rules that are not in the table."""
     system, rules = viewed.system, viewed.rules
     if rules is None:
@@ -228,7 +228,7 @@ def _notes(viewed: View) -> Iterator[Markup]:
     elif len(rules.rules) > MOST_RULES:
         more = counted(len(rules.rules) - MOST_RULES, "more rule")
         yield tag("p", f"{more} not shown", class_="left-out")
-    if system is None or (rules is not None and not viewed.places):
+    if system is None or (rules is not None and not viewed.rule_names):
         return
     if rules is not None:
         said = "These are the system's conditions as they are audited: one that says "

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.records import Answer, Audit
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import RuleBase
@@ -91,7 +91,7 @@ def page(
     audit: Audit,
     model: FuzzyTree | RuleBase | FuzzySystem,
     *,
-    rows: Rows | None = None,
+    rows: AuditRows | None = None,
     agreement: Agreement | None = None,
     stability: Stability | None = None,
 ) -> str:
@@ -105,12 +105,12 @@ def page(
         stability: The result of a study of the same model.
 
     Example:
-        >>> from fuzzytree.auditing.findings.records import Policy, Settings
+        >>> from fuzzytree.auditing.findings.records import Policy, AuditSettings
         >>> from fuzzytree.auditing.engine.domain import Domain
         >>> from fuzzytree.testing import random_tree
         >>> tree, nothing = random_tree(1), Domain(())
         >>> audit = Audit("0.1", tree.name, "tree", "", None, None, 0,
-        ...     Policy("min", "strongest"), nothing, Settings(), (), (), (), True)
+        ...     Policy("min", "strongest"), nothing, AuditSettings(), (), (), (), True)
         >>> "Nothing was found" in page(audit, tree)
         True
     """
@@ -155,7 +155,7 @@ def _policy(whole: str) -> str:
 def _sections(
     audit: Audit,
     model: FuzzyTree | RuleBase | FuzzySystem,
-    rows: Rows | None,
+    rows: AuditRows | None,
     agreement: Agreement | None,
     stability: Stability | None,
 ) -> Iterator[_Section]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import RuleBase, Variable
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
@@ -46,7 +46,7 @@ class Passing(NamedTuple):
     missing: int
 
 
-def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: Rows) -> Data:
+def data_of(model: FuzzyTree | RuleBase | FuzzySystem, rows: AuditRows) -> Data:
     """Return the rows on every axis of a model."""
     count = rows.values.shape[1]
     variables: tuple[Variable, ...]

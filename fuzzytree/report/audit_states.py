@@ -17,7 +17,7 @@ from fuzzytree.auditing.engine.states import (
     Witness,
 )
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Answer, Audit, Result, Severity
+from fuzzytree.auditing.findings.records import Answer, Audit, Severity, VerbResult
 from fuzzytree.report.markup import Markup, folded, joined, table, tag
 from fuzzytree.report.text import counted, number
 
@@ -280,12 +280,12 @@ def state_text(state: State, *, has_title: bool = False) -> str:
             return f"{code}{after}: {reason}"
 
 
-def result_text(result: Result) -> str:
+def result_text(result: VerbResult) -> str:
     """Return what another verb found, in words.
 
     Example:
-        >>> from fuzzytree.auditing.findings.records import Source
-        >>> result_text(Result("stability", Source("s.json", ""), 10, 1))
+        >>> from fuzzytree.auditing.findings.records import SourceFile
+        >>> result_text(VerbResult("stability", SourceFile("s.json", ""), 10, 1))
         '1 of 10 criteria fails'
     """
     what, wrong = ("comparisons and bounds", "disagree")

@@ -6,9 +6,9 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from fuzzytree.auditing.diff.difference_records import Change, Compared, Difference
+from fuzzytree.auditing.diff.difference_records import Change, ComparedModel, Difference
 from fuzzytree.auditing.engine.states import Bracket, Coordinate, Witness
-from fuzzytree.auditing.findings.records import Answer, Place
+from fuzzytree.auditing.findings.records import Answer, FileLocation
 from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import state_text, state_word
 from fuzzytree.report.svg_terms import span_text
@@ -93,7 +93,7 @@ def _counts_text(changes: Sequence[Change]) -> str:
     return f"{counted(len(grades), 'change')}: {', '.join(counts)}"
 
 
-def _model_text(title: str, model: Compared) -> str:
+def _model_text(title: str, model: ComparedModel) -> str:
     of = f"{model.file.name}: " if model.file else ""
     return printable(f"{title:8} {of}{model.form} {model.name!r}")
 
@@ -137,7 +137,7 @@ def _change_lines(change: Change, *, has_place: bool) -> Iterator[str]:
         yield printable(f"{' ' * 15}{places}")
 
 
-def _place_text(place: Place) -> str:
+def _place_text(place: FileLocation) -> str:
     return f"{place.file}:{place.line}:{place.column}"
 
 

@@ -10,9 +10,9 @@ from urllib.parse import quote
 import msgspec
 
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.baselines import gone
+from fuzzytree.auditing.findings.baselines import resolved_ids
 from fuzzytree.auditing.findings.codes import CODES, Code
-from fuzzytree.auditing.findings.records import Answer, Audit, Place, Severity
+from fuzzytree.auditing.findings.records import Answer, Audit, FileLocation, Severity
 from fuzzytree.model.naming import printable
 from fuzzytree.report.audit_states import SEVERITIES, as_in_file, state_text, state_word
 
@@ -111,7 +111,7 @@ def _absent(
     audit: Audit, baseline: Mapping[str, str], codes: list[str]
 ) -> Iterator[_Json]:
     """Yield accepted findings that are no longer there."""
-    for name in gone(baseline, audit):
+    for name in resolved_ids(baseline, audit):
         code = name.partition("-")[0]
         if code in codes:
             yield {
@@ -125,7 +125,9 @@ def _absent(
             }
 
 
-def _locations(places: tuple[Place, ...], audit: Audit | None) -> Iterator[_Json]:
+def _locations(
+    places: tuple[FileLocation, ...], audit: Audit | None
+) -> Iterator[_Json]:
     """Yield places; without one, the file that was audited."""
     for place in places:
         spot = {"startLine": place.line, "startColumn": place.column}

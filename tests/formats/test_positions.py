@@ -16,7 +16,7 @@ import pytest
 
 import fuzzytree as ft
 from fuzzytree.auditing.findings.locations import model_file, rule_path, term_path
-from fuzzytree.auditing.findings.records import Label
+from fuzzytree.auditing.findings.records import TermName
 from fuzzytree.checking.converting import format_of, load_content
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Document
@@ -141,7 +141,7 @@ def spots_of(
     ]
     for one in system.variables if system is model else system.inputs:
         parts += [
-            ("term", label.name, term_path(model, Label(one.name, label.name)))
+            ("term", label.name, term_path(model, TermName(one.name, label.name)))
             for label in one.labels
         ]
     for kind, part, path in parts:

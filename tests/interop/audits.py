@@ -15,7 +15,7 @@ from fuzzytree import learn
 from fuzzytree.api.verbs import audited_rows
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.records import Answer, Audit, Settings
+from fuzzytree.auditing.findings.records import Answer, Audit, AuditSettings
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.contracts import Document
 from tests.interop.corpus_fcl import FCL
@@ -27,7 +27,7 @@ CORPORA = (FCL, FIS, FLL)
 LEFT_OUT = ("FT6", "FT7")
 """Codes that need rows or runtimes: docs/reference/corpus.md compares engines."""
 
-SETTINGS = Settings(budget_s=600.0)
+SETTINGS = AuditSettings(budget_s=600.0)
 
 INTRODUCTION = """\
 # Audits of real rule bases

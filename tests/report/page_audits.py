@@ -23,15 +23,15 @@ from fuzzytree.auditing.findings.records import (
     LIMITS,
     Answer,
     Audit,
-    Label,
+    AuditSettings,
+    FileLocation,
     Measure,
-    Place,
     Policy,
-    Settings,
-    Source,
+    SourceFile,
+    TermName,
     digest_of,
 )
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import (
     Clause,
     Points,
@@ -81,7 +81,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             severity="error",
             rules=(4, 2),
             measures=(Measure("largest lead", 0.0, "0"),),
-            places=(Place("grip.yaml", 58, 5),),
+            places=(FileLocation("grip.yaml", 58, 5),),
             repeat="fuzzytree audit grip.yaml --select FT101",
             id="FT101-9f2c11ab",
         ),
@@ -121,7 +121,7 @@ def answers(pressure: str = "pressure") -> tuple[Answer, ...]:
             f"'low' and 'medium' of {pressure!r} are hard to tell apart",
             Sampled("rows in both", 3, 40, 0.02, 0.2, 0.95, "the rows of the table"),
             is_finding=True,
-            terms=(Label(pressure, "low"), Label(pressure, "medium")),
+            terms=(TermName(pressure, "low"), TermName(pressure, "medium")),
             repeat="fuzzytree audit grip.yaml --select FT403",
             id="FT403-00000003",
         ),
@@ -167,12 +167,12 @@ def audit_of(
         model=model.name,
         form="rules",
         fingerprint=fingerprint(model),
-        file=Source("grip.yaml", "ab" * 32),
-        data=Source("grasps.csv", "cd" * 32),
+        file=SourceFile("grip.yaml", "ab" * 32),
+        data=SourceFile("grasps.csv", "cd" * 32),
         rows=40,
         policy=Policy("min", "strongest"),
         domain=Domain(tuple(sides)),
-        settings=Settings(),
+        settings=AuditSettings(),
         answers=answers(model.variables[0].name) if found is None else found,
         unasked=(),
         limits=LIMITS,
@@ -182,11 +182,11 @@ def audit_of(
     return msgspec.structs.replace(made, digest=digest_of(made))
 
 
-def rows_of(model: RuleBase) -> Rows:
+def rows_of(model: RuleBase) -> AuditRows:
     """Return 40 rows: one outside of the domain, one missing, one without a class."""
     random = np.random.default_rng(0)
     values = random.uniform([[0.0], [0.0]], [[10.0], [100.0]], (2, 40))
     values[0, 0], values[1, 1] = 13.0, np.nan
     codes = random.integers(0, len(model.classes), 40)
     codes[2] = -1
-    return Rows("grasps.csv", values, codes)
+    return AuditRows("grasps.csv", values, codes)

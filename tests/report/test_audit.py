@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.records import LIMITS, Source
+from fuzzytree.auditing.findings.records import LIMITS, SourceFile
 from fuzzytree.report.audit import (
     MOST_FINDINGS,
     WIDTH,
@@ -142,7 +142,7 @@ def test_the_head_shows_no_name_as_it_should_not_be_shown() -> None:
     audit = every_state()
     evil = "\x1b[31m\u202e\n"
     domain = Domain((Side(evil, 0.0, 5.0), Side("L" * 10_000, 0.0, 1.0)))
-    data = Source(evil, "b" * 64)
+    data = SourceFile(evil, "b" * 64)
     lines = [*audit_lines(replace(audit, model=evil, domain=domain, data=data))]
     assert all(line.isprintable() for line in lines)
     start = lines.index(r"rows     4 of \x1b[31m\u202e\n")

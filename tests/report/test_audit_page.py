@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.states import Declined, Proved
 from fuzzytree.auditing.findings.records import Answer, Measure
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking.stability.results import Stability, judged
 from fuzzytree.model.agreement import Agreement, Comparison
 from fuzzytree.model.rulebase import RuleBase
@@ -289,7 +289,7 @@ def test_a_tree_is_drawn_with_the_rows_that_pass() -> None:
     rules = rule_base()
     values = np.random.default_rng(1).normal(size=(len(tree.inputs), 30))
     values[0, 0] = np.nan
-    rows = Rows("rows", values, np.zeros(30, np.int64))
+    rows = AuditRows("rows", values, np.zeros(30, np.int64))
     audit = audit_of(rules, (), form="tree")
     text = Outline(page(audit, tree, rows=rows)).text
     assert f"The tree {tree.name}: {len(tree.nodes)} nodes, 5 leaves" in text

@@ -12,7 +12,7 @@ import pytest
 
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Span
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import (
     Band,
     Flank,
@@ -143,7 +143,7 @@ def test_ticks_and_pictures_are_finite_whatever_the_range(
     found = ticks(start, end)
     assert 1 <= len(found) <= 5
     assert len(set(tick_words(found))) == len(set(found))
-    data = data_of(_force(low, high), Rows("", np.array([[low, high, low]])))
+    data = data_of(_force(low, high), AuditRows("", np.array([[low, high, low]])))
     for drawn in (
         terms_picture(axis(low, high), data, "p"),
         bar_picture(axis(low, high), Span("force", low, high), low, "q"),
@@ -173,7 +173,7 @@ def test_rows_pass_a_tree_as_it_decides() -> None:
     tree = random_tree(7, leaves=9)
     values = np.random.default_rng(2).normal(size=(len(tree.inputs), 200))
     codes = np.arange(200) % len(tree.classes)
-    found = passing(tree, data_of(tree, Rows("rows", values, codes)))
+    found = passing(tree, data_of(tree, AuditRows("rows", values, codes)))
     leaves = [
         descend(tree, dict(zip(tree.inputs, r, strict=True))).rule for r in values.T
     ]

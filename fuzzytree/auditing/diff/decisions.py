@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import msgspec
 import numpy as np
 
-from fuzzytree.auditing.diff.difference_records import Evidence
+from fuzzytree.auditing.diff.difference_records import DecisionEvidence
 from fuzzytree.auditing.diff.matching import have_same_classes
 from fuzzytree.auditing.engine.arrangement import Answered, answer_at, difference_at
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
@@ -35,9 +35,9 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.witnesses import simplified
 from fuzzytree.auditing.findings.domains import inputs_of
-from fuzzytree.auditing.findings.records import Answer, Settings
-from fuzzytree.auditing.findings.subject import Rows
-from fuzzytree.auditing.findings.support import drawn, share
+from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Rule, RuleBase, Variable
 from fuzzytree.model.tree import FuzzyTree
@@ -57,7 +57,7 @@ _PORTION = 64  # rows between two looks at the clock, at first
 _MOST_REGIONS = 4  # of which the box is looked for
 
 
-class Pair(msgspec.Struct, frozen=True, eq=False):
+class RulePair(msgspec.Struct, frozen=True, eq=False):
     """Two models as rules, with the points on which they are compared.
 
     Attributes:
@@ -113,20 +113,22 @@ def union(old: Document, new: Document) -> RuleBase:
 
 
 def decisions(
-    pair: Pair,
-    rows: Rows | None,
-    settings: Settings,
+    pair: RulePair,
+    rows: AuditRows | None,
+    settings: AuditSettings,
     clock: Clock,
-) -> tuple[list[Answer], Evidence]:
+) -> tuple[list[Answer], DecisionEvidence]:
     """Return what is known of decisions, and how those that differ come about."""
     whole = _same_everywhere(pair)
     if whole is not None:
-        return [whole], Evidence(is_equal=True)
+        return [whole], DecisionEvidence(is_equal=True)
     found = _Found(pair, clock.share(_POINTS))
     answers: list[Answer] = []
     if rows is not None:
         answers.append(_on_rows(rows, found))
-    values = drawn(union(pair.old, pair.new), pair.domain, settings.rows, settings.seed)
+    values = sample_points(
+        union(pair.old, pair.new), pair.domain, settings.rows, settings.seed
+    )
     many, seen = found.add(values)
     found.add(_probes(pair))
     if not found.witnesses:
@@ -149,7 +151,7 @@ def decisions(
     return answers, found.evidence(is_equal=not is_open)
 
 
-def _alike(pair: Pair, clock: Clock) -> State:
+def _alike(pair: RulePair, clock: Clock) -> State:
     """Return whether both answer alike; the budget is kept even within a box."""
     try:
         with enforced(clock):
@@ -162,7 +164,7 @@ def _alike(pair: Pair, clock: Clock) -> State:
     return state
 
 
-def _same_everywhere(pair: Pair) -> Answer | None:
+def _same_everywhere(pair: RulePair) -> Answer | None:
     """Return that both perform the same operations on the same numbers, if they do."""
     old, new = pair.old, pair.new
     faults = [*proof_faults(old, new), *unguarded(old, new), *unguarded(new, old)]
@@ -175,7 +177,7 @@ def _same_everywhere(pair: Pair) -> Answer | None:
 _EQUAL = "both models decide alike"
 
 
-def _equal_answer(pair: Pair, state: State) -> Answer:
+def _equal_answer(pair: RulePair, state: State) -> Answer:
     sentence = f"{_EQUAL} everywhere on the domain"
     old, new = pair.old, pair.new
     if old.semantics.missing != new.semantics.missing or unguarded(old, new):
@@ -188,13 +190,13 @@ def _equal_answer(pair: Pair, state: State) -> Answer:
     return Answer("FT801", "decisions", sentence, state, is_finding=False)
 
 
-def _on_rows(rows: Rows, found: _Found) -> Answer:
+def _on_rows(rows: AuditRows, found: _Found) -> Answer:
     hits, count = found.add(rows.values, name="row")
     of = f"{count} rows"
     if count < rows.values.shape[1]:
         of = f"the first {count} of {rows.values.shape[1]} rows"
     sentence = f"{hits} of {of} of {rows.name} are answered otherwise"
-    state = share("rows that are answered otherwise", hits, count, rows.name)
+    state = sampled_share("rows that are answered otherwise", hits, count, rows.name)
     return Answer(
         "FT801", "rows", sentence, state, is_finding=hits > 0, severity="error"
     )
@@ -202,7 +204,7 @@ def _on_rows(rows: Rows, found: _Found) -> Answer:
 
 def _drawn_answer(hits: int, rows: int, seed: int) -> Answer:
     how = f"{rows} points drawn evenly from the domain, seed {seed}"
-    state = share("the domain that is answered otherwise", hits, rows, how)
+    state = sampled_share("the domain that is answered otherwise", hits, rows, how)
     sentence = f"{hits} of {rows} points drawn from the domain are answered otherwise"
     return Answer("FT801", "domain", sentence, state, is_finding=hits > 0)
 
@@ -215,7 +217,7 @@ def _left_answer(count: int) -> Answer:
     return Answer("FT801", "points", sentence, state, is_finding=False)
 
 
-def _witness_answers(pair: Pair, found: _Found) -> Iterator[Answer]:
+def _witness_answers(pair: RulePair, found: _Found) -> Iterator[Answer]:
     """Yield a witness for each pair of classes, the clearest one that is known."""
     told = sorted(found.witnesses.items(), key=lambda item: str(item[0]))
     for number, (labels, (_, name, found_at)) in enumerate(told[:_MOST_TOLD]):
@@ -250,7 +252,7 @@ def _witness_answers(pair: Pair, found: _Found) -> Iterator[Answer]:
 
 
 def _simple(
-    pair: Pair, labels: tuple[str | None, str | None], point: dict[str, Fraction]
+    pair: RulePair, labels: tuple[str | None, str | None], point: dict[str, Fraction]
 ) -> dict[str, Fraction]:
     """Return a point of few digits at which both models answer the same as here."""
 
@@ -277,7 +279,7 @@ class _Found:
             and `is_cut` tells whether some were not even made.
     """
 
-    def __init__(self, pair: Pair, clock: Clock) -> None:
+    def __init__(self, pair: RulePair, clock: Clock) -> None:
         self.pair, self.clock, self.left, self.is_cut = pair, clock, 0, False
         self.witnesses: dict[
             tuple[str | None, str | None], tuple[float, str, dict[str, Fraction]]
@@ -337,9 +339,9 @@ class _Found:
         if kept is None or is_better:
             self.witnesses[one.label, other.label] = (margin, name, point)
 
-    def evidence(self, *, is_equal: bool) -> Evidence:
+    def evidence(self, *, is_equal: bool) -> DecisionEvidence:
         """Return how differing decisions come about."""
-        return Evidence(
+        return DecisionEvidence(
             frozenset(self.old_rules),
             frozenset(self.new_rules),
             self.has_tie,
@@ -372,7 +374,7 @@ def _clearest(one: IntArray, other: IntArray, margins: FloatArray) -> list[int]:
     return list(best.values())
 
 
-def _probes(pair: Pair) -> FloatArray:
+def _probes(pair: RulePair) -> FloatArray:
     """Return the probes of both models that are on the domain."""
     sides = [pair.domain.side(name) for name in pair.inputs]
     low = np.array([side.low if side else 0.0 for side in sides])

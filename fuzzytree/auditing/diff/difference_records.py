@@ -8,7 +8,13 @@ import msgspec
 
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
-from fuzzytree.auditing.findings.records import Answer, Measure, Place, Settings, Source
+from fuzzytree.auditing.findings.records import (
+    Answer,
+    AuditSettings,
+    FileLocation,
+    Measure,
+    SourceFile,
+)
 from fuzzytree.model.rulebase import Path, Value
 
 FORMAT: Final = "fuzzytree-diff/1"
@@ -45,12 +51,12 @@ class Change(Value, frozen=True):
     old_rules: tuple[int, ...] = ()
     new_rules: tuple[int, ...] = ()
     measures: tuple[Measure, ...] = ()
-    old: Place | None = None
-    new: Place | None = None
+    old: FileLocation | None = None
+    new: FileLocation | None = None
     code: Literal["FT802"] = "FT802"
 
 
-class Compared(Value, frozen=True):
+class ComparedModel(Value, frozen=True):
     """One of the two models.
 
     Attributes:
@@ -63,7 +69,7 @@ class Compared(Value, frozen=True):
     name: str
     form: str
     fingerprint: str
-    file: Source | None = None
+    file: SourceFile | None = None
 
 
 class Difference(Value, frozen=True):
@@ -83,12 +89,12 @@ class Difference(Value, frozen=True):
     """
 
     version: str
-    old: Compared
-    new: Compared
-    data: Source | None
+    old: ComparedModel
+    new: ComparedModel
+    data: SourceFile | None
     rows: int
     domain: Domain
-    settings: Settings
+    settings: AuditSettings
     changes: tuple[Change, ...]
     answers: tuple[Answer, ...]
     format: Literal["fuzzytree-diff/1"] = FORMAT
@@ -162,7 +168,7 @@ class Draft(NamedTuple):
     is_harmless: bool = False
 
 
-class Evidence(NamedTuple):
+class DecisionEvidence(NamedTuple):
     """How decisions that differ come about.
 
     Attributes:
@@ -185,7 +191,7 @@ class Evidence(NamedTuple):
         return bool(self.old_rules or self.new_rules or self.has_none)
 
 
-def graded(draft: Draft, evidence: Evidence) -> Change:
+def grade(draft: Draft, evidence: DecisionEvidence) -> Change:
     """Return a change with its grade, and whether that is certain."""
     is_broken = {
         "always": True,

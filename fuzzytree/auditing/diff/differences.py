@@ -6,22 +6,22 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from fuzzytree.auditing.diff.decisions import Pair, all_inputs, decisions, union
+from fuzzytree.auditing.diff.decisions import RulePair, all_inputs, decisions, union
 from fuzzytree.auditing.diff.difference_records import (
     Change,
-    Compared,
+    ComparedModel,
     Difference,
-    graded,
+    grade,
 )
-from fuzzytree.auditing.diff.structure import drafts
-from fuzzytree.auditing.diff.system_differences import compared
+from fuzzytree.auditing.diff.structure import draft_changes
+from fuzzytree.auditing.diff.system_differences import system_changes
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side, limited
 from fuzzytree.auditing.findings.audit import source_of
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.locations import ModelFile
-from fuzzytree.auditing.findings.records import Settings, Source
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.records import AuditSettings, SourceFile
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.checking.converting import kind_of
 from fuzzytree.errors import ReadError
 from fuzzytree.formats.yaml.spots import in_system
@@ -34,7 +34,7 @@ from fuzzytree.semantics.conversion import as_rules
 from fuzzytree.semantics.lowering import rules_from_tree
 
 
-def refuse_strangers(old: Document, new: Document, names: tuple[str, str]) -> None:
+def check_common_inputs(old: Document, new: Document, names: tuple[str, str]) -> None:
     """Refuse two models that are about different things.
 
     Raises:
@@ -49,7 +49,7 @@ def refuse_strangers(old: Document, new: Document, names: tuple[str, str]) -> No
         )
 
 
-def deciding(model: Document, name: str) -> FuzzyTree | RuleBase:
+def deciding_model(model: Document, name: str) -> FuzzyTree | RuleBase:
     """Return a model that decides: a system only if it stands for rules.
 
     Raises:
@@ -70,7 +70,7 @@ def joined_domain(
     old: Document,
     new: Document,
     limits: Mapping[str, tuple[float, float]],
-    rows: Rows | None = None,
+    rows: AuditRows | None = None,
 ) -> Domain:
     """Return where two models are compared: what either of them declares.
 
@@ -94,7 +94,7 @@ def joined_domain(
         asked = None
         if rows is not None:
             places = [inputs.index(name) for name in inputs_of(model)]
-            asked = Rows(rows.name, rows.values[places])
+            asked = AuditRows(rows.name, rows.values[places])
         for side in domain_of(model, rows=asked, limited=limits).sides:
             known = sides.get(side.variable)
             origins = (known.origin if known else "unused", side.origin)
@@ -115,11 +115,11 @@ def difference(
     new: Document,
     *,
     domain: Domain,
-    rows: Rows | None = None,
-    settings: Settings | None = None,
+    rows: AuditRows | None = None,
+    settings: AuditSettings | None = None,
     clock: Clock | None = None,
     files: tuple[ModelFile | None, ModelFile | None] = (None, None),
-    data: Source | None = None,
+    data: SourceFile | None = None,
 ) -> Difference:
     """Return what changed from one model to another.
 
@@ -143,29 +143,29 @@ def difference(
         >>> difference(tree, tree, domain=domain_of(tree)).verdict
         'equal'
     """
-    settings = settings or Settings()
+    settings = settings or AuditSettings()
     clock = clock or Clock()
     both = old, new
     if _give_numbers(old) and _give_numbers(new):
         assert isinstance(old, FuzzySystem)  # no other model gives numbers
         assert isinstance(new, FuzzySystem)
-        told, answers = compared(old, new, domain, rows, settings, clock)
+        told, answers = system_changes(old, new, domain, rows, settings, clock)
     else:
         titles = [
             file.name if file else model.name
             for file, model in zip(files, both, strict=True)
         ]
-        models = deciding(old, titles[0]), deciding(new, titles[1])
+        models = deciding_model(old, titles[0]), deciding_model(new, titles[1])
         pair = _pair(*models, domain)
         clock.tell("comparing rules", 0.0)
-        found = [*drafts(pair.old, pair.new, domain, pair.trees)]
+        found = [*draft_changes(pair.old, pair.new, domain, pair.trees)]
         clock.tell("comparing decisions", 0.1)
         answers, evidence = decisions(pair, rows, settings, clock)
-        told = [(graded(one, evidence), one.old, one.new) for one in found]
+        told = [(grade(one, evidence), one.old, one.new) for one in found]
     changes = [_placed(change, paths, both, files) for change, *paths in told]
     order = {"breaking": 0, "non-breaking": 1, "cosmetic": 2}
     one, other = (
-        Compared(
+        ComparedModel(
             model.name,
             kind_of(model),
             fingerprint(model),
@@ -186,14 +186,16 @@ def difference(
     )
 
 
-def _pair(old: FuzzyTree | RuleBase, new: FuzzyTree | RuleBase, domain: Domain) -> Pair:
+def _pair(
+    old: FuzzyTree | RuleBase, new: FuzzyTree | RuleBase, domain: Domain
+) -> RulePair:
     one, other = (
         rules_from_tree(m) if isinstance(m, FuzzyTree) else m for m in (old, new)
     )
     trees = None
     if isinstance(old, FuzzyTree) and isinstance(new, FuzzyTree):
         trees = (old, new)
-    return Pair(one, other, all_inputs(one, other), domain, trees)
+    return RulePair(one, other, all_inputs(one, other), domain, trees)
 
 
 def _give_numbers(model: Document) -> bool:

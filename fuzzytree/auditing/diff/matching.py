@@ -78,7 +78,7 @@ def _joined(laid: Sequence[Piece]) -> Iterable[Piece]:
         yield Piece(first.low, rest[-1].high if rest else first.high, polynomial, cap)
 
 
-class Said:
+class RuleKeys:
     """What the rules of a rule base say, as keys that can be compared.
 
     Args:
@@ -143,7 +143,7 @@ def have_same_classes(old: RuleBase, new: RuleBase) -> bool:
     curves = Curves()
     asked: list[set[Hashable]] = []
     for rules in (old, new):
-        said = Said(rules, curves)
+        said = RuleKeys(rules, curves)
         known: set[Hashable] = set()
         for rule in rules.rules:
             counts = Counter(map(said.clause, rule.when))
@@ -159,23 +159,23 @@ def words_of(clause: Clause) -> NamedKey:
     return clause.variable, clause.negated, frozenset(clause.terms)
 
 
-def matching(one: Said, other: Said) -> Matching:
+def matching(one: RuleKeys, other: RuleKeys) -> Matching:
     """Match the rules of two rule bases.
 
     Example:
         >>> from fuzzytree.semantics.lowering import rules_from_tree
         >>> from fuzzytree.testing import random_tree
         >>> rules = rules_from_tree(random_tree(1))
-        >>> said = Said(rules, Curves())
+        >>> said = RuleKeys(rules, Curves())
         >>> {match.how for match in matching(said, said).matches}
         {'same'}
     """
     old, new = (dict(enumerate(said.rules, 1)) for said in (one, other))
     found: list[Match] = []
-    steps: tuple[tuple[How, Callable[[Said, Rule], Hashable]], ...] = (
-        ("same", Said.same),
-        ("class", Said.asked),
-        ("curves", Said.words),
+    steps: tuple[tuple[How, Callable[[RuleKeys, Rule], Hashable]], ...] = (
+        ("same", RuleKeys.same),
+        ("class", RuleKeys.asked),
+        ("curves", RuleKeys.words),
     )
     for how, key in steps:
         pairs = _paired(
@@ -204,7 +204,7 @@ def _paired(
 
 
 def _nearest(
-    one: Said, old: Mapping[int, Rule], other: Said, new: Mapping[int, Rule]
+    one: RuleKeys, old: Mapping[int, Rule], other: RuleKeys, new: Mapping[int, Rule]
 ) -> list[tuple[int, int]]:
     """Return pairs of rules that have clauses in common, those with the most first."""
     scored: list[tuple[float, int, int]] = []

@@ -13,7 +13,7 @@ from fuzzytree.auditing.diff.matching import (
     Curves,
     Match,
     Matching,
-    Said,
+    RuleKeys,
     matching,
     words_of,
 )
@@ -35,7 +35,7 @@ from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.numerics.exact import outwards
 
 
-def drafts(
+def draft_changes(
     old: RuleBase,
     new: RuleBase,
     domain: Domain,
@@ -53,7 +53,7 @@ def drafts(
     names = _renamed_classes(old, new, curves)
     yield from _class_drafts(old, new, names)
     yield from _answer_drafts(old, new, names)
-    found = matching(Said(old, curves, names), Said(new, curves))
+    found = matching(RuleKeys(old, curves, names), RuleKeys(new, curves))
     yield from _rule_drafts(old, new, found, curves, names)
     yield from variable_drafts(old, new, curves, domain)
     if trees is not None:
@@ -114,7 +114,7 @@ def _renamed_classes(old: RuleBase, new: RuleBase, curves: Curves) -> dict[str, 
     come = [label for label in new.classes if label not in old.classes]
     if not gone or not come:
         return {}
-    one, other = Said(old, curves), Said(new, curves)
+    one, other = RuleKeys(old, curves), RuleKeys(new, curves)
     asked = {
         label: {other.asked(rule) for rule in new.rules if rule.then == label}
         for label in come
@@ -182,7 +182,7 @@ def _rule_drafts(
     curves: Curves,
     names: Mapping[str, str],
 ) -> Iterator[Draft]:
-    one, other = Said(old, curves, names), Said(new, curves)
+    one, other = RuleKeys(old, curves, names), RuleKeys(new, curves)
     for match in found.matches:
         yield from _changed_rule(match, one, other)
     for number in found.removed:
@@ -199,7 +199,7 @@ def _rule_drafts(
     yield from _order_drafts(found.matches)
 
 
-def _changed_rule(match: Match, one: Said, other: Said) -> Iterator[Draft]:
+def _changed_rule(match: Match, one: RuleKeys, other: RuleKeys) -> Iterator[Draft]:
     if match.how in ("same", "curves"):
         return  # what the curves do is told of the terms
     was, now = one.rules[match.old - 1], other.rules[match.new - 1]
@@ -220,7 +220,9 @@ def _changed_rule(match: Match, one: Said, other: Said) -> Iterator[Draft]:
     )
 
 
-def _clause_texts(was: Rule, now: Rule, one: Said, other: Said) -> Iterator[str]:
+def _clause_texts(
+    was: Rule, now: Rule, one: RuleKeys, other: RuleKeys
+) -> Iterator[str]:
     """Yield which clauses a rule has lost and gained."""
     asked, read = {other.clause(c) for c in now.when}, {words_of(c) for c in now.when}
     gone = [c for c in was.when if one.clause(c) not in asked]

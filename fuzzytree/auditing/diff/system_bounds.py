@@ -13,7 +13,7 @@ from functools import reduce
 from types import MappingProxyType
 from typing import NoReturn
 
-from fuzzytree.auditing.diff.system_keys import Entry, entries, facts_of
+from fuzzytree.auditing.diff.system_keys import Contribution, contributions, facts_of
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.model.system import (
     And,
@@ -211,7 +211,7 @@ def most(
         next(each for each in system.outputs if each.name == output)
         for system in (old, new)
     )
-    known = entries(old, output, domain), entries(new, output, domain)
+    known = contributions(old, output, domain), contributions(new, output, domain)
     found = _moved(old, new, (one, other), known, domain)
     spans = [
         _span(system, each, asked, domain)
@@ -232,7 +232,7 @@ def _moved(
     old: FuzzySystem,
     new: FuzzySystem,
     outputs: tuple[SystemOutput, SystemOutput],
-    known: tuple[Sequence[Entry], Sequence[Entry]],
+    known: tuple[Sequence[Contribution], Sequence[Contribution]],
     domain: Domain,
 ) -> tuple[Fraction, str] | None:
     """Return the bound where only numbers differ, and all degrees are the same."""
@@ -270,7 +270,10 @@ def _is_small(system: FuzzySystem) -> bool:
 
 
 def _move(
-    old: FuzzySystem, new: FuzzySystem, pair: tuple[Entry, Entry], domain: Domain
+    old: FuzzySystem,
+    new: FuzzySystem,
+    pair: tuple[Contribution, Contribution],
+    domain: Domain,
 ) -> Fraction | None:
     """Return how far the numbers of two entries are apart on the domain, at most."""
     one, other = pair[0].label, pair[1].label
@@ -318,7 +321,10 @@ def _linear_span(
 
 
 def _span(
-    system: FuzzySystem, one: SystemOutput, known: Sequence[Entry], domain: Domain
+    system: FuzzySystem,
+    one: SystemOutput,
+    known: Sequence[Contribution],
+    domain: Domain,
 ) -> _Ends | None:
     """Return between which ends an output's numbers lie."""
     found: list[_Ends] = []

@@ -10,11 +10,11 @@ from collections.abc import Hashable, Iterator, Sequence
 import msgspec
 
 from fuzzytree.auditing.diff.difference_records import Change, Grade
-from fuzzytree.auditing.diff.system_numbers import Pair, number_answers
+from fuzzytree.auditing.diff.system_numbers import SystemPair, number_answers
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain
-from fuzzytree.auditing.findings.records import Answer, Settings
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import Path
 from fuzzytree.model.system import (
     FuzzySystem,
@@ -27,12 +27,12 @@ from fuzzytree.model.system import (
 Found = tuple[list[tuple[Change, Path | None, Path | None]], list[Answer]]
 
 
-def compared(
+def system_changes(
     old: FuzzySystem,
     new: FuzzySystem,
     domain: Domain,
-    rows: Rows | None,
-    settings: Settings,
+    rows: AuditRows | None,
+    settings: AuditSettings,
     clock: Clock,
 ) -> Found:
     """Return what a new system says otherwise, with places, and how numbers differ.
@@ -52,14 +52,14 @@ def compared(
         >>> from fuzzytree.auditing.findings.domains import domain_of
         >>> from fuzzytree.testing import random_system
         >>> system = random_system(2)
-        >>> changes, answers = compared(
-        ...     system, system, domain_of(system), None, Settings(), Clock()
+        >>> changes, answers = system_changes(
+        ...     system, system, domain_of(system), None, AuditSettings(), Clock()
         ... )
         >>> changes, answers[0].sentence
         ([], 'both systems compute alike')
     """
     columns = tuple(dict.fromkeys((*old.columns, *new.columns)))
-    pair = Pair(old, new, columns, domain)
+    pair = SystemPair(old, new, columns, domain)
     answers = number_answers(pair, rows, settings, clock)
     moves = any(answer.is_finding for answer in answers)
     is_equal = any(answer.subject == "decisions" for answer in answers)  # proved

@@ -43,7 +43,7 @@ _STEPPED = {
 _SMOOTH = ("centroid", "weighted average", "weighted sum")
 
 
-class Entry(NamedTuple):
+class Contribution(NamedTuple):
     """What concludes an output: how strongly, and which of its terms.
 
     Attributes:
@@ -57,7 +57,9 @@ class Entry(NamedTuple):
     most: float
 
 
-def computed(system: FuzzySystem, domain: Domain | None = None) -> dict[str, Hashable]:
+def operation_keys(
+    system: FuzzySystem, domain: Domain | None = None
+) -> dict[str, Hashable]:
     """Return for each output the operations and numbers that it is computed by.
 
     Args:
@@ -67,7 +69,7 @@ def computed(system: FuzzySystem, domain: Domain | None = None) -> dict[str, Has
 
     Example:
         >>> from fuzzytree.testing import random_system
-        >>> one, other = computed(random_system(2)), computed(random_system(3))
+        >>> one, other = (operation_keys(random_system(n)) for n in (2, 3))
         >>> any(one[name] == other.get(name) for name in one)
         False
     """
@@ -75,7 +77,7 @@ def computed(system: FuzzySystem, domain: Domain | None = None) -> dict[str, Has
     return {one.name: read.output(one.name) for one in system.outputs}
 
 
-def meant(
+def function_keys(
     system: FuzzySystem, curves: Curves, domain: Domain | None = None
 ) -> dict[str, Hashable]:
     """Return for each output the function of real numbers that it is.
@@ -101,9 +103,11 @@ def meant(
     }
 
 
-def entries(system: FuzzySystem, output: str, domain: Domain) -> tuple[Entry, ...]:
+def contributions(
+    system: FuzzySystem, output: str, domain: Domain
+) -> tuple[Contribution, ...]:
     """Return what concludes an output on a domain, in the order of the rules."""
-    return tuple(_Read(system, None, domain).entries(output))
+    return tuple(_Read(system, None, domain).contributions(output))
 
 
 class _Read:
@@ -167,7 +171,7 @@ class _Read:
     def _output(self, one: SystemOutput) -> Hashable:
         made = [
             (entry.strength, entry.label and self._concluded(one, entry.label))
-            for entry in self.entries(one.name)
+            for entry in self.contributions(one.name)
         ]
         joins, is_weighted = one.aggregation, one.defuzzifier.is_weighted
         if self.curves is not None and is_weighted:
@@ -211,7 +215,7 @@ class _Read:
             key = (curve.offset, *((n, w, self.sources[n]) for n, w in pairs if w))
         return key, label.height
 
-    def entries(self, output: str) -> Iterator[Entry]:
+    def contributions(self, output: str) -> Iterator[Contribution]:
         """Yield what concludes an output."""
         for block in self.system.blocks:
             how = block.activation
@@ -220,12 +224,12 @@ class _Read:
                 key = None if how.method == "general" else (how.threshold, how.relation)
                 for rule in rules:
                     for label, said in self._then(rule, block, output):
-                        yield Entry(
+                        yield Contribution(
                             (key, self._rule(rule, block), said), label, rule.weight
                         )
             elif any(one.output == output for rule in rules for one in rule.then):
                 said_by = tuple(self._chosen(rule, block, output) for rule in rules)
-                yield Entry((how, said_by), None, 1.0)
+                yield Contribution((how, said_by), None, 1.0)
 
     def _rule(self, rule: SystemRule, block: RuleBlock) -> Hashable:
         checkpoint()

@@ -20,7 +20,7 @@ import numpy as np
 from fuzzytree.auditing.diff.decisions import portions
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
-from fuzzytree.auditing.diff.system_keys import computed, meant
+from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import (
@@ -32,9 +32,9 @@ from fuzzytree.auditing.engine.states import (
     coordinates,
 )
 from fuzzytree.auditing.engine.witnesses import simplified
-from fuzzytree.auditing.findings.records import Answer, Measure, Settings
-from fuzzytree.auditing.findings.subject import Rows
-from fuzzytree.auditing.findings.support import share
+from fuzzytree.auditing.findings.records import Answer, AuditSettings, Measure
+from fuzzytree.auditing.findings.subject import AuditRows
+from fuzzytree.auditing.findings.support import sampled_share
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.runtimes.systems import run_system
@@ -50,7 +50,7 @@ _MOST_SHOWN = 0.9  # of the largest difference, at a witness of fewer digits
 _ALIKE = "both systems compute alike"
 
 
-class Pair(NamedTuple):
+class SystemPair(NamedTuple):
     """Two systems, and where they are compared.
 
     Attributes:
@@ -73,7 +73,7 @@ class Pair(NamedTuple):
 
 
 def number_answers(
-    pair: Pair, rows: Rows | None, settings: Settings, clock: Clock
+    pair: SystemPair, rows: AuditRows | None, settings: AuditSettings, clock: Clock
 ) -> list[Answer]:
     """Return what is known of the numbers of two systems; nothing if none is of both.
 
@@ -134,13 +134,13 @@ _ROUNDED = _Alike(
 )
 
 
-def _hows(pair: Pair) -> dict[str, _Alike | None]:
+def _hows(pair: SystemPair) -> dict[str, _Alike | None]:
     """Return how each output of both is known to be alike; None if it is not."""
     both, curves = (pair.old, pair.new), Curves()
     keys = (
-        (_SAME, [computed(system) for system in both]),
-        (_HELD, [computed(system, pair.domain) for system in both]),
-        (_ROUNDED, [meant(system, curves, pair.domain) for system in both]),
+        (_SAME, [operation_keys(system) for system in both]),
+        (_HELD, [operation_keys(system, pair.domain) for system in both]),
+        (_ROUNDED, [function_keys(system, curves, pair.domain) for system in both]),
     )
     return {
         name: next(
@@ -150,14 +150,14 @@ def _hows(pair: Pair) -> dict[str, _Alike | None]:
     }
 
 
-def _proved(pair: Pair, sentence: str, how: str) -> Answer:
+def _proved(pair: SystemPair, sentence: str, how: str) -> Answer:
     if {*pair.old.columns} != {*pair.new.columns}:
         sentence += ", where no value is missing"
     return Answer("FT801", "decisions", sentence, Proved(how), is_finding=False)
 
 
 def _sampled(
-    found: _Found, rows: Rows | None, settings: Settings, clock: Clock
+    found: _Found, rows: AuditRows | None, settings: AuditSettings, clock: Clock
 ) -> Iterator[Answer]:
     """Yield how often outputs differ, and what the budget left out."""
     pair = found.pair
@@ -194,7 +194,9 @@ def _sampled(
 
 
 def _counted(found: _Found, subject: str, hits: int, seen: int, how: str) -> Answer:
-    state = share("rows in which an output differs", hits, seen, f"{seen} {how}")
+    state = sampled_share(
+        "rows in which an output differs", hits, seen, f"{seen} {how}"
+    )
     sentence = f"no output differs on {seen} {how}"
     if hits:
         sentence = f"an output differs on {hits} of {seen} {how}"
@@ -246,7 +248,7 @@ class _Found:
 
     def __init__(
         self,
-        pair: Pair,
+        pair: SystemPair,
         outputs: Sequence[str],
         rounded: frozenset[str],
         runs: Sequence[SystemRun],

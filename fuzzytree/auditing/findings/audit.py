@@ -20,7 +20,7 @@ from fuzzytree.auditing.findings.configuration import check_settings, chosen_cod
 from fuzzytree.auditing.findings.domains import domain_of, inputs_of
 from fuzzytree.auditing.findings.locations import (
     ModelFile,
-    places_of,
+    locations_of,
     with_ids,
     writable,
 )
@@ -29,13 +29,13 @@ from fuzzytree.auditing.findings.records import (
     LIMITS,
     Answer,
     Audit,
+    AuditSettings,
     Policy,
-    Settings,
-    Source,
+    SourceFile,
     digest_of,
 )
-from fuzzytree.auditing.findings.subject import Rows, Subject
-from fuzzytree.auditing.findings.views import View, view
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.views import AuditView, view
 from fuzzytree.model.agreement import version
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import RuleBase, fingerprint, name_choice
@@ -52,14 +52,14 @@ _TOO_LARGE = "it needs more memory than there is"
 def audit(
     model: Document,
     *,
-    rows: Rows | None = None,
+    rows: AuditRows | None = None,
     domain: Domain | None = None,
-    settings: Settings | None = None,
+    settings: AuditSettings | None = None,
     select: Sequence[str] = (),
     ignore: Sequence[str] = (),
     clock: Clock | None = None,
     file: ModelFile | None = None,
-    data: Source | None = None,
+    data: SourceFile | None = None,
     row: Mapping[str, float] | None = None,
     accepted: Collection[str] = (),
     repeat: str = "",
@@ -91,7 +91,7 @@ def audit(
         >>> audit(random_tree(1), select=["FT501"]).is_complete
         True
     """
-    settings = settings or Settings()
+    settings = settings or AuditSettings()
     check_settings(settings)
     wanted = chosen_codes(select, ignore)
     domain = domain or domain_of(model)
@@ -103,10 +103,10 @@ def audit(
     kept = sorted(
         (one for one in asked.answers if one.code in wanted), key=lambda one: one.code
     )
-    held = viewed.held
-    whole = (viewed.rules, viewed.raw) if held is None else (held.lower,)
+    bounds = viewed.bounds
+    whole = (viewed.rules, viewed.raw) if bounds is None else (bounds.lower,)
     representations = [rules for rules in whole if rules is not None]
-    curves = {name: one.key for name, one in held.terms.items()} if held else {}
+    curves = {name: one.key for name, one in bounds.terms.items()} if bounds else {}
     answers = tuple(
         _placed(one, viewed, model, file, repeat)
         for one in with_ids(kept, representations, curves)
@@ -155,10 +155,10 @@ def _check_row(row: Mapping[str, float], inputs: Sequence[str]) -> None:
 
 
 def _ask_view(
-    found: View,
-    rows: Rows | None,
+    found: AuditView,
+    rows: AuditRows | None,
     row: Mapping[str, float] | None,
-    settings: Settings,
+    settings: AuditSettings,
     clock: Clock,
     wanted: set[str],
 ) -> _Asked:
@@ -176,18 +176,18 @@ def _ask_view(
         raw=found.raw,
         system=found.system,
         rows=rows,
-        places=found.places,
+        rule_names=found.rule_names,
         declined=found.declined,
         is_whole=found.is_whole,
-        held=found.held,
+        bounds=found.bounds,
     )
     _ask_all([*_tasks(wanted, row)], subject, clock, asked)
     return asked
 
 
-def source_of(name: str, content: bytes) -> Source:
+def source_of(name: str, content: bytes) -> SourceFile:
     """Return the name of a file and the SHA-256 of its bytes."""
-    return Source(writable(name), hashlib.sha256(content).hexdigest())
+    return SourceFile(writable(name), hashlib.sha256(content).hexdigest())
 
 
 class _Asked:
@@ -295,7 +295,7 @@ def _unasked(policy: Policy, wanted: set[str], asked: _Asked) -> Iterator[str]:
 
 def _placed(
     answer: Answer,
-    viewed: View,
+    viewed: AuditView,
     model: Document,
     file: ModelFile | None,
     repeat: str,
@@ -306,7 +306,7 @@ def _placed(
         numbers = [viewed.left_out[answer.subject]]
     return msgspec.structs.replace(
         answer,
-        places=places_of(answer, model, file, numbers),
+        places=locations_of(answer, model, file, numbers),
         repeat=f"{writable(repeat)} --select {answer.code}" if repeat else "",
     )
 

@@ -60,7 +60,7 @@ def baseline_of(audit: Audit) -> bytes:
     return (json.dumps(facts, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-def gone(baseline: Mapping[str, str], audit: Audit) -> Iterator[str]:
+def resolved_ids(baseline: Mapping[str, str], audit: Audit) -> Iterator[str]:
     """Yield the accepted ids that an audit no longer finds, in order.
 
     Of a code that was not asked, or not to its end, nothing is said.

@@ -27,9 +27,9 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.auditing.findings.records import Answer, Label, Measure
-from fuzzytree.auditing.findings.subject import Subject, Turns
-from fuzzytree.auditing.findings.support import drawn
+from fuzzytree.auditing.findings.records import Answer, Measure, TermName
+from fuzzytree.auditing.findings.subject import Subject, TimeSlices
+from fuzzytree.auditing.findings.support import sample_points
 from fuzzytree.model.rulebase import Clause, Rule, RuleBase, clause_text
 from fuzzytree.numerics.oracle import decide
 
@@ -82,7 +82,7 @@ def clause_answers(subject: Subject) -> Iterator[Answer]:
     silent = [
         number for number in range(1, count + 1) if not compared.fires[number - 1]
     ]
-    needed, turns = 0, Turns(subject.clock, 0.9)
+    needed, turns = 0, TimeSlices(subject.clock, 0.9)
     for number, one in enumerate(every, count + 1):
         if one.rule in silent:
             continue
@@ -135,7 +135,7 @@ def _state(
     seen: _Seen,
     one: _Dropped,
     number: int,
-    turns: Turns,
+    turns: TimeSlices,
 ) -> State | None:
     left = len(compared.ground.rules.rules) - number + 1
     if compared.never_weaker(one.rule, number) == "always":
@@ -190,7 +190,9 @@ class _Seen:
         self.count = len(subject.rules.rules)
         most = min(MOST_ROWS, _MOST_STRENGTHS // len(both.rules))
         rows, seed = subject.settings.rows, subject.settings.seed
-        self.values = drawn(subject.rules, subject.domain, min(rows, most), seed)
+        self.values = sample_points(
+            subject.rules, subject.domain, min(rows, most), seed
+        )
         strengths = decide(both, self.values).strengths
         assert strengths is not None  # they were asked for
         self.strengths: FloatArray = strengths
@@ -260,5 +262,5 @@ def _answer(subject: Subject, one: _Dropped, state: State) -> Answer:
         is_finding=isinstance(state, Proved),
         severity="info",
         rules=(one.rule,),
-        terms=tuple(Label(one.clause.variable, term) for term in one.clause.terms),
+        terms=tuple(TermName(one.clause.variable, term) for term in one.clause.terms),
     )

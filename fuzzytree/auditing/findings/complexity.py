@@ -18,7 +18,7 @@ from fuzzytree.auditing.engine.polynomials import (
 from fuzzytree.auditing.engine.states import Proved, counted, short
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.terms import Range, measure, ranges
+from fuzzytree.auditing.findings.terms import VariableRange, measure, ranges
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.tree import FuzzyTree
 
@@ -101,7 +101,7 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
         shape.
     """
     asked = _terms(subject.rules)
-    if subject.held and not asked.isdisjoint(subject.held.terms):
+    if subject.bounds and not asked.isdisjoint(subject.bounds.terms):
         return None
     names = {variable for variable, _ in asked}
     used = [of for of in ranges(subject) if of.variable.name in names]
@@ -126,14 +126,14 @@ def nauck(subject: Subject) -> tuple[Bounds, Bounds, Bounds] | None:
     )
 
 
-def coverage(of: Range) -> Bounds:
+def coverage(of: VariableRange) -> Bounds:
     """Return the mean of h(x) over a range, as `nauck` defines it.
 
     Example:
         >>> from fuzzytree.model.rulebase import Points, Term, Variable
         >>> down, up = (Points((0.0, 1.0), ends) for ends in ((1.0, 0.0), (0.0, 1.0)))
         >>> both = Variable("x", (Term("low", down), Term("high", up)))
-        >>> coverage(Range(both, Fraction(0), Fraction(1), False)).exact
+        >>> coverage(VariableRange(both, Fraction(0), Fraction(1), False)).exact
         '1'
     """
     terms = of.variable.terms

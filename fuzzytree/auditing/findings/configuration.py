@@ -24,7 +24,7 @@ import msgspec
 from msgspec import Meta, field
 
 from fuzzytree.auditing.findings.codes import CODES
-from fuzzytree.auditing.findings.records import Settings
+from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.files import PathLike, read_bounded
 from fuzzytree.formats.text_files import Found, report
 from fuzzytree.formats.yaml.binding import bind, find
@@ -88,7 +88,7 @@ def chosen_codes(select: Sequence[str] = (), ignore: Sequence[str] = ()) -> set[
     return found
 
 
-def check_settings(settings: Settings) -> None:
+def check_settings(settings: AuditSettings) -> None:
     """Refuse settings outside their ranges.
 
     Raises:
@@ -105,7 +105,7 @@ def check_settings(settings: Settings) -> None:
             raise ValueError(f"{name} must be {least} to {most}, not {value!r}")
 
 
-def changed(settings: Settings, texts: Mapping[str, str]) -> Settings:
+def settings_with(settings: AuditSettings, texts: Mapping[str, str]) -> AuditSettings:
     """Return settings with others for some names, as a user writes them.
 
     The budget is not among them.
@@ -114,7 +114,7 @@ def changed(settings: Settings, texts: Mapping[str, str]) -> Settings:
         ValueError: If there is no such setting, or its value is none.
 
     Example:
-        >>> changed(Settings(), {"epsilon": "0.2"}).epsilon
+        >>> settings_with(AuditSettings(), {"epsilon": "0.2"}).epsilon
         0.2
     """
     known = [name for name in (*_RANGES, *_COUNTS) if name != "budget_s"]
@@ -153,7 +153,7 @@ class LimitsOfFile(Record, frozen=True, kw_only=True):
 
 
 class SettingsOfFile(Record, frozen=True, kw_only=True):
-    """What is taken for small; see `Settings`."""
+    """What is taken for small; see `AuditSettings`."""
 
     noun: ClassVar[str] = "settings"
     epsilon: float | None = None
@@ -193,7 +193,7 @@ class Configuration(msgspec.Struct, frozen=True):
     select: tuple[str, ...] = ()
     ignore: tuple[str, ...] = ()
     limits: tuple[tuple[str, float, float], ...] = ()
-    settings: Settings = Settings()
+    settings: AuditSettings = AuditSettings()
     baseline: str | None = None
     fail_on: FailOn | None = None
 
@@ -263,9 +263,11 @@ def _wrong_limits(limits: Sequence[LimitsOfFile]) -> Iterator[tuple[int, str]]:
             yield position, f"{swapped}; the smaller one stands first"
 
 
-def _settings(given: SettingsOfFile, root: MappingNode, found: list[Found]) -> Settings:
+def _settings(
+    given: SettingsOfFile, root: MappingNode, found: list[Found]
+) -> AuditSettings:
     """Return settings, the defaults where a value is left out or wrong."""
-    made = Settings()
+    made = AuditSettings()
     for key, value in msgspec.structs.asdict(given).items():
         if value is None:
             continue

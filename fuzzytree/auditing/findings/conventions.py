@@ -24,7 +24,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.support import drawn, outside
+from fuzzytree.auditing.findings.support import rows_outside, sample_points
 from fuzzytree.checking.comparing import Answers, labels
 from fuzzytree.errors import LossError
 from fuzzytree.model.contracts import Model, SystemOutcome
@@ -56,7 +56,7 @@ _TRIED = 1_000  # probes, and as many drawn points, among which ties are looked 
 _FAR = (-1e300, -1e30, 1e30, 1e300)
 
 
-class Question(NamedTuple):
+class Convention(NamedTuple):
     """A convention, and the probes that ask for it.
 
     Attributes:
@@ -86,7 +86,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         found = [
             Answers(title, form, run(question.values)) for title, form, run in runs
         ]
-        yield from told(subject, question, found)
+        yield from convention_answers(subject, question, found)
 
 
 def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
@@ -99,11 +99,11 @@ def _runs(model: Model) -> Iterator[tuple[str, Model, Run]]:
                     yield f"{runtime.name}: {name}", form, runtime.load(form)
 
 
-def questions(subject: Subject) -> Iterator[Question]:
+def questions(subject: Subject) -> Iterator[Convention]:
     """Yield the conventions with their probes, at most `MOST` of each.
 
     Example:
-        >>> from fuzzytree.auditing.findings.records import Settings
+        >>> from fuzzytree.auditing.findings.records import AuditSettings
         >>> from fuzzytree.auditing.findings.views import view
         >>> from fuzzytree.auditing.engine.clock import Clock
         >>> from fuzzytree.auditing.engine.domain import Domain, Side
@@ -111,7 +111,7 @@ def questions(subject: Subject) -> Iterator[Question]:
         >>> tree = random_tree(1)
         >>> box = Domain(tuple(Side(name, 0.0, 1.0) for name in tree.inputs))
         >>> seen = view(tree, box)
-        >>> subject = Subject(seen.rules, seen.policy, box, Settings(), Clock())
+        >>> subject = Subject(seen.rules, seen.policy, box, AuditSettings(), Clock())
         >>> [question.name for question in questions(subject)][:3]
         ['ties', 'missing values', 'infinite values']
     """
@@ -125,7 +125,7 @@ def questions(subject: Subject) -> Iterator[Question]:
     yield _question("missing values", rules, bases, missing)
     yield _question("infinite values", rules, bases, infinite)
     ends = np.array([[row[name] for row in aimed] for name in rules.inputs])
-    yield Question("ends of curves and cuts", ends.reshape(len(rules.inputs), -1))
+    yield Convention("ends of curves and cuts", ends.reshape(len(rules.inputs), -1))
     yield _question("far outside", rules, bases, _outside(subject))
 
 
@@ -134,22 +134,22 @@ def _question(
     rules: RuleBase,
     bases: Sequence[Mapping[str, float]],
     changes: Iterable[tuple[str, float]],
-) -> Question:
+) -> Convention:
     """Return rows in which one value is replaced, in each of the bases."""
     made = [{**row, one: x} for one, x in changes for row in bases]
     step = -(-len(made) // MOST) or 1
     kept = made[::step]
     table = [[row[one] for row in kept] for one in rules.inputs]
     values = np.array(table, np.float64).reshape(len(rules.inputs), len(kept))
-    return Question(name, values, len(made) - len(kept))
+    return Convention(name, values, len(made) - len(kept))
 
 
-def _ties(subject: Subject) -> Question:
+def _ties(subject: Subject) -> Convention:
     """Return the points on which rules tie exactly, of drawn ones and of probes."""
     points = np.hstack(
         [
             probe_values(subject.rules, _TRIED),
-            drawn(subject.rules, subject.domain, _TRIED, subject.settings.seed),
+            sample_points(subject.rules, subject.domain, _TRIED, subject.settings.seed),
         ]
     )
     is_tied = np.zeros(points.shape[1], np.bool_)
@@ -157,7 +157,7 @@ def _ties(subject: Subject) -> Question:
         if rules is not None:
             is_tied |= decide(rules, points, with_strengths=False).status == TIE
     tied = points[:, is_tied]
-    return Question("ties", tied[:, :MOST], max(tied.shape[1] - MOST, 0))
+    return Convention("ties", tied[:, :MOST], max(tied.shape[1] - MOST, 0))
 
 
 def _outside(subject: Subject) -> Iterator[tuple[str, float]]:
@@ -174,8 +174,8 @@ def _outside(subject: Subject) -> Iterator[tuple[str, float]]:
             yield name, far
 
 
-def told(
-    subject: Subject, question: Question, found: Sequence[Answers]
+def convention_answers(
+    subject: Subject, question: Convention, found: Sequence[Answers]
 ) -> Iterator[Answer]:
     """Yield each representation that differs in a question, or that none does.
 
@@ -226,7 +226,7 @@ def _differ(one: Answers, base: Answers) -> BoolArray:
 
 
 def _broken(
-    subject: Subject, question: Question, one: Answers, base: Answers, rows: IntArray
+    subject: Subject, question: Convention, one: Answers, base: Answers, rows: IntArray
 ) -> Answer:
     values = question.values[:, rows]
     probe = _probe(subject, values[:, 0])
@@ -275,11 +275,11 @@ def _of_system(subject: Subject, system: FuzzySystem) -> Iterator[Answer]:
             continue
         subject.clock.check()
         found = [(name, run(question.values)) for name, run in runs]
-        yield from told_of_system(subject, question, found)
+        yield from system_answers(subject, question, found)
 
 
-def told_of_system(
-    subject: Subject, question: Question, found: Sequence[tuple[str, SystemOutcome]]
+def system_answers(
+    subject: Subject, question: Convention, found: Sequence[tuple[str, SystemOutcome]]
 ) -> Iterator[Answer]:
     """Yield what runtimes of a system answer: each that differs, or that none does."""
     count = question.values.shape[1]
@@ -329,7 +329,7 @@ def witness(subject: Subject, form: Model, values: FloatArray) -> Witness | None
         form: The form of it that the rows were answered by.
         values: Shape (inputs, rows).
     """
-    inside = ~outside(subject.rules, subject.domain, values)
+    inside = ~rows_outside(subject.rules, subject.domain, values)
     inside &= np.isfinite(values).all(axis=0)
     for row in np.flatnonzero(inside).tolist()[:1]:
         named = dict(zip(form.inputs, values[:, row].tolist(), strict=True))

@@ -60,14 +60,14 @@ _MORE = 1 + Fraction(1, 2**20)  # of a bound that was computed in doubles
 _SLOPE_MORE = float(_MORE)  # of slopes in doubles
 
 Side = Literal["lower", "upper"]
-Range = tuple[Fraction, Fraction]
+Interval = tuple[Fraction, Fraction]
 Knot = tuple[float, Fraction]
 """A point of a line before it is rounded."""
 Name = tuple[str, str]
 """A variable and one of its terms."""
 
 
-class Enclosed(NamedTuple):
+class CurveBounds(NamedTuple):
     """A curve between two lines.
 
     Attributes:
@@ -86,13 +86,13 @@ class Enclosed(NamedTuple):
         return self.lower == self.upper
 
     @property
-    def swapped(self) -> Enclosed:
+    def swapped(self) -> CurveBounds:
         """The same with the upper line in the place of the lower one."""
-        return Enclosed(self.upper, self.lower, ("swapped", *self.key))
+        return CurveBounds(self.upper, self.lower, ("swapped", *self.key))
 
 
 @functools.lru_cache(maxsize=256)
-def enclosed(curve: Curve, of: Range | None) -> Enclosed | None:
+def curve_bounds(curve: Curve, of: Interval | None) -> CurveBounds | None:
     """Return two lines between which a curve is.
 
     Args:
@@ -104,7 +104,7 @@ def enclosed(curve: Curve, of: Range | None) -> Enclosed | None:
 
     Example:
         >>> of = Fraction(-3), Fraction(3)
-        >>> found = enclosed(Gaussian(0.0, 1.0), of)
+        >>> found = curve_bounds(Gaussian(0.0, 1.0), of)
         >>> found.lower.degrees[0] > 0.01, float(gap(found, of)) < 0.001
         (True, True)
     """
@@ -125,33 +125,33 @@ def enclosed(curve: Curve, of: Range | None) -> Enclosed | None:
                 line = above if degree == 0 else below
                 line[place] = x, degree
     least = Fraction(0) if of is None else _least(curve, of)
-    lower = laid([*clipped(below, least, "lower")], "lower", of)
-    upper = laid([*clipped(above, Fraction(1), "upper")], "upper", of)
-    return Enclosed(lower, upper, (curve,))
+    lower = rounded_line([*clip(below, least, "lower")], "lower", of)
+    upper = rounded_line([*clip(above, Fraction(1), "upper")], "upper", of)
+    return CurveBounds(lower, upper, (curve,))
 
 
-def pointed(shape: Shape, of: Range | None) -> Enclosed | None:
+def as_points(shape: Shape, of: Interval | None) -> CurveBounds | None:
     """Return a shape as points: itself if it is points, else lines around it."""
     if isinstance(shape, Points):
-        return Enclosed(shape, shape, (shape,))
-    return enclosed(shape, of)
+        return CurveBounds(shape, shape, (shape,))
+    return curve_bounds(shape, of)
 
 
-def complement(found: Enclosed) -> Enclosed | None:
+def complement(found: CurveBounds) -> CurveBounds | None:
     """Return 1 minus a curve; None if it is no points."""
     sides: list[Shape] = []
     for shape, pick in ((found.upper, 0), (found.lower, 1)):
         if not isinstance(shape, Points):
             return None
         sides.append(_mapped(shape, lambda degree: 1 - degree, pick))
-    return Enclosed(sides[0], sides[1], ("not", *found.key))
+    return CurveBounds(sides[0], sides[1], ("not", *found.key))
 
 
-def scaled(found: Enclosed, factor: float) -> Enclosed | None:
+def scale(found: CurveBounds, factor: float) -> CurveBounds | None:
     """Return a curve times a factor in [0, 1]; None if it is no points.
 
     Example:
-        >>> half = scaled(Enclosed(line := Points((0.0,), (0.5,)), line, ()), 0.5)
+        >>> half = scale(CurveBounds(line := Points((0.0,), (0.5,)), line, ()), 0.5)
         >>> half.lower.degrees, half.is_exact
         ((0.25,), True)
     """
@@ -160,7 +160,7 @@ def scaled(found: Enclosed, factor: float) -> Enclosed | None:
         if not isinstance(shape, Points):
             return None
         sides.append(_mapped(shape, lambda degree: degree * Fraction(factor), pick))
-    return Enclosed(sides[0], sides[1], (factor, *found.key))
+    return CurveBounds(sides[0], sides[1], (factor, *found.key))
 
 
 def _mapped(
@@ -172,7 +172,7 @@ def _mapped(
 
 
 @functools.lru_cache(maxsize=256)
-def gap(found: Enclosed, of: Range) -> Fraction:
+def gap(found: CurveBounds, of: Interval) -> Fraction:
     """Return how far two lines are apart at most on a range."""
     low, high = of
     apart = Fraction(0)
@@ -232,7 +232,7 @@ def _is_smooth(curve: Curve) -> bool:
             return isinstance(curve, kinds)
 
 
-def _least(curve: Curve, of: Range) -> Fraction:
+def _least(curve: Curve, of: Interval) -> Fraction:
     """Return what a curve is not below on a range; it rises, then falls, or is 0."""
     kinds = (Gaussian, TwoGaussians, Sigmoid, SigmoidProduct, Concave, Spike)
     is_risen = isinstance(curve, kinds) or (isinstance(curve, Bell) and curve.slope > 0)
@@ -246,7 +246,7 @@ def _least(curve: Curve, of: Range) -> Fraction:
 # --- lines
 
 
-def clipped(knots: Sequence[Knot], limit: Fraction, side: Side) -> Iterator[Knot]:
+def clip(knots: Sequence[Knot], limit: Fraction, side: Side) -> Iterator[Knot]:
     """Yield a line held at a limit; where it meets it, the limit lasts longer.
 
     Args:
@@ -274,7 +274,7 @@ def _meeting(one: Knot, other: Knot, limit: Fraction, sign: int) -> Iterator[Kno
     yield min(max(place, a), b), limit
 
 
-def laid(knots: Sequence[Knot], side: Side, of: Range | None) -> Points:
+def rounded_line(knots: Sequence[Knot], side: Side, of: Interval | None) -> Points:
     """Return a line as points, with degrees rounded to its side; only on a range."""
     pick = 0 if side == "lower" else 1
     made = [(x, outwards(degree)[pick]) for x, degree in knots]
@@ -290,7 +290,9 @@ def laid(knots: Sequence[Knot], side: Side, of: Range | None) -> Points:
     return Points(values, degrees)
 
 
-def _trimmed(knots: list[tuple[float, float]], of: Range) -> list[tuple[float, float]]:
+def _trimmed(
+    knots: list[tuple[float, float]], of: Interval
+) -> list[tuple[float, float]]:
     """Return the points of a line on a range, and one more on either side."""
     low, high = of
     first = next((n for n, (x, _) in enumerate(knots) if x >= low), len(knots))
@@ -325,7 +327,7 @@ class _Rising(NamedTuple):
     bend: tuple[Bend, Bend]
 
 
-def hedged(found: Enclosed, hedge: Hedge) -> Enclosed | None:
+def hedged_bounds(found: CurveBounds, hedge: Hedge) -> CurveBounds | None:
     """Return what a hedge makes of a curve between lines.
 
     Returns:
@@ -333,7 +335,7 @@ def hedged(found: Enclosed, hedge: Hedge) -> Enclosed | None:
 
     Example:
         >>> ramp = Points((0.0, 1.0), (0.0, 1.0))
-        >>> very = hedged(Enclosed(ramp, ramp, (ramp,)), "very")
+        >>> very = hedged_bounds(CurveBounds(ramp, ramp, (ramp,)), "very")
         >>> from fuzzytree.numerics.exact import exact_degree
         >>> low, high = (exact_degree(one, Fraction(1, 3)) for one in very[:2])
         >>> low < Fraction(1, 9) < high, high - low < 0.001
@@ -343,14 +345,14 @@ def hedged(found: Enclosed, hedge: Hedge) -> Enclosed | None:
         return complement(found)
     if hedge == "any":
         one = Points((0.0,), (1.0,))
-        return Enclosed(one, one, (one,))
+        return CurveBounds(one, one, (one,))
     if not isinstance(found.lower, Points) or not isinstance(found.upper, Points):
         return None
     lower = _line(found.lower, _RISING[hedge], "lower")
     upper = _line(found.upper, _RISING[hedge], "upper")
     if lower is None or upper is None:
         return None
-    return Enclosed(lower, upper, (hedge, *found.key))
+    return CurveBounds(lower, upper, (hedge, *found.key))
 
 
 def _line(points: Points, hedge: _Rising, side: Side) -> Points | None:
@@ -367,7 +369,7 @@ def _line(points: Points, hedge: _Rising, side: Side) -> Points | None:
         ends = [(x, hedge.value(degree)[pick] + shift) for x, degree in of]
         made += ends if not made or made[-1] != ends[0] else ends[1:]
     extreme = (max if pick else min)(map(Fraction, points.degrees))
-    return laid([*clipped(made, hedge.value(extreme)[pick], side)], side, None)
+    return rounded_line([*clip(made, hedge.value(extreme)[pick], side)], side, None)
 
 
 def _stretches(points: Points, hedge: _Rising) -> Iterator[list[Knot]]:

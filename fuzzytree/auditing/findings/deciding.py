@@ -23,8 +23,8 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.engine.ties import decides_by_order, tie
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
-from fuzzytree.auditing.findings.strength_bounds import Sides, sides_of
-from fuzzytree.auditing.findings.subject import Subject, Turns
+from fuzzytree.auditing.findings.strength_bounds import StrengthBounds, strength_bounds
+from fuzzytree.auditing.findings.subject import Subject, TimeSlices
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.engine.arrangement import BoolArray
@@ -41,7 +41,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
 
     Where every rule that fires takes part in the answer, it is asked whether it fires.
     """
-    sides = sides_of(subject)
+    sides = strength_bounds(subject)
     given = sides.lower
     if given.is_empty:
         return
@@ -57,7 +57,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield from ties.answers()
 
 
-def _firing(subject: Subject, sides: Sides) -> Iterator[Answer]:
+def _firing(subject: Subject, sides: StrengthBounds) -> Iterator[Answer]:
     """Answer whether each rule fires; a rule of several ways, whether one of them."""
     ways: dict[str, list[int]] = {}
     for number in range(1, len(subject.rules.rules) + 1):
@@ -103,7 +103,7 @@ def _winning(
     """
     given = seen.given
     count = len(subject.rules.rules)
-    turns = Turns(subject.clock, 0.5)
+    turns = TimeSlices(subject.clock, 0.5)
     order = sorted(range(1, count + 1), key=seen.is_ahead)
     for place, number in enumerate(order):
         name = subject.rule_name(number)
@@ -133,7 +133,7 @@ def _leading(
     subject: Subject, seen: Glimpses, won: dict[int, Witness]
 ) -> Iterator[Answer]:
     """Answer whether each rule that wins leads by enough."""
-    turns = Turns(subject.clock, 0.5)
+    turns = TimeSlices(subject.clock, 0.5)
     for place, (number, state) in enumerate(sorted(won.items())):
         name = subject.rule_name(number)
         subject.clock.tell(f"how far does {name} lead", place / len(won))
@@ -236,7 +236,7 @@ class _Ties:
 
     def __init__(self, subject: Subject, given: Ground) -> None:
         self.subject, self.given = subject, given
-        self.turns = Turns(subject.clock, 0.9)
+        self.turns = TimeSlices(subject.clock, 0.9)
         self.known: dict[tuple[int, int], State] = {}
         self.may: BoolArray | None = None
 
@@ -319,7 +319,7 @@ def _needed(subject: Subject, seen: Glimpses, ties: _Ties) -> Iterator[Answer]:
     count = len(subject.rules.rules)
     if count == 1:
         return
-    turns = Turns(subject.clock, 0.5)
+    turns = TimeSlices(subject.clock, 0.5)
     for number in range(1, count + 1):
         name = subject.rule_name(number)
         subject.clock.tell(f"is {name} needed", number / count)

@@ -31,12 +31,12 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.auditing.findings.leaves import NOT_LOOKED_AT, too_many
+from fuzzytree.auditing.findings.leaves import NOT_LOOKED_AT, too_many_boxes
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.robustness import CrispDecider
 from fuzzytree.auditing.findings.rows import (
     OF_RANGES,
-    Points,
+    DomainRows,
     distance_measure,
     narrowed_state,
     not_asked,
@@ -57,7 +57,7 @@ _HINTS = 16  # rows from which a point where both differ is sought by doubles
 _CROSSED = 8  # rows whose nearest cut is looked at
 
 
-class Both:
+class TreeAndRules:
     """A tree and its raw rules, asked together.
 
     Args:
@@ -98,7 +98,7 @@ class Both:
         left_open: State | None = None
         for region in self.found:
             inside = [*boxes(region, self.tree, box)]
-            state = other_in(self.given, inside, region.label, clock)
+            state = other_in_boxes(self.given, inside, region.label, clock)
             if isinstance(state, Witness):
                 return state
             if not isinstance(state, Proved):
@@ -110,7 +110,7 @@ class Both:
         return self.crisp.bound(point, label)
 
 
-def other_in(
+def other_in_boxes(
     given: Ground, inside: Sequence[Domain], label: str, clock: Clock
 ) -> State:
     """Return whether raw rules decide somewhere in some boxes otherwise than a class.
@@ -142,8 +142,8 @@ class _Row(NamedTuple):
 
 
 def nearest_difference(
-    both: Both,
-    points: Points,
+    both: TreeAndRules,
+    points: DomainRows,
     clock: Clock,
     *,
     known: Sequence[Mapping[str, Fraction]] = (),
@@ -198,7 +198,7 @@ class _Search:
     how far to look, and bounds on all balls at once which rows are left.
     """
 
-    def __init__(self, both: Both, rows: Sequence[_Row], clock: Clock) -> None:
+    def __init__(self, both: TreeAndRules, rows: Sequence[_Row], clock: Clock) -> None:
         self.both, self.rows, self.clock = both, rows, clock
         self.end = clock.share(_PART)
         self.settled: set[int] = set()
@@ -334,7 +334,9 @@ class _Search:
         return left
 
 
-def _nearest_answer(points: Points, search: _Search, differ: int, alike: int) -> Answer:
+def _nearest_answer(
+    points: DomainRows, search: _Search, differ: int, alike: int
+) -> Answer:
     measures = [Measure("rows that differ already", differ)]
     measures.append(Measure("rows asked", len(search.settled)))
     before = f"of {points.text} {differ} differ already"
@@ -385,16 +387,16 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if tree is None or raw is None:
         return
     found = regions(tree)
-    declined = too_many(found)
+    declined = too_many_boxes(found)
     if declined is not None:
         yield Answer("FT203", "leaves", NOT_LOOKED_AT, declined, False)
         return
     told: list[Answer] = []
-    for answer in differing(subject, raw, tree, found):
+    for answer in leaf_differences(subject, raw, tree, found):
         told.append(answer)
         yield answer
     if subject.rows is not None:
-        both = Both(tree, raw, subject.domain, found)
+        both = TreeAndRules(tree, raw, subject.domain, found)
         points = points_of(subject, subject.rows)
         known = [
             point_of(one.state.point) for one in told if isinstance(one.state, Witness)
@@ -406,7 +408,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         )
 
 
-def differing(
+def leaf_differences(
     subject: Subject, raw: RuleBase, tree: FuzzyTree, found: Sequence[Region]
 ) -> Iterator[Answer]:
     """Yield the leaves in whose regions the raw rules decide otherwise.
@@ -426,7 +428,7 @@ def differing(
         inside = [*boxes(region, tree, subject.domain)]
         subject.clock.check()
         part = subject.clock.share(_LEAF_PART)
-        state = other_in(given, inside, region.label, part)
+        state = other_in_boxes(given, inside, region.label, part)
         asked += len(inside)
         if isinstance(state, Proved):
             alike += 1

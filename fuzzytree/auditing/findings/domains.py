@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import LR, Band, Points, Variable
 from fuzzytree.model.system import FuzzySystem, SystemInput
@@ -51,7 +51,7 @@ def domain_of(
     *,
     within: Within = "model",
     spreads: float | None = None,
-    rows: Rows | None = None,
+    rows: AuditRows | None = None,
     limited: Iterable[str] = (),
     row: Mapping[str, float] | None = None,
 ) -> Domain:

@@ -16,8 +16,8 @@ from fuzzytree.auditing.engine.cover import uncovered
 from fuzzytree.auditing.engine.domain import Domain, Side, span
 from fuzzytree.auditing.engine.states import Declined, Proved, Span, State, Witness
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
-from fuzzytree.auditing.findings.rows import ranked
-from fuzzytree.auditing.findings.strength_bounds import Sides, sides_of
+from fuzzytree.auditing.findings.rows import rank_by_distance
+from fuzzytree.auditing.findings.strength_bounds import StrengthBounds, strength_bounds
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics.exact import outwards
 
@@ -36,7 +36,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
         sentence = "whether an input is covered by no rule is not decided"
         yield Answer("FT301", "cover", sentence, Declined("FTD07", reason), False)
         return
-    sides = sides_of(subject)
+    sides = strength_bounds(subject)
     if sides.lower.is_empty:
         return
     bare = sides.uncovered(subject.clock.share(_PART))
@@ -50,7 +50,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield _weak(subject, sides)
 
 
-def _weak(subject: Subject, sides: Sides) -> Answer:
+def _weak(subject: Subject, sides: StrengthBounds) -> Answer:
     """Answer whether some rule reaches epsilon everywhere, and how little is least."""
     epsilon = subject.settings.epsilon
     state = sides.below(Fraction(epsilon), subject.clock.share(_PART))
@@ -82,7 +82,7 @@ def _gaps(subject: Subject, given: Ground, first: Witness) -> Iterator[Answer]:
     told = [_gap(subject, state) for state in found]
     if subject.rows is not None:
         rules = subject.rules
-        found_near = ranked(
+        found_near = rank_by_distance(
             told, subject.rows, subject.domain, rules.inputs, rules.variables
         )
         told = [*found_near]

@@ -48,15 +48,15 @@ def answers(subject: Subject) -> Iterator[Answer]:
     if tree is None:
         return
     found = regions(tree)
-    declined = too_many(found)
+    declined = too_many_boxes(found)
     if declined is not None:
         for code in ("FT101", "FT205"):
             yield Answer(code, "leaves", NOT_LOOKED_AT, declined, False)
         return
-    yield from reached(subject, tree, found)
+    yield from leaf_regions(subject, tree, found)
 
 
-def too_many(found: Sequence[Region]) -> Declined | None:
+def too_many_boxes(found: Sequence[Region]) -> Declined | None:
     """Return why the regions of a tree are not looked at, None if they are."""
     count = sum(map(box_count, found))
     if count <= MOST_BOXES:
@@ -65,7 +65,7 @@ def too_many(found: Sequence[Region]) -> Declined | None:
     return Declined("FTD05", why)
 
 
-def reached(
+def leaf_regions(
     subject: Subject, tree: FuzzyTree, found: Sequence[Region]
 ) -> Iterator[Answer]:
     """Yield where each leaf decides, or that it never does.

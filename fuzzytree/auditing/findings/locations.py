@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
-from fuzzytree.auditing.findings.records import Answer, Label, Place
+from fuzzytree.auditing.findings.records import Answer, FileLocation, TermName
 from fuzzytree.checking.converting import format_of
 from fuzzytree.errors import ReadError
 from fuzzytree.model.contracts import Document, Locate
@@ -34,10 +34,10 @@ class ModelFile(msgspec.Struct, frozen=True, eq=False):
     content: bytes
     locate: Locate = _nowhere
 
-    def place(self, path: Path) -> Place | None:
+    def place(self, path: Path) -> FileLocation | None:
         """Return where a part of the model stands, None if that is not known."""
         spot = self.locate(path)
-        return None if spot is None else Place(writable(self.name), *spot)
+        return None if spot is None else FileLocation(writable(self.name), *spot)
 
 
 def writable(text: str) -> str:
@@ -84,7 +84,7 @@ def _system_rule_path(system: FuzzySystem, number: int) -> Path:
     return ("blocks",)
 
 
-def term_path(model: Document, label: Label) -> Path:
+def term_path(model: Document, label: TermName) -> Path:
     """Return where a model holds a term; `variables` if it has none of that name."""
     if isinstance(model, FuzzySystem):
         return _label_path(model, label)
@@ -99,7 +99,7 @@ def term_path(model: Document, label: Label) -> Path:
     return ("variables",)
 
 
-def _label_path(system: FuzzySystem, label: Label) -> Path:
+def _label_path(system: FuzzySystem, label: TermName) -> Path:
     for position, one in enumerate(system.variables):
         names = [found.name for found in one.labels]
         if one.name == label.variable and label.term in names:
@@ -109,9 +109,9 @@ def _label_path(system: FuzzySystem, label: Label) -> Path:
     return ("inputs",)
 
 
-def places_of(
+def locations_of(
     answer: Answer, model: Document, file: ModelFile | None, numbers: Iterable[int]
-) -> tuple[Place, ...]:
+) -> tuple[FileLocation, ...]:
     """Return where the rules and terms of an answer stand, in that order.
 
     Args:
@@ -186,6 +186,6 @@ def _rule_facts(rule: Rule, shapes: Mapping[tuple[str, str], object]) -> list[ob
 
 
 def _label_facts(
-    label: Label, shapes: Mapping[tuple[str, str], object]
+    label: TermName, shapes: Mapping[tuple[str, str], object]
 ) -> list[object]:
     return [label.variable, label.term, shapes.get((label.variable, label.term))]

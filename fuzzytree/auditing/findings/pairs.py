@@ -20,7 +20,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.engine.witnesses import coupled
 from fuzzytree.auditing.findings.clauses import clause_answers
 from fuzzytree.auditing.findings.records import Answer, Measure, Severity
-from fuzzytree.auditing.findings.strength_bounds import Sides, sides_of
+from fuzzytree.auditing.findings.strength_bounds import StrengthBounds, strength_bounds
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import measure
 
@@ -38,7 +38,7 @@ Pair = tuple[int, int]
 
 def answers(subject: Subject) -> Iterator[Answer]:
     """Answer what is to be said of pairs of rules, and of single clauses."""
-    compared = sides_of(subject)
+    compared = strength_bounds(subject)
     if compared.lower.is_empty:
         return
     yield from _subsumed(subject, compared)
@@ -78,7 +78,7 @@ def _noun(subject: Subject) -> str:
 # --- FT104 and FT105: is one rule at least as strong everywhere?
 
 
-def _subsumed(subject: Subject, compared: Sides) -> Iterator[Answer]:
+def _subsumed(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
     asked = undecided = 0
     found: dict[int, list[int]] = {}
     for pair in _pairs(subject, is_alike=True):
@@ -111,7 +111,7 @@ def _subsumed(subject: Subject, compared: Sides) -> Iterator[Answer]:
     yield from _rest_of_strengths("FT104", subject, compared, *counts)
 
 
-def _masked(subject: Subject, compared: Sides) -> Iterator[Answer]:
+def _masked(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
     asked = undecided = 0
     found: dict[int, list[tuple[int, bool]]] = {}
     for first, second in _pairs(subject, is_alike=False):
@@ -147,7 +147,7 @@ def _masked(subject: Subject, compared: Sides) -> Iterator[Answer]:
     yield from _rest_of_strengths("FT105", subject, compared, *counts)
 
 
-def _how(compared: Sides) -> str:
+def _how(compared: StrengthBounds) -> str:
     cells = sum(len(laid.cells.rank) for laid in compared.lower.laid[0])
     means = "ratios of degrees" if compared.is_product else "orders of degrees"
     axes = len(compared.lower.axes)
@@ -157,7 +157,7 @@ def _how(compared: Sides) -> str:
 def _rest_of_strengths(
     code: str,
     subject: Subject,
-    compared: Sides,
+    compared: StrengthBounds,
     asked: int,
     found: int,
     undecided: int,
@@ -198,7 +198,7 @@ def _rest_of_strengths(
 # --- FT106: do two rules ask the same?
 
 
-def _copied(subject: Subject, compared: Sides) -> Iterator[Answer]:
+def _copied(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
     count = len(subject.rules.rules)
     copies: list[tuple[Pair, Distance]] = []
     pairs = near = 0
@@ -273,7 +273,7 @@ def _copied(subject: Subject, compared: Sides) -> Iterator[Answer]:
 # --- FT201: do rules of different classes reach a level together?
 
 
-def _conflicts(subject: Subject, compared: Sides) -> Iterator[Answer]:
+def _conflicts(subject: Subject, compared: StrengthBounds) -> Iterator[Answer]:
     level = subject.settings.level
     near: list[tuple[float, Pair]] = []
     clean = touching = 0
@@ -378,7 +378,7 @@ def level_reached(found: Meeting) -> str:
 
 
 def _rest_of_conflicts(
-    subject: Subject, compared: Sides, told: tuple[int, int], hidden: int
+    subject: Subject, compared: StrengthBounds, told: tuple[int, int], hidden: int
 ) -> Answer:
     clean, touching = told
     level, noun = short(subject.settings.level), _noun(subject)

@@ -20,7 +20,7 @@ INTERRUPTED: Final = "interrupted"
 Severity = Literal["error", "warning", "info"]
 
 
-class Place(Value, frozen=True):
+class FileLocation(Value, frozen=True):
     """Where something stands in the model's file."""
 
     file: str
@@ -28,7 +28,7 @@ class Place(Value, frozen=True):
     column: int
 
 
-class Label(Value, frozen=True):
+class TermName(Value, frozen=True):
     """A term of a variable."""
 
     variable: str
@@ -80,15 +80,15 @@ class Answer(Value, frozen=True):
     is_finding: bool
     severity: Severity = "info"
     rules: tuple[int, ...] = ()
-    terms: tuple[Label, ...] = ()
+    terms: tuple[TermName, ...] = ()
     region: tuple[Span, ...] = ()
     measures: tuple[Measure, ...] = ()
-    places: tuple[Place, ...] = ()
+    places: tuple[FileLocation, ...] = ()
     repeat: str = ""
     id: str = ""
 
 
-class Settings(Value, frozen=True):
+class AuditSettings(Value, frozen=True):
     """What an audit takes for small, and how long it may take.
 
     Attributes:
@@ -112,14 +112,14 @@ class Settings(Value, frozen=True):
     budget_s: float = 60.0
 
 
-class Source(Value, frozen=True):
+class SourceFile(Value, frozen=True):
     """A file: its name, and the SHA-256 of its bytes."""
 
     name: str
     sha256: str
 
 
-class Result(Value, frozen=True):
+class VerbResult(Value, frozen=True):
     """What another verb found of the same model, as the user gave it.
 
     Attributes:
@@ -130,7 +130,7 @@ class Result(Value, frozen=True):
     """
 
     verb: Literal["check", "stability"]
-    file: Source
+    file: SourceFile
     parts: int
     wrong: int
 
@@ -183,18 +183,18 @@ class Audit(Value, frozen=True):
     model: str
     form: str
     fingerprint: str
-    file: Source | None
-    data: Source | None
+    file: SourceFile | None
+    data: SourceFile | None
     rows: int
     policy: Policy
     domain: Domain
-    settings: Settings
+    settings: AuditSettings
     answers: tuple[Answer, ...]
     unasked: tuple[str, ...]
     limits: tuple[str, ...]
     is_complete: bool
     accepted: tuple[str, ...] = ()
-    results: tuple[Result, ...] = ()
+    results: tuple[VerbResult, ...] = ()
     numbers: tuple[int, ...] = ()
     digest: str = ""
     format: Literal["fuzzytree-audit/1"] = FORMAT

@@ -19,7 +19,7 @@ from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, State
 from fuzzytree.auditing.findings import conventions
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
-from fuzzytree.auditing.findings.support import drawn, share
+from fuzzytree.auditing.findings.support import sample_points, sampled_share
 from fuzzytree.checking.comparing import probed
 from fuzzytree.checking.models import check
 from fuzzytree.checking.systems import check_system
@@ -64,7 +64,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     subject.clock.check()
     values, how = _points(subject)
     found = agreement(subject, values)
-    yield from told(subject, found, values)
+    yield from agreement_answers(subject, found, values)
     if subject.system is None:
         made = {str(name): form for name, form in forms(_model(subject)).items()}
         for one in found.certificates:
@@ -84,7 +84,7 @@ def _points(subject: Subject) -> tuple[FloatArray, str]:
     settings = subject.settings
     most = min(settings.rows, _MOST_ROWS)
     if subject.rows is None:
-        points = drawn(subject.rules, subject.domain, most, settings.seed)
+        points = sample_points(subject.rules, subject.domain, most, settings.seed)
         return points, f"points drawn evenly from the domain, seed {settings.seed}"
     values, name = subject.rows.values, subject.rows.name
     count = values.shape[1]
@@ -111,7 +111,9 @@ def agreement(
     return check(_model(subject), *others, data=values, runtimes=RUNTIMES, limit=PROBES)
 
 
-def told(subject: Subject, found: Agreement, values: FloatArray) -> Iterator[Answer]:
+def agreement_answers(
+    subject: Subject, found: Agreement, values: FloatArray
+) -> Iterator[Answer]:
     """Yield the answers that a check gives: each disagreement, and the rest in short.
 
     Args:
@@ -219,7 +221,9 @@ def _certified(
     if one.on == "data" and one.rows:
         noun = "rows" if subject.rows is not None else "points"
         text = f"{name}: the class is open on {one.in_band} of {one.rows} {noun}"
-        seen = share(f"{noun} within the band of {name}", one.in_band, one.rows, how)
+        seen = sampled_share(
+            f"{noun} within the band of {name}", one.in_band, one.rows, how
+        )
         yield Answer("FT601", f"{name}, its band", text, seen, is_finding=False)
 
 

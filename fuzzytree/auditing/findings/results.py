@@ -12,7 +12,7 @@ import msgspec
 from msgspec import inspect
 
 from fuzzytree.auditing.findings.locations import writable
-from fuzzytree.auditing.findings.records import Audit, Result, Source, digest_of
+from fuzzytree.auditing.findings.records import Audit, SourceFile, VerbResult, digest_of
 from fuzzytree.checking.stability.results import Stability
 from fuzzytree.errors import ReadError
 from fuzzytree.files import PathLike, read_bounded
@@ -26,7 +26,7 @@ _KINDS: dict[str, type[Agreement] | type[Stability]] = {
 }
 
 
-class Given(NamedTuple):
+class LoadedResult(NamedTuple):
     """A result that a user gave.
 
     Attributes:
@@ -34,18 +34,20 @@ class Given(NamedTuple):
         found: All of it.
     """
 
-    result: Result
+    result: VerbResult
     found: Agreement | Stability
 
 
-def with_results(audit: Audit, given: Iterable[Given]) -> Audit:
+def with_results(audit: Audit, given: Iterable[LoadedResult]) -> Audit:
     """Return an audit that names the results that it is read beside."""
     results = tuple(one.result for one in given)
     told = msgspec.structs.replace(audit, results=results)
     return msgspec.structs.replace(told, digest=digest_of(told))
 
 
-def read_results(paths: Iterable[PathLike], model: Document) -> tuple[Given, ...]:
+def read_results(
+    paths: Iterable[PathLike], model: Document
+) -> tuple[LoadedResult, ...]:
     """Return what `fuzzytree check --json` and `stability --json` wrote of a model.
 
     Args:
@@ -56,7 +58,7 @@ def read_results(paths: Iterable[PathLike], model: Document) -> tuple[Given, ...
         ReadError: If a file is none of these, was changed by hand, is about another
             model or of another version, or another one is of the same verb.
     """
-    found: dict[str, Given] = {}
+    found: dict[str, LoadedResult] = {}
     for path in paths:
         one = _read(path, model)
         verb = one.result.verb
@@ -69,7 +71,7 @@ def read_results(paths: Iterable[PathLike], model: Document) -> tuple[Given, ...
     return tuple(found.values())
 
 
-def _read(path: PathLike, model: Document) -> Given:
+def _read(path: PathLike, model: Document) -> LoadedResult:
     """Return one result.
 
     Raises:
@@ -78,7 +80,9 @@ def _read(path: PathLike, model: Document) -> Given:
     name = os.fspath(path)
     content = read_bounded(path, _MOST_BYTES)
     found = _decoded(content, name)
-    result = _result(found, Source(writable(name), hashlib.sha256(content).hexdigest()))
+    result = _result(
+        found, SourceFile(writable(name), hashlib.sha256(content).hexdigest())
+    )
     wanted = fingerprint(model)
     if found.fingerprint != wanted:
         raise ReadError(
@@ -86,16 +90,16 @@ def _read(path: PathLike, model: Document) -> Given:
             f"{found.fingerprint[:12]}..., and that of {model.name[:60]!r} is "
             f"{wanted[:12]}...; run `fuzzytree {result.verb}` again"
         )
-    return Given(result, found)
+    return LoadedResult(result, found)
 
 
-def _result(found: Agreement | Stability, file: Source) -> Result:
+def _result(found: Agreement | Stability, file: SourceFile) -> VerbResult:
     """Return what an audit tells of a result."""
     if isinstance(found, Stability):
         verdicts = [one.verdict for one in found.criteria]
-        return Result("stability", file, len(verdicts), verdicts.count("FAILS"))
+        return VerbResult("stability", file, len(verdicts), verdicts.count("FAILS"))
     count = len(found.comparisons) + len(found.certificates)
-    return Result("check", file, count, len(found.wrong))
+    return VerbResult("check", file, count, len(found.wrong))
 
 
 def _decoded(content: bytes, name: str) -> Agreement | Stability:

@@ -42,11 +42,11 @@ from fuzzytree.auditing.engine.states import (
     percent,
 )
 from fuzzytree.auditing.engine.witnesses import is_within
-from fuzzytree.auditing.findings.leaves import too_many
+from fuzzytree.auditing.findings.leaves import too_many_boxes
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.rows import (
     OF_RANGES,
-    Points,
+    DomainRows,
     distance_measure,
     narrowed_state,
     not_asked,
@@ -297,7 +297,7 @@ def _declined(subject: Subject) -> Declined | None:
         return Declined("FTD07", why)
     if not subject.is_whole:
         return Declined("FTD07", "rules are left out that may decide")
-    return None if subject.tree is None else too_many(regions(subject.tree))
+    return None if subject.tree is None else too_many_boxes(regions(subject.tree))
 
 
 def _point(subject: Subject, row: Mapping[str, float]) -> dict[str, Fraction]:
@@ -427,7 +427,7 @@ class _Asked(NamedTuple):
     is_aside: bool
 
 
-def _in_all(points: Points, asked: Sequence[_Asked]) -> Answer:
+def _in_all(points: DomainRows, asked: Sequence[_Asked]) -> Answer:
     """Return an answer about all rows together; `asked` is in order of their radius."""
     count = Measure("rows asked", len(asked))
     if not asked:

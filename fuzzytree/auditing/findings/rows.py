@@ -23,7 +23,7 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.findings.records import Answer, Measure
-from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model.rulebase import Variable
 from fuzzytree.numerics.exact import outwards
 from fuzzytree.numerics.oracle import decide
@@ -34,7 +34,7 @@ OF_RANGES = "of each input's range"
 _MOST_DIGITS = 80  # of an exact number beside a double
 
 
-class Points(msgspec.Struct, frozen=True, eq=False):
+class DomainRows(msgspec.Struct, frozen=True, eq=False):
     """Rows that lie in the domain.
 
     Attributes:
@@ -58,7 +58,7 @@ class Points(msgspec.Struct, frozen=True, eq=False):
         return text
 
 
-def points_of(subject: Subject, rows: Rows) -> Points:
+def points_of(subject: Subject, rows: AuditRows) -> DomainRows:
     """Return the user's rows as points of the domain, close calls first.
 
     A call is close where the margin of the rules is small: there another decision tends
@@ -84,7 +84,7 @@ def points_of(subject: Subject, rows: Rows) -> Points:
         for number, point in complete
         if contains(subject.domain, subject.rules.variables, point)
     )
-    return Points(at, len(seen) - len(at), total)
+    return DomainRows(at, len(seen) - len(at), total)
 
 
 def distance_measure(name: str, value: Fraction) -> Measure:
@@ -102,9 +102,9 @@ def distance_measure(name: str, value: Fraction) -> Measure:
     return Measure(f"{name}, in ranges", outwards(value)[0])
 
 
-def ranked(
+def rank_by_distance(
     gaps: Sequence[Answer],
-    rows: Rows,
+    rows: AuditRows,
     domain: Domain,
     inputs: Sequence[str],
     variables: Sequence[Variable] = (),
@@ -128,8 +128,8 @@ def ranked(
         >>> box = Domain((Side("x", 0.0, 4.0),))
         >>> where = (Span("x", 3.0, 4.0),)
         >>> gap = Answer("FT301", "gap", "", Proved(""), True, region=where)
-        >>> rows = Rows("rows", np.array([[0.0, 1.0]]))
-        >>> ranked([gap], rows, box, ["x"])[0].measures[0].exact
+        >>> rows = AuditRows("rows", np.array([[0.0, 1.0]]))
+        >>> rank_by_distance([gap], rows, box, ["x"])[0].measures[0].exact
         '1/2'
     """
     known: list[tuple[Fraction, int, Answer]] = []
@@ -179,7 +179,7 @@ def _part(
 
 
 def _nearest_to_part(
-    part: Polytope, rows: Rows, domain: Domain, inputs: Sequence[str]
+    part: Polytope, rows: AuditRows, domain: Domain, inputs: Sequence[str]
 ) -> tuple[Fraction, int] | None:
     """Return how near a row is to a part of the inputs, at least, and which is it."""
     asked = Polytopes(domain, inputs, [part])
@@ -209,7 +209,7 @@ def _spans(gap: Answer, inputs: Sequence[str]) -> tuple[Span, ...]:
 
 
 def _nearest_row(
-    spans: Sequence[Span], rows: Rows, domain: Domain, inputs: Sequence[str]
+    spans: Sequence[Span], rows: AuditRows, domain: Domain, inputs: Sequence[str]
 ) -> tuple[Fraction, int] | None:
     """Return the least distance of a row from a box, and the row's number."""
     column = {name: place for place, name in enumerate(inputs)}

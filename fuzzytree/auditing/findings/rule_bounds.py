@@ -21,14 +21,14 @@ import msgspec
 
 from fuzzytree.auditing.engine.states import Bracket, State, Witness
 from fuzzytree.auditing.findings.curve_bounds import (
-    Enclosed,
+    CurveBounds,
+    Interval,
     Name,
-    Range,
     Side,
+    as_points,
     complement,
     gap,
-    pointed,
-    scaled,
+    scale,
 )
 from fuzzytree.model.rulebase import (
     Clause,
@@ -43,7 +43,7 @@ from fuzzytree.model.rulebase import (
 from fuzzytree.numerics.exact import outwards
 
 
-class Held(msgspec.Struct, frozen=True, eq=False, dict=True):
+class BoundedRules(msgspec.Struct, frozen=True, eq=False, dict=True):
     """Rules from below and from above.
 
     Attributes:
@@ -56,7 +56,7 @@ class Held(msgspec.Struct, frozen=True, eq=False, dict=True):
 
     lower: RuleBase
     upper: RuleBase
-    terms: Mapping[Name, Enclosed]
+    terms: Mapping[Name, CurveBounds]
     rules: frozenset[int]
     gap: float
 
@@ -109,12 +109,12 @@ class Held(msgspec.Struct, frozen=True, eq=False, dict=True):
         return msgspec.structs.replace(state, claims=claims)
 
 
-def held(
+def bounded_rules(
     rules: RuleBase,
     weights: Sequence[float],
-    terms: Mapping[Name, Enclosed],
-    ranges: Mapping[str, Range | None],
-) -> Held | None:
+    terms: Mapping[Name, CurveBounds],
+    ranges: Mapping[str, Interval | None],
+) -> BoundedRules | None:
     """Return rules from below and from above; None if they are plain.
 
     Args:
@@ -140,7 +140,7 @@ def held(
     ]
     known = {name for of in asked for name in of} & inexact
     apart = (gap(made.terms[one], of) for one in known if (of := ranges[one[0]]))
-    return Held(
+    return BoundedRules(
         msgspec.structs.replace(rules, rules=own, variables=made.variables("lower")),
         msgspec.structs.replace(rules, rules=own, variables=made.variables("upper")),
         made.terms,
@@ -155,8 +155,8 @@ class _Made:
     def __init__(
         self,
         rules: RuleBase,
-        terms: Mapping[Name, Enclosed],
-        ranges: Mapping[str, Range | None],
+        terms: Mapping[Name, CurveBounds],
+        ranges: Mapping[str, Interval | None],
     ) -> None:
         self.rules, self.ranges = rules, ranges
         self.is_product = rules.semantics.conjunction == "product"
@@ -194,7 +194,7 @@ class _Made:
             text = f"{term} x {weight!r}"
             if clause.negated:
                 one, text = complement(one) or one, f"not {text}"
-            found = scaled(one, weight)
+            found = scale(one, weight)
             assert found is not None  # of points
             made.append(self._named(text, clause.variable, found))
         if clause.negated:
@@ -202,12 +202,12 @@ class _Made:
         else:
             yield Clause(clause.variable, tuple(made))
 
-    def _points(self, variable: str, term: str) -> Enclosed:
+    def _points(self, variable: str, term: str) -> CurveBounds:
         """Return a term as points, between two lines if need be."""
         known = self.terms.get((variable, term))
         if known is not None:
             return known
-        found = pointed(self.plain[variable, term], self.ranges[variable])
+        found = as_points(self.plain[variable, term], self.ranges[variable])
         if found is None:
             raise ValueError(f"the curve of {term!r} of {variable!r} has no points")
         return found
@@ -219,10 +219,10 @@ class _Made:
         if not names:
             raise ValueError("there is no input that a weight could be laid upon")
         line = Points((0.0,), (weight,))
-        found = Enclosed(line, line, (line,))
+        found = CurveBounds(line, line, (line,))
         return Clause(names[0], (self._named(f"x {weight!r}", names[0], found),))
 
-    def _named(self, text: str, variable: str, one: Enclosed) -> str:
+    def _named(self, text: str, variable: str, one: CurveBounds) -> str:
         """Return the name of a term that is made, kept once."""
         while self.terms.get((variable, text), one) != one or (
             (variable, text) in self.plain and (variable, text) not in self.terms

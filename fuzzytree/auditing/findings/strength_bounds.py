@@ -31,7 +31,7 @@ from fuzzytree.auditing.engine.factors import Distance, distance
 from fuzzytree.auditing.engine.joint_maximum import Meeting, highest, meet
 from fuzzytree.auditing.engine.measures import Bounds
 from fuzzytree.auditing.engine.states import Bracket, Claim, Proved, State, Witness
-from fuzzytree.auditing.findings.rule_bounds import Held
+from fuzzytree.auditing.findings.rule_bounds import BoundedRules
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import (
     Clause,
@@ -61,22 +61,22 @@ _ROUNDING: Final = 1e-9
 """What differences of degrees in doubles may be off by, and far more."""
 
 
-class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
+class StrengthBounds(msgspec.Struct, frozen=True, eq=False, dict=True):
     """Rules from below and from above, on a box.
 
     Attributes:
         lower: The rules, none of which is stronger than in truth.
         upper: The rules, none of which is weaker.
-        held: What is held between lines, None if nothing is.
+        bounds: The rule bases, None if nothing is.
     """
 
     lower: Ground
     upper: Ground
-    held: Held | None = None
+    bounds: BoundedRules | None = None
 
-    def is_held(self, *numbers: int) -> bool:
+    def is_inexact(self, *numbers: int) -> bool:
         """Return whether one of some rules is not known exactly."""
-        return self.held is not None and not self.held.rules.isdisjoint(numbers)
+        return self.bounds is not None and not self.bounds.rules.isdisjoint(numbers)
 
     @functools.cached_property
     def from_below(self) -> Compared:
@@ -101,20 +101,20 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
     def firing(self, number: int, clock: Clock) -> State:
         """Return whether a rule fires anywhere; see `wins`."""
         found = wins(self.lower, number, (), clock)
-        if self.held is None or not self.is_held(number):
+        if self.bounds is None or not self.is_inexact(number):
             return found
         if isinstance(found, Witness):
-            return self.held.certified(found)
+            return self.bounds.certified(found)
         most = wins(self.upper, number, (), clock)
         if isinstance(most, Proved):
             return most
         # Where the lower strength is 0, a clause is, and its gap bounds the upper one.
-        high = self.held.gap if isinstance(found, Proved) else 1.0
-        return Bracket(f"the strength of rule {number}", 0.0, high, self.held.why)
+        high = self.bounds.gap if isinstance(found, Proved) else 1.0
+        return Bracket(f"the strength of rule {number}", 0.0, high, self.bounds.why)
 
     def never_weaker(self, strong: int, weak: int) -> Verdict:
         """Return whether a rule is nowhere weaker than another one."""
-        if not self.is_held(strong, weak):
+        if not self.is_inexact(strong, weak):
             return self.from_below.never_weaker(strong, weak)
         if self._pair(strong, weak).never_weaker(1, 2) == "always":
             return "always"
@@ -152,11 +152,11 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
 
         Under the product they must do so as often: `v b` is not below `v v a`.
         """
-        assert self.held is not None
+        assert self.bounds is not None
         if self.is_product:
             return rule.when.count(clause) <= others.count(clause)
-        mine, weight, _ = self.held.asked(clause)
-        found = map(self.held.asked, others)
+        mine, weight, _ = self.bounds.asked(clause)
+        found = map(self.bounds.asked, others)
         return any(theirs == mine and most <= weight for theirs, _, most in found)
 
     def distance(self, one: int, other: int, most: Fraction) -> Distance | None:
@@ -164,7 +164,7 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
 
         Of rules that are held it is known only if they ask the same.
         """
-        if self.is_held(one, other) and self._keys[one - 1] != self._keys[other - 1]:
+        if self.is_inexact(one, other) and self._keys[one - 1] != self._keys[other - 1]:
             return None
         return distance(self.from_below.factored, one - 1, other - 1, most)
 
@@ -174,7 +174,7 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
         That is so only of rules that are held.
         """
         limit = float(most) + _ROUNDING
-        return self.is_held(one, other) and not any(
+        return self.is_inexact(one, other) and not any(
             bool((low[a - 1] - high[b - 1] > limit).any())
             for low, high in self._degrees
             for a, b in ((one, other), (other, one))
@@ -183,7 +183,7 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
     @functools.cached_property
     def _keys(self) -> tuple[tuple[object, ...], ...]:
         count = len(self.lower.rules.rules)
-        return tuple(self.held.key(n) for n in range(1, count + 1) if self.held)
+        return tuple(self.bounds.key(n) for n in range(1, count + 1) if self.bounds)
 
     @functools.cached_property
     def _degrees(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
@@ -206,31 +206,31 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
     def uncovered(self, clock: Clock) -> State:
         """Return whether every rule is somewhere exactly 0; see `cover`."""
         found = uncovered(self.upper, clock)
-        if self.held is None or isinstance(found, Witness):
+        if self.bounds is None or isinstance(found, Witness):
             return found
         least = uncovered(self.lower, clock)
         if isinstance(least, Proved):
             return least
-        return Bracket("how many rules fire at least", 0.0, 1.0, self.held.why)
+        return Bracket("how many rules fire at least", 0.0, 1.0, self.bounds.why)
 
     def below(self, epsilon: Fraction, clock: Clock) -> State:
         """Return whether all rules are somewhere weaker than a level; see `cover`."""
         found = below(self.lower, epsilon, clock)
-        if self.held is None or isinstance(found, Proved):
+        if self.bounds is None or isinstance(found, Proved):
             return found
         most = below(self.upper, epsilon, clock)
         if isinstance(most, Witness):
             return most
         least = self.least_cover(clock)
-        return Bracket(least.of, least.low, least.high, self.held.why)
+        return Bracket(least.of, least.low, least.high, self.bounds.why)
 
     def least_cover(self, clock: Clock) -> Bracket:
         """Return bounds of the least strength that the strongest rule has anywhere."""
         found = least_cover(self.lower, clock)
-        if self.held is None:
+        if self.bounds is None:
             return found
         high = least_cover(self.upper, clock).high
-        return Bracket(found.of, found.low, max(high, found.low), self.held.why)
+        return Bracket(found.of, found.low, max(high, found.low), self.bounds.why)
 
     def highest(self, one: int) -> FloatArray:
         """Return bounds of the levels that a rule reaches with each other one."""
@@ -239,12 +239,12 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
     def meet(self, one: int, other: int, level: Fraction, clock: Clock) -> Meeting:
         """Return the highest level that two rules reach at one point; see `meeting`."""
         found = meet(self.from_below, one, other, level, clock)
-        if self.held is None or not self.is_held(one, other):
+        if self.bounds is None or not self.is_inexact(one, other):
             return found
         above = meet(self.from_above, one, other, level, clock)
         most = above.level.high
         if isinstance(found.state, Witness):
-            state = self.held.certified(found.state)
+            state = self.bounds.certified(found.state)
             return Meeting(Bounds(found.level.low, max(most, found.level.low)), state)
         if most < level or isinstance(above.state, Proved):
             state = above.state
@@ -252,26 +252,26 @@ class Sides(msgspec.Struct, frozen=True, eq=False, dict=True):
                 state = replace(state, low=0.0, point=(), claims=())
             return Meeting(Bounds(Fraction(0), most), state, above.is_touch)
         # What is reached nearly is told, with its point.
-        easier = max(level - 4 * Fraction(self.held.gap), Fraction(0))
+        easier = max(level - 4 * Fraction(self.bounds.gap), Fraction(0))
         near = meet(self.from_below, one, other, easier, clock)
         low = near.level.low if isinstance(near.state, Witness) else Fraction(0)
         name = f"the highest level that rules {one} and {other} both reach"
         ends = outwards(low)[0], outwards(most)[1]
-        state = Bracket(name, *ends, self.held.why)
+        state = Bracket(name, *ends, self.bounds.why)
         if isinstance(near.state, Witness):
             claim = Claim("reaches", rules=(one, other), level=str(Fraction(ends[0])))
             state = replace(state, point=near.state.point, claims=(claim,))
         return Meeting(Bounds(low, most), state)
 
 
-def sides_of(subject: Subject) -> Sides:
+def strength_bounds(subject: Subject) -> StrengthBounds:
     """Return a subject's rules from below and from above, on its domain."""
-    if subject.held is None:
+    if subject.bounds is None:
         given = ground(subject.rules, subject.domain)
-        return Sides(given, given)
-    lower, upper = subject.held.lower, subject.held.upper
-    return Sides(
-        ground(lower, subject.domain), ground(upper, subject.domain), subject.held
+        return StrengthBounds(given, given)
+    lower, upper = subject.bounds.lower, subject.bounds.upper
+    return StrengthBounds(
+        ground(lower, subject.domain), ground(upper, subject.domain), subject.bounds
     )
 
 

@@ -10,8 +10,13 @@ import msgspec
 from fuzzytree.auditing.engine.clock import Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, counted
-from fuzzytree.auditing.findings.records import Answer, Policy, Settings, Source
-from fuzzytree.auditing.findings.rule_bounds import Held
+from fuzzytree.auditing.findings.records import (
+    Answer,
+    AuditSettings,
+    Policy,
+    SourceFile,
+)
+from fuzzytree.auditing.findings.rule_bounds import BoundedRules
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import RuleBase
 from fuzzytree.model.system import FuzzySystem
@@ -19,11 +24,11 @@ from fuzzytree.model.tree import FuzzyTree
 
 if TYPE_CHECKING:
     from fuzzytree.auditing.findings.locations import ModelFile
-    from fuzzytree.auditing.findings.results import Given
+    from fuzzytree.auditing.findings.results import LoadedResult
     from fuzzytree.model.contracts import FloatArray, IntArray
 
 
-class Rows(msgspec.Struct, frozen=True, eq=False):
+class AuditRows(msgspec.Struct, frozen=True, eq=False):
     """Rows of a table.
 
     Attributes:
@@ -51,9 +56,9 @@ class Material(msgspec.Struct, frozen=True, eq=False):
 
     model: Document
     file: ModelFile | None = None
-    rows: Rows | None = None
-    data: Source | None = None
-    given: tuple[Given, ...] = ()
+    rows: AuditRows | None = None
+    data: SourceFile | None = None
+    given: tuple[LoadedResult, ...] = ()
 
 
 class Subject(msgspec.Struct, frozen=True, eq=False):
@@ -70,32 +75,32 @@ class Subject(msgspec.Struct, frozen=True, eq=False):
         raw: The tree's raw rules, if it has fitted sets.
         system: The system that the rules are a view of.
         rows: The user's rows.
-        places: Texts such as `rule 2 of block 1` for the rules of a system, one for
+        rule_names: Texts such as `rule 2 of block 1` for the rules of a system, one for
             each rule; empty where rules are simply numbered.
         declined: What the view could not take over, as answers.
         is_whole: Whether no rule is left out of the view that may fire. Otherwise what
             no rule of it covers may be covered all the same, and a term that no rule of
             it asks may be asked.
-        held: The rules from below and from above; None if they are as they stand here.
+        bounds: Lower and upper rules; None if the rules are exact as they stand here.
     """
 
     rules: RuleBase
     policy: Policy
     domain: Domain
-    settings: Settings
+    settings: AuditSettings
     clock: Clock
     tree: FuzzyTree | None = None
     raw: RuleBase | None = None
     system: FuzzySystem | None = None
-    rows: Rows | None = None
-    places: tuple[str, ...] = ()
+    rows: AuditRows | None = None
+    rule_names: tuple[str, ...] = ()
     declined: tuple[Answer, ...] = ()
     is_whole: bool = True
-    held: Held | None = None
+    bounds: BoundedRules | None = None
 
     def rule_name(self, number: int) -> str:
         """Return what messages call a rule."""
-        return self.places[number - 1] if self.places else f"rule {number}"
+        return self.rule_names[number - 1] if self.rule_names else f"rule {number}"
 
 
 _MOST: Final = 0.25  # of the time that is left, for one question
@@ -104,7 +109,7 @@ _FAIR: Final = 4.0  # times as much as its own share may one of many take
 _Found = TypeVar("_Found")
 
 
-class Turns:
+class TimeSlices:
     """Questions that are asked one after another.
 
     Args:

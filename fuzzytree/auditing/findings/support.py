@@ -18,7 +18,7 @@ import numpy as np
 from fuzzytree.auditing.engine.domain import Domain
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings.records import Answer, Measure
-from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model.rulebase import Clause, RuleBase, shapes_of
 from fuzzytree.numerics.enclosures import (
     Enclosure,
@@ -83,7 +83,7 @@ def wilson(hits: int, rows: int, confidence: float = CONFIDENCE) -> tuple[float,
     return low, 1.0 if hits == rows else min(middle + half, 1.0)
 
 
-def share(
+def sampled_share(
     of: str, hits: int, rows: int, how: str, confidence: float = CONFIDENCE
 ) -> Sampled:
     """Return a share that was counted in a sample, with its interval.
@@ -101,7 +101,7 @@ def share(
     return Sampled(of, hits, rows, *wilson(hits, rows, confidence), confidence, how)
 
 
-def drawn(rules: RuleBase, domain: Domain, rows: int, seed: int) -> FloatArray:
+def sample_points(rules: RuleBase, domain: Domain, rows: int, seed: int) -> FloatArray:
     """Return points drawn evenly from a domain.
 
     Args:
@@ -128,10 +128,10 @@ def drawn(rules: RuleBase, domain: Domain, rows: int, seed: int) -> FloatArray:
         table[position] = np.clip(
             side.low * (1.0 - u) + side.high * u, side.low, side.high
         )
-    return table[:, ~outside(rules, domain, table)]
+    return table[:, ~rows_outside(rules, domain, table)]
 
 
-def outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
+def rows_outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
     """Return which rows have a finite value beyond a side; combinations exactly."""
     beyond: BoolArray = np.zeros(values.shape[1], np.bool_)
     known = np.isfinite(values).all(axis=0)
@@ -149,7 +149,7 @@ def outside(rules: RuleBase, domain: Domain, values: FloatArray) -> BoolArray:
     return beyond
 
 
-class Counted(msgspec.Struct, frozen=True, eq=False):
+class RuleCounts(msgspec.Struct, frozen=True, eq=False):
     """What the rules say about some rows.
 
     Attributes:
@@ -182,9 +182,9 @@ class Counted(msgspec.Struct, frozen=True, eq=False):
         return self.rows - self.missing
 
 
-def counted(
+def count_rows(
     subject: Subject, values: FloatArray, codes: IntArray | None = None
-) -> Counted:
+) -> RuleCounts:
     """Count what the rules say about some rows.
 
     Args:
@@ -219,12 +219,12 @@ def counted(
         totals["weak"] += int((is_known & is_weak).sum())
         totals["tied"] += int((is_covered & (margin == 0.0)).sum())
         totals["close"] += int((is_covered & (margin <= settings.margin)).sum())
-    return Counted(
+    return RuleCounts(
         rows=values.shape[1],
         fired=fired,
         won=won,
         right=None if codes is None else right,
-        outside=int(outside(rules, subject.domain, values).sum()),
+        outside=int(rows_outside(rules, subject.domain, values).sum()),
         **totals,
     )
 
@@ -300,7 +300,7 @@ def answers(subject: Subject) -> Iterator[Answer]:
     yield from _of_domain(subject)
 
 
-def _of_rows(subject: Subject, rows: Rows) -> Iterator[Answer]:
+def _of_rows(subject: Subject, rows: AuditRows) -> Iterator[Answer]:
     """Yield what the user's rows say, of all rules together and of each."""
     codes = None if subject.system else rows.codes  # a view has classes of its own
     found, most = _both(subject, rows.values, codes)
@@ -310,7 +310,7 @@ def _of_rows(subject: Subject, rows: Rows) -> Iterator[Answer]:
         ("rows with a missing value", found.missing, "a value is missing"),
         ("rows outside the domain", found.outside, "a value is outside the domain"),
     ):
-        state = share(name, hits, total, how)
+        state = sampled_share(name, hits, total, how)
         sentence = f"on {hits} of {total} rows {text}"
         yield Answer("FT701", name, sentence, state, is_finding=hits > 0)
     if not found.known:
@@ -333,7 +333,7 @@ def _of_domain(subject: Subject) -> Iterator[Answer]:
     settings = subject.settings
     clauses = sum(len(rule.when) for rule in subject.rules.rules)
     rows = min(settings.rows, max(_MOST_DEGREES // max(clauses, 1), _LEAST_ROWS))
-    points = drawn(subject.rules, subject.domain, rows, settings.seed)
+    points = sample_points(subject.rules, subject.domain, rows, settings.seed)
     if not points.shape[1]:
         reason = "no drawn point lies within the sides of the combinations"
         text = f"shares of the domain are not known: {reason}"
@@ -347,19 +347,21 @@ def _of_domain(subject: Subject) -> Iterator[Answer]:
 
 def _both(
     subject: Subject, values: FloatArray, codes: IntArray | None = None
-) -> tuple[Counted, Counted]:
+) -> tuple[RuleCounts, RuleCounts]:
     """Count what the rules say from below, and from above; see `counted`."""
-    if subject.held is None:
-        found = counted(subject, values, codes)
+    if subject.bounds is None:
+        found = count_rows(subject, values, codes)
         return found, found
     lower, upper = (
         msgspec.structs.replace(subject, rules=rules)
-        for rules in (subject.held.lower, subject.held.upper)
+        for rules in (subject.bounds.lower, subject.bounds.upper)
     )
-    return counted(lower, values, codes), counted(upper, values, codes)
+    return count_rows(lower, values, codes), count_rows(upper, values, codes)
 
 
-def _nearly_fired(subject: Subject, found: Counted, number: int, most: int) -> Answer:
+def _nearly_fired(
+    subject: Subject, found: RuleCounts, number: int, most: int
+) -> Answer:
     """Return on how many rows a rule fires, as far as its curves are known."""
     name, least = subject.rule_name(number), int(found.fired[number - 1])
     reason = f"it fires on {least} of {found.known} at least, and on {most} at most"
@@ -368,7 +370,7 @@ def _nearly_fired(subject: Subject, found: Counted, number: int, most: int) -> A
 
 
 def _shares(
-    subject: Subject, counts: tuple[Counted, Counted], noun: str, how: str
+    subject: Subject, counts: tuple[RuleCounts, RuleCounts], noun: str, how: str
 ) -> Iterator[Answer]:
     """Yield in which share of some rows or points the rules are weak or undecided."""
     found, most = counts
@@ -398,30 +400,30 @@ def _shares(
             ("close", found.close, margin),
         ]
     for name, hits, text in questions:
-        state = share(f"{name} {noun}", hits, total, how)
+        state = sampled_share(f"{name} {noun}", hits, total, how)
         sentence = f"on {hits} of {total} {noun} {text}"
         yield Answer("FT701", f"{name} {noun}", sentence, state, is_finding=False)
 
 
-def _of_rule(subject: Subject, found: Counted, number: int, how: str) -> Answer:
+def _of_rule(subject: Subject, found: RuleCounts, number: int, how: str) -> Answer:
     """Return on how many rows a rule fires, how many it wins, and how many rightly."""
     name, total = subject.rule_name(number), found.known
     fired, won = int(found.fired[number - 1]), int(found.won[number - 1])
     label = subject.rules.rules[number - 1].then
     sentence = f"{name} fires on {fired or 'none'} of {total} rows"
     measures = [Measure("rows fired", fired)]
-    state = share(f"rows on which {name} fires", fired, total, how)
+    state = sampled_share(f"rows on which {name} fires", fired, total, how)
     is_finding = not fired
     if subject.policy.decision == "strongest":
         is_finding = not won
         measures.append(Measure("rows won", won))
-        state = share(f"rows that {name} wins", won, total, how)
+        state = sampled_share(f"rows that {name} wins", won, total, how)
         sentence += f" and wins {won or 'none'}" if fired else ""
         if found.right is not None and won:
             right = int(found.right[number - 1])
             measures.append(Measure("rows won rightly", right))
             of = f"rows that {name} wins and that have its class"
-            state = share(of, right, won, f"of {how}, those that it wins")
+            state = sampled_share(of, right, won, f"of {how}, those that it wins")
             sentence += f"; {right} of these have its class {label!r}"
     return Answer(
         "FT701",

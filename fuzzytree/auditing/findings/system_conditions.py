@@ -17,16 +17,16 @@ from typing import Final, Literal, NoReturn
 from fuzzytree.auditing.engine.domain import Domain, span
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.curve_bounds import (
-    Enclosed,
+    CurveBounds,
+    Interval,
     Name,
-    Range,
-    enclosed,
+    as_points,
+    curve_bounds,
     gap,
-    hedged,
-    pointed,
-    scaled,
+    hedged_bounds,
+    scale,
 )
-from fuzzytree.auditing.findings.records import Answer, Label
+from fuzzytree.auditing.findings.records import Answer, TermName
 from fuzzytree.model.rulebase import (
     Clause,
     Conjunction,
@@ -52,41 +52,41 @@ from fuzzytree.model.system import Label as SystemLabel
 from fuzzytree.semantics.conversion.points import shape_of
 
 
-class Terms:
+class SystemTerms:
     """The terms of each input.
 
     Args:
         plain: Those with an exact shape, by variable and name.
-        held: Those between two lines.
+        bounds: Those between two lines.
         ranges: The values of each input, as far as they are known.
 
     Attributes:
         plain: As given.
-        held: As given.
+        bounds: As given.
         made: Hedged terms that conditions ask, by variable and a name of their own.
     """
 
     def __init__(
         self,
         plain: Mapping[str, Mapping[str, Shape]],
-        held: Mapping[Name, Enclosed] | None = None,
-        ranges: Mapping[str, Range | None] | None = None,
+        bounds: Mapping[Name, CurveBounds] | None = None,
+        ranges: Mapping[str, Interval | None] | None = None,
     ) -> None:
         self.plain = plain
-        self.held = held or {}
+        self.bounds = bounds or {}
         self.ranges = ranges or {}
-        self.made: dict[Name, Enclosed] = {}
+        self.made: dict[Name, CurveBounds] = {}
 
     def knows(self, variable: str, term: str) -> bool:
         """Return whether rules can ask a term."""
-        return term in self.plain[variable] or (variable, term) in self.held
+        return term in self.plain[variable] or (variable, term) in self.bounds
 
-    def pointed(self, variable: str, term: str) -> Enclosed | None:
+    def pointed(self, variable: str, term: str) -> CurveBounds | None:
         """Return a term between lines of points, or as points; None if it has none."""
-        known = {**self.held, **self.made}.get((variable, term))
+        known = {**self.bounds, **self.made}.get((variable, term))
         if known is not None:
             return known
-        return pointed(self.plain[variable][term], self.ranges.get(variable))
+        return as_points(self.plain[variable][term], self.ranges.get(variable))
 
     def hedged(self, variable: str, term: str, hedges: Sequence[Hedge]) -> str | None:
         """Return the name of a hedged term, which rules can then ask.
@@ -96,7 +96,7 @@ class Terms:
         """
         found = self.pointed(variable, term)
         for hedge in reversed(hedges):
-            found = found and hedged(found, hedge)
+            found = found and hedged_bounds(found, hedge)
         if found is None:
             return None
         name = " ".join((*hedges, term))
@@ -111,16 +111,16 @@ class Terms:
     def variable(self, one: SystemInput) -> Variable:
         """Return an input as a variable; what is held is there as its lower line."""
         shapes = {**self.plain[one.name]}
-        for (variable, term), found in {**self.held, **self.made}.items():
+        for (variable, term), found in {**self.bounds, **self.made}.items():
             if variable == one.name:
                 shapes[term] = found.lower
         terms = tuple(Term(name, shape) for name, shape in shapes.items())
         return Variable(one.name, terms, one.unit, one.low, one.high, one.parts)
 
 
-def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Range | None]:
+def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Interval | None]:
     """Return the values of each input on a domain, None where they are not known."""
-    found: dict[str, Range | None] = {}
+    found: dict[str, Interval | None] = {}
     for one in system.inputs:
         needed = [part.input for part in one.parts] or [one.name]
         found[one.name] = None
@@ -131,8 +131,8 @@ def ranges_of(system: FuzzySystem, domain: Domain) -> dict[str, Range | None]:
 
 
 def terms_of(
-    system: FuzzySystem, ranges: Mapping[str, Range | None]
-) -> tuple[Terms, tuple[Answer, ...]]:
+    system: FuzzySystem, ranges: Mapping[str, Interval | None]
+) -> tuple[SystemTerms, tuple[Answer, ...]]:
     """Return the terms of a system's inputs, and what is to be said of some.
 
     Args:
@@ -140,7 +140,7 @@ def terms_of(
         ranges: The values of each input.
     """
     plain: dict[str, dict[str, Shape]] = {}
-    held: dict[Name, Enclosed] = {}
+    bounds: dict[Name, CurveBounds] = {}
     answers: list[Answer] = []
     asking = Counter(
         key
@@ -157,13 +157,13 @@ def terms_of(
                 continue
             found = None if is_moved else _between(label, ranges[one.name])
             if found is not None:
-                held[one.name, label.name] = found
+                bounds[one.name, label.name] = found
             count = asking[one.name, label.name]
             few = {0: "no rule asks", 1: "1 rule asks"}
             asks = few.get(count, f"{count} rules ask")
             told = _told(one, label, found, ranges[one.name])
             answers.append(_answer(one, label, told, f"{asks} for it"))
-    return Terms(plain, held, ranges), tuple(answers)
+    return SystemTerms(plain, bounds, ranges), tuple(answers)
 
 
 def _shape(label: SystemLabel) -> Shape | None:
@@ -173,20 +173,20 @@ def _shape(label: SystemLabel) -> Shape | None:
         return None if shape is None or any(shape_mistakes(shape)) else shape
     if not isinstance(shape, Points):
         return None
-    found = scaled(Enclosed(shape, shape, (shape,)), label.height)
+    found = scale(CurveBounds(shape, shape, (shape,)), label.height)
     return found.lower if found is not None and found.is_exact else None
 
 
-def _between(label: SystemLabel, of: Range | None) -> Enclosed | None:
+def _between(label: SystemLabel, of: Interval | None) -> CurveBounds | None:
     shape = shape_of(label.curve)
     if shape is not None and any(shape_mistakes(shape)):
         return None
-    found = enclosed(label.curve, of)
-    return found and (found if label.height == 1.0 else scaled(found, label.height))
+    found = curve_bounds(label.curve, of)
+    return found and (found if label.height == 1.0 else scale(found, label.height))
 
 
 def _told(
-    one: SystemInput, label: SystemLabel, found: Enclosed | None, of: Range | None
+    one: SystemInput, label: SystemLabel, found: CurveBounds | None, of: Interval | None
 ) -> tuple[str, str]:
     """Return what becomes of a term, and why."""
     kind = str(label.curve.__struct_config__.tag)
@@ -214,7 +214,7 @@ def _answer(
         f"{name} {what}: {reason}; {asks}",
         Declined("FTD02", f"{reason}; {asks}"),
         is_finding=False,
-        terms=(Label(one.name, label.name),),
+        terms=(TermName(one.name, label.name),),
     )
 
 
@@ -264,14 +264,14 @@ class Conditions:
     Example:
         >>> from fuzzytree.model.rulebase import Points
         >>> line = Points((0.0, 1.0), (0.0, 1.0))
-        >>> terms = Terms({"a": {"high": line}, "b": {"high": line}})
+        >>> terms = SystemTerms({"a": {"high": line}, "b": {"high": line}})
         >>> made = Conditions("min", terms, RuleBlock(()))
         >>> len(made.ways(Or((Is("a", "high"), Is("b", "high")))))
         2
     """
 
     def __init__(
-        self, conjunction: Conjunction, terms: Terms, block: RuleBlock
+        self, conjunction: Conjunction, terms: SystemTerms, block: RuleBlock
     ) -> None:
         self.conjunction = conjunction
         self.terms = terms

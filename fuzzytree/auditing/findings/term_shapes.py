@@ -33,7 +33,7 @@ from fuzzytree.auditing.engine.states import (
 from fuzzytree.auditing.findings.records import Answer, Measure
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.auditing.findings.terms import (
-    Range,
+    VariableRange,
     labels_of,
     measure,
     ranges,
@@ -69,20 +69,20 @@ def shape_answers(subject: Subject) -> Iterator[Answer]:
     )
 
 
-def _defects(of: Range, term: Term) -> Iterator[Answer | None]:
+def _defects(of: VariableRange, term: Term) -> Iterator[Answer | None]:
     """Yield the defects of a term's shape, None for each that is too small to tell."""
     for excess in outside(term.shape, of.low, of.high):
         yield _excess(of, term, excess) if excess.depth >= SHALLOW else None
     yield from _dips(of, term)
     if isinstance(term.shape, Points) and max(term.shape.degrees) < 1.0:
         yield _subnormal(of, term, max(term.shape.degrees))
-    share = inside(term.shape, of)
+    share = share_inside(term.shape, of)
     if share is not None and 0 < share.high < Fraction(1, 2):
         yield _outlying(of, term, share)
 
 
 def _defect(
-    of: Range,
+    of: VariableRange,
     term: Term,
     text: str,
     how: str,
@@ -103,7 +103,7 @@ def _defect(
     )
 
 
-def _excess(of: Range, term: Term, found: Excess) -> Answer:
+def _excess(of: VariableRange, term: Term, found: Excess) -> Answer:
     end = "above 1" if found.is_above else "below 0"
     return _defect(
         of,
@@ -119,7 +119,7 @@ def _excess(of: Range, term: Term, found: Excess) -> Answer:
     )
 
 
-def _dips(of: Range, term: Term) -> Iterator[Answer | None]:
+def _dips(of: VariableRange, term: Term) -> Iterator[Answer | None]:
     made = of.line(term)
     walked = [*walk(made, 0)]
     told = [*dips(walked, SHALLOW)]
@@ -146,7 +146,7 @@ def _dips(of: Range, term: Term) -> Iterator[Answer | None]:
     )
 
 
-def _subnormal(of: Range, term: Term, most: float) -> Answer:
+def _subnormal(of: VariableRange, term: Term, most: float) -> Answer:
     return _defect(
         of,
         term,
@@ -156,7 +156,7 @@ def _subnormal(of: Range, term: Term, most: float) -> Answer:
     )
 
 
-def _outlying(of: Range, term: Term, share: Bounds) -> Answer:
+def _outlying(of: VariableRange, term: Term, share: Bounds) -> Answer:
     return _defect(
         of,
         term,
@@ -167,7 +167,7 @@ def _outlying(of: Range, term: Term, share: Bounds) -> Answer:
     )
 
 
-def inside(shape: Shape, of: Range) -> Bounds | None:
+def share_inside(shape: Shape, of: VariableRange) -> Bounds | None:
     """Return the share of a curve's area that lies on a range.
 
     Returns:
@@ -238,7 +238,7 @@ def overlap_answers(subject: Subject) -> Iterator[Answer]:
 
 
 def _overlapping(
-    of: Range,
+    of: VariableRange,
     one: Term,
     other: Term,
     shared: Overlap,
@@ -289,7 +289,7 @@ def _share(jaccard: Bounds) -> str:
     return "more than 0.9999" if text == "1" and jaccard.low < 1 else text
 
 
-def _too_large(of: Range, one: Term, other: Term) -> Answer:
+def _too_large(of: VariableRange, one: Term, other: Term) -> Answer:
     name = f"terms {one.name!r} and {other.name!r} of {of.variable.name!r}"
     reason = f"their curves have more than {_MOST_PIECES} pieces"
     return Answer(

@@ -12,14 +12,14 @@ from fuzzytree.auditing.engine.domain import span
 from fuzzytree.auditing.engine.measures import Bounds, Line, heights, line
 from fuzzytree.auditing.engine.pieces import Element, pieces
 from fuzzytree.auditing.engine.states import Bracket, Proved, counted, short
-from fuzzytree.auditing.findings.records import Answer, Label, Measure
+from fuzzytree.auditing.findings.records import Answer, Measure, TermName
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import Term, Variable
 from fuzzytree.model.system import questions
 from fuzzytree.numerics.exact import outwards
 
 
-class Range(NamedTuple):
+class VariableRange(NamedTuple):
     """The values of a variable on the domain.
 
     Attributes:
@@ -40,13 +40,13 @@ class Range(NamedTuple):
         return line(shapes, self.low, self.high, is_open=self.is_open)
 
 
-def ranges(subject: Subject) -> tuple[Range, ...]:
+def ranges(subject: Subject) -> tuple[VariableRange, ...]:
     """Return the range of each variable that has terms; none if the domain is empty.
 
     Terms that are held between two lines are left out.
     """
-    held = subject.held.terms if subject.held else {}
-    found: list[Range] = []
+    held = subject.bounds.terms if subject.bounds else {}
+    found: list[VariableRange] = []
     for of in whole_ranges(subject):
         name, terms = of.variable.name, of.variable.terms
         plain = tuple(term for term in terms if (name, term.name) not in held)
@@ -55,14 +55,14 @@ def ranges(subject: Subject) -> tuple[Range, ...]:
     return tuple(found)
 
 
-def whole_ranges(subject: Subject) -> tuple[Range, ...]:
+def whole_ranges(subject: Subject) -> tuple[VariableRange, ...]:
     """Return the same with all terms; of those that are held the lower line.
 
     Terms that only the view has, such as `very high`, are left out.
     """
-    found: list[Range] = []
+    found: list[VariableRange] = []
     for variable in subject.rules.variables:
-        if subject.held is not None:
+        if subject.bounds is not None:
             variable = replace(variable, terms=tuple(_own_terms(subject, variable)))
         low, high = span(variable, subject.domain)
         if low > high:
@@ -70,7 +70,7 @@ def whole_ranges(subject: Subject) -> tuple[Range, ...]:
         side = subject.domain.side(variable.name)
         if variable.terms:
             is_open = side is not None and side.is_open and low == side.low < high
-            found.append(Range(variable, low, high, is_open))
+            found.append(VariableRange(variable, low, high, is_open))
     return tuple(found)
 
 
@@ -93,9 +93,9 @@ def term_name(variable: Variable, term: Term) -> str:
     return f"term {term.name!r} of {variable.name!r}"
 
 
-def labels_of(of: Range, *terms: Term) -> tuple[Label, ...]:
+def labels_of(of: VariableRange, *terms: Term) -> tuple[TermName, ...]:
     """Return terms of a variable as answers name them."""
-    return tuple(Label(of.variable.name, term.name) for term in terms)
+    return tuple(TermName(of.variable.name, term.name) for term in terms)
 
 
 def answers(subject: Subject) -> Iterator[Answer]:
@@ -107,9 +107,9 @@ def answers(subject: Subject) -> Iterator[Answer]:
 # --- FT401: is the term reached?
 
 
-def _heights(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
+def _heights(subject: Subject, whole: Sequence[VariableRange]) -> Iterator[Answer]:
     level = Fraction(subject.settings.level)
-    held = subject.held.terms if subject.held else {}
+    held = subject.bounds.terms if subject.bounds else {}
     clean, lowest = 0, Fraction(1)
     for of in whole:
         for term in of.variable.terms:
@@ -141,7 +141,7 @@ def _heights(subject: Subject, whole: Sequence[Range]) -> Iterator[Answer]:
         )
 
 
-def _is_full(of: Range, term: Term) -> bool:
+def _is_full(of: VariableRange, term: Term) -> bool:
     """Return whether a curve is 1 where one of its pieces ends, or the range does."""
     curve = Element(term.shape)
     ends = {of.low, of.high}
@@ -155,7 +155,7 @@ def _is_full(of: Range, term: Term) -> bool:
 
 
 def _low_term(
-    of: Range, term: Term, height: Bounds, at: Fraction, cells: int
+    of: VariableRange, term: Term, height: Bounds, at: Fraction, cells: int
 ) -> Answer:
     name = term_name(of.variable, term)
     where = f"from {short(of.low)} to {short(of.high)}"
@@ -178,7 +178,9 @@ def _low_term(
     )
 
 
-def _low_curve(of: Range, term: Term, height: Bounds, *, is_low: bool) -> Answer:
+def _low_curve(
+    of: VariableRange, term: Term, height: Bounds, *, is_low: bool
+) -> Answer:
     """Return that a curve that is held between lines is hardly reached, or may be."""
     name = term_name(of.variable, term)
     low, high = outwards(height.low)[0], outwards(height.high)[1]
@@ -218,7 +220,7 @@ def _unused(subject: Subject) -> Iterator[Answer]:
                 proof,
                 is_finding=True,
                 severity="info",
-                terms=tuple(Label(name, term) for of, term in terms if of == name),
+                terms=tuple(TermName(name, term) for of, term in terms if of == name),
             )
     idle = [one for one in terms if one[0] in needed and one not in asked]
     for name, term in idle:
@@ -229,7 +231,7 @@ def _unused(subject: Subject) -> Iterator[Answer]:
             proof,
             is_finding=True,
             severity="info",
-            terms=(Label(name, term),),
+            terms=(TermName(name, term),),
         )
     counts = (
         sum(name in needed for name in variables),

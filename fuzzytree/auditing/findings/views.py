@@ -22,13 +22,13 @@ import msgspec
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Declined, Proved
 from fuzzytree.auditing.findings.records import Answer, Policy
-from fuzzytree.auditing.findings.rule_bounds import Held, held
+from fuzzytree.auditing.findings.rule_bounds import BoundedRules, bounded_rules
 from fuzzytree.auditing.findings.system_conditions import (
     MOST_QUESTIONS,
     NORMS,
     Conditions,
     DecliningError,
-    Terms,
+    SystemTerms,
     Way,
     decline,
     ranges_of,
@@ -51,7 +51,7 @@ from fuzzytree.semantics.conversion import as_rules
 from fuzzytree.semantics.lowering import rules_from_tree
 
 
-class View(msgspec.Struct, frozen=True, eq=False):
+class AuditView(msgspec.Struct, frozen=True, eq=False):
     """A model's rules as they are audited.
 
     Attributes:
@@ -64,14 +64,14 @@ class View(msgspec.Struct, frozen=True, eq=False):
         tree: The tree they come from.
         raw: Its raw rules, if it has fitted sets.
         system: The system they come from.
-        places: What to call each rule, such as `rule 2 of block 1`; empty where rules
+        rule_names: Such as `rule 2 of block 1` for each rule; empty where rules
             are simply numbered.
         numbers: The number in the model of each rule, from 1, over all blocks.
         declined: What was left out, and why; and rules that can never fire.
         left_out: The number in the model of each rule that is named there.
         is_whole: Whether no rule is left out that may fire. Otherwise where no rule of
             the view fires another one may.
-        held: The rules from below and from above; None if they are plain.
+        bounds: The rules from below and from above; None if they are plain.
     """
 
     rules: RuleBase | None
@@ -80,15 +80,15 @@ class View(msgspec.Struct, frozen=True, eq=False):
     tree: FuzzyTree | None = None
     raw: RuleBase | None = None
     system: FuzzySystem | None = None
-    places: tuple[str, ...] = ()
+    rule_names: tuple[str, ...] = ()
     numbers: tuple[int, ...] = ()
     declined: tuple[Answer, ...] = ()
     is_whole: bool = True
-    held: Held | None = None
+    bounds: BoundedRules | None = None
     left_out: Mapping[str, int] = {}
 
 
-def view(model: Document, domain: Domain) -> View:
+def view(model: Document, domain: Domain) -> AuditView:
     """Return the rules of a model as they are audited.
 
     Args:
@@ -116,17 +116,17 @@ def view(model: Document, domain: Domain) -> View:
             return msgspec.structs.replace(_of_rules(rules, domain), system=model)
 
 
-def _of_rules(rules: RuleBase, domain: Domain) -> View:
+def _of_rules(rules: RuleBase, domain: Domain) -> AuditView:
     meant = rules.semantics
     policy = Policy(meant.conjunction, "strongest", meant.uncovered, meant.missing)
     numbers = tuple(range(1, len(rules.rules) + 1))
-    return View(rules, policy, domain, numbers=numbers)
+    return AuditView(rules, policy, domain, numbers=numbers)
 
 
 # --- systems
 
 
-def _of_system(system: FuzzySystem, domain: Domain) -> View:
+def _of_system(system: FuzzySystem, domain: Domain) -> AuditView:
     conjunction = _conjunction(system)
     sides, moved = _within(system, domain)
     ranges = ranges_of(system, sides)
@@ -149,18 +149,20 @@ def _of_system(system: FuzzySystem, domain: Domain) -> View:
             tuple(taken.rules),
             Semantics(conjunction),
         )
-        both = held(rules, taken.weights, {**terms.held, **terms.made}, ranges)
-    return View(
+        both = bounded_rules(
+            rules, taken.weights, {**terms.bounds, **terms.made}, ranges
+        )
+    return AuditView(
         rules,
         Policy(conjunction, "all"),
         sides,
         system=system,
-        places=tuple(taken.places),
+        rule_names=tuple(taken.rule_names),
         numbers=tuple(taken.numbers),
         declined=tuple(taken.answers),
         left_out=taken.left_out,
         is_whole=taken.is_whole,
-        held=both,
+        bounds=both,
     )
 
 
@@ -212,14 +214,14 @@ class _Taken:
     """The rules that were taken over so far, and what was left out."""
 
     def __init__(
-        self, conjunction: Conjunction, terms: Terms, answers: list[Answer]
+        self, conjunction: Conjunction, terms: SystemTerms, answers: list[Answer]
     ) -> None:
         self.conjunction: Conjunction = conjunction
         self.terms = terms
         self.answers = answers
         self.rules: list[Rule] = []
         self.weights: list[float] = []
-        self.places: list[str] = []
+        self.rule_names: list[str] = []
         self.numbers: list[int] = []
         self.left_out: dict[str, int] = {}
         self.is_whole = True
@@ -258,7 +260,9 @@ class _Taken:
         for position, way in enumerate(ways, 1):
             self.rules.append(Rule(way, _text(rule.then)))
             self.weights.append(rule.weight)
-            self.places.append(name if len(ways) == 1 else f"way {position} of {name}")
+            self.rule_names.append(
+                name if len(ways) == 1 else f"way {position} of {name}"
+            )
             self.numbers.append(number)
 
     def _check_weight(self, ways: Iterable[Way]) -> None:

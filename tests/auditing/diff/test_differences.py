@@ -26,8 +26,8 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.records import Settings
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.records import AuditSettings
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.errors import ReadError, TableError
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
@@ -45,7 +45,7 @@ from fuzzytree.semantics.conversion import as_system
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.testing import random_system, random_tree
 
-FEW = Settings(rows=500)
+FEW = AuditSettings(rows=500)
 
 
 def grip(cut: float = 2.0) -> RuleBase:
@@ -318,7 +318,7 @@ def test_points_that_a_spent_budget_leaves_out_are_told() -> None:
     clock = Clock(4.0, now=lambda: float(next(ticks)))  # over after a few looks
     values = np.zeros((len(old.inputs), 5000))
     found = difference(
-        old, new, domain=domain_of(old), rows=Rows("rows.csv", values), clock=clock
+        old, new, domain=domain_of(old), rows=AuditRows("rows.csv", values), clock=clock
     )
     rows = next(one for one in found.answers if one.subject == "rows")
     assert isinstance(rows.state, Sampled)

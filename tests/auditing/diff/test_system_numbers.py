@@ -15,7 +15,7 @@ from fuzzytree.auditing.diff.difference_records import Difference
 from fuzzytree.auditing.diff.differences import difference, joined_domain
 from fuzzytree.auditing.diff.matching import Curves
 from fuzzytree.auditing.diff.system_bounds import NotExactError, most, number_at
-from fuzzytree.auditing.diff.system_keys import computed, meant
+from fuzzytree.auditing.diff.system_keys import function_keys, operation_keys
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import (
     Bracket,
@@ -25,7 +25,7 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.records import Settings
+from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.model.rulebase import Points
 from fuzzytree.model.system import (
     Activation,
@@ -53,7 +53,7 @@ from fuzzytree.model.system import (
 from fuzzytree.semantics.inference import infer
 from fuzzytree.testing import random_system
 
-FEW = Settings(rows=100)
+FEW = AuditSettings(rows=100)
 AVERAGE = Defuzzifier("weighted average")
 
 
@@ -138,7 +138,7 @@ def test_curves_of_equal_degrees_are_alike_in_any_form() -> None:
     other = replace(one, labels=(long, one.labels[1]))
     service = tipper().inputs[1]
     old, new = (tipper(inputs=(each, service)) for each in (one, other))
-    assert computed(old) != computed(new)
+    assert operation_keys(old) != operation_keys(new)
     assert told(old, new).answers[0].state == Proved(
         "both are one function of real numbers: equal curves in equal rules"
     )
@@ -172,7 +172,7 @@ def test_where_order_decides_it_is_no_rounding() -> None:
     first = RuleBlock((ONE, TWO, THREE), activation=Activation("highest"))
     highest = replace(tipper(), blocks=(first,))
     turned = with_rules(highest, THREE, ONE, TWO)
-    assert meant(highest, Curves()) == {}
+    assert function_keys(highest, Curves()) == {}
     assert told(highest, turned).verdict == "changed"
 
 
@@ -372,8 +372,8 @@ def check_pair(seed: int, rows: int) -> None:
     new = altered(old, chance)
     name, curves = output.name, Curves()
     domain = domain_of(old)
-    is_same = computed(old, domain)[name] == computed(new, domain)[name]
-    keys = [meant(system, curves, domain).get(name) for system in (old, new)]
+    is_same = operation_keys(old, domain)[name] == operation_keys(new, domain)[name]
+    keys = [function_keys(system, curves, domain).get(name) for system in (old, new)]
     is_meant = keys[0] is not None and keys[0] == keys[1]
     bound = most(old, new, name, domain)
     for _ in range(rows):

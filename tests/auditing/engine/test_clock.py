@@ -12,7 +12,7 @@ from fuzzytree.auditing.diff import decisions
 from fuzzytree.auditing.engine.clock import GRACE_S, Clock, OutOfTimeError, enforced
 from fuzzytree.auditing.engine.pieces import Element
 from fuzzytree.auditing.engine.states import Bracket
-from fuzzytree.auditing.findings.records import Settings
+from fuzzytree.auditing.findings.records import AuditSettings
 from fuzzytree.model.interrupts import checkpoint
 from fuzzytree.model.rulebase import Points
 from tests.auditing.engine.bases import random_base, unit_domain
@@ -83,7 +83,9 @@ def test_a_comparison_ends_within_a_box_that_holds_no_clock(
     first, *_, last = old.rules
     narrower = msgspec.structs.replace(last, when=(*last.when, first.when[0]))
     new = msgspec.structs.replace(old, rules=(*old.rules, narrower))
-    pair = decisions.Pair(old, new, old.inputs, unit_domain(old))
-    (answer, *_), _ = decisions.decisions(pair, None, Settings(rows=10), Clock(0.05))
+    pair = decisions.RulePair(old, new, old.inputs, unit_domain(old))
+    (answer, *_), _ = decisions.decisions(
+        pair, None, AuditSettings(rows=10), Clock(0.05)
+    )
     assert isinstance(answer.state, Bracket)
     assert answer.state.why == "the budget was spent within a box"

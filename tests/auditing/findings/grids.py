@@ -8,12 +8,12 @@ from fractions import Fraction
 
 from fuzzytree.auditing.engine.states import Bracket, Proved, Witness, point_of
 from fuzzytree.auditing.findings.records import Answer, Audit
-from fuzzytree.auditing.findings.views import View
+from fuzzytree.auditing.findings.views import AuditView
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.inference import infer
 
 
-def told_rightly(system: FuzzySystem, found: Audit, seen: View, steps: int) -> int:
+def told_rightly(system: FuzzySystem, found: Audit, seen: AuditView, steps: int) -> int:
     """Hold an audit of a system against its degrees on a grid.
 
     Args:
@@ -30,7 +30,9 @@ def told_rightly(system: FuzzySystem, found: Audit, seen: View, steps: int) -> i
     activations = [_strengths(system, seen, row) for row in grid]
     checked = 0
     for answer in found.answers:
-        if any(seen.places[number - 1].startswith("way ") for number in answer.rules):
+        if any(
+            seen.rule_names[number - 1].startswith("way ") for number in answer.rules
+        ):
             continue  # a way is at most as strong as its rule
         if answer.code == "FT101" and isinstance(answer.state, Proved) and answer.rules:
             number = answer.rules[0]
@@ -56,7 +58,7 @@ def told_rightly(system: FuzzySystem, found: Audit, seen: View, steps: int) -> i
     return checked
 
 
-def _claimed(system: FuzzySystem, seen: View, answer: Answer) -> int:
+def _claimed(system: FuzzySystem, seen: AuditView, answer: Answer) -> int:
     """Hold the claims at a point against the system's own degrees there."""
     state = answer.state
     assert isinstance(state, Witness | Bracket)
@@ -80,7 +82,7 @@ def _claimed(system: FuzzySystem, seen: View, answer: Answer) -> int:
 
 
 def _strengths(
-    system: FuzzySystem, seen: View, row: Mapping[str, float]
+    system: FuzzySystem, seen: AuditView, row: Mapping[str, float]
 ) -> list[float]:
     """Return the true strength of each rule of a view; a way has its rule's."""
     found = infer(system, row).activations

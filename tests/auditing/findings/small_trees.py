@@ -8,8 +8,8 @@ import numpy as np
 
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.findings.records import Policy, Settings
-from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.auditing.findings.records import AuditSettings, Policy
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model.rulebase import (
     Band,
     Conjunction,
@@ -122,11 +122,11 @@ def subject_of(
         rules=rules,
         policy=Policy(semantics.conjunction, "strongest", semantics.uncovered),
         domain=Domain(tuple(Side(name, *of) for name, of in ends.items())),
-        settings=Settings(),
+        settings=AuditSettings(),
         clock=clock or Clock(),
         tree=model if isinstance(model, FuzzyTree) else None,
         raw=rules_from_tree(model, "raw")
         if isinstance(model, FuzzyTree) and model.sets
         else None,
-        rows=None if rows is None else Rows("rows", np.array(rows, dtype=float).T),
+        rows=None if rows is None else AuditRows("rows", np.array(rows, dtype=float).T),
     )

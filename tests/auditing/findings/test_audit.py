@@ -19,8 +19,8 @@ from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Declined
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.codes import AUDITED, CODES, FAMILIES
-from fuzzytree.auditing.findings.records import LIMITS, Audit, Settings, digest_of
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.records import LIMITS, Audit, AuditSettings, digest_of
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.errors import TableError
 from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
 from fuzzytree.testing import random_system, random_tree
@@ -145,7 +145,7 @@ def test_codes_that_are_left_out_are_told() -> None:
 def test_a_spent_budget_leaves_the_rest_unasked_and_says_so() -> None:
     times = itertools.chain([0.0], itertools.repeat(10.0))
     clock = Clock(1.0, now=lambda: next(times))
-    found = audit(grip(), domain=FAR, clock=clock, settings=Settings(budget_s=1.0))
+    found = audit(grip(), domain=FAR, clock=clock, settings=AuditSettings(budget_s=1.0))
     assert not found.is_complete
     assert not found.was_interrupted
     why = "not asked: the budget of 1 s is spent"
@@ -243,14 +243,14 @@ def test_a_system_is_audited_as_a_view(seed: int) -> None:
 
 
 def test_a_tree_with_rows_counts_them() -> None:
-    rows = Rows("rows", np.array([[3.0, 4.0], [0.0, 1.0]]))
+    rows = AuditRows("rows", np.array([[3.0, 4.0], [0.0, 1.0]]))
     assert audit(grip(), domain=FAR, rows=rows, select=["FT205"]).rows == 2
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("seed", range(3))
 def test_every_random_tree_is_audited_to_its_end(seed: int) -> None:
-    found = audit(random_tree(seed), settings=Settings(rows=500))
+    found = audit(random_tree(seed), settings=AuditSettings(rows=500))
     assert found.is_complete
     assert digest_of(found) == found.digest
     assert msgspec.json.decode(msgspec.json.encode(found), type=Audit) == found

@@ -9,13 +9,17 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.baselines import baseline_of, gone, read_baseline
+from fuzzytree.auditing.findings.baselines import (
+    baseline_of,
+    read_baseline,
+    resolved_ids,
+)
 from fuzzytree.auditing.findings.configuration import (
     Configuration,
     configuration,
     read_configuration,
 )
-from fuzzytree.auditing.findings.records import Audit, Settings
+from fuzzytree.auditing.findings.records import Audit, AuditSettings
 from fuzzytree.errors import ReadError
 from tests.cli.conftest import grip
 
@@ -35,7 +39,7 @@ def test_a_whole_configuration_is_read() -> None:
         ("FT1", "FT301"),
         ("FT103",),
         (("force", 1.0, 5.5),),
-        Settings(epsilon=0.2, budget_s=120.0, rows=10),
+        AuditSettings(epsilon=0.2, budget_s=120.0, rows=10),
         "accepted.json",
         "error",
     )
@@ -126,17 +130,17 @@ def test_a_baseline_that_was_written_is_read_and_accepts_all(tmp_path: Path) -> 
     path.write_bytes(baseline_of(found))
     (one,) = found.findings
     assert read_baseline(path) == {one.id: one.sentence}
-    assert not [*gone(read_baseline(path), found)]
+    assert not [*resolved_ids(read_baseline(path), found)]
 
 
 def test_what_is_accepted_and_no_longer_found_is_told_where_it_was_asked() -> None:
     known = {"FT101-00000000": "a", "FT501-00000000": "not asked here"}
-    assert [*gone(known, far())] == ["FT101-00000000"]
+    assert [*resolved_ids(known, far())] == ["FT101-00000000"]
 
 
 def test_of_a_code_that_was_cut_short_nothing_is_said_to_be_gone() -> None:
     cut = replace(far(), unasked=("FT101 dead rule: cut short: interrupted",))
-    assert not [*gone({"FT101-00000000": "a"}, cut)]
+    assert not [*resolved_ids({"FT101-00000000": "a"}, cut)]
 
 
 @pytest.mark.parametrize(

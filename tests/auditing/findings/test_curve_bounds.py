@@ -9,11 +9,11 @@ import pytest
 
 from fuzzytree.auditing.findings.curve_bounds import (
     HALF_GAP,
-    Enclosed,
+    CurveBounds,
     complement,
-    enclosed,
+    curve_bounds,
     gap,
-    scaled,
+    scale,
 )
 from fuzzytree.model.rulebase import LR, Band, Flank, Points, Side
 from fuzzytree.model.system import (
@@ -65,7 +65,7 @@ CURVES: tuple[Curve, ...] = (
 )
 
 
-def places(found: Enclosed, count: int) -> list[Fraction]:
+def places(found: CurveBounds, count: int) -> list[Fraction]:
     """Return drawn values, the points of both lines, and values close to these."""
     chance = random.Random(7)
     made = [Fraction(chance.uniform(*map(float, OF))) for _ in range(count)]
@@ -76,7 +76,7 @@ def places(found: Enclosed, count: int) -> list[Fraction]:
     return [x for x in made if OF[0] <= x <= OF[1]]
 
 
-def beyond(curve: Curve, found: Enclosed, count: int) -> list[Fraction]:
+def beyond(curve: Curve, found: CurveBounds, count: int) -> list[Fraction]:
     """Return values at which a curve is surely beyond one of its lines."""
     made: list[Fraction] = []
     for x in places(found, count):
@@ -93,7 +93,7 @@ def beyond(curve: Curve, found: Enclosed, count: int) -> list[Fraction]:
 def test_a_curve_is_nowhere_beyond_its_lines_and_never_far_from_them(
     curve: Curve,
 ) -> None:
-    found = enclosed(curve, OF)
+    found = curve_bounds(curve, OF)
     assert found is not None
     assert not beyond(curve, found, 4)
     assert 0 < gap(found, OF) <= 2 * HALF_GAP * (1 + 2**-19)
@@ -118,14 +118,14 @@ def test_drawn_curves_are_nowhere_beyond_their_lines() -> None:
             SigmoidDifference(Sigmoid(a, slope), Sigmoid(b, 3.0)),
         )
         for curve in curves:
-            found = enclosed(curve, OF)
+            found = curve_bounds(curve, OF)
             assert found is not None
             assert not beyond(curve, found, 20)
 
 
 def test_a_line_that_is_too_high_is_seen_beyond_its_curve() -> None:
     curve = Gaussian(0.3, 0.7)
-    found = enclosed(curve, OF)
+    found = curve_bounds(curve, OF)
     assert found is not None
     assert isinstance(found.lower, Points)
     raised = tuple(min(one + 0.002, 1.0) for one in found.lower.degrees)
@@ -135,7 +135,7 @@ def test_a_line_that_is_too_high_is_seen_beyond_its_curve() -> None:
 
 def test_a_curve_that_is_0_nowhere_has_a_lower_line_above_0() -> None:
     for curve in (Gaussian(0.0, 1.0), Bell(0.0, 1.0, 2.0), Sigmoid(0.0, -2.0)):
-        found = enclosed(curve, OF)
+        found = curve_bounds(curve, OF)
         assert found is not None
         assert isinstance(found.lower, Points)
         assert min(found.lower.degrees) > 0.0
@@ -143,7 +143,7 @@ def test_a_curve_that_is_0_nowhere_has_a_lower_line_above_0() -> None:
 
 def test_a_curve_that_is_0_and_1_somewhere_has_lines_that_are() -> None:
     for curve in (SCurve(-1.0, 2.0), PiCurve(-2.0, -1.0, 0.0, 3.0), Cosine(0.5, 3.0)):
-        found = enclosed(curve, OF)
+        found = curve_bounds(curve, OF)
         assert found is not None
         assert isinstance(found.lower, Points)
         assert isinstance(found.upper, Points)
@@ -152,13 +152,13 @@ def test_a_curve_that_is_0_and_1_somewhere_has_lines_that_are() -> None:
 
 
 def test_a_formula_has_no_lines() -> None:
-    assert enclosed(Formula(Name("x")), OF) is None
+    assert curve_bounds(Formula(Name("x")), OF) is None
 
 
 def test_what_is_left_of_1_and_what_is_weighted_lies_between_lines_too() -> None:
-    found = enclosed(Gaussian(0.3, 0.7), OF)
+    found = curve_bounds(Gaussian(0.3, 0.7), OF)
     assert found is not None
-    rest, part = complement(found), scaled(found, 0.3)
+    rest, part = complement(found), scale(found, 0.3)
     assert rest is not None
     assert part is not None
     for x in places(found, 8):
@@ -173,12 +173,12 @@ def test_what_is_left_of_1_and_what_is_weighted_lies_between_lines_too() -> None
 
 
 def test_only_equal_curves_have_one_key() -> None:
-    one, other = (enclosed(Gaussian(0.3, width), OF) for width in (0.7, 0.7))
-    third = enclosed(Gaussian(0.3, 0.5), OF)
+    one, other = (curve_bounds(Gaussian(0.3, width), OF) for width in (0.7, 0.7))
+    third = curve_bounds(Gaussian(0.3, 0.5), OF)
     assert one is not None
     assert other is not None
     assert third is not None
     assert one.key == other.key != third.key
-    half = scaled(one, 0.5)
+    half = scale(one, 0.5)
     assert half is not None
     assert half.key != one.key

@@ -10,7 +10,7 @@ from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, Witness
 from fuzzytree.auditing.findings.deciding import _won as won
 from fuzzytree.auditing.findings.deciding import answers
-from fuzzytree.auditing.findings.records import Answer, Policy, Settings
+from fuzzytree.auditing.findings.records import Answer, AuditSettings, Policy
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.model.rulebase import (
     Clause,
@@ -50,7 +50,7 @@ def _asked(
     base = _base(*rules, conjunction=conjunction)
     box = Domain((Side("x", 0.0, 1.0), Side("y", 0.0, 1.0)))
     policy = Policy(conjunction, decision)  # type: ignore[arg-type]
-    return [*answers(Subject(base, policy, box, Settings(), Clock(30.0)))]
+    return [*answers(Subject(base, policy, box, AuditSettings(), Clock(30.0)))]
 
 
 def _found(given: list[Answer], code: str) -> dict[tuple[int, ...], Answer]:
@@ -156,7 +156,7 @@ def test_where_all_rules_take_part_only_firing_is_asked() -> None:
 
 def _subject(base: RuleBase, clock: Clock) -> Subject:
     return Subject(
-        base, Policy("min", "strongest"), unit_domain(base), Settings(), clock
+        base, Policy("min", "strongest"), unit_domain(base), AuditSettings(), clock
     )
 
 

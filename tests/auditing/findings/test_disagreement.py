@@ -18,7 +18,11 @@ from fuzzytree.auditing.engine.states import (
     percent,
     point_of,
 )
-from fuzzytree.auditing.findings.disagreement import Both, answers, nearest_difference
+from fuzzytree.auditing.findings.disagreement import (
+    TreeAndRules,
+    answers,
+    nearest_difference,
+)
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.rows import points_of
 from fuzzytree.auditing.findings.subject import Subject
@@ -93,7 +97,9 @@ def test_a_budget_that_ends_certifies_no_more_than_was_asked(calls: int) -> None
     assert subject.tree is not None
     assert subject.raw is not None
     assert subject.rows is not None
-    both = Both(subject.tree, subject.raw, subject.domain, regions(subject.tree))
+    both = TreeAndRules(
+        subject.tree, subject.raw, subject.domain, regions(subject.tree)
+    )
     times = iter([0.0] * calls + [9.0] * 10_000)
     clock = Clock(1.0, now=lambda: next(times))
     told, *more = nearest_difference(both, points_of(subject, subject.rows), clock)
@@ -150,7 +156,7 @@ def _sampled(seed: int, points: int) -> None:
     told = [*answers(subject)]
     differing = {one.rules[0] for one in told if one.is_finding}
     assert subject.raw is not None
-    both = Both(tree, subject.raw, subject.domain, regions(tree))
+    both = TreeAndRules(tree, subject.raw, subject.domain, regions(tree))
     near = next(one for one in told if one.subject == "rows")
     starts = [
         {name: Fraction(x) for name, x in zip(reach, row, strict=True)} for row in rows

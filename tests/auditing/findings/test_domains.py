@@ -7,7 +7,7 @@ import pytest
 
 from fuzzytree.auditing.engine.domain import Side, limited
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
     LR,
@@ -63,7 +63,7 @@ POWER = SystemOutput(
     1.0,
     Defuzzifier("weighted average"),
 )
-ROWS = Rows("rows", np.array([[1.0, 3.0, np.nan]]))
+ROWS = AuditRows("rows", np.array([[1.0, 3.0, np.nan]]))
 
 
 def asking(
@@ -143,7 +143,7 @@ SUM = RuleBase(
     ),
     (Rule((Clause("y", ("t",)),), "a"),),
 )
-EMPTY = Rows("rows", np.array([[np.nan]]))
+EMPTY = AuditRows("rows", np.array([[np.nan]]))
 
 
 @pytest.mark.parametrize(

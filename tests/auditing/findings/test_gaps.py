@@ -8,8 +8,8 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings.gaps import answers
-from fuzzytree.auditing.findings.records import Answer, Policy, Settings
-from fuzzytree.auditing.findings.subject import Rows, Subject
+from fuzzytree.auditing.findings.records import Answer, AuditSettings, Policy
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
 from fuzzytree.model.rulebase import (
     Clause,
     Points,
@@ -25,7 +25,7 @@ def _asked(
     *peaks: float,
     width: float = 1.0,
     uncovered: str | None = None,
-    rows: Rows | None = None,
+    rows: AuditRows | None = None,
     is_whole: bool = True,
 ) -> list[Answer]:
     terms = tuple(
@@ -40,7 +40,7 @@ def _asked(
     box = Domain((Side("x", 0.0, 4.0),))
     policy = Policy("min", "strongest", uncovered)
     subject = Subject(
-        base, policy, box, Settings(), Clock(30.0), rows=rows, is_whole=is_whole
+        base, policy, box, AuditSettings(), Clock(30.0), rows=rows, is_whole=is_whole
     )
     return [*answers(subject)]
 
@@ -70,7 +70,7 @@ def test_a_gap_with_a_declared_answer_is_no_warning() -> None:
 
 
 def test_the_gap_nearest_to_a_row_comes_first() -> None:
-    rows = Rows("rows", np.array([[3.4, 2.0]]))
+    rows = AuditRows("rows", np.array([[3.4, 2.0]]))
     first, second = _asked(0.0, 2.5, rows=rows)
     assert first.region[0].low == 3.5
     assert second.region[0].low == 1.0

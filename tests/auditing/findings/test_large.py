@@ -10,7 +10,7 @@ import pytest
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Witness
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.records import Audit, Settings
+from fuzzytree.auditing.findings.records import Audit, AuditSettings
 from fuzzytree.model.rulebase import RuleBase
 from tests.auditing.engine.bases import random_base, unit_domain
 
@@ -30,7 +30,7 @@ def asked(name: str) -> tuple[Audit, float]:
     """Return an audit of a large model, and what it took of the processor."""
     clock = Clock(BUDGET_S, now=time.process_time)
     start = time.process_time()
-    settings = Settings(budget_s=BUDGET_S)
+    settings = AuditSettings(budget_s=BUDGET_S)
     found = audit(
         LARGE[name], domain=unit_domain(LARGE[name]), settings=settings, clock=clock
     )

@@ -7,7 +7,7 @@ import pytest
 from fuzzytree.auditing.engine.regions import Region
 from fuzzytree.auditing.engine.states import Declined, Proved, Witness
 from fuzzytree.auditing.findings import leaves
-from fuzzytree.auditing.findings.leaves import answers, too_many, values_text
+from fuzzytree.auditing.findings.leaves import answers, too_many_boxes, values_text
 from fuzzytree.auditing.findings.records import Answer
 from fuzzytree.auditing.findings.subject import Subject
 from fuzzytree.numerics.exact import exact_answer
@@ -105,7 +105,7 @@ def test_of_rules_without_a_tree_nothing_is_asked() -> None:
 def test_leaves_of_too_many_boxes_are_declined() -> None:
     line = tuple((float(n), n + 0.5) for n in range(100))
     region = Region(1, "a", tuple((name, line) for name in "xyz"))
-    declined = too_many([region])
+    declined = too_many_boxes([region])
     assert isinstance(declined, Declined)
     assert declined.reason == "the leaves are made of 1000000 boxes, more than 20000"
 

@@ -11,13 +11,13 @@ from fuzzytree.auditing.engine.states import Proved, Span
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import (
     ModelFile,
+    locations_of,
     model_file,
-    places_of,
     rule_path,
     term_path,
     with_ids,
 )
-from fuzzytree.auditing.findings.records import Answer, Label, Place
+from fuzzytree.auditing.findings.records import Answer, FileLocation, TermName
 from fuzzytree.checking.converting import format_of, read_content
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import Band, Clause, Rule, RuleBase, Term, Variable
@@ -32,7 +32,7 @@ def written(model: Document) -> ModelFile:
     return model_file("model.yaml", ft.export(model, "yaml").content)
 
 
-def text_at(file: ModelFile, place: Place | None) -> str:
+def text_at(file: ModelFile, place: FileLocation | None) -> str:
     """Return what begins at a place."""
     assert place is not None
     line = file.content.decode().split("\n")[place.line - 1]
@@ -59,7 +59,7 @@ def test_each_leaf_and_term_of_a_tree_is_found(seed: int) -> None:
     check_terms(tree, file)
     for group in tree.sets:
         for term in group.terms:
-            path = term_path(tree, Label(group.variable, term.name))
+            path = term_path(tree, TermName(group.variable, term.name))
             assert path[0] == "sets"
             assert "name:" in text_at(file, file.place(path))
 
@@ -68,7 +68,7 @@ def check_terms(model: RuleBase | FuzzyTree, file: ModelFile) -> None:
     """Find every term's name where it is said to be."""
     for variable in model.variables:
         for term in variable.terms:
-            path = term_path(model, Label(variable.name, term.name))
+            path = term_path(model, TermName(variable.name, term.name))
             assert path[:1] == ("variables",)
             assert "name:" in text_at(file, file.place(path))
 
@@ -92,7 +92,7 @@ def test_each_label_of_a_system_is_found(seed: int) -> None:
     file = written(system)
     for one in system.variables:
         for label in one.labels:
-            path = term_path(system, Label(one.name, label.name))
+            path = term_path(system, TermName(one.name, label.name))
             assert "name:" in text_at(file, file.place(path))
 
 
@@ -116,14 +116,14 @@ def test_places_are_told_once_each_rules_first() -> None:
     rules = ft.rules_from_tree(random_tree(1))
     file = written(rules)
     first = rules.variables[0]
-    label = Label(first.name, first.terms[0].name)
+    label = TermName(first.name, first.terms[0].name)
     answer = found("FT401", rules=(2,), terms=(label, label))
-    places = places_of(answer, rules, file, (2,))
+    places = locations_of(answer, rules, file, (2,))
     assert places == (
         file.place(("rules", 1)),
         file.place(("variables", 0, "terms", 0)),
     )
-    assert places_of(answer, rules, None, (2,)) == ()
+    assert locations_of(answer, rules, None, (2,)) == ()
 
 
 # --- ids
@@ -134,7 +134,7 @@ def found(
     *,
     subject: str = "it",
     rules: tuple[int, ...] = (),
-    terms: tuple[Label, ...] = (),
+    terms: tuple[TermName, ...] = (),
     region: tuple[Span, ...] = (),
 ) -> Answer:
     """Return an answer about some rules and terms."""
@@ -261,7 +261,7 @@ END_FUNCTION_BLOCK
     model = read_content(text, format_of("brake.fcl"), name="brake.fcl").model
     assert isinstance(model, FuzzySystem)
     for file, place in [
-        (model_file("brake.fcl", text), Place("brake.fcl", 18, 3)),
+        (model_file("brake.fcl", text), FileLocation("brake.fcl", 18, 3)),
         (written(model), None),
     ]:
         found = audit(model, select=["FT101"], file=file)

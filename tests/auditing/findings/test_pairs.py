@@ -20,7 +20,7 @@ from fuzzytree.auditing.engine.states import (
 )
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.pairs import level_reached
-from fuzzytree.auditing.findings.records import Answer, Settings
+from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.model.rulebase import (
     Band,
     Clause,
@@ -74,8 +74,10 @@ def base(
     )
 
 
-def asked(rules: RuleBase, code: str, settings: Settings | None = None) -> list[Answer]:
-    settings = settings or Settings(budget_s=5.0)
+def asked(
+    rules: RuleBase, code: str, settings: AuditSettings | None = None
+) -> list[Answer]:
+    settings = settings or AuditSettings(budget_s=5.0)
     return [*audit(rules, select=[code], settings=settings).answers]
 
 
@@ -92,7 +94,7 @@ def test_a_clean_model_has_no_finding_about_pairs(
     code: str, conjunction: Conjunction
 ) -> None:
     rules = base(*CLEAN, conjunction=conjunction)
-    settings = Settings(level=0.6)
+    settings = AuditSettings(level=0.6)
     assert not any(one.is_finding for one in asked(rules, code, settings))
 
 
@@ -354,7 +356,7 @@ def test_no_point_of_a_grid_is_above_the_highest_common_level(kind: str) -> None
     rows = [
         exact_answer(rules, {"x1": a, "x2": b}).strengths for a in grid for b in grid
     ]
-    for answer in asked(rules, "FT201", Settings(level=0.1)):
+    for answer in asked(rules, "FT201", AuditSettings(level=0.1)):
         if len(answer.rules) == 2:
             one, other = (number - 1 for number in answer.rules)
             level = Fraction(answer.measures[0].exact or answer.measures[0].value)
@@ -371,7 +373,9 @@ def test_no_point_of_a_grid_is_above_the_highest_common_level(kind: str) -> None
 
 def test_under_the_product_the_highest_common_level_is_closed_in_on() -> None:
     rules = random_base(0, 4, 2, "product", "points")
-    found = [one for one in asked(rules, "FT201", Settings(level=0.2)) if one.rules]
+    found = [
+        one for one in asked(rules, "FT201", AuditSettings(level=0.2)) if one.rules
+    ]
     assert found
     for answer in found:
         assert isinstance(answer.state, Witness)
@@ -405,7 +409,7 @@ def test_pairs_that_cross_at_the_level_itself_conflict() -> None:
     assert isinstance(answer.state, Witness)
     assert point_of(answer.state.point)["force"] == Fraction(third)
     assert answer.measures[0].value == 0.5
-    above = Settings(level=0.5 + 2.0**-53)
+    above = AuditSettings(level=0.5 + 2.0**-53)
     assert not any(one.is_finding for one in asked(rules, "FT201", above))
 
 
@@ -424,7 +428,7 @@ def test_pairs_that_cross_at_the_level_at_an_irrational_value_are_counted(
         "1 pair of rules of different classes never reaches 0.5 together; "
         "1 of them at most touch it, at irrational values"
     )
-    below = asked(rules, "FT201", Settings(level=0.499))
+    below = asked(rules, "FT201", AuditSettings(level=0.499))
     assert below[0].is_finding
 
 
@@ -541,6 +545,6 @@ def test_many_clauses_that_matter_are_told_up_to_a_number_and_counted(
 
 def test_what_a_spent_budget_leaves_open_is_a_bracket_or_cut_short() -> None:
     rules = random_base(2, 4, 2, kind="points", odd=0.2, combinations=1)
-    made = audit(rules, select=["FT107"], settings=Settings(budget_s=0.02))
+    made = audit(rules, select=["FT107"], settings=AuditSettings(budget_s=0.02))
     states = {type(one.state) for one in made.answers}
     assert not made.is_complete or Bracket in states

@@ -17,11 +17,15 @@ from fuzzytree.auditing.engine.states import (
     point_of,
 )
 from fuzzytree.auditing.findings import conventions
-from fuzzytree.auditing.findings.conventions import Question, questions
+from fuzzytree.auditing.findings.conventions import Convention, questions
 from fuzzytree.auditing.findings.records import Answer
-from fuzzytree.auditing.findings.representations import agreement, answers, told
-from fuzzytree.auditing.findings.subject import Rows, Subject
-from fuzzytree.auditing.findings.support import drawn
+from fuzzytree.auditing.findings.representations import (
+    agreement,
+    agreement_answers,
+    answers,
+)
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.support import sample_points
 from fuzzytree.checking.comparing import Answers
 from fuzzytree.exporters.onnx import Output, write
 from fuzzytree.model.agreement import Agreement, Comparison
@@ -46,9 +50,9 @@ def shipped(model: Model) -> OnnxModel:
 
 
 def findings(subject: Subject, *others: Model | OnnxModel) -> list[Answer]:
-    points = drawn(subject.rules, subject.domain, 200, 0)
+    points = sample_points(subject.rules, subject.domain, 200, 0)
     found = agreement(subject, points, *others)
-    return [one for one in told(subject, found, points) if one.is_finding]
+    return [one for one in agreement_answers(subject, found, points) if one.is_finding]
 
 
 def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
@@ -59,7 +63,10 @@ def test_all_forms_of_a_tree_answer_alike_in_all_runtimes() -> None:
         "2 representations are equal on every input"
     )
     assert isinstance(by_name["representations, by rows"].state, Proved)
-    assert "onnxruntime float32: raw rules" in by_name["representations, by rows"].state.how
+    assert (
+        "onnxruntime float32: raw rules"
+        in by_name["representations, by rows"].state.how
+    )
     assert {one.code for one in found} == {"FT601", "FT602"}
 
 
@@ -88,7 +95,7 @@ def test_shipped_rules_that_part_from_the_model_are_found() -> None:
 
 
 def test_what_a_number_type_can_change_is_bounded_and_how_often_is_sampled() -> None:
-    rows = Rows("grips.csv", np.array([np.linspace(0.0, 4.0, 50)]))
+    rows = AuditRows("grips.csv", np.array([np.linspace(0.0, 4.0, 50)]))
     found = {one.subject: one for one in answers(subject_of(RULES, rows))}
     facts = found["rules in float32"]
     assert facts.sentence.startswith(
@@ -116,7 +123,7 @@ def test_an_error_without_a_bound_lies_between_what_was_seen_and_1() -> None:
 
 
 def test_many_rows_are_drawn_from_by_the_seed() -> None:
-    rows = Rows("grips.csv", np.array([np.linspace(0.0, 4.0, 9000)]))
+    rows = AuditRows("grips.csv", np.array([np.linspace(0.0, 4.0, 9000)]))
     found = {one.subject: one for one in answers(subject_of(RULES, rows))}
     band = found["rules in float64, its band"].state
     assert isinstance(band, Sampled)
@@ -128,7 +135,7 @@ def test_what_was_not_compared_is_declined() -> None:
     other = "native float32: rules: term 'low' of 'force' is not wider than rounding"
     cells = "all cells one by one (1e+09 points): the proof covers them"
     skipped = Agreement("grip", "", (), skipped=(text, other, cells))
-    found = [*told(subject_of(RULES), skipped, POINTS)]
+    found = [*agreement_answers(subject_of(RULES), skipped, POINTS)]
     assert [(one.subject, one.state) for one in found] == [
         ("onnxruntime float64", Declined("FTD08", text)),
         ("native float32", Declined("FTD08", other)),
@@ -139,7 +146,7 @@ def test_what_was_not_compared_is_declined() -> None:
 def test_raw_rules_that_differ_from_their_tree_by_design_are_no_finding() -> None:
     one = Comparison("raw rules", "tree", "rows", 5, "differs by design", 3)
     found = Agreement("grip", "", (one,))
-    assert [*told(subject_of(TREE), found, POINTS)] == []
+    assert [*agreement_answers(subject_of(TREE), found, POINTS)] == []
 
 
 def test_a_system_is_compared_in_all_runtimes() -> None:
@@ -159,10 +166,10 @@ def test_a_runtime_of_systems_in_which_nan_is_a_number_is_found() -> None:
     assert load is not None
     right = load(system)(question.values)
     blind = load(system)(np.nan_to_num(question.values, nan=0.5))
-    (clean,) = conventions.told_of_system(subject, question, [("one", right)] * 2)
+    (clean,) = conventions.system_answers(subject, question, [("one", right)] * 2)
     assert not clean.is_finding
     pairs = [("native", right), ("blind", blind)]
-    (finding,) = conventions.told_of_system(subject, question, pairs)
+    (finding,) = conventions.system_answers(subject, question, pairs)
     assert finding.is_finding
     assert finding.sentence.startswith(
         "missing values: blind and native differ in which outputs have a number, at a "
@@ -179,12 +186,12 @@ def tied_rules() -> RuleBase:
     return replace(RULES, rules=(*RULES.rules, again))
 
 
-def asked(subject: Subject, name: str) -> Question:
+def asked(subject: Subject, name: str) -> Convention:
     return next(one for one in questions(subject) if one.name == name)
 
 
 def answered(
-    subject: Subject, question: Question, representation: OnnxModel | None
+    subject: Subject, question: Convention, representation: OnnxModel | None
 ) -> list[Answer]:
     """Return what the native runtime and a graph answer to a question."""
     native = find_runtime("native").load(subject.rules)(question.values)
@@ -192,7 +199,7 @@ def answered(
     if representation is not None:
         outcome = representation.run(question.values)
         found.append(Answers("m.onnx: rules", subject.rules, outcome))
-    return [*conventions.told(subject, question, found)]
+    return [*conventions.convention_answers(subject, question, found)]
 
 
 def graph(rules: RuleBase) -> OnnxModel:
@@ -253,7 +260,7 @@ def test_a_runtime_in_which_nan_is_a_number_is_found() -> None:
         Answers("native: rules", RULES, native(question.values)),
         Answers("blind: rules", RULES, blind),
     ]
-    (finding,) = conventions.told(subject, question, found)
+    (finding,) = conventions.convention_answers(subject, question, found)
     assert finding.sentence == (
         "missing values: blind: rules answers 'soft' (rule 1) where native: rules "
         "answers no class (no rule, missing), at force nan; 6 of 6 probes differ"
@@ -273,9 +280,9 @@ def test_the_witness_of_a_broken_convention_lies_in_the_domain() -> None:
 
 def test_a_question_without_a_probe_says_so_and_one_with_too_many_too() -> None:
     subject = subject_of(RULES)
-    (none,) = answered(subject, Question("ties", np.empty((1, 0))), None)
+    (none,) = answered(subject, Convention("ties", np.empty((1, 0))), None)
     assert none.sentence == "ties: no probe of it was met"
-    (some,) = answered(subject, Question("ties", np.array([[1.0]]), 3), None)
+    (some,) = answered(subject, Convention("ties", np.array([[1.0]]), 3), None)
     assert isinstance(some.state, Proved)
     assert some.state.how.endswith("; 3 more probes were left out")
 

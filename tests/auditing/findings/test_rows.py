@@ -13,15 +13,15 @@ from fuzzytree.auditing.findings.rows import (
     box_distance,
     distance_measure,
     points_of,
-    ranked,
+    rank_by_distance,
 )
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.model.rulebase import Part, Variable
 from fuzzytree.numerics.oracle import decide
 from tests.auditing.findings.small_trees import subject_of, two_cuts
 
 BOX = Domain((Side("x", 0.0, 4.0), Side("y", 0.0, 1.0)))
-ROWS = Rows("rows", np.array([[0.0, 1.0, np.nan], [0.0, 0.5, 0.0]]))
+ROWS = AuditRows("rows", np.array([[0.0, 1.0, np.nan], [0.0, 0.5, 0.0]]))
 
 
 def _gap(name: str, *spans: Span) -> Answer:
@@ -30,7 +30,7 @@ def _gap(name: str, *spans: Span) -> Answer:
 
 def test_gaps_are_ranked_by_their_distance_to_the_nearest_row() -> None:
     far, near = _gap("far", Span("x", 3.0, 4.0)), _gap("near", Span("y", 0.75, 1.0))
-    first, second = ranked([far, near], ROWS, BOX, ["x", "y"])
+    first, second = rank_by_distance([far, near], ROWS, BOX, ["x", "y"])
     assert (first.subject, second.subject) == ("near", "far")
     assert [one.name for one in first.measures] == [
         "distance to the nearest row, in ranges",
@@ -41,7 +41,9 @@ def test_gaps_are_ranked_by_their_distance_to_the_nearest_row() -> None:
 
 
 def test_a_gap_that_holds_a_row_is_at_distance_zero() -> None:
-    [told] = ranked([_gap("here", Span("x", None, 2.0))], ROWS, BOX, ["x", "y"])
+    [told] = rank_by_distance(
+        [_gap("here", Span("x", None, 2.0))], ROWS, BOX, ["x", "y"]
+    )
     assert told.measures[0].value == 0.0
 
 
@@ -49,11 +51,11 @@ def test_a_gap_of_a_combination_is_as_far_as_its_inputs_must_move() -> None:
     # From row 2, (1, 0.5), both move by r of their ranges: 1 + 4 r + 0.5 + r = 3.
     of = Variable("sum", parts=(Part("x", 1.0), Part("y", 1.0)))
     gap = _gap("sum", Span("sum", 3.0, None))
-    [told] = ranked([gap], ROWS, BOX, ["x", "y"], [of])
+    [told] = rank_by_distance([gap], ROWS, BOX, ["x", "y"], [of])
     assert told.measures[0].exact == "3/10"
     assert told.measures[1].value == 2
     low, high = _gap("low", Span("sum", None, 1.0)), _gap("high", Span("sum", 2.0, 3.0))
-    first, second = ranked([high, low], ROWS, BOX, ["x", "y"], [of])
+    first, second = rank_by_distance([high, low], ROWS, BOX, ["x", "y"], [of])
     assert (first.subject, second.subject) == ("low", "high")
     assert first.measures[0].value == 0.0
 
@@ -62,21 +64,21 @@ def test_a_gap_of_an_unknown_combination_is_measured_at_its_point() -> None:
     point = coordinates({"x": Fraction(3), "y": Fraction(1, 2)})
     state = Witness(point, (Claim("below", rules=(1,), level="0"),))
     gap = Answer("FT301", "sum", "", state, True, region=(Span("sum", 3.0, 4.0),))
-    [told] = ranked([gap], ROWS, BOX, ["x", "y"])
+    [told] = rank_by_distance([gap], ROWS, BOX, ["x", "y"])
     assert told.measures[0].exact == "1/2"
 
 
 def test_a_place_that_is_not_named_stands_last_as_it_is() -> None:
     nowhere, here = _gap("nowhere"), _gap("here", Span("x", 3.0, 4.0))
-    first, second = ranked([nowhere, here], ROWS, BOX, ["x", "y"])
+    first, second = rank_by_distance([nowhere, here], ROWS, BOX, ["x", "y"])
     assert first.subject == "here"
     assert second is nowhere
 
 
 def test_without_a_complete_row_nothing_is_ranked() -> None:
-    empty = Rows("rows", np.array([[np.nan], [0.0]]))
+    empty = AuditRows("rows", np.array([[np.nan], [0.0]]))
     gap = _gap("here", Span("x", 3.0, 4.0))
-    assert ranked([gap], empty, BOX, ["x", "y"]) == (gap,)
+    assert rank_by_distance([gap], empty, BOX, ["x", "y"]) == (gap,)
 
 
 def test_a_fixed_input_does_not_count() -> None:

@@ -6,11 +6,11 @@ import pytest
 
 from fuzzytree.auditing.findings.codes import CODES
 from fuzzytree.auditing.findings.configuration import (
-    changed,
     check_settings,
     chosen_codes,
+    settings_with,
 )
-from fuzzytree.auditing.findings.records import Settings
+from fuzzytree.auditing.findings.records import AuditSettings
 
 
 def test_all_codes_are_asked_unless_some_are_chosen() -> None:
@@ -67,7 +67,7 @@ def test_a_misspelt_code_is_answered_with_the_one_that_was_meant() -> None:
 )
 def test_a_wrong_setting_is_one_sentence(texts: dict[str, str], message: str) -> None:
     with pytest.raises(ValueError, match=r".") as caught:
-        changed(Settings(), texts)
+        settings_with(AuditSettings(), texts)
     assert str(caught.value) == message
 
 
@@ -75,7 +75,7 @@ def test_a_wrong_setting_is_one_sentence(texts: dict[str, str], message: str) ->
 def test_a_budget_of_nothing_or_without_end_is_refused(budget: float) -> None:
     message = f"the budget must be above 0 and at most 1e9 seconds, not {budget!r}"
     with pytest.raises(ValueError, match=r".") as caught:
-        check_settings(Settings(budget_s=budget))
+        check_settings(AuditSettings(budget_s=budget))
     assert str(caught.value) == message
 
 

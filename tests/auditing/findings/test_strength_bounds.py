@@ -16,9 +16,9 @@ from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Bracket, Witness
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.records import Answer, Settings
-from fuzzytree.auditing.findings.rule_bounds import held
-from fuzzytree.auditing.findings.strength_bounds import Sides
+from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.rule_bounds import bounded_rules
+from fuzzytree.auditing.findings.strength_bounds import StrengthBounds
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.rulebase import (
     LR,
@@ -94,7 +94,7 @@ def system_of(
 
 
 def told(system: FuzzySystem, code: str, **settings: float) -> list[Answer]:
-    made = replace(Settings(), **settings)
+    made = replace(AuditSettings(), **settings)
     answers = audit(system, settings=made, select=[code]).answers
     return [one for one in answers if one.code == code]
 
@@ -119,12 +119,12 @@ def test_a_weight_is_part_of_strengths_exactly(norm: TNorm) -> None:
     rules = tuple((one, "big", w) for one in conditions for w in (0.5, 0.25, 1.0))
     system = system_of(rules, norm=norm, low=ramp, high=tent)
     found = view(system, domain_of(system))
-    assert found.held is not None
-    assert not found.held.rules
+    assert found.bounds is not None
+    assert not found.bounds.rules
     assert found.is_whole
     for row in rows(30):
         right = infer(system, row).activations
-        exact = exact_answer(found.held.lower, row).strengths
+        exact = exact_answer(found.bounds.lower, row).strengths
         assert [float(one) for one in exact] == list(right)
 
 
@@ -139,13 +139,13 @@ def test_a_weight_whose_products_are_rounded_lies_between_doubles() -> None:
     tent = Points((0.0, 1.0, 3.0), (0.0, 0.7, 0.1))
     system = system_of(((A, "big", 0.3),), low=tent)
     found = view(system, domain_of(system))
-    assert found.held is not None
-    assert found.held.rules == {1}
-    assert 0.0 < found.held.gap < 1e-15
+    assert found.bounds is not None
+    assert found.bounds.rules == {1}
+    assert 0.0 < found.bounds.gap < 1e-15
     for row in rows(20):
         low, high = (
             exact_answer(one, row).strengths[0]
-            for one in (found.held.lower, found.held.upper)
+            for one in (found.bounds.lower, found.bounds.upper)
         )
         (right,) = exact_answer(rules_of(Term("low", tent)), row).strengths
         assert low <= Fraction(0.3) * right <= high
@@ -161,7 +161,7 @@ def rules_of(term: Term) -> RuleBase:
 def test_a_weight_on_a_curve_of_polynomials_is_held_between_lines() -> None:
     side = Flank(1.0, (0.5,), 2.0)
     term = Term("low", LR(1.0, side, side))
-    weighted = held(
+    weighted = bounded_rules(
         rules_of(term), [0.5], {}, {"a": (Fraction(0), Fraction(4)), "b": None}
     )
     assert weighted is not None
@@ -193,8 +193,8 @@ def test_a_term_that_has_the_name_of_a_weighted_one_stays_itself() -> None:
     others: dict[str, Curve] = {"low x 0.5": other}
     system = system_of(rules, norm="minimum", low=ramp, high=HIGH, **others)
     found = view(system, domain_of(system))
-    assert found.held is not None
-    strengths = exact_answer(found.held.lower, {"a": 1.0, "b": 0.0}).strengths
+    assert found.bounds is not None
+    strengths = exact_answer(found.bounds.lower, {"a": 1.0, "b": 0.0}).strengths
     assert strengths == (Fraction(1, 8), Fraction(3, 4))
 
 
@@ -230,14 +230,14 @@ def test_hedged_clauses_are_as_strong_as_those_of_the_system(curve: Curve) -> No
     rules = tuple((one, "big", 0.5) for one in asked)
     system = system_of(rules, low=curve)
     found = view(system, domain_of(system))
-    assert found.held is not None
+    assert found.bounds is not None
     assert found.is_whole
     assert len(found.numbers) == len(rules)
     for row in rows(4):
         right = infer(system, row).activations
         low, high = (
             exact_answer(one, row).strengths
-            for one in (found.held.lower, found.held.upper)
+            for one in (found.bounds.lower, found.bounds.upper)
         )
         for below, true, above in zip(low, right, high, strict=True):
             assert below - ROUNDING <= true <= above + ROUNDING
@@ -403,11 +403,13 @@ def test_where_rules_do_not_meet_nothing_is_claimed_of_the_upper_ones(
 ) -> None:
     system = system_of(((A, "x", 1.0), (A_HIGH, "y", 0.5)), norm=norm)
     seen = view(system, domain_of(system))
-    assert seen.held is not None
+    assert seen.bounds is not None
     lower, upper = (
-        ground(one, seen.domain) for one in (seen.held.lower, seen.held.upper)
+        ground(one, seen.domain) for one in (seen.bounds.lower, seen.bounds.upper)
     )
-    found = Sides(lower, upper, seen.held).meet(1, 2, Fraction(1, 2), Clock())
+    found = StrengthBounds(lower, upper, seen.bounds).meet(
+        1, 2, Fraction(1, 2), Clock()
+    )
     assert found.level.high < Fraction(1, 2)
     assert isinstance(found.state, Bracket)
     assert not found.state.point

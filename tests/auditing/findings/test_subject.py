@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.states import Declined
-from fuzzytree.auditing.findings.subject import Turns
+from fuzzytree.auditing.findings.subject import TimeSlices
 from fuzzytree.model.interrupts import checkpoint
 
 
@@ -22,14 +22,14 @@ def forever(clock: Clock) -> str:
 
 
 def test_a_question_without_end_leaves_time_for_the_others() -> None:
-    turns = Turns(ticking(), 0.5)
+    turns = TimeSlices(ticking(), 0.5)
     found = [turns.ask(1, forever), *(turns.ask(9 - n, str) for n in range(9))]
     assert found[0] is None
     assert None not in found[1:]
 
 
 def test_many_questions_without_end_each_take_a_small_part() -> None:
-    turns = Turns(ticking(), 1.0)
+    turns = TimeSlices(ticking(), 1.0)
     left: list[float] = []
     for place in range(40):
         left.append(turns.clock.left_s)
@@ -40,7 +40,7 @@ def test_many_questions_without_end_each_take_a_small_part() -> None:
 
 
 def test_what_is_left_open_is_told_in_one_answer() -> None:
-    turns = Turns(ticking(), 0.5)
+    turns = TimeSlices(ticking(), 0.5)
     assert not [*turns.rest("FT101", "rule", "whether they ever win")]
     turns.left_out = 12
     (answer,) = turns.rest("FT101", "rule", "whether they ever win")

@@ -13,9 +13,15 @@ from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Declined, Sampled
 from fuzzytree.auditing.findings import support
 from fuzzytree.auditing.findings.domains import domain_of
-from fuzzytree.auditing.findings.records import Answer, Settings
-from fuzzytree.auditing.findings.subject import Rows, Subject
-from fuzzytree.auditing.findings.support import answers, counted, drawn, share, wilson
+from fuzzytree.auditing.findings.records import Answer, AuditSettings
+from fuzzytree.auditing.findings.subject import AuditRows, Subject
+from fuzzytree.auditing.findings.support import (
+    answers,
+    count_rows,
+    sample_points,
+    sampled_share,
+    wilson,
+)
 from fuzzytree.auditing.findings.views import view
 from fuzzytree.model.contracts import Document
 from fuzzytree.model.rulebase import (
@@ -48,7 +54,9 @@ CODES = np.array([0, 1, 0, 1, 1, -1, 0])
 
 
 def subject_of(
-    model: Document, rows: Rows | None = None, settings: Settings | None = None
+    model: Document,
+    rows: AuditRows | None = None,
+    settings: AuditSettings | None = None,
 ) -> Subject:
     found = view(model, domain_of(model))
     assert found.rules is not None
@@ -56,16 +64,16 @@ def subject_of(
         found.rules,
         found.policy,
         found.domain,
-        settings or Settings(rows=500),
+        settings or AuditSettings(rows=500),
         Clock(),
         found.tree,
         found.raw,
         found.system,
         rows,
-        found.places,
+        found.rule_names,
         found.declined,
         found.is_whole,
-        found.held,
+        found.bounds,
     )
 
 
@@ -122,7 +130,7 @@ def test_what_is_no_share_is_refused(
 
 
 def test_rows_are_told_rule_by_rule_and_together() -> None:
-    found = asked(subject_of(RULES, Rows("grips.csv", FORCES, CODES)))
+    found = asked(subject_of(RULES, AuditRows("grips.csv", FORCES, CODES)))
     assert sentences(
         found,
         *("rows with a missing value", "rows outside the domain", "uncovered rows"),
@@ -138,7 +146,7 @@ def test_rows_are_told_rule_by_rule_and_together() -> None:
         "rule 2 fires on 3 of 6 rows and wins 3; 2 of these have its class 'hard'",
     ]
     state = found["rule 2"].state
-    assert state == share(
+    assert state == sampled_share(
         "rows that rule 2 wins and that have its class",
         2,
         3,
@@ -161,18 +169,18 @@ def test_a_rule_without_rows_is_found_and_gone_when_it_is_removed() -> None:
         rules=(*RULES.rules, Rule((Clause("force", ("far",)),), "soft")),
     )
     values = np.array([[0.5, 2.0, 3.0]])
-    found = asked(subject_of(planted, Rows("grips.csv", values)))
+    found = asked(subject_of(planted, AuditRows("grips.csv", values)))
     assert found["rule 3"].is_finding
     assert found["rule 3"].sentence == "rule 3 fires on none of 3 rows"
     assert found["rule 3"].rules == (3,)
-    clean = asked(subject_of(RULES, Rows("grips.csv", values)))
+    clean = asked(subject_of(RULES, AuditRows("grips.csv", values)))
     assert not any(one.is_finding for one in clean.values())
 
 
 def test_a_rule_that_fires_and_never_wins_is_found() -> None:
     planted = replace(RULES, rules=(*RULES.rules, RULES.rules[0]))
     values = np.array([[0.5, 2.0]])
-    found = asked(subject_of(planted, Rows("grips.csv", values)))["rule 3"]
+    found = asked(subject_of(planted, AuditRows("grips.csv", values)))["rule 3"]
     assert found.is_finding
     assert found.sentence == "rule 3 fires on 1 of 2 rows and wins none"
     assert [(one.name, one.value) for one in found.measures] == [
@@ -185,9 +193,9 @@ def test_a_rule_that_fires_and_never_wins_is_found() -> None:
 def test_counts_are_those_of_answers_in_fractions(conjunction: str) -> None:
     rules = random_base(3, 7, 4, conjunction, shared=0.5)  # type: ignore[arg-type]
     subject = subject_of(rules)
-    values = drawn(subject.rules, subject.domain, 60, 1)
+    values = sample_points(subject.rules, subject.domain, 60, 1)
     values[0, :3] = (np.nan, np.inf, 1e9)
-    found = counted(subject, values)
+    found = count_rows(subject, values)
     rows = [dict(zip(rules.inputs, row, strict=True)) for row in values.T.tolist()]
     exact = [exact_answer(rules, row) for row in rows]
     known = [one for one in exact if one.status != MISSING]
@@ -219,12 +227,12 @@ def test_rows_exactly_at_an_end_a_level_and_a_margin_are_counted_exactly() -> No
     tiny = 5e-324
     values = np.array([[0.0, tiny, 3.0, np.nextafter(3.0, 0.0), 1.5]])
     exact = [exact_answer(rules, {"force": float(x)}) for x in values[0]]
-    found = counted(subject_of(rules), values)
+    found = count_rows(subject_of(rules), values)
     assert found.fired.tolist() == [4, 4]
     assert found.tied == 1
     assert [one.status == TIE for one in exact] == [False] * 4 + [True]
-    narrow = Settings(epsilon=0.5, margin=float(exact[3].margin))
-    again = counted(subject_of(rules, settings=narrow), values)
+    narrow = AuditSettings(epsilon=0.5, margin=float(exact[3].margin))
+    again = count_rows(subject_of(rules, settings=narrow), values)
     assert again.weak == 0
     assert again.close == sum(one.margin <= Fraction(narrow.margin) for one in exact)
 
@@ -233,18 +241,18 @@ def test_points_are_drawn_within_the_domain_and_alike_for_a_seed() -> None:
     mix = Variable("mix", parts=(Part("force", 1.0), Part("slip", 1.0)))
     rules = replace(RULES, variables=(*RULES.variables, Variable("slip"), mix))
     box = Domain((Side("force", 0.0, 1.0), Side("slip", 2.0, 2.0), Side("mix", 2.5, 9)))
-    points = drawn(rules, box, 400, 7)
+    points = sample_points(rules, box, 400, 7)
     assert 150 < points.shape[1] < 250
     assert points[0].min() >= 0.5
     assert (points[1] == 2.0).all()
-    assert np.array_equal(points, drawn(rules, box, 400, 7))
-    assert not np.array_equal(points[:, :9], drawn(rules, box, 400, 8)[:, :9])
+    assert np.array_equal(points, sample_points(rules, box, 400, 7))
+    assert not np.array_equal(points[:, :9], sample_points(rules, box, 400, 8)[:, :9])
     with pytest.raises(ValueError, match=r"^input 'slip' has no side in the domain$"):
-        drawn(rules, Domain(box.sides[:1]), 5, 0)
+        sample_points(rules, Domain(box.sides[:1]), 5, 0)
 
 
 def test_shares_of_the_domain_are_told_without_rows() -> None:
-    found = asked(subject_of(RULES, settings=Settings(rows=4000, seed=3)))
+    found = asked(subject_of(RULES, settings=AuditSettings(rows=4000, seed=3)))
     assert isinstance(found["rows"].state, Declined)
     assert found["rows"].sentence == (
         "what rows say about the rules is not known: rows are needed (--data TABLE)"
@@ -269,12 +277,12 @@ def test_a_domain_that_no_point_meets_is_declined() -> None:
 
 def test_of_a_system_only_firing_is_counted_and_gaps_only_if_it_is_whole() -> None:
     values = np.array([[0.0, 3.5], [0.0, 0.0]])
-    whole = asked(subject_of(system_of(block_of(A_LOW)), Rows("pump", values)))
+    whole = asked(subject_of(system_of(block_of(A_LOW)), AuditRows("pump", values)))
     assert whole["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
     assert whole["uncovered rows"].is_finding
     assert "tied rows" not in whole
     part = system_of(block_of(A_LOW, Is("power", "big")))
-    found = asked(subject_of(part, Rows("pump", values)))
+    found = asked(subject_of(part, AuditRows("pump", values)))
     assert "uncovered rows" not in found
     assert found["covered rows"].sentence == (
         "how many rows are covered is not known: rules are left out, and they may "
@@ -288,10 +296,10 @@ def test_of_a_curve_between_lines_counts_are_told_where_both_lines_agree() -> No
         np.array([[0.0, 3.0], [0.0, 0.0]]),
         np.array([[0.01, 3.0], [0.0, 0.0]]),
     )
-    found = asked(subject_of(system, Rows("pump", clear)))
+    found = asked(subject_of(system, AuditRows("pump", clear)))
     assert found["rule 1"].sentence == "rule 1 fires on 1 of 2 rows"
     assert found["uncovered rows"].sentence == "on 1 of 2 rows no rule fires"
-    found = asked(subject_of(system, Rows("pump", near)))
+    found = asked(subject_of(system, AuditRows("pump", near)))
     assert found["rule 1"].sentence == (
         "on how many rows rule 1 fires is not decided: it fires on 1 of 2 at least, "
         "and on 2 at most"
@@ -308,14 +316,14 @@ def test_of_a_curve_between_lines_counts_are_told_where_both_lines_agree() -> No
 def test_a_spent_budget_stops_the_count() -> None:
     clock = Clock(1.0, now=iter([0.0, 2.0, 2.0]).__next__)
     with pytest.raises(OutOfTimeError):
-        counted(replace(subject_of(RULES), clock=clock), FORCES)
+        count_rows(replace(subject_of(RULES), clock=clock), FORCES)
 
 
 def test_of_a_model_of_many_clauses_fewer_points_are_drawn(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(support, "_MOST_DEGREES", 1)
-    subject = subject_of(RULES, settings=Settings(rows=5000))
+    subject = subject_of(RULES, settings=AuditSettings(rows=5000))
     found = asked(subject)["uncovered points"]
     assert isinstance(found.state, Sampled)
     assert found.state.rows == 1000

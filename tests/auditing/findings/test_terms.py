@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.engine.states import Bracket, Declined, Proved, short
 from fuzzytree.auditing.findings.audit import audit
-from fuzzytree.auditing.findings.records import Answer, Settings
+from fuzzytree.auditing.findings.records import Answer, AuditSettings
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -45,7 +45,9 @@ def base(*terms: Term, high: float = 4.0) -> RuleBase:
     )
 
 
-def found(rules: RuleBase, code: str, settings: Settings | None = None) -> list[Answer]:
+def found(
+    rules: RuleBase, code: str, settings: AuditSettings | None = None
+) -> list[Answer]:
     return [*audit(rules, select=[code], settings=settings).findings]
 
 
@@ -77,7 +79,7 @@ def test_a_term_that_is_hardly_reached_is_told_with_its_height() -> None:
         "its largest degree from 0 to 4 is 0.25, at 4"
     )
     assert (answer.severity, answer.measures[0].exact) == ("warning", "1/4")
-    assert not found(base(LOW, HIGH, faint), "FT401", Settings(level=0.25))
+    assert not found(base(LOW, HIGH, faint), "FT401", AuditSettings(level=0.25))
 
 
 def test_a_step_at_an_open_lower_end_counts_from_above_only() -> None:
@@ -164,7 +166,7 @@ def test_two_terms_for_one_thing_are_told_with_their_shared_area() -> None:
         "they share 0.8571 of their area; 'low' is nowhere above 'mild'"
     )
     assert answer.measures[0].exact == "6/7"
-    assert not found(base(LOW, HIGH, same), "FT403", Settings(overlap=0.9))
+    assert not found(base(LOW, HIGH, same), "FT403", AuditSettings(overlap=0.9))
 
 
 def test_equal_terms_share_all_of_their_area() -> None:
@@ -174,19 +176,19 @@ def test_equal_terms_share_all_of_their_area() -> None:
 
 def test_terms_that_cross_are_told_with_the_crossing() -> None:
     near = Term("near", Points((0.0, 0.5, 3.5), (1.0, 1.0, 0.0)))
-    (answer,) = found(base(LOW, near), "FT403", Settings(overlap=0.5))
+    (answer,) = found(base(LOW, near), "FT403", AuditSettings(overlap=0.5))
     assert "they cross at 1.25 with degree 0.75" in answer.sentence
 
 
 def test_shares_that_cannot_be_told_from_the_setting_are_a_bracket() -> None:
     one = Term("one", Band(0.0, 1.0, right=Flank(1.0, 3.0, (0.0, 0.0, 1.0))))
     other = Term("other", Band(0.0, 1.0, right=Flank(1.0, 3.5, (0.0, 1.5, -0.5))))
-    (answer,) = found(base(one, other), "FT403", Settings(overlap=0.1))
+    (answer,) = found(base(one, other), "FT403", AuditSettings(overlap=0.1))
     exact = next(m.value for m in answer.measures if m.name.startswith("shared"))
     rules = base(one, other)
     states = [
         type(
-            audit(rules, select=["FT403"], settings=Settings(overlap=at))
+            audit(rules, select=["FT403"], settings=AuditSettings(overlap=at))
             .answers[0]
             .state
         )

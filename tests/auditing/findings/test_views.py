@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from fuzzytree.auditing.engine.domain import Domain, Side
 from fuzzytree.auditing.findings.system_conditions import MOST_QUESTIONS, MOST_WAYS
-from fuzzytree.auditing.findings.views import View, view
+from fuzzytree.auditing.findings.views import AuditView, view
 from fuzzytree.model.rulebase import sentence
 from fuzzytree.model.system import (
     Activation,
@@ -70,11 +70,11 @@ def system_of(*blocks: RuleBlock, low: Curve = LOW, clips: bool = False) -> Fuzz
     return FuzzySystem("pump", inputs, (output,), blocks)
 
 
-def rules_of(found: View) -> list[str]:
+def rules_of(found: AuditView) -> list[str]:
     return [sentence(one) for one in found.rules.rules] if found.rules else []
 
 
-def reasons(found: View) -> list[str]:
+def reasons(found: AuditView) -> list[str]:
     return [one.sentence for one in found.declined]
 
 
@@ -82,7 +82,7 @@ def activations(system: FuzzySystem, values: Sequence[float]) -> list[float]:
     return list(infer(system, dict(zip(BOX_INPUTS, values, strict=True))).activations)
 
 
-def strengths(found: View, values: Sequence[float]) -> list[Fraction]:
+def strengths(found: AuditView, values: Sequence[float]) -> list[Fraction]:
     """Return the strength of each rule in the model: of its strongest way."""
     assert found.rules is not None
     row = dict(zip(BOX_INPUTS, values, strict=True))
@@ -133,7 +133,7 @@ def test_a_rule_with_an_or_of_two_inputs_becomes_one_for_each_way() -> None:
         "IF a is low AND b is low THEN power is big",
         "IF a is low AND a is high THEN power is big",
     ]
-    assert found.places == (
+    assert found.rule_names == (
         "rule 1 of block 1",
         "way 1 of rule 1 of block 2",
         "way 2 of rule 1 of block 2",
@@ -242,7 +242,7 @@ def test_a_height_is_carried_where_no_degree_is_rounded() -> None:
         one = replace(system.inputs[0], labels=(Label("low", curve, height),))
         found = view(replace(system, inputs=(one, system.inputs[1])), BOX)
         assert found.rules is not None
-        assert (found.held is not None) is (expected is None)
+        assert (found.bounds is not None) is (expected is None)
         if expected is not None:
             assert found.rules.variables[0].terms[0].shape == Points(*expected)
 
@@ -327,13 +327,13 @@ def test_random_systems_are_as_strong_as_their_views_within_rounding() -> None:
 
 
 def both_strengths(
-    found: View, row: Mapping[str, float]
+    found: AuditView, row: Mapping[str, float]
 ) -> tuple[dict[int, Fraction], dict[int, Fraction]]:
     """Return each rule's strength from below and from above, by its number."""
     assert found.rules is not None
     both = (found.rules, found.rules)
-    if found.held is not None:
-        both = (found.held.lower, found.held.upper)
+    if found.bounds is not None:
+        both = (found.bounds.lower, found.bounds.upper)
     made: list[dict[int, Fraction]] = []
     for rules in both:
         best = dict.fromkeys(found.numbers, Fraction(0))

@@ -9,7 +9,7 @@ import msgspec
 
 from fuzzytree.auditing.findings.audit import audit
 from fuzzytree.auditing.findings.locations import model_file
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.exporters import yaml
 from fuzzytree.model.rulebase import Clause, Points, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import FuzzyTree
@@ -39,7 +39,7 @@ def grip() -> RuleBase:
 
 
 def audited(
-    model: RuleBase | FuzzyTree, *, rows: Rows | None = None, **options: Any
+    model: RuleBase | FuzzyTree, *, rows: AuditRows | None = None, **options: Any
 ) -> tuple[bytes, bytes]:
     """Return an audit and the file that it is of."""
     content = yaml.write(model).content

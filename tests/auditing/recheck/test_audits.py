@@ -14,7 +14,7 @@ import pytest
 
 from fuzzytree.auditing.engine.clock import Clock
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.head import LIMITS, digest_of
 from fuzzytree.model.rulebase import (
@@ -341,14 +341,14 @@ def test_an_answer_that_names_three_rules_for_two_is_told() -> None:
 
 
 def test_the_audit_with_rows_that_are_no_table_holds() -> None:
-    rows = Rows("an array", np.array([[0.5, 1.5, 3.5]]))
+    rows = AuditRows("an array", np.array([[0.5, 1.5, 3.5]]))
     assert wrong_of(rules_of((Clause("x", ("up",)),)), rows=rows) == []
 
 
 def test_distances_in_sentences_about_rows_are_held_against_their_measures() -> None:
     tree = random_tree(4, leaves=4)
     values = np.random.default_rng(1).uniform(-1.0, 1.0, (len(tree.inputs), 6))
-    options: Facts = {"rows": Rows("an array", values), "domain": unit(tree)}
+    options: Facts = {"rows": AuditRows("an array", values), "domain": unit(tree)}
     text, content = audited(tree, select=["FT203", "FT204"], **options)
     assert wrong_with(json.loads(text), content) == []
     edited_of = set[str]()

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from fuzzytree.auditing.engine.domain import Domain, Side
-from fuzzytree.auditing.findings.records import Source
-from fuzzytree.auditing.findings.subject import Rows
+from fuzzytree.auditing.findings.records import SourceFile
+from fuzzytree.auditing.findings.subject import AuditRows
 from fuzzytree.auditing.recheck import CannotRunError, recheck
 from fuzzytree.auditing.recheck.head import digest_of
 from fuzzytree.model.system import FuzzySystem
@@ -56,8 +56,8 @@ def audit_of(planted: Planted) -> tuple[Facts, bytes]:
         sides = tuple(Side(name, 0.0, 1.0) for name in model.inputs)
         options["domain"] = Domain(sides)
     if planted.code == "FT701":
-        options["rows"] = Rows("rows.csv", ROWS.T)
-        options["data"] = Source("rows.csv", 64 * "0")
+        options["rows"] = AuditRows("rows.csv", ROWS.T)
+        options["data"] = SourceFile("rows.csv", 64 * "0")
     text, content = audited(model, ignore=["FT6"], **options)
     return json.loads(text), content
 
