@@ -66,16 +66,12 @@ def _commands(group: click.Group, parent: click.Context, level: int) -> Iterator
 
 def formats() -> Iterator[str]:
     """Yield the table of formats."""
-    rows = [
-        (
-            one.name,
-            ", ".join(f"`{suffix}`" for suffix in one.suffixes),
-            ", ".join(one.carries) if one.read else "",
-            ", ".join(one.carries),
-            one.extra or "",
-        )
-        for one in all_formats()
-    ]
+    rows = []
+    for one in all_formats():
+        kinds = ", ".join(one.carries)
+        suffixes = ", ".join(f"`{suffix}`" for suffix in one.suffixes)
+        reads = kinds if one.read else ""
+        rows.append((one.name, suffixes, reads, kinds, one.extra or ""))
     yield _table(("format", "suffix", "reads", "writes", "extra"), rows)
 
 
@@ -98,17 +94,10 @@ def options() -> Iterator[str]:
 
 def runtimes() -> Iterator[str]:
     """Yield the table of runtimes."""
-    rows = [
-        (
-            one.name,
-            ", ".join(one.runs),
-            one.dtype,
-            _promise(one),
-            one.extra or "",
-            "; ".join(one.cannot),
-        )
-        for one in all_runtimes()
-    ]
+    rows = []
+    for one in all_runtimes():
+        runs, cannot = ", ".join(one.runs), "; ".join(one.cannot)
+        rows.append((one.name, runs, one.dtype, _promise(one), one.extra or "", cannot))
     head = ("runtime", "runs", "numbers", "strengths", "extra", "cannot run")
     yield _table(head, rows)
 
@@ -136,18 +125,6 @@ def findings() -> Iterator[str]:
         yield f"*What to do.* {one.remedy}\n"
 
 
-def limits() -> Iterator[str]:
-    """Yield what no audit establishes."""
-    yield from (f"- {text}" for text in LIMITS)
-
-
-def api() -> Iterator[str]:
-    """Yield a mark of mkdocstrings for each public name."""
-    for name in fuzzytree.__all__:
-        if not name.startswith("_"):
-            yield f"::: fuzzytree.{name}\n"
-
-
 def _prose(text: str) -> str:
     """Return a help text as Markdown; its unwrapped parts become blocks."""
     parts = []
@@ -167,7 +144,12 @@ def _on_one_line(cell: str) -> str:
     return text if text.startswith("`") else text.replace("|", "\\|")
 
 
-PARTS: dict[str, Callable[[], Iterator[str]]] = {
-    part.__name__: part
-    for part in (verbs, formats, options, runtimes, findings, limits, api)
+PARTS: dict[str, Callable[[], Iterable[str]]] = {
+    "verbs": verbs,
+    "formats": formats,
+    "options": options,
+    "runtimes": runtimes,
+    "findings": findings,
+    "limits": lambda: (f"- {text}" for text in LIMITS),
+    "api": lambda: (f"::: fuzzytree.{x}\n" for x in fuzzytree.__all__ if x[0] != "_"),
 }
