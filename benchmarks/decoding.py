@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from fuzzytree.tactile.boards import Board, Marker, Protocol, Request, Sentinel, Text
-from fuzzytree.tactile.link.decoding import decoder_of
+from fuzzytree.tactile.link import decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.tactile.simulation.encoding import encoded
 

@@ -239,7 +239,7 @@ def _write(
     """Write the model, its rules, the board, the tables and, if possible, pictures."""
     from fuzzytree.api.verbs import export
     from fuzzytree.semantics.lowering import rules_from_tree
-    from fuzzytree.tactile.board_files.writer import board_text
+    from fuzzytree.tactile.board_file import board_text
     from fuzzytree.tactile.boards import Board, Marker
 
     folder.mkdir(exist_ok=True)

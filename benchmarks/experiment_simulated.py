@@ -11,7 +11,7 @@ from experiment_splits import Split
 from experiment_tasks import Task
 
 from fuzzytree.learning import Settings
-from fuzzytree.tactile.recognition.effects import EFFECTS
+from fuzzytree.tactile.recognition.paper_tables import EFFECTS
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER, press
 from fuzzytree.tactile.simulation.physics import Settings as Physics

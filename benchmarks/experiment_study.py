@@ -19,8 +19,7 @@ from fuzzytree.learning import Learnt, Settings, learn_arrays
 from fuzzytree.model.rulebase import Value
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.features import costs
-from fuzzytree.tactile.features.names import feature_of
-from fuzzytree.tactile.features.sets import names_of
+from fuzzytree.tactile.features.names import feature_of, names_of
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
 from fuzzytree.tactile.runtimes.frames import Features, features_of
 
@@ -157,7 +156,7 @@ def experiment(
 
     Args:
         task: The frames and how they are divided.
-        features: Sets of features (`fuzzytree.tactile.features.sets`); the task's
+        features: Sets of features (`fuzzytree.tactile.features.names`); the task's
             unless given.
         settings: How to learn; the task's unless given.
         choose: Settings to choose from in each division, by the subjects that are

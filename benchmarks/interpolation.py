@@ -22,9 +22,9 @@ import numpy.typing as npt
 from fuzzytree.report.plots import save
 from fuzzytree.report.plots.saving import style
 from fuzzytree.report.plots.sheet import SIZE
-from fuzzytree.tactile.given import given_frames
 from fuzzytree.tactile.interpolation import interpolated
 from fuzzytree.tactile.plots import colours, draw_frames
+from fuzzytree.tactile.presses import given_frames
 from fuzzytree.tactile.sensor import pressed
 
 if TYPE_CHECKING:

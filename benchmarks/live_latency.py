@@ -31,9 +31,9 @@ from fuzzytree.tactile.boards import Board, Marker, Port
 from fuzzytree.tactile.cli.live import MOST_WAITING, SWITCH_S
 from fuzzytree.tactile.cli.screen import Screen
 from fuzzytree.tactile.link import open_line
+from fuzzytree.tactile.recognition.frame_sources import PAPER_BOARD, FromLine, simulated
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser
-from fuzzytree.tactile.recognition.sources import PAPER_BOARD, FromLine, simulated
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.simulation.device import Wire
 from fuzzytree.tactile.simulation.encoding import encoded

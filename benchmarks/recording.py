@@ -14,10 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.link.recording import Recorder, read_recording
-from fuzzytree.tactile.link.records import layout_of
-from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.link.recording import Recorder, layout_of, read_recording
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 SIDES = (16, 64)
 RATES = (10, 100, 1000)

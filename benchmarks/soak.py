@@ -39,7 +39,7 @@ from fuzzytree.tactile.boards import (
     Sentinel,
     Text,
 )
-from fuzzytree.tactile.link.decoding import Decoder, decoder_of
+from fuzzytree.tactile.link import Decoder, decoder_of
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.tactile.simulation.device import bounds
 from fuzzytree.tactile.simulation.encoding import banner, encoded

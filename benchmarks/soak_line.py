@@ -21,9 +21,8 @@ from serial_faults import ConnectionFaults, FaultyDevice
 from soak import CASES, FAULTS, Pool, frame_key, pool_of
 
 from fuzzytree.tactile.boards import Board, Request
-from fuzzytree.tactile.frames import Counters
 from fuzzytree.tactile.link import Line, open_line
-from fuzzytree.tactile.sensor import Cells
+from fuzzytree.tactile.sensor import Cells, Counters
 from fuzzytree.tactile.simulation.device import BoardCounts, Pause
 
 # The cells of some frames hold the marker anyway.

@@ -20,6 +20,7 @@ from fuzzytree.model.rulebase import RuleBase, fingerprint
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.exact import exact_features
 from fuzzytree.tactile.features.plain import plain_answer
+from fuzzytree.tactile.recognition.agreement import errors
 from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
 from fuzzytree.tactile.recognition.runners import (
     PLAIN,
@@ -28,7 +29,6 @@ from fuzzytree.tactile.recognition.runners import (
     as_sent,
     runners,
 )
-from fuzzytree.tactile.recognition.scales import errors
 from fuzzytree.tactile.sensor import Cells, Sensor, pressed
 
 STRENGTHS = "numpy with strengths"
@@ -47,7 +47,7 @@ class Point(msgspec.Struct, frozen=True):
         timings: One for each number of frames in a call.
         bytes: The size of the file that runs; 0 if there is none.
         error: The largest error of a feature, as a share of its scale
-            (`fuzzytree.tactile.recognition.scales`); None for a floor.
+            (`fuzzytree.tactile.recognition.agreement`); None for a floor.
         flips: Frames whose class is not that of the exact features, rounded once.
     """
 

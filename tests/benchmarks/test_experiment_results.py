@@ -12,7 +12,7 @@ from experiment_study import Study, experiment
 from experiment_tasks import known_task
 
 from fuzzytree.learning import Settings
-from fuzzytree.tactile.features.sets import names_of
+from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.runtimes.frames import features_of
 
 pytestmark = pytest.mark.heavy

@@ -17,7 +17,7 @@ from fuzzytree.tactile.boards import (
     Sentinel,
     Text,
 )
-from fuzzytree.tactile.link.decoding import Decoder
+from fuzzytree.tactile.link import Decoder
 from fuzzytree.tactile.sensor import Cells, Sensor
 from fuzzytree.tactile.simulation.encoding import banner, encoded
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "explanation"
 DRAWN_BY = "3.11.2"
 
 FRAME = np.array([[0, 4], [8, 2]])
@@ -413,7 +413,7 @@ def test_the_commands_of_the_page_write_what_they_say(
     from fuzzytree.cli import main
 
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
+    (tmp_path / "examples").symlink_to(DOCS.parents[1] / "examples")
     (block,) = re.findall(r"```sh\n(.*?)```", _page(), re.DOTALL)
     for line in block.splitlines():
         words = shlex.split(line)[1:]

@@ -53,8 +53,8 @@ def command(
     """
     from fuzzytree.files import read_bounded
     from fuzzytree.report.text import agreement_lines, verdict_text
-    from fuzzytree.tactile.given import given_frames
-    from fuzzytree.tactile.recognition.shipped import check_shipped
+    from fuzzytree.tactile.presses import given_frames
+    from fuzzytree.tactile.recognition.onnx_files import check_shipped
 
     is_named = any(one is not None for one in (board, size, full, threshold))
     sensor = wanted_sensor(board, size, full, threshold) if is_named else None

@@ -72,7 +72,7 @@ def command(
     arithmetic. If one disagrees, nothing is written: exit 1. `-` is standard output.
     """
     from fuzzytree.report.text import verdict_text
-    from fuzzytree.tactile.recognition.carriers import (
+    from fuzzytree.tactile.recognition.agreement import (
         check_frames_carriers,
         frames_export,
     )

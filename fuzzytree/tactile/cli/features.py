@@ -25,7 +25,7 @@ from fuzzytree.files import check_place, write_atomically
 from fuzzytree.tactile.cli.sensors import given_options, wanted_frames
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.given import Given
+    from fuzzytree.tactile.presses import Given
     from fuzzytree.tactile.runtimes.frames import Features
 
 CLASS = "class"
@@ -67,7 +67,7 @@ def command(
     of one class each are told as CLASS=FILE: cup=cup.ftr pen=pen.ftr.
     """
     from fuzzytree.tactile.features import costs
-    from fuzzytree.tactile.features.sets import names_of
+    from fuzzytree.tactile.features.names import names_of
 
     if output and output != "-":
         check_place(output)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from fuzzytree.tactile.given import Given
     from fuzzytree.tactile.plots import Axis
+    from fuzzytree.tactile.presses import Given
 
     Pressed = npt.NDArray[np.int64]
 

@@ -17,10 +17,10 @@ from fuzzytree.tactile.cli.sensors import asked_model
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.frames import Frame
     from fuzzytree.tactile.link import Line
     from fuzzytree.tactile.link.recording import Recorder
     from fuzzytree.tactile.recognition.live import Answer, Hold, Live, Source
+    from fuzzytree.tactile.sensor import Frame
 
 SIMULATOR = "simulator"
 MOST_WAITING = 4
@@ -157,7 +157,7 @@ def _opened(
     quiet: bool,
 ) -> tuple[Source, Board]:
     """Return where frames come from, and the board that they fit."""
-    from fuzzytree.tactile.recognition import sources
+    from fuzzytree.tactile.recognition import frame_sources as sources
 
     is_file = Path(source).is_file()
     if board is None and source != SIMULATOR and not is_file:
@@ -178,8 +178,8 @@ def _opened(
 def _line(port: str, board: str, *, is_kept: bool, quiet: bool) -> tuple[Source, Board]:
     """Open a port, and measure what its board reads when nothing presses."""
     from fuzzytree.tactile import link as lines
-    from fuzzytree.tactile.board_files.reader import load_board
-    from fuzzytree.tactile.recognition.sources import FromLine
+    from fuzzytree.tactile.board_file import load_board
+    from fuzzytree.tactile.recognition.frame_sources import FromLine
 
     known = load_board(board)
     most = lines.MOST_WAITING if is_kept else MOST_WAITING

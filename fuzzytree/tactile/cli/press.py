@@ -24,7 +24,7 @@ from fuzzytree.cli.console import (
 )
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.recognition.table2 import Comparison
+    from fuzzytree.tactile.recognition.paper_tables import Comparison
     from fuzzytree.tactile.simulation.physics import Settings, Simulated
 
 
@@ -105,7 +105,7 @@ def command(
         say_rows(("wrote", output, size), ("next", after, ""), quiet=quiet)
         facts |= {"file": output, "bytes": len(content), "sha256": digest}
     if means:
-        from fuzzytree.tactile.recognition.table2 import compare
+        from fuzzytree.tactile.recognition.paper_tables import compare
 
         comparison = compare(settings, seed, count=count, objects=names)
         facts["means"] = _means_facts(comparison)
@@ -188,7 +188,7 @@ def _content(found: dict[str, Simulated]) -> bytes:
 
 
 def _means_facts(found: Comparison) -> dict[str, object]:
-    from fuzzytree.tactile.recognition.table2 import FEATURES
+    from fuzzytree.tactile.recognition.paper_tables import FEATURES
 
     return {
         "features": FEATURES,
@@ -203,7 +203,7 @@ def _means_facts(found: Comparison) -> dict[str, object]:
 
 def _tell_means(found: Comparison, *, quiet: bool) -> None:
     """Print a line for each feature: each object's mean and its ratio to Table 2."""
-    from fuzzytree.tactile.recognition.table2 import FEATURES, NO_ORACLE
+    from fuzzytree.tactile.recognition.paper_tables import FEATURES, NO_ORACLE
 
     rows = zip(FEATURES, found.means, found.ratios, strict=True)
     answer(_line("feature", found.objects))
@@ -222,7 +222,7 @@ def _tell_effects(
     settings: Settings, seed: int, count: int, *, is_silent: bool
 ) -> list[dict[str, object]]:
     """Print a line for each effect that is switched off, and return the facts."""
-    from fuzzytree.tactile.recognition.effects import effects
+    from fuzzytree.tactile.recognition.paper_tables import effects
     from fuzzytree.tactile.simulation.objects import OBJECTS
 
     facts: list[dict[str, object]] = []

@@ -16,13 +16,13 @@ import click
 from fuzzytree.cli.console import answer_json, json_option, quiet_option, say, say_rows
 from fuzzytree.errors import PortError, WriteError
 from fuzzytree.files import check_place
-from fuzzytree.tactile.cli.ending import told_to_end
+from fuzzytree.tactile.cli.signals import told_to_end
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
-    from fuzzytree.tactile.frames import Frame
     from fuzzytree.tactile.link import Line, Started, State
     from fuzzytree.tactile.link.recording import Recorder
+    from fuzzytree.tactile.sensor import Frame
 
 End = Literal["frames", "seconds", "told", "port"]
 """Enough frames, or seconds; Ctrl-C and its like; or the port went away."""
@@ -67,7 +67,7 @@ def command(
     First it is measured what the sensor reads at rest: let nothing lie on it. A port
     that goes away is waited for. Exit 1 if it went away for good.
     """
-    from fuzzytree.tactile.board_files.reader import load_board
+    from fuzzytree.tactile.board_file import load_board
     from fuzzytree.tactile.link import open_line, start
     from fuzzytree.tactile.link.recording import Recorder
 

@@ -20,11 +20,10 @@ from fuzzytree.cli.console import (
     say_rows,
 )
 from fuzzytree.files import check_place, open_atomically, write_atomically
-from fuzzytree.tactile.cli.ending import told_to_end
+from fuzzytree.tactile.cli.signals import told_to_end
 
 if TYPE_CHECKING:
-    from fuzzytree.tactile.link.recording import RecordingFile
-    from fuzzytree.tactile.link.review import Review
+    from fuzzytree.tactile.link.recording import RecordingFile, Review
 
 _LOOK_S = 0.1
 _LAST_S = 0.2  # for the reader of a port to take the last bytes
@@ -60,8 +59,7 @@ def command(
     With --to-port the frames go out through a new port, whose name is printed, once
     something reads there, each when it came; Ctrl-C ends.
     """
-    from fuzzytree.tactile.link.recording import RecordingFile
-    from fuzzytree.tactile.link.review import review
+    from fuzzytree.tactile.link.recording import RecordingFile, review
 
     if speed is not None and not to_port:
         raise click.UsageError("--speed is for --to-port")
@@ -163,7 +161,7 @@ def _write_arrays(output: str, name: str, _: RecordingFile) -> None:
 
 def _write_board(output: str, _: str, file: RecordingFile) -> None:
     """Write the board, with what was measured, as its file."""
-    from fuzzytree.tactile.board_files.writer import board_text
+    from fuzzytree.tactile.board_file import board_text
 
     write_atomically(output, board_text(file.board).encode())
 
@@ -174,7 +172,7 @@ _WRITERS = {".csv": _write_table, ".npz": _write_arrays, ".yaml": _write_board}
 def _play(file: RecordingFile, speed: float, *, quiet: bool) -> None:
     """Send the frames through a port of our own, each when it came."""
     from fuzzytree.report.text import counted
-    from fuzzytree.tactile.recognition.sources import Paced
+    from fuzzytree.tactile.recognition.frame_sources import Paced
     from fuzzytree.tactile.simulation.device import Device
 
     paced = Paced(file, speed)

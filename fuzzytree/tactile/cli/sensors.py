@@ -12,7 +12,7 @@ from fuzzytree.cli.console import say_rows, wrong_options
 
 if TYPE_CHECKING:
     from fuzzytree.model.contracts import Model
-    from fuzzytree.tactile.given import Given
+    from fuzzytree.tactile.presses import Given
     from fuzzytree.tactile.sensor import Cells, Sensor
 
 _SIZE = re.compile(r"(\d{1,3})x(\d{1,3})")
@@ -48,7 +48,7 @@ def wanted_sensor(
             raise click.UsageError(
                 "--board tells --sensor, --full and --threshold; give one of them"
             )
-        from fuzzytree.tactile.board_files.reader import load_board
+        from fuzzytree.tactile.board_file import load_board
 
         return load_board(board).sensor
     if size is None:
@@ -88,11 +88,11 @@ def wanted_frames(
         click.UsageError: If a board is named, and what it tells as well.
         ReadError: If a file is none, or the frames do not fit the board.
     """
-    from fuzzytree.tactile.given import given_frames
+    from fuzzytree.tactile.presses import given_frames
 
     if board is None:
         return given_frames(path, full=full, threshold=threshold, label=label)
-    from fuzzytree.tactile.board_files.reader import load_board
+    from fuzzytree.tactile.board_file import load_board
 
     sensor = load_board(board).sensor
     if full is not None or threshold is not None:
@@ -110,7 +110,7 @@ def frames_of(path: str | None, sensor: Sensor, *, quiet: bool = False) -> Cells
     """
     if path is None:
         return None
-    from fuzzytree.tactile.given import given_frames
+    from fuzzytree.tactile.presses import given_frames
 
     presses = given_frames(path, sensor=sensor).presses
     if presses.threshold not in (0, sensor.threshold):  # 0 where it tells none

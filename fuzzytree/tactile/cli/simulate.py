@@ -17,7 +17,7 @@ from fuzzytree.cli.console import (
     say_rows,
     wrong_options,
 )
-from fuzzytree.tactile.cli.ending import told_to_end
+from fuzzytree.tactile.cli.signals import told_to_end
 
 if TYPE_CHECKING:
     from fuzzytree.tactile.boards import Board
@@ -67,8 +67,8 @@ def command(
     """
     if name is not None and recording is not None:
         raise click.UsageError("--object and --recording exclude each other")
-    from fuzzytree.tactile.board_files.reader import load_board
-    from fuzzytree.tactile.recognition.sources import FRAMES_A_SECOND
+    from fuzzytree.tactile.board_file import load_board
+    from fuzzytree.tactile.recognition.frame_sources import FRAMES_A_SECOND
     from fuzzytree.tactile.simulation.device import Device, faults_of
 
     known = load_board(board)
@@ -130,7 +130,7 @@ def _frames(
         return rest, (fitted(board, one, sensor.full) for one in frames)
     if name is None:
         return empty(board), blob(board, seed)
-    from fuzzytree.tactile.recognition.sources import simulated
+    from fuzzytree.tactile.recognition.frame_sources import simulated
     from fuzzytree.tactile.simulation.objects import OBJECTS
 
     if name not in (*OBJECTS, ALL):

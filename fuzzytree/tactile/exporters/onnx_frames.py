@@ -24,8 +24,7 @@ from fuzzytree.model.rulebase import RuleBase, fingerprint
 from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
 from fuzzytree.tactile.features.aimed import frame_type, proving_frames
-from fuzzytree.tactile.features.plain import check_reject
-from fuzzytree.tactile.features.states import State
+from fuzzytree.tactile.features.plain import State, check_reject
 from fuzzytree.tactile.sensor import Sensor, offsets
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def write_frames(
     The input is `frames`, of shape (frames, rows, columns), uint8, or uint16 for a
     sensor of 16 bits. The outputs, each with one entry per frame: `label`, the class,
     or "" where nothing presses or nothing known; `state`, a
-    `fuzzytree.tactile.features.states.State`; `rule`, the number of the rule or leaf
+    `fuzzytree.tactile.features.plain.State`; `rule`, the number of the rule or leaf
     that decides, from 1, or 0; `features`, of shape (frames, features); `strengths` of
     a rule base, of shape (frames, rules), 0 where nothing presses. The same model,
     sensor and options give the same bytes.

@@ -14,17 +14,18 @@ from typing import Literal
 from fuzzytree.errors import InvalidModelError, TableError
 from fuzzytree.model.rulebase import Value
 from fuzzytree.semantics.programs.steps import Maker, Program, Result
-from fuzzytree.tactile.features.elementary import angle, signed_log
 from fuzzytree.tactile.features.moments import (
     ORDER,
     Centred,
     Measured,
     Moments,
+    Noisy,
+    angle,
     complex_moment,
+    signed_log,
     sum_name,
 )
 from fuzzytree.tactile.features.names import Feature, features_of_names
-from fuzzytree.tactile.features.noise import Noisy
 from fuzzytree.tactile.sensor import Sensor
 
 PRESSED = "pressed"

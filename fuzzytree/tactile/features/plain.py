@@ -1,19 +1,29 @@
-"""Frame to class in plain Python: whole numbers, one step and one rule after another.
-
-Graphs and C are held against this when they are written.
-"""
+"""Frame to class in plain Python, the reference of graphs and C code."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import IntEnum
 
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import RuleBase, Value
 from fuzzytree.semantics.programs.evaluate import evaluate as run
 from fuzzytree.semantics.reference import Status, descend, evaluate
 from fuzzytree.tactile.features import FrameProgram
-from fuzzytree.tactile.features.states import State
 from fuzzytree.tactile.sensor import Cells, pressed
+
+
+class State(IntEnum):
+    """What a frame shows."""
+
+    OBJECT = 0
+    """An object of one of the classes."""
+
+    NOTHING = 1
+    """Nothing presses: there is no centre of pressure, and no answer."""
+
+    UNKNOWN = 2
+    """Something that is none of the known objects."""
 
 
 class Shown(Value, frozen=True):

@@ -1,6 +1,6 @@
-"""A serial port as a stream of frames: silence, pulled plugs and slow readers included.
+"""A serial port as a stream of frames, with pauses, unplugging and slow readers.
 
-The only module that knows pyserial.
+The only module that imports pyserial.
 """
 
 from __future__ import annotations
@@ -15,20 +15,61 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Self, assert_never
 
 import numpy as np
 
 from fuzzytree.errors import MissingExtraError, PortError, install_hint
-from fuzzytree.tactile.boards import Board
-from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.link.decoding import decoder_of
+from fuzzytree.tactile.boards import Board, Marker, Request, Sentinel, Text
+from fuzzytree.tactile.link.decoder import Decoder
+from fuzzytree.tactile.link.fixed import RequestDecoder
+from fuzzytree.tactile.link.markers import MarkerDecoder
+from fuzzytree.tactile.link.sentinels import SentinelDecoder
 from fuzzytree.tactile.link.starting import measured, remarks
+from fuzzytree.tactile.link.texts import TextDecoder
 from fuzzytree.tactile.link.watching import PATIENCE_S, Questions, Watch
-from fuzzytree.tactile.sensor import Cells
+from fuzzytree.tactile.sensor import Cells, Counters, Frame
 
 if TYPE_CHECKING:
     from serial import Serial
+
+
+__all__ = ["Decoder", "decoder_of"]
+
+
+def decoder_of(board: Board, *, is_joined: bool = False) -> Decoder:
+    """Return what finds the frames of a board in its bytes.
+
+    Nothing of it reads, writes or looks at a clock. A decoder is for one stream.
+
+    Args:
+        board: The board.
+        is_joined: Whether the stream begins anywhere, as that of a board that sent
+            before. Then the first line of text, or the first bytes up to one that
+            ends a frame, are skipped: cut at their front they could still look whole.
+            Where the banner comes, nothing else is skipped.
+
+    Example:
+        >>> from fuzzytree.tactile.sensor import Sensor
+        >>> decoder = decoder_of(Board("tiny", Sensor(1, 3), Sentinel()))
+        >>> decoder.feed(bytes([7, 0])), decoder.feed(bytes([2, 255]))
+        ([], [array([[7, 0, 0]], dtype=uint8)])
+        >>> decoder.counters.bytes, decoder.counters.frames, decoder.framed
+        (4, 1, 4)
+    """
+    protocol = board.protocol
+    match protocol:
+        case Marker():
+            return MarkerDecoder(board, protocol)
+        case Sentinel():
+            return SentinelDecoder(board, protocol, is_joined=is_joined)
+        case Request():
+            return RequestDecoder(board, protocol)
+        case Text():
+            return TextDecoder(board, protocol, is_joined=is_joined)
+        case _:
+            assert_never(protocol)
+
 
 State = Literal["open", "silent", "away", "ended"]
 """Frames come; none came for too long; the port went away; no more will come."""

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from fuzzytree.tactile.boards import Board
-from fuzzytree.tactile.frames import Counters
-from fuzzytree.tactile.sensor import Cells
+from fuzzytree.tactile.sensor import Cells, Counters
 
 _SLICE: Final = 2**16  # bytes that are looked at together: it bounds the memory
 _LONGEST_BANNER_LINE: Final = 1000

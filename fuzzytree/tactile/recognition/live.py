@@ -11,9 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from fuzzytree.errors import TableError
-from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
-from fuzzytree.tactile.sensor import Cells, pressed
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, pressed
 
 STATES = {
     State.OBJECT: "object",

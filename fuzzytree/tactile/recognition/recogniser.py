@@ -15,8 +15,8 @@ from fuzzytree.runtimes.one_row import load
 from fuzzytree.semantics.lowering import rules_from_tree
 from fuzzytree.semantics.reference import Status
 from fuzzytree.tactile.features.names import feature_of
+from fuzzytree.tactile.features.plain import State as State
 from fuzzytree.tactile.features.plain import check_reject
-from fuzzytree.tactile.features.states import State as State
 from fuzzytree.tactile.runtimes.frames import Features, FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor, saturated
 

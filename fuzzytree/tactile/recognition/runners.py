@@ -42,7 +42,7 @@ class Found:
     Attributes:
         features: Shape (features, frames).
         codes: Shape (frames,): the place of the class, -1 for none.
-        states: Shape (frames,): a `fuzzytree.tactile.features.states.State` each.
+        states: Shape (frames,): a `fuzzytree.tactile.features.plain.State` each.
         rules: Shape (frames,): the rule or leaf that decides; None where it is not
             told.
     """

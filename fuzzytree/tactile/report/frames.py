@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fuzzytree.report.text import agreement_lines, counted
-from fuzzytree.tactile.recognition.carriers import FramesAgreement
+from fuzzytree.tactile.recognition.agreement import FramesAgreement
 
 
 def check_lines(found: FramesAgreement, *, is_full: bool = False) -> Iterator[str]:

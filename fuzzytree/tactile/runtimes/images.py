@@ -17,8 +17,7 @@ import numpy.typing as npt
 from fuzzytree.errors import TableError
 from fuzzytree.runtimes.programs import plan_program, run_program
 from fuzzytree.tactile.features import image_program
-from fuzzytree.tactile.features.moments import ORDER
-from fuzzytree.tactile.features.noise import UNIT
+from fuzzytree.tactile.features.moments import ORDER, UNIT
 from fuzzytree.tactile.runtimes.frames import Features
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from fuzzytree.api.verbs import save
 from fuzzytree.cli import main
 from fuzzytree.tactile.cli.sensors import frames_of
 from fuzzytree.tactile.presses import Presses, write_presses
-from fuzzytree.tactile.recognition import carriers
+from fuzzytree.tactile.recognition import agreement
 from fuzzytree.tactile.sensor import Sensor
 from tests.tactile.frame_models import SMALL, learnt_tree, raw_rules
 
@@ -38,10 +38,11 @@ def test_a_graph_is_checked_and_written(capsys: Said) -> None:
     assert main(words) == 0
     out, err = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[1].split()[:3] == ["representation", "against", "on"]
+    assert lines[0].startswith("tree: none of 9 comparisons disagrees (")
+    assert lines[1].split()[:2] == ["compared", "with"]
     assert "4 show nothing" in out  # three are made
     assert "exact arithmetic" in lines[2]
-    assert all(line.endswith("agrees") for line in lines[2:8])
+    assert all(line.endswith("agree") for line in lines[2:6])
     content = Path("pad.onnx").read_bytes()
     assert err.startswith(f"wrote    pad.onnx onnx, {len(content)} bytes, sha256 ")
     onnx.checker.check_model(onnx.load_model_from_string(content))
@@ -79,7 +80,7 @@ def test_facts_for_programs(capsys: Said) -> None:
 def test_nothing_is_written_where_a_way_disagrees(
     capsys: Said, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(carriers, "ALLOWED", -1.0)  # nothing is as exact as that
+    monkeypatch.setattr(agreement, "ALLOWED", -1.0)  # nothing is as exact as that
     words = ["tactile", "export", "tree.yaml", "pad.onnx", *SIZE]
     assert main(words) == 1
     assert (

@@ -12,10 +12,9 @@ import pytest
 
 from fuzzytree.cli import main
 from fuzzytree.tactile.boards import Board, Marker
-from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.link.recording import Recorder
 from fuzzytree.tactile.presses import Presses, write_presses
-from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 NONE = np.zeros(0, np.int64)
 

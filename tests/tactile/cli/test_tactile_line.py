@@ -17,14 +17,13 @@ import numpy as np
 import pytest
 
 from fuzzytree.cli.console import say
-from fuzzytree.tactile.board_files.reader import load_board
-from fuzzytree.tactile.board_files.writer import board_text
+from fuzzytree.tactile.board_file import board_text, load_board
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.link import SerialPort, open_line, ports, records
+from fuzzytree.tactile.link import SerialPort, open_line, ports
+from fuzzytree.tactile.link import recording as records
 from fuzzytree.tactile.link.recording import Recorder, read_recording
 from fuzzytree.tactile.presses import read_presses
-from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.device import Device, Faults, Pause, blob
 from fuzzytree.tactile.simulation.encoding import encoded
 

@@ -28,12 +28,11 @@ from serial_faults import ConnectionFaults, FaultyDevice
 
 import fuzzytree as ft
 from fuzzytree.cli import main
-from fuzzytree.tactile.board_files.writer import board_text
+from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.boards import Board, Marker, Start
 from fuzzytree.tactile.cli.screen import look_of
-from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.link.recording import Recorder, read_recording
-from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 from fuzzytree.tactile.simulation.device import Device, Pause
 
 Call = Callable[..., tuple[int, str, str]]

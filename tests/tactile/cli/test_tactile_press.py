@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.tactile.presses import read_presses
-from fuzzytree.tactile.recognition.effects import EFFECTS
-from fuzzytree.tactile.recognition.table2 import FEATURES
+from fuzzytree.tactile.recognition.paper_tables import EFFECTS, FEATURES
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER, Settings, press
 

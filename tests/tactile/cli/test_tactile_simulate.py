@@ -15,12 +15,11 @@ import numpy as np
 import pytest
 import serial
 
-from fuzzytree.tactile.board_files.writer import board_text
+from fuzzytree.tactile.board_file import board_text
 from fuzzytree.tactile.boards import Board, Marker, Start
-from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.link.decoding import decoder_of
+from fuzzytree.tactile.link import decoder_of
 from fuzzytree.tactile.link.recording import Recorder
-from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 from tests.cli.conftest import Call
 
 HELP = "\n  fuzzytree tactile simulate --help lists the options\n"

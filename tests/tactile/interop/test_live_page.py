@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 
 from fuzzytree.api.verbs import learn
-from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.recognition.live import Answer, Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.report.page import Page
-from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 pytestmark = pytest.mark.heavy
 

@@ -6,7 +6,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.tactile.recognition.effects import EFFECTS, Effect, discriminate, effects
+from fuzzytree.tactile.recognition.paper_tables import (
+    EFFECTS,
+    Effect,
+    discriminate,
+    effects,
+)
 from fuzzytree.tactile.simulation.objects import OBJECTS
 from fuzzytree.tactile.simulation.physics import PAPER
 

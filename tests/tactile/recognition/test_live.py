@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 
 from fuzzytree.api.verbs import learn
-from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.link.records import Record
+from fuzzytree.tactile.link.recording import Record
+from fuzzytree.tactile.recognition.frame_sources import Paced, simulated
 from fuzzytree.tactile.recognition.live import Hold, Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State
-from fuzzytree.tactile.recognition.sources import Paced, simulated
-from fuzzytree.tactile.sensor import Cells, Sensor
+from fuzzytree.tactile.sensor import Cells, Counters, Frame, Sensor
 
 SENSOR = Sensor(4, 4)
 SMALL = np.eye(4, dtype=np.uint8)

@@ -16,7 +16,7 @@ from fuzzytree.tactile.features import frame_program
 from fuzzytree.tactile.features.aimed import aimed_frames
 from fuzzytree.tactile.features.names import FEATURES, LOG, PER_FORCE, feature_of
 from fuzzytree.tactile.features.plain import plain_answer, plain_features
-from fuzzytree.tactile.recognition.carriers import check_frames_carriers
+from fuzzytree.tactile.recognition.agreement import check_frames_carriers
 from fuzzytree.tactile.recognition.recogniser import Recogniser
 from fuzzytree.tactile.runtimes.frames import FramePlan
 from fuzzytree.tactile.sensor import Cells, Sensor

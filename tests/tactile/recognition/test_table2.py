@@ -8,7 +8,12 @@ import msgspec
 import numpy as np
 import pytest
 
-from fuzzytree.tactile.recognition.table2 import FEATURES, TABLE_2, Comparison, compare
+from fuzzytree.tactile.recognition.paper_tables import (
+    FEATURES,
+    TABLE_2,
+    Comparison,
+    compare,
+)
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.simulation.objects import OBJECTS, FloatArray, Object, rectangle
 from fuzzytree.tactile.simulation.physics import PAPER, Settings, press, press_object

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fuzzytree.api.verbs import learn
-from fuzzytree.tactile.features.sets import names_of
+from fuzzytree.tactile.features.names import names_of
 from fuzzytree.tactile.recognition.recogniser import Recogniser, State, usual_floor
 from fuzzytree.tactile.runtimes.frames import features_of
 from fuzzytree.tactile.simulation.objects import OBJECTS

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from rich.cells import cell_len
 
-from fuzzytree.tactile.frames import Counters, Frame
 from fuzzytree.tactile.recognition.live import Answer, Latency, View
 from fuzzytree.tactile.recognition.recogniser import State
 from fuzzytree.tactile.report.live import (
@@ -27,7 +26,7 @@ from fuzzytree.tactile.report.live import (
     timing,
     visible,
 )
-from fuzzytree.tactile.sensor import Cells
+from fuzzytree.tactile.sensor import Cells, Counters, Frame
 
 CELLS = np.array([[0, 10, 20], [0, 255, 30]], np.int64)
 ANSWER = Answer(

@@ -17,13 +17,12 @@ import pytest
 
 from fuzzytree.api.verbs import learn
 from fuzzytree.errors import PortError
-from fuzzytree.tactile.frames import Counters, Frame
-from fuzzytree.tactile.link.records import Record
+from fuzzytree.tactile.link.recording import Record
+from fuzzytree.tactile.recognition.frame_sources import Paced
 from fuzzytree.tactile.recognition.live import Live
 from fuzzytree.tactile.recognition.recogniser import Recogniser
-from fuzzytree.tactile.recognition.sources import Paced
 from fuzzytree.tactile.report.page import MOST_BROWSERS, Page
-from fuzzytree.tactile.sensor import Sensor
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
 
 LARGE = np.full((4, 4), 255, np.uint8)
 AREAS = np.array([[4.0], [5.0], [16.0], [15.0]])

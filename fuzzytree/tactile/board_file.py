@@ -1,0 +1,451 @@
+"""The YAML file of a board, read and written; see `docs/reference/boards.md`."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Final, Literal, assert_never
+
+from msgspec import Meta, field
+
+from fuzzytree.errors import InvalidModelError, ReadError
+from fuzzytree.exporters.yaml_text import Entry, Noted, Short, joined
+from fuzzytree.files import PathLike, read_bounded
+from fuzzytree.formats.text_files import Found, report
+from fuzzytree.formats.yaml.binding import entries, located, record, value_of
+from fuzzytree.formats.yaml.layout import Form, Name, Record
+from fuzzytree.formats.yaml.nodes import MappingNode, Scalar, compose
+from fuzzytree.model.rulebase import Mistake
+from fuzzytree.tactile.boards import (
+    HEXADECIMAL,
+    LARGEST_BAUD,
+    LONGEST_TIMEOUT_S,
+    MOST_BANNER_LINES,
+    MOST_SKIPPED,
+    MOST_START_FRAMES,
+    PREFIX,
+    Board,
+    ByteOrder,
+    Checksum,
+    Marker,
+    Order,
+    Port,
+    Pressure,
+    Protocol,
+    Request,
+    Sentinel,
+    Start,
+    Text,
+)
+from fuzzytree.tactile.sensor import LARGEST_SIDE, Sensor
+
+BOARD_FORMAT: Final = "fuzzytree-board/1"
+
+Side = Annotated[int, Meta(ge=1, le=LARGEST_SIDE)]
+Reading = Annotated[int, Meta(ge=0, le=65535)]
+Byte = Annotated[int, Meta(ge=0, le=255)]
+Skip = Annotated[int, Meta(ge=0, le=MOST_SKIPPED)]
+Hexadecimal = Annotated[
+    str,
+    Meta(
+        pattern=rf"^{HEXADECIMAL}$(?!\n)",
+        description="1 to 64 bytes in hexadecimal, such as 'AA 55'",
+        examples=["AA 55", "0D 0A"],
+    ),
+]
+
+
+class SensorOfBoard(Record, frozen=True, kw_only=True):
+    """The matrix: its size, and what its cells read.
+
+    `full` is what a cell reads that takes no more. A cell is pressed where it reads
+    more than `threshold` over its `baseline`, which has a number for each cell, row
+    by row. Cells that are `masked`, each as [row, column] from 0, always read 0.
+    """
+
+    noun: ClassVar[str] = "a sensor"
+    rows: Side
+    columns: Side
+    full: Annotated[int, Meta(ge=1, le=65535)] = 255
+    threshold: Annotated[int, Meta(ge=0, le=65534)] = 0
+    baseline: Annotated[tuple[Reading, ...], Meta(max_length=LARGEST_SIDE**2)] = ()
+    masked: Annotated[
+        tuple[Annotated[tuple[Byte, ...], Meta(min_length=2, max_length=2)], ...],
+        Meta(max_length=LARGEST_SIDE**2),
+    ] = ()
+
+
+class MarkerOfBoard(Record, frozen=True, kw_only=True):
+    """Frames that begin with a marker, and have a fixed length.
+
+    Behind the marker come the `sizes` (16 bits each), `skip` bytes that are ignored,
+    the cells, the checksum of all of these, and the tail.
+    """
+
+    noun: ClassVar[str] = "a marker"
+    bytes: Hexadecimal
+    bits: Literal[8, 16] = 8
+    byte_order: ByteOrder = field(name="byte order", default="little")
+    sizes: Literal["none", "rows and columns"] = "none"
+    skip: Skip = 0
+    checksum: Checksum = "none"
+    tail: Hexadecimal | None = None
+
+
+class SentinelOfBoard(Record, frozen=True, kw_only=True):
+    """Frames that the byte `end` ends, a byte a cell.
+
+    The byte `zero` begins a run of zeros, and the next byte is its length.
+    """
+
+    noun: ClassVar[str] = "a sentinel"
+    end: Byte = 255
+    zero: Byte = 0
+
+
+class RequestOfBoard(Record, frozen=True, kw_only=True):
+    """Frames that are asked for, and have a fixed length.
+
+    `skip` bytes that are ignored, the cells, and the checksum of both. The `timeout`
+    is in seconds.
+    """
+
+    noun: ClassVar[str] = "a request"
+    ask: Hexadecimal
+    bits: Literal[8, 16] = 8
+    byte_order: ByteOrder = field(name="byte order", default="little")
+    skip: Skip = 0
+    checksum: Checksum = "none"
+    timeout: Annotated[float, Meta(ge=0.001, le=LONGEST_TIMEOUT_S)] = 0.5
+
+
+class TextOfBoard(Record, frozen=True, kw_only=True):
+    """Frames as numbers in lines of text.
+
+    A frame is a line, or a block of lines, one for each row (column), with an empty
+    line or a title between blocks. A line of cells begins with the `prefix`, if there
+    is one, and with `skip` numbers that are ignored.
+    """
+
+    noun: ClassVar[str] = "text"
+    frame: Literal["line", "block"] = "line"
+    separator: Literal["space", "comma", "semicolon"] = "space"
+    prefix: (
+        Annotated[
+            str,
+            Meta(
+                pattern=rf"^{PREFIX}$(?!\n)",
+                description="a word of 1 to 32 signs of ASCII, without , and ;, that "
+                "begins with no digit, sign or point",
+                examples=["F"],
+            ),
+        ]
+        | None
+    ) = None
+    skip: Skip = 0
+
+
+class PortOfBoard(Record, frozen=True, kw_only=True):
+    """How the serial port is set."""
+
+    noun: ClassVar[str] = "a port"
+    baud: Annotated[int, Meta(ge=1, le=LARGEST_BAUD)] = 115200
+    data_bits: Literal[7, 8] = field(name="data bits", default=8)
+    parity: Literal["none", "even", "odd"] = "none"
+    stop_bits: Literal[1, 2] = field(name="stop bits", default=1)
+
+
+class StartOfBoard(Record, frozen=True, kw_only=True):
+    """What is measured before the first frame counts.
+
+    The baseline is the median of so many `frames`, cell by cell. A cell whose
+    baseline is above the share `hot` of full is masked.
+    """
+
+    noun: ClassVar[str] = "a start"
+    frames: Annotated[int, Meta(ge=0, le=MOST_START_FRAMES)] = 30
+    hot: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5
+
+
+class BoardFile(Record, frozen=True, kw_only=True):
+    """A board with a tactile sensor: what it sends, and how it is connected.
+
+    One of `marker`, `sentinel`, `request` and `text` says how a frame lies in the
+    bytes.
+    """
+
+    noun: ClassVar[str] = "a board"
+    forms: ClassVar[tuple[Form, ...]] = (
+        Form(("marker",)),
+        Form(("sentinel",)),
+        Form(("request",)),
+        Form(("text",)),
+    )
+    format: Literal["fuzzytree-board/1"]
+    name: Name
+    sensor: SensorOfBoard
+    marker: MarkerOfBoard | None = None
+    sentinel: SentinelOfBoard | None = None
+    request: RequestOfBoard | None = None
+    text: TextOfBoard | None = None
+    order: Order = "rows"
+    pressure: Pressure = "rises"
+    port: PortOfBoard = PortOfBoard()
+    start: StartOfBoard = StartOfBoard()
+    banner: Annotated[int, Meta(ge=0, le=MOST_BANNER_LINES)] = 0
+
+
+MOST_BYTES: Final = 4 * 2**20
+"""The largest file of a board; one of 65536 cells with a baseline is a tenth of it."""
+
+_FAMILIES: Final = ("marker", "sentinel", "request", "text")
+
+
+def load_board(path: PathLike) -> Board:
+    """Return the board of a file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ReadError: If the file cannot be read or is no board; it lists all mistakes
+            with their places.
+    """
+    return read_board(read_bounded(path, MOST_BYTES), os.fspath(path))
+
+
+def read_board(content: bytes, name: str) -> Board:
+    """Return the board of a file's content.
+
+    Args:
+        content: The file.
+        name: What messages call it.
+
+    Raises:
+        ReadError: If it is no board; it lists all mistakes with their places.
+
+    Example:
+        >>> text = '''
+        ... format: fuzzytree-board/1
+        ... name: mat
+        ... sensor: {rows: 16, columns: 16}
+        ... marker: {bytes: AA 55}
+        ... port: {baud: 2000000}
+        ... '''
+        >>> read_board(text.encode(), "mat.yaml").protocol
+        Marker(marker='AA 55', bits=8, byte_order='little', sizes=False, skip=0, \
+checksum='none', tail='')
+    """
+    if len(content) > MOST_BYTES:
+        text = f"{len(content):,} bytes are more than the {MOST_BYTES:,} of a board"
+        raise ReadError(f"{name}: {text}")
+    root, found = compose(content, name)
+    if not isinstance(root, MappingNode):
+        text = f"a board must be a mapping that begins with 'format: {BOARD_FORMAT}'"
+        raise report(name, [*found, (root.line, root.column, text)])
+    wrong_format = [*_format_mistakes(root)]
+    if wrong_format:
+        raise report(name, [*found, *wrong_format])
+    file = record(entries(root, BoardFile, found), BoardFile, found)
+    if file is None or found:
+        raise report(name, found)
+    sensor, mistakes = _sensor(file.sensor)
+    try:
+        board = _board(file, sensor)
+    except InvalidModelError as error:
+        mistakes += error.mistakes
+    else:
+        if not mistakes:
+            return board
+    raise report(name, [*located(root, _renamed(file, mistakes))])
+
+
+def _format_mistakes(root: MappingNode) -> Iterator[Found]:
+    node = value_of(root, "format")
+    if node is None:
+        text = f"no 'format: {BOARD_FORMAT}' says what this file is"
+        yield root.line, root.column, text
+        return
+    given = node.text if isinstance(node, Scalar) else ""
+    if given == BOARD_FORMAT:
+        return
+    text = f"'format' must be {BOARD_FORMAT!r}"
+    if re.fullmatch(r"fuzzytree-board/[1-9][0-9]{0,8}", given):
+        text = (
+            f"a board of format {given!r} needs a newer fuzzytree, one that reads "
+            f"{given!r}; this one reads {BOARD_FORMAT!r}"
+        )
+    elif given.startswith("fuzzytree/"):
+        text = f"this is a model, and no board; {text}"
+    yield node.line, node.column, text
+
+
+def _sensor(file: SensorOfBoard) -> tuple[Sensor, list[Mistake]]:
+    """Return the sensor, or the part that cannot be wrong and what is wrong."""
+    try:
+        sensor = Sensor(
+            rows=file.rows,
+            columns=file.columns,
+            full=file.full,
+            threshold=file.threshold,
+            baseline=file.baseline,
+            masked=tuple((row, column) for row, column in file.masked),
+        )
+    except InvalidModelError as error:
+        mistakes = [(("sensor", *path), text) for path, text in error.mistakes]
+        return Sensor(file.rows, file.columns, file.full), mistakes
+    return sensor, []
+
+
+def _board(file: BoardFile, sensor: Sensor) -> Board:
+    port, start = file.port, file.start
+    return Board(
+        name=file.name,
+        sensor=sensor,
+        protocol=_protocol(file),
+        order=file.order,
+        pressure=file.pressure,
+        port=Port(port.baud, port.data_bits, port.parity, port.stop_bits),
+        start=Start(start.frames, start.hot),
+        banner=file.banner,
+    )
+
+
+def _protocol(file: BoardFile) -> Protocol:
+    match file.marker or file.sentinel or file.request or file.text:
+        case MarkerOfBoard() as marker:
+            return Marker(
+                marker=marker.bytes,
+                bits=marker.bits,
+                byte_order=marker.byte_order,
+                sizes=marker.sizes == "rows and columns",
+                skip=marker.skip,
+                checksum=marker.checksum,
+                tail=marker.tail or "",
+            )
+        case SentinelOfBoard() as sentinel:
+            return Sentinel(sentinel.end, sentinel.zero)
+        case RequestOfBoard() as request:
+            return Request(
+                ask=request.ask,
+                bits=request.bits,
+                byte_order=request.byte_order,
+                skip=request.skip,
+                checksum=request.checksum,
+                timeout_s=request.timeout,
+            )
+        case TextOfBoard() as text:
+            return Text(text.frame, text.separator, text.prefix or "", text.skip)
+        case None:
+            raise AssertionError("a form of the file has one of the four")
+
+
+def _renamed(file: BoardFile, mistakes: list[Mistake]) -> Iterator[Mistake]:
+    """Yield mistakes with the keys of the file on their paths.
+
+    Markers, prefixes and limits were checked with the form of the file: what is left
+    bears the same words there, but for the family and for blanks.
+    """
+    family = next(key for key in _FAMILIES if getattr(file, key) is not None)
+    for path, text in mistakes:
+        keys = [family if step == "protocol" else step for step in path]
+        yield (
+            tuple(k.replace("_", " ") if isinstance(k, str) else k for k in keys),
+            text,
+        )
+
+
+_TITLE: Final = "# A board of fuzzytree: what it sends, and how it is connected."
+
+
+def board_text(board: Board) -> str:
+    """Return a board as YAML; what is as usual is left out.
+
+    Reading it gives an equal board.
+
+    Raises:
+        LossError: If the file is too large to be read again.
+
+    Example:
+        >>> board = Board("mat", Sensor(16, 16), Marker("AA 55"))
+        >>> print(board_text(board), end="")
+        # A board of fuzzytree: what it sends, and how it is connected.
+        format: fuzzytree-board/1
+        name: mat
+        sensor: {rows: 16, columns: 16, full: 255}
+        marker: {bytes: AA 55}
+        order: rows
+        port: {baud: 115200}
+    """
+    entries: dict[str, Entry] = {
+        "format": BOARD_FORMAT,
+        "name": board.name,
+        "sensor": _sensor_entry(board.sensor),
+        **_protocol_entry(board),
+        "order": board.order,
+    }
+    if board.pressure != "rises":
+        entries["pressure"] = board.pressure
+    entries["port"] = _changed(board.port, Port(), always=("baud",))
+    if board.start != Start():
+        entries["start"] = _changed(board.start, Start())
+    if board.banner:
+        entries["banner"] = Noted(board.banner, "lines")
+    return joined(board.name, _TITLE, entries).decode()
+
+
+def _sensor_entry(sensor: Sensor) -> Entry:
+    entries: dict[str, Entry] = {
+        "rows": sensor.rows,
+        "columns": sensor.columns,
+        "full": sensor.full,
+    }
+    if sensor.threshold:
+        entries["threshold"] = sensor.threshold
+    if sensor.baseline:
+        entries["baseline"] = Short([*sensor.baseline], is_run_on=True)
+    if sensor.masked:
+        cells: list[Entry] = [Short([*cell]) for cell in sensor.masked]
+        entries["masked"] = Short(cells, is_run_on=True)
+    is_short = not (sensor.baseline or sensor.masked)
+    return Short(entries) if is_short else entries
+
+
+def _protocol_entry(board: Board) -> dict[str, Entry]:
+    protocol = board.protocol
+    match protocol:
+        case Marker():
+            changed = _changed(protocol, Marker(protocol.marker), always=("marker",))
+            return {"marker": changed}
+        case Sentinel():
+            return {"sentinel": _changed(protocol, Sentinel(), always=("end", "zero"))}
+        case Request():
+            changed = _changed(protocol, Request(protocol.ask), always=("ask",))
+            return {"request": changed}
+        case Text():
+            return {"text": _changed(protocol, Text(), always=("frame",))}
+        case _:
+            assert_never(protocol)
+
+
+def _changed(
+    value: Marker | Sentinel | Request | Text | Port | Start,
+    usual: Marker | Sentinel | Request | Text | Port | Start,
+    always: tuple[str, ...] = (),
+) -> Short:
+    """Return the fields that are not as usual, by their keys."""
+    entries: dict[str, Entry] = {}
+    for name in value.__struct_fields__:
+        one = getattr(value, name)
+        if one == getattr(usual, name) and name not in always:
+            continue
+        match name:
+            case "marker":
+                key = "bytes"
+            case "timeout_s":
+                key = "timeout"
+            case _:
+                key = name.replace("_", " ")
+        entries[key] = "rows and columns" if name == "sizes" else one
+    return Short(entries)

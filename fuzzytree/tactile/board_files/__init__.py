@@ -1,1 +1,0 @@
-"""Board descriptions as YAML files."""

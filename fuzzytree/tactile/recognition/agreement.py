@@ -1,0 +1,436 @@
+"""Agreement of all implementations from frame to class, and files that are checked.
+
+NumPy, ONNX and C must give the bits and classes of plain Python, and plain Python must
+give the features of exact rational arithmetic up to rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Literal
+
+import msgspec
+import numpy as np
+
+from fuzzytree.errors import TableError
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.contracts import Model, Written
+from fuzzytree.model.rulebase import RuleBase, fingerprint
+from fuzzytree.tactile.exporters.c_frames import write_frames_c
+from fuzzytree.tactile.exporters.onnx_frames import USUAL, Output, write_frames
+from fuzzytree.tactile.features import frame_program
+from fuzzytree.tactile.features.aimed import proving_frames
+from fuzzytree.tactile.features.exact import exact_features
+from fuzzytree.tactile.features.names import Feature, features_of_names
+from fuzzytree.tactile.features.plain import State, plain_answer
+from fuzzytree.tactile.recognition.recogniser import Recogniser, check_inputs
+from fuzzytree.tactile.recognition.runners import (
+    NUMPY,
+    PLAIN,
+    Found,
+    Runner,
+    as_sent,
+    runners,
+)
+from fuzzytree.tactile.sensor import Cells, Sensor, pressed, saturated
+
+if TYPE_CHECKING:
+    from fuzzytree.model.contracts import FloatArray
+
+
+_PARTS = {
+    1: (1, (2,)),
+    2: (1, (2, 2)),
+    3: (1, (3, 3)),
+    4: (1, (3, 3)),
+    5: (2, (3, 3, 3, 3)),
+    6: (2, (3, 3, 2)),
+    7: (1, (4, 4)),
+    8: (1, (4, 4)),
+    9: (1, (4,)),
+    10: (2, (4, 4, 4)),
+    11: (2, (4, 2)),
+}
+"""Of each invariant: a factor, and the orders of the moments that it is made of."""
+
+_DEGREES = 90.0 / math.pi  # of half an angle, for each radian of the whole
+
+
+def errors(
+    sensor: Sensor,
+    frame: Cells,
+    names: Sequence[str],
+    values: Sequence[float],
+    exact: Sequence[Fraction],
+) -> tuple[float, ...]:
+    """Return how far features are from the exact ones, as shares of their scales.
+
+    Args:
+        sensor: The sensor.
+        frame: Shape (rows, columns).
+        names: Of the features.
+        values: What was computed.
+        exact: What is right.
+
+    Example:
+        >>> bar = np.array([[0, 255, 255]])
+        >>> errors(Sensor(1, 3), bar, ["S1"], [0.75], [Fraction(1, 2)])
+        (0.5,)
+    """
+    cells = pressed(sensor, frame)[0] / sensor.full
+    if not cells.any():
+        return tuple(0.0 if value == 0.0 else math.inf for value in values)
+    sizes = _sizes(cells)
+    found: list[float] = []
+    every = zip(features_of_names(names), values, exact, strict=True)
+    for feature, value, right in every:
+        apart = abs(Fraction(value) - right)
+        if feature.base == "angle":
+            apart = min(apart, 180 - apart)  # -90 and 90 are one direction
+        if not apart:
+            found.append(0.0)
+            continue
+        scale = _scale(feature, sizes, cells, float(right))
+        found.append(float(apart) / scale if scale else math.inf)
+    return tuple(found)
+
+
+def _sizes(cells: FloatArray) -> list[float]:
+    """Return the sums of g r^n for n from 0 to 4; |C20| at the end."""
+    force = cells.sum()
+    down, along = np.mgrid[0 : cells.shape[0], 0 : cells.shape[1]]
+    z = (along - (along * cells).sum() / force) + 1j * (
+        (down * cells).sum() / force - down
+    )
+    found = [float((cells * np.abs(z) ** order).sum()) for order in range(5)]
+    return [*found, float(abs((cells * z**2).sum()))]
+
+
+def _scale(
+    feature: Feature,
+    sizes: Sequence[float],
+    cells: FloatArray,
+    right: float,
+) -> float:
+    """Return the scale of a feature."""
+    scale = _own_scale(feature, sizes, cells)
+    if feature.is_log:  # an error of v is one of v / (1 + |v|) in log(1 + |v|)
+        value = math.expm1(abs(right))
+        return scale / (1.0 + value) + max(abs(right), 1.0)
+    return scale
+
+
+def _own_scale(
+    feature: Feature,
+    sizes: Sequence[float],
+    cells: FloatArray,
+) -> float:
+    unit = sizes[0] if feature.per_force else 1.0
+    base, direction = feature.base, sizes[2] / (sizes[5] or math.inf)
+    if feature.kind != "moment" or base in ("force", "area", "peak"):
+        return sizes[0] / unit
+    match base:
+        case "x" | "y":
+            return float(max(cells.shape))
+        case "angle":
+            return 90.0 + _DEGREES * direction
+        case "cos2" | "sin2":
+            return 1.0 + direction
+        case _ if base[0] == "S":
+            factor, orders = _PARTS[int(base[1:])]
+            return factor * math.prod(sizes[order] / unit for order in orders)
+        case _:
+            return sizes[int(base[-2]) + int(base[-1])] / unit
+
+
+EXACT = "exact arithmetic"
+
+ALLOWED = 1e-12
+"""The largest error of a feature as a share of its scale: some thousand roundings, and
+what the series of angles and logarithms leave out (`docs/explanation/moments.md`)."""
+
+_PLAIN_CELLS, _EXACT_CELLS = 512_000, 51_200  # of frames that are asked slowly
+_FEWEST, _TOLD = 10, 3
+
+
+class FrameCounts(msgspec.Struct, frozen=True):
+    """What the frames of a check show: nothing of this is hidden in a total.
+
+    Attributes:
+        frames: How many there are, aimed ones included.
+        aimed: How many are made, at bounds and cuts.
+        nothing: On how many nothing presses.
+        unknown: How many show none of the known objects.
+        saturated: How many have a cell that takes no more.
+        ties: In how many two classes are equally strong; 0 for a tree.
+    """
+
+    frames: int
+    aimed: int
+    nothing: int
+    unknown: int
+    saturated: int
+    ties: int
+
+
+class FramesAgreement(Agreement, frozen=True, kw_only=True):
+    """The result of a check of frames.
+
+    Attributes:
+        shown: What the frames show.
+        largest_error: Of a feature against exact arithmetic, as a share of its scale.
+    """
+
+    shown: FrameCounts
+    largest_error: float
+
+
+def frames_export(
+    model: Model,
+    sensor: Sensor,
+    form: Literal["onnx", "c"],
+    *,
+    outputs: Sequence[Output] = USUAL,
+    reject: float = 0.0,
+    name: str | None = None,
+    opset: int = 17,
+    ir: int = 8,
+    plain: bool = False,
+    verify: bool = True,
+) -> Written:
+    """Return a file that takes raw frames: a graph, or C.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        sensor: Whose frames come.
+        form: The format.
+        outputs: Of a graph; see `fuzzytree.tactile.exporters.onnx_frames.write_frames`.
+        reject: Of raw rules: what is weaker in the rule that decides is unknown.
+        name: Of C: the beginning of all names.
+        opset: Of a graph.
+        ir: Of a graph.
+        plain: Of a graph: whether a tree does without the operators of ai.onnx.ml.
+        verify: Of a graph: whether it is run before it counts as written.
+
+    Raises:
+        TableError: If an input of the model is no feature of a frame.
+        InvalidModelError: If a feature is beyond the sensor.
+        ValueError: If an option has no such value.
+    """
+    check_inputs(model)
+    if form == "c":
+        return write_frames_c(model, sensor, name=name, reject=reject)
+    return write_frames(
+        model,
+        sensor,
+        outputs=outputs,
+        reject=reject,
+        opset=opset,
+        ir=ir,
+        plain=plain,
+        verify=verify,
+    )
+
+
+def check_frames_carriers(
+    model: Model, sensor: Sensor, frames: Cells | None = None, *, reject: float = 0.0
+) -> FramesAgreement:
+    """Hold every way from frame to class against plain Python, and that against exact.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        sensor: Whose frames come.
+        frames: Shape (frames, rows, columns); beside the aimed ones.
+        reject: Of raw rules: what is weaker in the rule that decides is unknown.
+
+    Returns:
+        What was compared and counted; `ok` tells whether all agree.
+
+    Raises:
+        TableError: If the model asks for other features, or frames do not fit.
+        InvalidModelError: If a feature is beyond the sensor.
+        ValueError: If the model has no strengths to reject by.
+
+    Example:
+        >>> from fuzzytree.api.verbs import learn
+        >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> check_frames_carriers(tree, Sensor(4, 4)).ok
+        True
+    """
+    check_inputs(model)
+    aimed = proving_frames(frame_program(sensor, model.inputs), model)
+    every = [aimed] if frames is None else [aimed, as_sent(sensor, frames)]
+    rows = np.concatenate(every)
+    ways, skipped = runners(model, sensor, reject)
+    found = {way.name: way.answer(rows) for way in ways if way.name != PLAIN}
+    cells = sensor.rows * sensor.columns
+    some = rows[: max(_PLAIN_CELLS // cells, _FEWEST)]
+    few = rows[: max(_EXACT_CELLS // cells, _FEWEST)]
+    plain = next(way for way in ways if way.name == PLAIN).answer(some)
+    if len(some) < len(rows):
+        skipped.append(f"{PLAIN}: {len(rows) - len(some)} frames, to save time")
+    comparisons = [_compared(NUMPY, found[NUMPY], PLAIN, plain, model)]
+    for name in found:
+        if name != NUMPY:
+            one = _compared(name, found[name], NUMPY, found[NUMPY], model)
+            comparisons += [one, _compared(name, found[name], PLAIN, plain, model)]
+    comparisons += [
+        _singly(way, rows, found[way.name]) for way in ways if way.name != PLAIN
+    ]
+    exact = _against_exact(model, sensor, few, plain, reject)
+    if len(few) < len(rows):
+        skipped.append(f"{EXACT}: {len(rows) - len(few)} frames, to save time")
+    return FramesAgreement(
+        model.name,
+        fingerprint(model),
+        (exact, *comparisons),
+        skipped=tuple(skipped),
+        probes=len(aimed),
+        shown=_shown(model, sensor, rows, len(aimed), reject),
+        largest_error=exact.largest_difference,
+    )
+
+
+def _shown(
+    model: Model, sensor: Sensor, frames: Cells, aimed: int, reject: float
+) -> FrameCounts:
+    found = Recogniser(model, sensor, reject)(frames)
+    top = np.sort(np.vstack([np.zeros((2, len(frames))), found.strengths]), axis=0)
+    is_tied = (top[-1] == top[-2]) & (top[-1] > 0.0)
+    return FrameCounts(
+        len(frames),
+        aimed,
+        int((found.states == State.NOTHING).sum()),
+        int((found.states == State.UNKNOWN).sum()),
+        int((saturated(sensor, frames) > 0).sum()),
+        int(is_tied.sum()) if isinstance(model, RuleBase) else 0,
+    )
+
+
+def _compared(
+    name: str, one: Found, other_name: str, other: Found, model: Model
+) -> Comparison:
+    """Hold the answers to some frames against others: bits, states, classes, rules."""
+    count = min(one.features.shape[1], other.features.shape[1])
+    bits = [
+        np.ascontiguousarray(f.features[:, :count]).view(np.uint64)
+        for f in (one, other)
+    ]
+    wrong = (bits[0] != bits[1]).any(axis=0)
+    flips = one.codes[:count] != other.codes[:count]
+    wrong = wrong | flips | (one.states[:count] != other.states[:count])
+    if one.rules is not None and other.rules is not None:
+        wrong = wrong | (one.rules[:count] != other.rules[:count])
+    apart = np.abs(one.features[:, :count] - other.features[:, :count])
+    told = np.flatnonzero(wrong)[:_TOLD].tolist()
+    return Comparison(
+        name,
+        other_name,
+        "rows",
+        count,
+        "DISAGREES" if wrong.any() else "agrees",
+        differing=int(wrong.sum()),
+        largest_difference=float(apart.max(initial=0.0)),
+        flips=int(flips.sum()),
+        detail=tuple(_told(frame, one, other, model) for frame in told),
+    )
+
+
+def _told(frame: int, one: Found, other: Found, model: Model) -> str:
+    ends = (found.features[:, frame].tolist() for found in (one, other))
+    every = zip(model.inputs, *ends, strict=True)
+    shown = [(name, repr(a), repr(b)) for name, a, b in every]  # -0.0 is not 0.0
+    texts = [f"{name} {a}, not {b}" for name, a, b in shown if a != b]
+    labels = [_label(found, frame, model) for found in (one, other)]
+    if labels[0] != labels[1]:
+        texts.append(f"{labels[0]}, not {labels[1]}")
+    return f"frame {frame}: {'; '.join(texts) or 'another rule'}"
+
+
+def _label(found: Found, frame: int, model: Model) -> str:
+    code = int(found.codes[frame])
+    return model.classes[code] if code >= 0 else State(found.states[frame]).name.lower()
+
+
+def _singly(way: Runner, frames: Cells, found: Found) -> Comparison:
+    """Ask with no frame, one at a time, some, another memory order, a wrong width."""
+    wrong: list[str] = []
+    step = max(len(frames) // 8, 1)
+    part = slice(None, None, step)
+    if way.answer(frames[:0]).features.shape[1]:
+        wrong.append("no frames get an answer")
+    for place in range(0, len(frames), step):
+        own = way.answer(frames[place : place + 1])
+        if not _is_same(own, found, slice(place, place + 1)):
+            wrong.append(f"frame {place} alone gets another answer")
+    for given in (frames[part], np.asfortranarray(frames[part])):
+        if not _is_same(way.answer(given), found, part):
+            wrong.append("some of the frames get other answers")
+    try:
+        way.answer(frames[:, :, :-1])
+        wrong.append("frames of another size get an answer")
+    except TableError:
+        pass
+    return Comparison(
+        way.name,
+        "itself",
+        "calls",
+        len(range(0, len(frames), step)) + 4,
+        "DISAGREES" if wrong else "agrees",
+        differing=len(wrong),
+        detail=tuple(wrong),
+    )
+
+
+def _is_same(one: Found, all_of: Found, part: slice) -> bool:
+    return (
+        np.array_equal(one.features, all_of.features[:, part])
+        and np.array_equal(one.codes, all_of.codes[part])
+        and np.array_equal(one.states, all_of.states[part])
+    )
+
+
+def _against_exact(
+    model: Model, sensor: Sensor, frames: Cells, plain: Found, reject: float
+) -> Comparison:
+    """Hold plain Python's features against fractions, and its classes against theirs.
+
+    A class may differ where a feature is within its rounding of a cut.
+    """
+    largest, flips, detail = 0.0, 0, list[str]()
+    wrong = np.zeros(len(frames), np.bool_)
+    for place, frame in enumerate(frames):
+        exact = exact_features(sensor, frame, model.inputs)
+        values = plain.features[:, place].tolist()
+        apart = errors(sensor, frame, model.inputs, values, exact)
+        largest = max(largest, *apart, 0.0)
+        wrong[place] = any(not share <= ALLOWED for share in apart)
+        if wrong[place]:
+            worst = int(np.argmax(apart))
+            detail.append(
+                f"frame {place}: {model.inputs[worst]} {values[worst]!r}, not "
+                f"{float(exact[worst])!r}"
+            )
+        shown = plain_answer(
+            model,
+            [float(value) for value in exact],
+            is_pressed=bool(plain.states[place] != State.NOTHING),
+            reject=reject,
+        )
+        flips += shown.code != int(plain.codes[place])
+    return Comparison(
+        PLAIN,
+        EXACT,
+        "rows",
+        len(frames),
+        "DISAGREES" if wrong.any() else "agrees",
+        differing=int(wrong.sum()),
+        largest_difference=largest,
+        allowed=ALLOWED,
+        origin="a share of each feature's scale",
+        flips=flips,
+        detail=tuple(detail[:_TOLD]),
+    )

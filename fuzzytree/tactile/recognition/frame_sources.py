@@ -1,0 +1,208 @@
+"""Sources of frames: a serial port, a recording or the simulator, each at its pace."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from fuzzytree.errors import PortError
+from fuzzytree.files import PathLike
+from fuzzytree.tactile.boards import Board, Marker
+from fuzzytree.tactile.link import Line
+from fuzzytree.tactile.link.recording import Record, RecordingFile
+from fuzzytree.tactile.sensor import Counters, Frame, Sensor
+from fuzzytree.tactile.simulation.objects import OBJECTS
+from fuzzytree.tactile.simulation.physics import FULL, PAPER, SIDE, press
+
+PAPER_BOARD = Board(
+    "simulator", Sensor(SIDE, SIDE, FULL, PAPER.threshold), Marker("AA 55")
+)
+"""The board of the simulator."""
+
+FRAMES_A_SECOND = 44
+"""What a board of 16 x 16 cells sends at 115200 baud."""
+
+_RISE, _STAY, _REST = 8, 64, 22  # frames of a simulated press
+
+
+class Paced:
+    """Gives frames out when their times say.
+
+    Args:
+        records: In the order of their times.
+        speed: How many times as fast as they came; 0 for no waiting at all.
+
+    Raises:
+        ValueError: If the speed is below 0.
+
+    Example:
+        >>> frame = Frame(np.zeros((2, 2), np.uint8), 0.01, 0)
+        >>> source = Paced([Record(frame, Counters(frames=1))])
+        >>> [seen.number for seen in source], source.counters.frames
+        ([0], 1)
+    """
+
+    def __init__(self, records: Iterable[Record], speed: float = 1.0) -> None:
+        if not speed >= 0.0:
+            raise ValueError(f"a speed is 0 or more, not {speed!r}")
+        self._records: Iterable[Record] = records
+        self._speed = speed
+        self._is_closed = threading.Event()
+        self._last = 0.0, time.monotonic()  # a frame's time, and when it went out
+        self.counters = Counters()
+
+    @property
+    def trouble(self) -> str:
+        """Empty: what is known beforehand comes."""
+        return ""
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Give the frames, each at its time."""
+        for frame, counters in self._records:
+            if self._speed:
+                before, went = self._last
+                due = went + (frame.time - before) / self._speed
+                rest = max(due - time.monotonic(), 0.0)
+                self._is_closed.wait(min(rest, threading.TIMEOUT_MAX))
+            if self._is_closed.is_set():
+                return
+            self._last = frame.time, time.monotonic()
+            self.counters = counters
+            yield frame
+
+    def now(self) -> float:
+        """Return the last frame's time, and what has gone by since."""
+        at, went = self._last
+        return at + time.monotonic() - went
+
+    def close(self) -> None:
+        """Give no more frames."""
+        self._is_closed.set()
+
+
+class Replayed(Paced):
+    """Gives the frames of a recording out, as `Paced`.
+
+    Args:
+        path: The recording; it is open until this is closed.
+        speed: How many times as fast as they came; 0 for no waiting at all.
+
+    Attributes:
+        board: What sent the frames.
+
+    Raises:
+        ValueError: If the speed is below 0.
+        ReadError: If it is no recording.
+    """
+
+    def __init__(self, path: PathLike, speed: float = 1.0) -> None:
+        super().__init__((), speed)
+        self._records = self._file = RecordingFile(path)
+        self.board = self._file.board
+
+    @property
+    def trouble(self) -> str:
+        """A sentence if records were damaged; empty if none was."""
+        count = self._file.damaged
+        records = "1 record is" if count == 1 else f"{count} records are"
+        return f"{records} damaged and left out" if count else ""
+
+    def close(self) -> None:
+        """Give no more frames, and close the file."""
+        super().close()
+        self._file.close()
+
+
+class FromLine:
+    """Gives the frames of a line out as they come.
+
+    Args:
+        line: An open line; it is closed with this.
+    """
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self._contradiction = ""
+
+    @property
+    def counters(self) -> Counters:
+        """What the line has counted."""
+        return self._line.counters
+
+    @property
+    def trouble(self) -> str:
+        """A sentence about a line that gives no frames."""
+        match self._line.state:
+            case "open":
+                return self._contradiction
+            case "silent":
+                return self._contradiction or "the board is silent"
+            case "away":
+                return f"{self._line.port} went away; waiting until it is back"
+            case "ended":
+                return f"{self._line.port} gives no more frames"
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Give frames until the line ends.
+
+        Raises:
+            PortError: If bytes come that are no frames of the board, and no frame has
+                come before; later that is a trouble, and it goes on.
+        """
+        while True:
+            try:
+                frame = self._line.take()
+            except PortError as error:
+                if not self._line.counters.frames:
+                    raise
+                self._contradiction = str(error)
+                continue
+            if frame is None:
+                return
+            self._contradiction = ""
+            yield frame
+
+    def now(self) -> float:
+        """Return the time since the line was opened."""
+        return time.monotonic() - self._line.opened_at
+
+    def close(self) -> None:
+        """Close the port."""
+        self._line.close()
+
+
+def simulated(
+    seed: int = 0, *, names: Sequence[str] = tuple(OBJECTS)
+) -> Iterator[Record]:
+    """Give frames without end: the paper's objects, pressed one after another.
+
+    Between two of them the sensor is empty for half a second.
+
+    Args:
+        seed: Of how each object is pressed.
+        names: Of the objects.
+
+    Raises:
+        ValueError: If there is no object of a name.
+
+    Example:
+        >>> first = next(simulated())
+        >>> first.frame.cells.shape, first.frame.time
+        ((16, 16), 0.0)
+    """
+    random = np.random.default_rng(seed)
+    shares = [*np.linspace(0.0, 1.0, _RISE), *[1.0] * _STAY]
+    shares += [*np.linspace(1.0, 0.0, _RISE), *[0.0] * _REST]
+    number = 0
+    while True:
+        for name in names:
+            cells = press(name, 1, int(random.integers(2**31))).frames[0]
+            for share in shares:
+                noisy = share * cells + random.normal(0.0, 0.5, cells.shape)
+                whole = np.rint(noisy).clip(0, 255).astype(np.uint8)
+                frame = Frame(whole, number / FRAMES_A_SECOND, number)
+                number += 1
+                yield Record(frame, Counters(frames=number))

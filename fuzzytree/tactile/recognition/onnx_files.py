@@ -1,0 +1,255 @@
+"""Check of ONNX files of frames against their model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+
+from fuzzytree.checking.comparing import counted, judged
+from fuzzytree.errors import InvalidModelError, ReadError
+from fuzzytree.model.agreement import Agreement, Comparison
+from fuzzytree.model.contracts import Model
+from fuzzytree.model.rulebase import fingerprint
+from fuzzytree.model.tree import FuzzyTree
+from fuzzytree.runtimes.onnxruntime import loaded, parsed, texts_of
+from fuzzytree.tactile.exporters.onnx_frames import Output, write_frames
+from fuzzytree.tactile.features import frame_program
+from fuzzytree.tactile.features.aimed import proving_frames
+from fuzzytree.tactile.recognition.recogniser import check_inputs
+from fuzzytree.tactile.recognition.runners import PLAIN, as_sent
+from fuzzytree.tactile.sensor import Cells, Sensor
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from fuzzytree.exporters.onnx_compare import Differences
+    from fuzzytree.exporters.onnx_session import Bare
+
+
+_TOLD = 3
+_MOST_CELLS = 2**22  # of frames that are asked in plain Python, about a minute
+
+
+class FramesFile(msgspec.Struct, frozen=True, kw_only=True):
+    """What an ONNX file of frames says about itself.
+
+    Attributes:
+        name: Of the model.
+        version: Of the fuzzytree that wrote it.
+        fingerprint: Of the model.
+        sensor: Whose frames it takes.
+        features: What it computes of them.
+        classes: The possible answers.
+        outputs: What it gives.
+        reject: What is weaker in the rule that decides is unknown.
+    """
+
+    name: str
+    version: str
+    fingerprint: str
+    sensor: Sensor
+    features: tuple[str, ...]
+    classes: tuple[str, ...]
+    outputs: tuple[Output, ...]
+    reject: float = 0.0
+
+
+def frames_file(content: bytes, name: str) -> FramesFile:
+    """Return what an ONNX file of frames says about itself.
+
+    Args:
+        content: The file.
+        name: Of the file, for messages.
+
+    Raises:
+        ReadError: If it is no such file.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+    """
+    proto = parsed(content, name)
+    texts = texts_of(proto, name)
+    if texts.get("carrier") != "frames":
+        raise ReadError(
+            f"{name}: the file takes rows, and not frames of a sensor; "
+            "`fuzzytree check` asks it"
+        )
+    records = {"sensor", "features", "classes", "outputs", "reject"}
+    try:
+        known = {k: json.loads(v) if k in records else v for k, v in texts.items()}
+        found = msgspec.convert(known, FramesFile)
+    except (json.JSONDecodeError, msgspec.ValidationError, RecursionError) as error:
+        raise ReadError(f"{name}: the file's metadata is broken: {error}") from error
+    except InvalidModelError as error:
+        raise ReadError(f"{name}: the file's sensor is none: {error}") from error
+    given = [entry.name for entry in proto.graph.input]
+    outputs = tuple(entry.name for entry in proto.graph.output)
+    if given != ["frames"] or outputs != found.outputs:
+        raise ReadError(
+            f"{name}: the graph's inputs and outputs are not those of its metadata"
+        )
+    return found
+
+
+def check_shipped(
+    model: Model,
+    files: Mapping[str, bytes],
+    frames: Cells | None = None,
+    *,
+    sensor: Sensor | None = None,
+    reject: float = 0.0,
+    rows_only: bool = False,
+) -> Agreement:
+    """Hold ONNX files of frames against a model, by what they say and by their answers.
+
+    Args:
+        model: A tree or a rule base whose inputs are names of features.
+        files: The files by name; each may be of a sensor of its own.
+        frames: Shape (frames, rows, columns); beside the aimed ones.
+        sensor: The one that each file must state; any if None.
+        reject: The reject that each file must state.
+        rows_only: Whether files whose answers agree are accepted with another graph.
+
+    Raises:
+        ReadError: If a file is no graph of frames, or does not run.
+        TableError: If the model asks for other features, or frames do not fit.
+        MissingExtraError: If onnx or onnxruntime is not installed.
+
+    Example:
+        >>> from fuzzytree.api.verbs import learn
+        >>> areas = np.array([[4.0], [5.0], [16.0], [15.0]])
+        >>> tree = learn(areas, target=["s", "s", "l", "l"], columns=["area"])
+        >>> content = write_frames(tree, Sensor(4, 4)).content
+        >>> check_shipped(tree, {"tree.onnx": content}).ok
+        True
+    """
+    check_inputs(model)
+    comparisons: list[Comparison] = []
+    skipped: list[str] = []
+    probes = 0
+    for name, content in files.items():
+        known = frames_file(content, name)
+        if sensor is None:
+            skipped.append(
+                f"{name}: its sensor, which is {_sensor_text(known.sensor)}; "
+                "name the right one with --sensor or --board"
+            )
+        if known.features != model.inputs or known.classes != model.classes:
+            comparisons.append(_strangers(known, name))
+            continue
+        made = frame_program(known.sensor, model.inputs)
+        aimed = proving_frames(made, model)
+        every = [aimed] if frames is None else [aimed, as_sent(known.sensor, frames)]
+        rows = np.concatenate(every)
+        asked = rows[: _MOST_CELLS // aimed[0].size]
+        if len(asked) < len(rows):
+            skipped.append(f"{name}: {len(rows) - len(asked)} frames, to save time")
+        probes += len(aimed)
+        stated = _misstated(known, sensor, reject)
+        graph, metadata = _differences(model, known, content)
+        answers = _answers(model, known, loaded(content, name), asked, name)
+        comparisons += [
+            counted("file", name, "the model's metadata", 1, (*metadata, *stated)),
+            judged(name, "a freshly written graph", graph, [answers]),
+            answers,
+        ]
+    return Agreement(
+        model.name,
+        fingerprint(model),
+        tuple(comparisons),
+        skipped=tuple(skipped),
+        probes=probes,
+        rows_only=rows_only,
+    )
+
+
+def _misstated(
+    known: FramesFile, sensor: Sensor | None, reject: float
+) -> Iterator[str]:
+    if sensor is not None and known.sensor != sensor:
+        yield f"its sensor is {_sensor_text(known.sensor)}, not {_sensor_text(sensor)}"
+    if known.reject != reject:
+        yield f"its reject is {known.reject!r}, not {reject!r}"
+
+
+def _sensor_text(sensor: Sensor) -> str:
+    text = f"{sensor.rows} x {sensor.columns} cells up to {sensor.full}"
+    text += f", threshold {sensor.threshold}"
+    extras = (("baseline", sensor.baseline), ("masked cells", sensor.masked))
+    return text + "".join(f", with {name}" for name, value in extras if value)
+
+
+def _strangers(known: FramesFile, name: str) -> Comparison:
+    asked, classes = ", ".join(known.features), ", ".join(known.classes)
+    told = f"it asks for {asked}, and knows {classes}"
+    return counted("file", name, "the model's features and classes", 1, (told,))
+
+
+def _differences(model: Model, known: FramesFile, content: bytes) -> Differences:
+    """Compare the file with the one that the model gives now."""
+    import onnx
+
+    from fuzzytree.exporters.onnx_compare import Differences, proto_differences
+    from fuzzytree.exporters.onnx_graph import TREES
+
+    proto = onnx.load_model_from_string(content)
+    versions = {one.domain: one.version for one in proto.opset_import}
+    try:
+        fresh = write_frames(
+            model,
+            known.sensor,
+            outputs=known.outputs,
+            reject=known.reject,
+            opset=versions.get("", 0),
+            ir=proto.ir_version,
+            plain=isinstance(model, FuzzyTree) and TREES not in versions,
+            verify=False,
+        ).content
+    except ValueError as error:
+        return Differences((str(error),), ())
+    return proto_differences(onnx.load_model_from_string(fresh), proto)
+
+
+def _answers(
+    model: Model, known: FramesFile, bare: Bare, frames: Cells, name: str
+) -> Comparison:
+    """Hold the answers to some frames against those of plain Python, bit by bit."""
+    from fuzzytree.tactile.exporters.onnx_frames_proof import apart
+
+    found = _run(bare, known, frames, name)
+    made = frame_program(known.sensor, model.inputs)
+    wrong: dict[int, list[tuple[Output, str]]] = {}
+    for number, output, text in apart(found, made, model, frames, known.reject):
+        wrong.setdefault(number, []).append((output, text))
+    firsts = [(number, *found[0]) for number, found in wrong.items()][:_TOLD]
+    return Comparison(
+        name,
+        PLAIN,
+        "rows",
+        len(frames),
+        "DISAGREES" if wrong else "agrees",
+        differing=len(wrong),
+        flips=sum(
+            any(output in ("label", "state") for output, _ in found)
+            for found in wrong.values()
+        ),
+        detail=tuple(f"frame {number}: {one} {text}" for number, one, text in firsts),
+    )
+
+
+def _run(
+    bare: Bare, known: FramesFile, frames: Cells, name: str
+) -> dict[Output, npt.NDArray[np.generic]]:
+    from fuzzytree.exporters.onnx_session import RUNTIME_ERRORS, first_line
+
+    try:
+        found = bare(list(known.outputs), {"frames": frames})
+    except RUNTIME_ERRORS as error:
+        text = f"{name}: onnxruntime does not run it: {first_line(error)}"
+        raise ReadError(text) from error
+    arrays = [np.asarray(one) for one in found]
+    if any(not one.ndim or len(one) != len(frames) for one in arrays):
+        raise ReadError(f"{name}: it does not give an answer for each frame")
+    return dict(zip(known.outputs, arrays, strict=True))

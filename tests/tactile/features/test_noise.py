@@ -1,0 +1,65 @@
+"""Numbers with a bound of their rounding error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from fuzzytree.semantics.programs.evaluate import evaluate
+from fuzzytree.semantics.programs.steps import Maker, Result
+from fuzzytree.tactile.features.moments import Noise, Noisy
+
+Operation = Callable[[Noise, Noisy, Noisy], Noisy]
+OPERATIONS: dict[str, tuple[Operation, Callable[[Fraction, Fraction], Fraction]]] = {
+    "sum": (lambda n, a, b: n.sum(a, b), lambda a, b: a + b),
+    "difference": (lambda n, a, b: n.difference(a, b), lambda a, b: a - b),
+    "product": (lambda n, a, b: n.product(a, b), lambda a, b: a * b),
+    "times": (lambda n, a, b: n.times(-3.0, a), lambda a, b: -3 * a),
+}
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_the_true_result_lies_within_the_bound_wherever_its_arguments_do(
+    name: str,
+) -> None:
+    make = Maker()
+    one, two = (
+        Noisy(make.input(k), make.input(f"error {k}")) for k in ("a", "b")
+    )  # fmt: skip
+    operation, exact = OPERATIONS[name]
+    found = operation(Noise(make), one, two)
+    assert found.error is not None
+    results = [Result("output", "v", found.value), Result("output", "e", found.error)]
+    inputs = ("a", "error a", "b", "error b")
+    program = make.program(name, inputs, tuple(results))
+    draw = np.random.default_rng(5)
+    for _ in range(300):
+        a, b = draw.normal(size=2) * 2.0 ** draw.integers(-40, 40, 2)
+        errors = np.abs([a, b]) * 2.0 ** draw.integers(-60, 1, 2)
+        row = dict(zip(inputs, map(float, (a, errors[0], b, errors[1])), strict=True))
+        value, bound = evaluate(program, row).values
+        allowed = Fraction(bound) * (1 + Fraction(2) ** -40)
+        for turn in (1, -1):
+            for other in (1, -1):
+                true = exact(
+                    Fraction(a) + turn * Fraction(errors[0]),
+                    Fraction(b) + other * Fraction(errors[1]),
+                )
+                assert abs(Fraction(value) - true) <= allowed
+
+
+def test_what_is_within_its_bound_is_exactly_0_and_the_rest_is_untouched() -> None:
+    make = Maker()
+    noise = Noise(make)
+    settled = noise.settled(Noisy(make.input("a"), make.input("e")))
+    program = make.program("s", ("a", "e"), (Result("output", "v", settled),))
+    for value, error, wanted in (
+        (1e-9, 1e-9, 0.0),
+        (-1e-9, 2e-9, 0.0),
+        (1e-9, 9e-10, 1e-9),
+        (-5.0, 0.0, -5.0),
+    ):
+        assert evaluate(program, {"a": value, "e": error}).values == (wanted,)
