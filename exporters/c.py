@@ -32,6 +32,7 @@ from fuzzytree.exporters.c_text import (
     whole_table,
 )
 from fuzzytree.exporters.c_tree import Question, questions_of, tree_code
+from fuzzytree.exporters.reference_tables import places_of
 from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
 from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint, sentence
 from fuzzytree.model.system import FuzzySystem
@@ -223,7 +224,7 @@ class Made:
 
     def __init__(self, model: Model, numbers: Numbers, prefix: str) -> None:
         self.model, self.numbers, self.prefix = model, numbers, prefix
-        self.line = lines_of(model.variables)
+        self.line = places_of(model.variables)
         self.asked: list[Question] = []
         self.tables: Tables | None = None
         if isinstance(model, RuleBase):
@@ -398,13 +399,6 @@ _TAKE_COMBINED = """\
     if (!name_has_all(x, value))
         return answer;
 """
-
-
-def lines_of(variables: Sequence[Variable]) -> dict[str, int]:
-    """Return the place of each variable's value: inputs first, then combinations."""
-    inputs = [v.name for v in variables if not v.parts]
-    mixed = [v.name for v in variables if v.parts]
-    return {name: place for place, name in enumerate([*inputs, *mixed])}
 
 
 def taking(variables: Sequence[Variable]) -> str:

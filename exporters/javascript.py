@@ -32,23 +32,21 @@ from fuzzytree.exporters.js_text import (
     table,
     text_of,
 )
+from fuzzytree.exporters.reference_tables import (
+    RuleRows,
+    combination_row,
+    node_rows,
+    places_of,
+)
 from fuzzytree.model.contracts import Document, Format, Model, Written
 from fuzzytree.model.rulebase import (
-    LR,
-    Band,
-    Clause,
-    Flank,
-    Points,
     RuleBase,
-    Shape,
-    Side,
     Variable,
     fingerprint,
     sentence,
-    shapes_of,
 )
 from fuzzytree.model.system import FuzzySystem
-from fuzzytree.model.tree import FuzzyTree, Node, intervals
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.probing import few_probes
 from fuzzytree.semantics.reference import descend, evaluate
 
@@ -128,16 +126,16 @@ def _body(model: Document) -> Iterator[str]:
         return
     inputs = [variable for variable in model.variables if not variable.parts]
     mixed = [variable for variable in model.variables if variable.parts]
-    line = {v.name: place for place, v in enumerate([*inputs, *mixed])}
+    places = places_of(model.variables)
     yield from table("INPUTS", (f"{text_of(v.name)},{_unit(v)}" for v in inputs))
     yield from table("CLASSES", (f"{text_of(label)}," for label in model.classes))
     yield f"const WHEN_MISSING = {literal(model.semantics.missing)};\n"
     yield "\n/* Place of an input, weight and centre of each part. */"
-    yield from table("COMBINATIONS", (_combination(v, line) for v in mixed))
+    yield from table("COMBINATIONS", (_combination(v, places) for v in mixed))
     if isinstance(model, RuleBase):
-        yield from _rule_tables(model, line)
+        yield from _rule_tables(model, places)
     else:
-        yield from _tree_tables(model, line)
+        yield from _tree_tables(model, places)
     yield ROWS
     yield AXES
     yield RULES if isinstance(model, RuleBase) else TREE
@@ -154,50 +152,38 @@ def _unit(variable: Variable) -> str:
     return f" // {text_of(variable.unit)}" if variable.unit else ""
 
 
-def _combination(variable: Variable, line: dict[str, int]) -> str:
-    parts = [(line[p.input], p.weight, p.centre) for p in variable.parts]
-    return f"{literal(parts)}, // {text_of(variable.name)}"
+def _combination(variable: Variable, places: dict[str, int]) -> str:
+    row = combination_row(variable, places)
+    return f"{literal(row)}, // {text_of(variable.name)}"
 
 
-def _tree_tables(tree: FuzzyTree, line: dict[str, int]) -> Iterator[str]:
+def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:
     yield "\n/* Line of the variable, cuts, and for each interval the next node's place"
     yield "\n * or -k for leaf k. A value on a cut belongs to the interval below it. */"
-    yield from table("NODES", (_node(tree, node, line) for node in tree.nodes))
+    yield from table(
+        "NODES",
+        (
+            f"{literal(row)}, // {text_of(node.variable)}: "
+            f"{', '.join(map(text_of, names))}"
+            for row, node, names in node_rows(tree, places)
+        ),
+    )
     yield "\n/* Places of the leaves' classes. */"
     yield from table("LEAVES", (f"{tree.classes.index(x.label)}," for x in tree.leaves))
 
 
-def _node(tree: FuzzyTree, node: Node, line: dict[str, int]) -> str:
-    ends = [
-        -branch.leaf if branch.leaf is not None else (branch.node or 0) - 1
-        for branch in node.branches
-    ]
-    targets = [ends[owner] for owner in node.owners]
-    counts = [0] * len(node.branches)
-    names: list[str] = []
-    for owner, _ in zip(node.owners, intervals(node), strict=True):
-        names.append(node.branches[owner].terms[counts[owner]])
-        counts[owner] += 1
-    comment = f"{text_of(node.variable)}: {', '.join(map(text_of, names))}"
-    return f"{literal((line[node.variable], node.cuts, targets))}, // {comment}"
-
-
-def _rule_tables(rules: RuleBase, line: dict[str, int]) -> Iterator[str]:
-    shapes = shapes_of(rules.variables)
-    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
-    keys = list(dict.fromkeys((c.variable, term) for c in clauses for term in c.terms))
-    term = {key: number for number, key in enumerate(keys)}
-    number = {clause: place for place, clause in enumerate(clauses)}
+def _rule_tables(rules: RuleBase, places: dict[str, int]) -> Iterator[str]:
+    rows = RuleRows(rules, places)
     label = {name: place for place, name in enumerate(rules.classes)}
     yield "\n/* Line of the variable, places of terms in TERMS, if it is negated. */"
-    yield from table("CLAUSES", (_clause(c, line, term) for c in clauses))
+    yield from table("CLAUSES", (f"{literal(row)}," for row in rows.clauses))
     yield "\n/* Places of the clauses in CLAUSES, and of the class. */"
+    pairs = zip(rules.rules, rows.rules, strict=True)
     yield from table(
         "RULES",
         (
-            f"{literal(([number[c] for c in rule.when], label[rule.then]))},"
-            f" // {place}. {text_of(sentence(rule))}"
-            for place, rule in enumerate(rules.rules, 1)
+            f"{literal((row, label[rule.then]))}, // {n}. {text_of(sentence(rule))}"
+            for n, (rule, row) in enumerate(pairs, 1)
         ),
     )
     yield f"const WHEN_UNCOVERED = {literal(rules.semantics.uncovered)};\n"
@@ -206,36 +192,10 @@ def _rule_tables(rules: RuleBase, line: dict[str, int]) -> Iterator[str]:
     yield from table(
         "TERMS",
         (
-            f"{_shape(shapes[variable, name])},"
-            f" // {text_of(variable)} is {text_of(name)}"
-            for variable, name in keys
+            f"{literal(row)}, // {text_of(variable)} is {text_of(name)}"
+            for variable, name, row in rows.terms
         ),
     )
-
-
-def _clause(
-    clause: Clause, line: dict[str, int], term: dict[tuple[str, str], int]
-) -> str:
-    terms = [term[clause.variable, name] for name in clause.terms]
-    return f"{literal((line[clause.variable], terms, clause.negated))},"
-
-
-def _shape(shape: Shape) -> str:
-    match shape:
-        case Band(low=low, high=high, left=left, right=right):
-            return literal(("band", low, high, _flank(left), _flank(right)))
-        case LR(mean=mean, left=below, right=above):
-            return literal(("lr", mean, _side(below), _side(above)))
-        case Points(values=values, degrees=degrees):
-            return literal(("points", values, degrees))
-
-
-def _flank(flank: Flank | None) -> Sequence[object] | None:
-    return None if flank is None else (flank.start, flank.end, flank.curve)
-
-
-def _side(side: Side) -> Sequence[object]:
-    return side.spread, side.reach, side.curve
 
 
 def _examples(model: Model) -> Iterator[str]:

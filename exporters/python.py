@@ -13,22 +13,20 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from fuzzytree.exporters.reference_tables import (
+    RuleRows,
+    combination_row,
+    node_rows,
+    places_of,
+)
 from fuzzytree.model.contracts import Format, Model, Written
 from fuzzytree.model.rulebase import (
-    LR,
-    Band,
-    Clause,
-    Flank,
-    Points,
     RuleBase,
-    Shape,
-    Side,
     Variable,
     fingerprint,
     sentence,
-    shapes_of,
 )
-from fuzzytree.model.tree import FuzzyTree, Node, intervals
+from fuzzytree.model.tree import FuzzyTree
 from fuzzytree.semantics.probing import probes
 from fuzzytree.semantics.reference import descend, evaluate
 
@@ -208,17 +206,17 @@ def write(model: Model, /, *, allow_loss: bool = False) -> Written:
     del allow_loss
     inputs = [variable for variable in model.variables if not variable.parts]
     mixed = [variable for variable in model.variables if variable.parts]
-    line = {v.name: place for place, v in enumerate([*inputs, *mixed])}
+    places = places_of(model.variables)
     if isinstance(model, RuleBase):
-        tables, functions = _rule_tables(model, line), _RULES
+        tables, functions = _rule_tables(model, places), _RULES
     else:
-        tables, functions = _tree_tables(model, line), _TREE
+        tables, functions = _tree_tables(model, places), _TREE
     text = "".join(
         [
             *_heading(model),
             _START,
             *_lines("INPUTS", (_literal(v.name) + f",  # {v.unit!r}" for v in inputs)),
-            *_lines("COMBINATIONS", (_combination(v, line) for v in mixed)),
+            *_lines("COMBINATIONS", (_combination(v, places) for v in mixed)),
             *tables,
             f"WHEN_MISSING = {model.semantics.missing!r}\n",
             _AXES,
@@ -263,48 +261,34 @@ def _literal(value: object) -> str:
             return repr(value)
 
 
-def _combination(variable: Variable, line: dict[str, int]) -> str:
-    parts = tuple((line[p.input], p.weight, p.centre) for p in variable.parts)
-    return f"{_literal(parts)},  # {variable.name!r}"
+def _combination(variable: Variable, places: dict[str, int]) -> str:
+    return f"{_literal(combination_row(variable, places))},  # {variable.name!r}"
 
 
-def _tree_tables(tree: FuzzyTree, line: dict[str, int]) -> Iterator[str]:
+def _tree_tables(tree: FuzzyTree, places: dict[str, int]) -> Iterator[str]:
     yield "\n# Line of the variable, cuts, and for each interval the next node's place"
     yield "\n# or -k for leaf k. A value on a cut belongs to the interval below it."
-    yield from _lines("NODES", (_node(tree, node, line) for node in tree.nodes))
+    yield from _lines(
+        "NODES",
+        (
+            f"{_literal(row)},  # {node.variable!r}: {', '.join(map(repr, names))}"
+            for row, node, names in node_rows(tree, places)
+        ),
+    )
     yield from _lines("LEAVES", (f"{leaf.label!r}," for leaf in tree.leaves))
 
 
-def _node(tree: FuzzyTree, node: Node, line: dict[str, int]) -> str:
-    ends = [
-        -branch.leaf if branch.leaf is not None else (branch.node or 0) - 1
-        for branch in node.branches
-    ]
-    targets = tuple(ends[owner] for owner in node.owners)
-    counts = [0] * len(node.branches)
-    names: list[str] = []
-    for owner, _ in zip(node.owners, intervals(node), strict=True):
-        names.append(node.branches[owner].terms[counts[owner]])
-        counts[owner] += 1
-    comment = f"{node.variable!r}: {', '.join(map(repr, names))}"
-    return f"{_literal((line[node.variable], node.cuts, targets))},  # {comment}"
-
-
-def _rule_tables(rules: RuleBase, line: dict[str, int]) -> Iterator[str]:
-    shapes = shapes_of(rules.variables)
-    clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
-    keys = list(dict.fromkeys((c.variable, term) for c in clauses for term in c.terms))
-    term = {key: number for number, key in enumerate(keys)}
-    number = {clause: place for place, clause in enumerate(clauses)}
+def _rule_tables(rules: RuleBase, places: dict[str, int]) -> Iterator[str]:
+    rows = RuleRows(rules, places)
     yield "\n# Line of the variable, places of the terms in TERMS, if it is negated."
-    yield from _lines("CLAUSES", (_clause(c, line, term) for c in clauses))
+    yield from _lines("CLAUSES", (f"{_literal(row)}," for row in rows.clauses))
     yield "\n# Places of the clauses in CLAUSES, and the class."
+    pairs = zip(rules.rules, rows.rules, strict=True)
     yield from _lines(
         "RULES",
         (
-            f"{_literal((tuple(number[c] for c in rule.when), rule.then))},"
-            f"  # {place}. {sentence(rule)!r}"
-            for place, rule in enumerate(rules.rules, 1)
+            f"{_literal((row, rule.then))},  # {n}. {sentence(rule)!r}"
+            for n, (rule, row) in enumerate(pairs, 1)
         ),
     )
     yield f"WHEN_UNCOVERED = {rules.semantics.uncovered!r}\n"
@@ -313,35 +297,10 @@ def _rule_tables(rules: RuleBase, line: dict[str, int]) -> Iterator[str]:
     yield from _lines(
         "TERMS",
         (
-            f"{_shape(shapes[variable, name])},  # {variable!r} is {name!r}"
-            for variable, name in keys
+            f"{_literal(row)},  # {variable!r} is {name!r}"
+            for variable, name, row in rows.terms
         ),
     )
-
-
-def _clause(
-    clause: Clause, line: dict[str, int], term: dict[tuple[str, str], int]
-) -> str:
-    terms = tuple(term[clause.variable, name] for name in clause.terms)
-    return f"{_literal((line[clause.variable], terms, clause.negated))},"
-
-
-def _shape(shape: Shape) -> str:
-    match shape:
-        case Band(low=low, high=high, left=left, right=right):
-            return _literal(("band", low, high, _flank(left), _flank(right)))
-        case LR(mean=mean, left=below, right=above):
-            return _literal(("lr", mean, _side(below), _side(above)))
-        case Points(values=values, degrees=degrees):
-            return _literal(("points", values, degrees))
-
-
-def _flank(flank: Flank | None) -> tuple[object, ...] | None:
-    return None if flank is None else (flank.start, flank.end, flank.curve)
-
-
-def _side(side: Side) -> tuple[object, ...]:
-    return side.spread, side.reach, side.curve
 
 
 def parameters(names: Sequence[str]) -> tuple[str, ...]:

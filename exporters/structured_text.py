@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 from fuzzytree.errors import LossError
+from fuzzytree.exporters.reference_tables import targets_of
 from fuzzytree.exporters.st_rules import RuleSteps, decision
 from fuzzytree.exporters.st_steps import SystemSteps
 from fuzzytree.exporters.st_text import (
@@ -212,11 +213,7 @@ def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: Numbers) -> Parts
     targets: list[str] = []
     for node in tree.nodes:
         firsts.append(str(len(targets)))
-        ends = [
-            -branch.leaf if branch.leaf is not None else (branch.node or 0) - 1
-            for branch in node.branches
-        ]
-        targets += [str(ends[owner]) for owner in node.owners]
+        targets += map(str, targets_of(node))
         lasts.append(str(len(targets) - 2))
         cuts += [numbers.digits(numbers.at_most(cut)) for cut in node.cuts]
         cuts.append("0.0")  # so that a cut and the target below it share a place

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.c import FORMAT, lines_of, write
+from fuzzytree.exporters.c import FORMAT, write
 from fuzzytree.exporters.c_selftest import axis_values, digest_of, leaf, strengths
 from fuzzytree.exporters.c_steps import number_text
 from fuzzytree.exporters.c_tables import tables_of
 from fuzzytree.exporters.c_text import DOUBLE, SINGLE, constants, prefix_of, remark
 from fuzzytree.exporters.c_tree import questions_of
+from fuzzytree.exporters.reference_tables import places_of
 from fuzzytree.model.rulebase import Band, Clause, Flank, Rule, RuleBase, Term, Variable
 from fuzzytree.model.tree import Branch, FuzzyTree, Leaf, Node
 from fuzzytree.semantics.lowering import rules_from_tree
@@ -114,7 +115,7 @@ def test_numbers_are_written_with_all_their_bits() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_tables_of_a_tree_say_what_the_reference_says(seed: int) -> None:
     tree = random_tree(seed, leaves=9, combinations=0.3)
-    line = lines_of(tree.variables)
+    line = places_of(tree.variables)
     asked = questions_of(tree, line)
     assert len(asked) == sum(len(node.cuts) for node in tree.nodes)
     for row in probes(tree, limit=300):
@@ -141,7 +142,7 @@ def test_the_tables_of_rules_say_what_the_reference_says(
         conjunction="product" if is_product else "min",
     )
     rules = with_points(rules, seed)
-    line = lines_of(rules.variables)
+    line = places_of(rules.variables)
     tables = tables_of(rules, line, DOUBLE)
     for row in probes(rules, limit=200):
         found = evaluate(rules, row)
@@ -157,7 +158,7 @@ def test_the_tables_of_rules_say_what_the_reference_says(
 
 def test_rules_that_begin_alike_share_their_beginning() -> None:
     rules = rules_from_tree(random_tree(2, leaves=30))
-    places = tables_of(rules, lines_of(rules.variables), DOUBLE).places
+    places = tables_of(rules, places_of(rules.variables), DOUBLE).places
     assert sorted(filter(None, places.rule)) == list(range(1, 31))
     assert len(places.rule) < sum(len(rule.when) for rule in rules.rules) / 2
     assert max(places.depth) == max(len(rule.when) for rule in rules.rules)
