@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
-from fuzzytree.errors import LossError
 from fuzzytree.exporters.c_rules import rules_code
 from fuzzytree.exporters.c_selftest import examples_of, number_of, selftest_code
 from fuzzytree.exporters.c_system import (
@@ -33,7 +32,8 @@ from fuzzytree.exporters.c_text import (
 )
 from fuzzytree.exporters.c_tree import Question, questions_of, tree_code
 from fuzzytree.exporters.reference_tables import places_of
-from fuzzytree.model.contracts import Document, Format, Loss, Model, Written
+from fuzzytree.model.contracts import Document, Format, Model, Written
+from fuzzytree.model.losses import narrowing_refusal
 from fuzzytree.model.rulebase import RuleBase, Variable, fingerprint, sentence
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree, outline
@@ -161,7 +161,7 @@ def write(
         raise ValueError("activations are those of fuzzy systems")
     lost = losses(model, dtype)
     if lost and not allow_loss:
-        raise LossError(_loss_text(model, lost))
+        raise narrowing_refusal(model.name, "c float32", lost)
     made = Made(model, _NUMBERS[dtype], prefix)
     return Written("".join(made.text()).encode("ascii"), lost)
 
@@ -194,14 +194,6 @@ def _system_text(
     yield from system_code(system, prefix, activations=activations)
     yield from system_selftest(system, prefix, activations=activations)
     yield "\n#endif\n"
-
-
-def _loss_text(model: Model, lost: Sequence[Loss]) -> str:
-    lines = [f"{loss.where}: {loss.what}" for loss in lost]
-    more = [f"and {len(lines) - 10} more"] if len(lines) > 10 else []
-    hint = "pass allow_loss=True to write it as stated, or choose dtype 'float64'"
-    head = f"cannot write {model.name} as c float32: "
-    return head + "\n  ".join([*lines[:10], *more, hint])
 
 
 def _checks(numbers: Numbers, *, is_arithmetic: bool) -> str:

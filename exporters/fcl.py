@@ -17,7 +17,6 @@ from fuzzytree.exporters.fcl_rules import (
     block_lines,
     has_accu,
     losses_of,
-    names_of_rules,
     norm_losses,
     uses,
     with_conditions,
@@ -287,7 +286,7 @@ def _remarks(system: FuzzySystem, names: _FclNames, words: Words) -> Iterator[st
     yield from names.remarks(system)
     if any(one.unit for one in system.variables) or system.note:
         yield "units and the note of the system have no place"
-    if names_of_rules(system.rules):
+    if any(rule.name for rule in system.rules):
         yield "names of rules have no place"
     ranged = [one.name for one in system.inputs if one.low is not None]
     if ranged and words.name in ("portable", "iec"):

@@ -9,15 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fuzzytree.exporters.fcl_rules import uses
+from fuzzytree.exporters.fll_text import has_not
 from fuzzytree.model.rulebase import Points, RuleBase
 from fuzzytree.model.system import (
     And,
     Condition,
     FuzzySystem,
     Label,
-    Not,
     Or,
-    SystemOutput,
+    joints,
+    questions,
 )
 from fuzzytree.semantics.conversion import as_system
 
@@ -57,7 +58,8 @@ def _lines(system: FuzzySystem) -> Iterator[str]:
     yield f"other terms: {', '.join(others) or 'none'}"
     yield f"rule blocks: {len(system.blocks)}"
     yield f"rules: {len(rules)}"
-    yield f"conditions of a rule: {_span(_count(rule.when) for rule in rules)}"
+    conditions = (len([*questions(rule.when)]) for rule in rules)
+    yield f"conditions of a rule: {_span(conditions)}"
     yield f"conclusions of a rule: {_span(len(rule.then) for rule in rules)}"
     yield f"weighted rules: {sum(rule.weight != 1.0 for rule in rules)}"
     yield f"operators: {', '.join(_operators(system)) or 'none'}"
@@ -85,18 +87,6 @@ def _span(counts: Iterator[int] | list[int] | map[int]) -> str:
         return "none"
     low, high = min(found), max(found)
     return str(low) if low == high else f"{low} to {high}"
-
-
-def _count(condition: Condition | None) -> int:
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            return sum(map(_count, parts))
-        case Not(part=part):
-            return _count(part)
-        case None:
-            return 0
-        case _:
-            return 1
 
 
 def _operators(system: FuzzySystem) -> Iterator[str]:
@@ -132,12 +122,8 @@ def _beyond_basic(system: FuzzySystem, labels: list[Label]) -> Iterator[str]:
         yield "several conclusions of a rule"
     if any(rule.weight != 1.0 for rule in system.rules):
         yield "weighted rules"
-    if any(_sums(output) for output in system.outputs):
+    if any(output.aggregation != "maximum" for output in system.outputs):
         yield "numbers that are summed, and not joined by ACCU maximum"
-
-
-def _sums(output: SystemOutput) -> bool:
-    return output.aggregation != "maximum"
 
 
 def _beyond_extension(system: FuzzySystem, labels: list[Label]) -> Iterator[str]:
@@ -154,7 +140,12 @@ def _beyond_extension(system: FuzzySystem, labels: list[Label]) -> Iterator[str]
     kinds = {type(label.curve).__name__ for label in labels} - {"Points", "Singleton"}
     if kinds:
         yield f"terms that are no points ({', '.join(sorted(kinds))})"
-    hedges = {hedge for rule in system.rules for hedge in _hedges(rule.when)}
+    hedges = {
+        hedge
+        for rule in system.rules
+        for question in questions(rule.when)
+        for hedge in question.hedges
+    }
     if hedges - {"not"}:
         yield "hedges"
     if any(one.parts for one in system.inputs):
@@ -168,23 +159,4 @@ def _most_points(label: Label) -> int:
 
 
 def _has_or(condition: Condition | None) -> bool:
-    match condition:
-        case Or() | Not():
-            return True
-        case And(parts=parts):
-            return any(map(_has_or, parts))
-        case _:
-            return False
-
-
-def _hedges(condition: Condition | None) -> Iterator[str]:
-    match condition:
-        case And(parts=parts) | Or(parts=parts):
-            for part in parts:
-                yield from _hedges(part)
-        case Not(part=part):
-            yield from _hedges(part)
-        case None:
-            return
-        case _:
-            yield from condition.hedges
+    return Or in joints(condition) or has_not(condition)

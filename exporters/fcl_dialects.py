@@ -9,6 +9,7 @@ from typing import Final, Literal
 import msgspec
 
 from fuzzytree.exporters.fll_text import KNOWN
+from fuzzytree.formats.fcl.fcl_dialects import METHOD_WORDS, S_WORDS, T_WORDS
 from fuzzytree.model.system import (
     FUNCTIONS,
     Arc,
@@ -65,46 +66,22 @@ class Words(msgspec.Struct, frozen=True):
     ignores_case: bool = False
 
 
-_ANDS: Mapping[TNorm, str] = {
-    "minimum": "MIN",
-    "product": "PROD",
-    "bounded difference": "BDIF",
-}
-_ORS: Mapping[SNorm, str] = {
-    "maximum": "MAX",
-    "algebraic sum": "ASUM",
-    "bounded sum": "BSUM",
-}
-_ACTS: Mapping[TNorm, str] = {"minimum": "MIN", "product": "PROD"}
-_ACCUS: Mapping[SNorm, str] = {
-    "maximum": "MAX",
-    "bounded sum": "BSUM",
-    "normalized sum": "NSUM",
-}
-_METHODS: Mapping[DefuzzifierMethod, str] = {
-    "weighted average": "COGS",
-    "centroid": "COG",
-    "bisector": "COA",
-    "smallest of maximum": "LM",
-    "largest of maximum": "RM",
-}
-_FUZZYLITE_ANDS: Mapping[TNorm, str] = {
-    **_ANDS,
-    "drastic product": "DPROD",
-    "einstein product": "EPROD",
-    "hamacher product": "HPROD",
-    "nilpotent minimum": "NMIN",
-}
-_FUZZYLITE_ORS: Mapping[SNorm, str] = {
-    **_ORS,
-    "drastic sum": "DSUM",
-    "einstein sum": "ESUM",
-    "hamacher sum": "HSUM",
-    "nilpotent maximum": "NMAX",
-    "normalized sum": "NSUM",
-    "sum": "UnboundedSum",
-}
+def _t_norms(words: str) -> dict[TNorm, str]:
+    return {T_WORDS[word]: word for word in words.split()}
 
+
+def _s_norms(words: str) -> dict[SNorm, str]:
+    return {S_WORDS[word.upper()]: word for word in words.split()}
+
+
+def _methods(words: str) -> dict[DefuzzifierMethod, str]:
+    return {METHOD_WORDS[word]: word for word in words.split()}
+
+
+_ANDS, _ACTS = _t_norms("MIN PROD BDIF"), _t_norms("MIN PROD")
+_ORS = _s_norms("MAX ASUM BSUM")
+_FUZZYLITE_ANDS = _t_norms("MIN PROD BDIF DPROD EPROD HPROD NMIN")
+_FUZZYLITE_ORS = _s_norms("MAX ASUM BSUM DSUM ESUM HSUM NMAX NSUM UnboundedSum")
 _STANDARD: Final = (
     *("accu", "act", "and", "asum", "bdif", "bsum", "coa", "cog", "cogs", "default"),
     *("defuzzify", "end_defuzzify", "end_function_block", "end_fuzzify", "end_options"),
@@ -135,7 +112,7 @@ WORDS: Mapping[Dialect, Words] = MappingProxyType(
             ors=_ORS,
             acts={},
             accus={},
-            methods={"weighted average": "COGS"},
+            methods=_methods("COGS"),
             joiner="",
             is_lower=True,
             has_not=False,
@@ -147,8 +124,8 @@ WORDS: Mapping[Dialect, Words] = MappingProxyType(
             ands=_ANDS,
             ors=_ORS,
             acts=_ACTS,
-            accus=_ACCUS,
-            methods=_METHODS,
+            accus=_s_norms("MAX BSUM NSUM"),
+            methods=_methods("COGS COG COA LM RM"),
             reserved=_STANDARD,
             ignores_case=True,
         ),
@@ -158,11 +135,7 @@ WORDS: Mapping[Dialect, Words] = MappingProxyType(
             ors=_FUZZYLITE_ORS,
             acts=_FUZZYLITE_ANDS,
             accus=_FUZZYLITE_ORS,
-            methods={
-                **_METHODS,
-                "mean of maximum": "MM",
-                "weighted sum": "COGSS",
-            },
+            methods=_methods("COGS COG COA LM RM MM COGSS"),
             curves=tuple(one for one in KNOWN if one not in (Arc, SemiEllipse)),
             joiner=" and ",
             is_lower=True,
@@ -173,21 +146,11 @@ WORDS: Mapping[Dialect, Words] = MappingProxyType(
         ),
         "jfuzzylogic": Words(
             name="jfuzzylogic",
-            ands={
-                **_ANDS,
-                "drastic product": "DMIN",
-                "nilpotent minimum": "NIPMIN",
-                "hamacher product": "HAMACHER",
-            },
-            ors={
-                **_ORS,
-                "drastic sum": "DMAX",
-                "nilpotent maximum": "NIPMAX",
-                "einstein sum": "EINSTEIN",
-            },
+            ands=_t_norms("MIN PROD BDIF DMIN NIPMIN HAMACHER"),
+            ors=_s_norms("MAX ASUM BSUM DMAX NIPMAX EINSTEIN"),
             acts=_ACTS,
-            accus={**_ACCUS, "algebraic sum": "PROBOR", "sum": "SUM"},
-            methods={**_METHODS, "mean of maximum": "MM"},
+            accus=_s_norms("MAX BSUM NSUM PROBOR SUM"),
+            methods=_methods("COGS COG COA LM RM MM"),
             curves=(
                 *(Trapezoid, Gaussian, TwoGaussians, Bell, Sigmoid, Cosine),
                 *(SigmoidDifference, Singleton),

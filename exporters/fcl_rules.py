@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 from msgspec.structs import replace
 
@@ -18,7 +18,6 @@ from fuzzytree.model.system import (
     And,
     Condition,
     FuzzySystem,
-    Hedge,
     Is,
     Label,
     Not,
@@ -165,7 +164,14 @@ def rule_losses(system: FuzzySystem, words: Words) -> Iterator[Loss]:
         return
     outputs = {one.name for one in system.outputs}
     for number, rule in enumerate(rules, 1):
-        unknown = sorted({hedge for hedge in _hedges(rule) if hedge != "not"})
+        unknown = sorted(
+            {
+                hedge
+                for one in questions(rule.when)
+                for hedge in one.hedges
+                if hedge != "not"
+            }
+        )
         then = sorted({hedge for one in rule.then for hedge in one.hedges})
         if unknown or then:
             names = ", ".join(map(repr, [*unknown, *then]))
@@ -176,11 +182,6 @@ def rule_losses(system: FuzzySystem, words: Words) -> Iterator[Loss]:
             names = ", ".join(map(repr, sorted(asked)))
             what = f"engines ask the value of {names}, and not how far it is concluded"
             yield Loss(f"rule {number}", what)
-
-
-def _hedges(rule: SystemRule) -> Iterator[Hedge]:
-    for one in questions(rule.when):
-        yield from one.hedges
 
 
 def norm_losses(block: RuleBlock, number: int, words: Words) -> Iterator[str]:
@@ -202,11 +203,6 @@ def norm_losses(block: RuleBlock, number: int, words: Words) -> Iterator[str]:
             f"{where}: FCL activates all rules, and not {block.activation.method!r} "
             "ones; a rule base can be written with scores=rule"
         )
-
-
-def names_of_rules(rules: Sequence[SystemRule]) -> bool:
-    """Return whether some rule has a name, for which FCL has no place."""
-    return any(rule.name for rule in rules)
 
 
 def losses_of(system: FuzzySystem, words: Words) -> Iterator[Loss]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.formats.fll.fll_rules import HEDGES
@@ -48,6 +48,7 @@ from fuzzytree.model.system import (
     Trapezoid,
     TwoGaussians,
     joints,
+    questions,
 )
 from fuzzytree.semantics.inference import value_at
 
@@ -169,24 +170,11 @@ def hedge_losses(rules: Sequence[SystemRule]) -> Iterator[Loss]:
     """Yield the hedges that FLL does not have, rule by rule."""
     for number, rule in enumerate(rules, 1):
         used = [hedge for one in rule.then for hedge in one.hedges]
-        used += _hedges(rule.when)
+        used += [hedge for one in questions(rule.when) for hedge in one.hedges]
         unknown = sorted({hedge for hedge in used if hedge not in _WORDS})
         if unknown:
             names = ", ".join(map(repr, unknown))
             yield Loss(f"rule {number}", f"FLL has no {names}: left out")
-
-
-def _hedges(condition: Condition | None) -> Iterator[Hedge]:
-    match condition:
-        case Is(hedges=hedges):
-            yield from hedges
-        case And(parts=parts) | Or(parts=parts):
-            for part in parts:
-                yield from _hedges(part)
-        case Not(part=part):
-            yield from _hedges(part)
-        case None:
-            return
 
 
 KNOWN: tuple[type, ...] = (
@@ -262,6 +250,15 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
+_CLASSES: Mapping[type, str] = {
+    **{one: one.__name__ for one in (Gaussian, Bell, Sigmoid, Cosine, Concave, Spike)},
+    **{one: one.__name__ for one in (Arc, SemiEllipse)},
+    TwoGaussians: "GaussianProduct",
+    PiCurve: "PiShape",
+}
+"""The classes whose numbers are the fields of a curve, in order."""
+
+
 def _parts(curve: Curve) -> tuple[str | float, ...]:
     match curve:
         case Trapezoid(a=a, b=b, c=c, d=d):
@@ -272,51 +269,18 @@ def _parts(curve: Curve) -> tuple[str | float, ...]:
             return (
                 ("Triangle", low, b, high) if b == c else ("Trapezoid", low, b, c, high)
             )
-        case Gaussian(mean=mean, deviation=deviation):
-            return "Gaussian", mean, deviation
-        case TwoGaussians(left=a, left_deviation=s, right=b, right_deviation=t):
-            return "GaussianProduct", a, s, b, t
-        case Bell(center=center, width=width, slope=slope):
-            return "Bell", center, width, slope
-        case Sigmoid(inflection=inflection, slope=slope):
-            return "Sigmoid", inflection, slope
-        case SigmoidDifference(first=one, second=two):
-            return (
-                "SigmoidDifference",
-                one.inflection,
-                one.slope,
-                two.slope,
-                two.inflection,
-            )
-        case SigmoidProduct(first=one, second=two):
-            return (
-                "SigmoidProduct",
-                one.inflection,
-                one.slope,
-                two.slope,
-                two.inflection,
-            )
+        case SigmoidDifference(first=one, second=two) | SigmoidProduct(one, two):
+            kind = type(curve).__name__
+            return kind, one.inflection, one.slope, two.slope, two.inflection
         case SCurve(start=start, end=end):
             rises = start <= end
             return ("SShape", start, end) if rises else ("ZShape", end, start)
-        case PiCurve(a=a, b=b, c=c, d=d):
-            return "PiShape", a, b, c, d
-        case Cosine(center=center, width=width):
-            return "Cosine", center, width
-        case Concave(inflection=inflection, end=end):
-            return "Concave", inflection, end
-        case Spike(center=center, width=width):
-            return "Spike", center, width
-        case Arc(start=start, end=end):
-            return "Arc", start, end
-        case SemiEllipse(start=start, end=end):
-            return "SemiEllipse", start, end
         case Binary(start=start, is_above=is_above):
             return "Binary", start, math.inf if is_above else -math.inf
         case Singleton(value=value):
             return "Rectangle", value, value
         case _:
-            raise TypeError(f"no class of FLL for {type(curve).__name__}")
+            return _CLASSES[type(curve)], *astuple(curve)
 
 
 def _points(points: Points) -> tuple[str | float, ...]:

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import msgspec
 
-from fuzzytree.errors import LossError, MissingExtraError, install_hint
-from fuzzytree.model.contracts import Dtype, Format, Loss, Model, Written
+from fuzzytree.errors import MissingExtraError, install_hint
+from fuzzytree.model.contracts import Dtype, Format, Model, Written
+from fuzzytree.model.losses import narrowing_refusal
 from fuzzytree.model.rulebase import fingerprint
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.model.tree import FuzzyTree
@@ -135,7 +136,7 @@ def write(
 
     lost = losses(model, dtype)
     if lost and not allow_loss:
-        raise LossError(_loss_text(model, dtype, lost))
+        raise narrowing_refusal(model.name, f"onnx {dtype}", lost)
     made = _model_proto(
         model, dtype, opset, ir, signature, outputs, readable=readable, plain=plain
     )
@@ -226,14 +227,6 @@ def require(package: str, purpose: str) -> None:
         raise MissingExtraError(f"{purpose} {install_hint('onnx')}")
 
 
-def _loss_text(model: Model, dtype: Dtype, lost: Sequence[Loss]) -> str:
-    lines = [f"{loss.where}: {loss.what}" for loss in lost]
-    more = [f"and {len(lines) - 10} more"] if len(lines) > 10 else []
-    head = f"cannot write {model.name} as onnx {dtype}: "
-    hint = "pass allow_loss=True to write it as stated, or choose dtype 'float64'"
-    return head + "\n  ".join([*lines[:10], *more, hint])
-
-
 def _columns(model: Model, signature: Signature) -> tuple[str, ...]:
     return model.columns if signature == "all" else model.inputs
 
@@ -253,7 +246,7 @@ def _model_proto(
     from onnx import TensorProto, helper
 
     from fuzzytree.exporters.onnx_ends import NUMBERS
-    from fuzzytree.exporters.onnx_graph import DOMAIN, TREES, Sheet
+    from fuzzytree.exporters.onnx_graph import Sheet, model_proto
 
     numbers = NUMBERS[dtype]
     sheet = Sheet(opset, is_readable=readable)
@@ -267,31 +260,15 @@ def _model_proto(
         "strengths": (degree, ["rows", _rule_count(model)]),
     }
     _fill(sheet, model, dtype, columns, outputs, plain=plain)
-    graph = helper.make_graph(
-        sheet.nodes,
-        "rules" if not _is_tree(model) else "tree",
-        [helper.make_tensor_value_info("inputs", axis, ["rows", len(columns)])],
-        [helper.make_tensor_value_info(name, *kinds[name]) for name in outputs],
-        sheet.tensors,
+    return model_proto(
+        sheet,
+        "tree" if _is_tree(model) else "rules",
+        (axis, len(columns)),
+        {name: kinds[name] for name in outputs},
+        ir=ir,
+        text=_in_words(model, dtype),
+        facts=_facts(model, dtype, columns, outputs),
     )
-    imports = [helper.make_opsetid("", opset)]
-    if any(node.domain == TREES for node in sheet.nodes):
-        imports.append(helper.make_opsetid(TREES, 5))
-    if sheet.functions:
-        imports.append(helper.make_opsetid(DOMAIN, 1))
-    made = helper.make_model(
-        graph,
-        opset_imports=imports,
-        ir_version=ir,
-        functions=list(sheet.functions.values()),
-        producer_name="fuzzytree",
-        producer_version=version(),
-        doc_string=_in_words(model, dtype),
-    )
-    facts = _facts(model, dtype, columns, outputs)
-    for key, value in facts.items():
-        made.metadata_props.add(key=key, value=value)
-    return made
 
 
 def _fill(
@@ -352,7 +329,7 @@ def _facts(
     facts = {
         key: json.dumps(value, ensure_ascii=False) for key, value in records.items()
     }
-    return {f"fuzzytree.{key}": value for key, value in (texts | facts).items()}
+    return texts | facts
 
 
 def _in_words(model: Model, dtype: Dtype) -> str:

@@ -66,7 +66,7 @@ def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
         fresh = write(
             model,
             allow_loss=True,
-            dtype=facts["dtype"],
+            dtype=facts["dtype"],  # pyright: ignore[reportArgumentType]  # write checks it
             opset=versions.get("", 0),
             ir=found.ir_version,
             signature="needed" if columns == list(needed) else "all",

@@ -7,7 +7,7 @@ same calls give the same bytes.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -230,7 +230,7 @@ class Sheet:
         return self.node(name, *inputs.values(), named=named, domain=DOMAIN)
 
     @contextlib.contextmanager
-    def about(self, topic: str) -> Iterator[None]:
+    def about(self, topic: str) -> Generator[None, None, None]:
         """Name the nodes that are added within after what they are part of."""
         before, self.topic = self.topic, topic
         yield
@@ -274,6 +274,54 @@ class Sheet:
         self._taken[hint] = max(number, 1)
         self._taken.setdefault(name, 1)
         return name
+
+
+def model_proto(
+    sheet: Sheet,
+    name: str,
+    columns: tuple[int, int],
+    outputs: Mapping[str, tuple[int, list[str | int]]],
+    *,
+    ir: int,
+    text: str,
+    facts: Mapping[str, str],
+) -> onnx.ModelProto:
+    """Return the file of a filled sheet.
+
+    Args:
+        sheet: All nodes.
+        name: The name of the graph.
+        columns: The type and the number of columns of `inputs`.
+        outputs: The type and shape of each output, in order.
+        ir: The version of the file.
+        text: The description of the model.
+        facts: The metadata, by keys without `fuzzytree.`.
+    """
+    kind, count = columns
+    graph = helper.make_graph(
+        sheet.nodes,
+        name,
+        [helper.make_tensor_value_info("inputs", kind, ["rows", count])],
+        [helper.make_tensor_value_info(key, *how) for key, how in outputs.items()],
+        sheet.tensors,
+    )
+    imports = [helper.make_opsetid("", sheet.opset)]
+    if any(node.domain == TREES for node in sheet.nodes):
+        imports.append(helper.make_opsetid(TREES, 5))
+    if sheet.functions:
+        imports.append(helper.make_opsetid(DOMAIN, 1))
+    proto = helper.make_model(
+        graph,
+        opset_imports=imports,
+        ir_version=ir,
+        functions=list(sheet.functions.values()),
+        producer_name="fuzzytree",
+        producer_version=facts["version"],
+        doc_string=text,
+    )
+    for key, value in facts.items():
+        proto.metadata_props.add(key=f"fuzzytree.{key}", value=value)
+    return proto
 
 
 class Table:

@@ -124,23 +124,33 @@ def prove(
         DisagreementError: If an answer differs.
     """
     rows = list(sample_rows(model, limit))
-    try:
-        session = open_session(content)
-        table = [[row.get(name, 0.0) for name in columns] for row in rows]
-        with np.errstate(over="ignore"):  # beyond float32 is missing in float32
-            values = np.array(table, np.float64).astype(kind)
-        values = values.reshape(len(rows), len(columns))
-        found = session(names, values)
-    except RUNTIME_ERRORS as error:
-        raise LossError(
-            f"cannot write {model.name} as onnx: onnxruntime "
-            f"{onnxruntime.__version__} does not run it: {first_line(error)}"
-        ) from error
+    table = [[row.get(name, 0.0) for name in columns] for row in rows]
+    with np.errstate(over="ignore"):  # beyond float32 is missing in float32
+        values = np.array(table, np.float64).astype(kind)
+    values = values.reshape(len(rows), len(columns))
+    found = proved_run(content, model.name, names, values)
     for number, row in enumerate(rows):
         is_missing = not all(map(math.isfinite, row.values()))
         if is_exact or is_missing:
             given = {name: array[number] for name, array in found.items()}
             _compare(model, row, given)
+
+
+def proved_run(
+    content: bytes, model: str, names: Sequence[str], values: Array
+) -> dict[str, Array]:
+    """Return the named outputs of a file for some rows.
+
+    Raises:
+        LossError: If onnxruntime does not load or run the file.
+    """
+    try:
+        return open_session(content)(names, values)
+    except RUNTIME_ERRORS as error:
+        raise LossError(
+            f"cannot write {model} as onnx: onnxruntime {onnxruntime.__version__} does "
+            f"not run it: {first_line(error)}"
+        ) from error
 
 
 def sample_rows(model: Model, limit: int) -> Iterator[dict[str, float]]:

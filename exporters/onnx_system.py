@@ -79,9 +79,9 @@ def _model_proto(
     outputs: Sequence[Output],
     facts: dict[str, str],
 ) -> onnx.ModelProto:
-    from onnx import TensorProto, helper
+    from onnx import TensorProto
 
-    from fuzzytree.exporters.onnx_graph import Sheet
+    from fuzzytree.exporters.onnx_graph import Sheet, model_proto
 
     sheet = Sheet(opset)
     _fill(sheet, system, program, outputs)
@@ -90,25 +90,15 @@ def _model_proto(
         "status": (TensorProto.INT64, ["rows"]),
         "activations": (TensorProto.DOUBLE, ["rows", len(system.rules)]),
     }
-    width: list[str | int] = ["rows", len(system.columns)]
-    graph = helper.make_graph(
-        sheet.nodes,
+    return model_proto(
+        sheet,
         "system",
-        [helper.make_tensor_value_info("inputs", TensorProto.DOUBLE, width)],
-        [helper.make_tensor_value_info(name, *kinds[name]) for name in outputs],
-        sheet.tensors,
+        (TensorProto.DOUBLE, len(system.columns)),
+        {name: kinds[name] for name in outputs},
+        ir=ir,
+        text=_in_words(system),
+        facts=facts | _facts(system, program, outputs),
     )
-    made = helper.make_model(
-        graph,
-        opset_imports=[helper.make_opsetid("", opset)],
-        ir_version=ir,
-        producer_name="fuzzytree",
-        producer_version=facts["version"],
-        doc_string=_in_words(system),
-    )
-    for key, value in (facts | _facts(system, program, outputs)).items():
-        made.metadata_props.add(key=f"fuzzytree.{key}", value=value)
-    return made
 
 
 def _fill(
@@ -217,13 +207,8 @@ def _in_words(system: FuzzySystem) -> str:
 def _prove(content: bytes, system: FuzzySystem, outputs: Sequence[Output]) -> None:
     """Load a file, run it and hold its answers against the inference."""
     import numpy as np
-    import onnxruntime
 
-    from fuzzytree.exporters.onnx_session import (
-        RUNTIME_ERRORS,
-        first_line,
-        open_session,
-    )
+    from fuzzytree.exporters.onnx_session import proved_run
     from fuzzytree.semantics.probing import system_probes
 
     program = from_system(system, activations=True)
@@ -231,13 +216,7 @@ def _prove(content: bytes, system: FuzzySystem, outputs: Sequence[Output]) -> No
     rows = system_probes(system, limit=limit)
     table = np.array([[row[name] for name in system.columns] for row in rows])
     table = table.reshape(len(rows), len(system.columns))
-    try:
-        found = open_session(content)(outputs, table)
-    except RUNTIME_ERRORS as error:
-        raise LossError(
-            f"cannot write {system.name} as onnx: onnxruntime "
-            f"{onnxruntime.__version__} does not run it: {first_line(error)}"
-        ) from error
+    found = proved_run(content, system.name, outputs, table)
     for text in _differences(system, program, rows, table, found):
         raise DisagreementError(text)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import assert_never
 
 from fuzzytree.exporters.yaml_text import (
     Entry,
@@ -24,32 +23,22 @@ from fuzzytree.model.contracts import Loss
 from fuzzytree.model.rulebase import LR, Band, Points
 from fuzzytree.model.system import (
     Activation,
-    Arc,
-    Bell,
     Binary,
-    Concave,
-    Cosine,
     Curve,
     Defuzzifier,
     Formula,
     FuzzySystem,
-    Gaussian,
     Label,
     Linear,
     PiCurve,
     RuleBlock,
-    SCurve,
-    SemiEllipse,
-    Sigmoid,
     SigmoidDifference,
     SigmoidProduct,
     Singleton,
-    Spike,
     SystemInput,
     SystemOutput,
     SystemRule,
     Trapezoid,
-    TwoGaussians,
 )
 
 
@@ -176,32 +165,10 @@ def _curve(curve: Curve) -> dict[str, Entry]:
             return named_shape("", curve)
         case Trapezoid():
             return _trapezoid(curve)
-        case Gaussian():
-            return _fields("gaussian", curve)
-        case TwoGaussians():
-            return _fields("two gaussians", curve)
-        case Bell():
-            return _fields("bell", curve)
-        case Sigmoid():
-            return _fields("sigmoid", curve)
-        case SigmoidDifference(first=first, second=second):
-            return {"sigmoid difference": Short([_numbers(first), _numbers(second)])}
-        case SigmoidProduct(first=first, second=second):
-            return {"sigmoid product": Short([_numbers(first), _numbers(second)])}
-        case SCurve():
-            return _fields("s", curve)
+        case SigmoidDifference(first, second) | SigmoidProduct(first, second):
+            return {_name(curve): Short([_numbers(first), _numbers(second)])}
         case PiCurve(a=a, b=b, c=c, d=d):
             return {"pi": numbers((a, b, c, d))}
-        case Cosine():
-            return _fields("cosine", curve)
-        case Concave():
-            return _fields("concave", curve)
-        case Spike():
-            return _fields("spike", curve)
-        case Arc():
-            return _fields("arc", curve)
-        case SemiEllipse():
-            return _fields("semi ellipse", curve)
         case Binary(start=start, is_above=is_above):
             return {"at least" if is_above else "at most": float(start)}
         case Singleton(value=value):
@@ -212,7 +179,7 @@ def _curve(curve: Curve) -> dict[str, Entry]:
         case Formula(expression=expression):
             return {"formula": text_of(expression)}
         case _:
-            assert_never(curve)
+            return {_name(curve): _numbers(curve)}
 
 
 def _trapezoid(curve: Trapezoid) -> dict[str, Entry]:
@@ -225,8 +192,8 @@ def _trapezoid(curve: Trapezoid) -> dict[str, Entry]:
     return {"trapezoid": numbers((a, curve.b, curve.c, d))}
 
 
-def _fields(name: str, curve: Curve) -> dict[str, Entry]:
-    return {name: _numbers(curve)}
+def _name(curve: Curve) -> str:
+    return str(curve.__struct_config__.tag)
 
 
 def _numbers(curve: Curve) -> Short:

@@ -38,3 +38,20 @@ def refusal(model: str, to: str, losses: Sequence[Loss]) -> LossError:
         f"cannot write {model[:100]} as {to} without loss:\n{listed}"
         "  pass allow_loss=True to write it as stated"
     )
+
+
+def narrowing_refusal(model: str, to: str, losses: Sequence[Loss]) -> LossError:
+    """Return the error with which a writer refuses to narrow numbers.
+
+    Args:
+        model: The name of the model.
+        to: The name of the format and the number type.
+        losses: Everything that would be lost; the first ten are listed.
+    """
+    lines = [f"{loss.where}: {loss.what}" for loss in losses[:10]]
+    if len(losses) > 10:
+        lines.append(f"and {len(losses) - 10} more")
+    lines.append(
+        "pass allow_loss=True to write it as stated, or choose dtype 'float64'"
+    )
+    return LossError(f"cannot write {model} as {to}: " + "\n  ".join(lines))
