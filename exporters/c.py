@@ -12,7 +12,7 @@ from typing import Literal
 
 from fuzzytree.exporters.c_rules import rules_code
 from fuzzytree.exporters.c_selftest import examples_of, number_of, selftest_code
-from fuzzytree.exporters.c_system import (
+from fuzzytree.exporters.c_steps import (
     SYSTEM_TYPES,
     system_code,
     system_heading,
@@ -244,11 +244,7 @@ class Made:
         yield from self._declarations()
 
     def definitions(self, *, is_arithmetic: bool) -> Iterator[str]:
-        """Yield the tables and functions of the model.
-
-        Args:
-            is_arithmetic: Whether anything is computed, and not only compared.
-        """
+        """Yield the tables and functions of the model."""
         yield self._fill(_DEFINE)
         yield self._fill(_checks(self.numbers, is_arithmetic=is_arithmetic))
         yield from self._defaults()

@@ -287,15 +287,7 @@ def rules_code(
     *,
     is_product: bool,
 ) -> Iterator[str]:
-    """Yield the tables of a rule base and the functions that fire it.
-
-    Args:
-        tables: The rule base.
-        numbers: The type of all numbers.
-        prefix: The beginning of all names.
-        axes: Statements that put the values of the variables into `value`, or return.
-        is_product: Whether degrees are multiplied.
-    """
+    """Yield the tables of a rule base and the functions that fire it."""
     yield from _data(tables, numbers, prefix)
     for template in _functions(tables, numbers):
         text = template.replace("JOIN", "a * b" if is_product else "b < a ? b : a")

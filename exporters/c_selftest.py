@@ -56,15 +56,7 @@ def examples_of(
     line: Mapping[str, int],
     numbers: Numbers,
 ) -> list[Example]:
-    """Return rows and their answers: the reference's in double, else the tables'.
-
-    Args:
-        model: The model.
-        asked: The questions of a tree.
-        tables: The rules of a rule base.
-        line: The place of each variable's value.
-        numbers: The number type.
-    """
+    """Return rows and their answers: the reference's in double, else the tables'."""
     found: list[Example] = []
     rows = rows_of(model, len(tables.label) if tables else 1)
     for row in rows:
@@ -126,12 +118,7 @@ def _computed(
 
 
 def rows_of(model: Model, rules: int) -> list[Row]:
-    """Return rows for a self-test: some at landmarks, some at random, and special ones.
-
-    Args:
-        model: The model.
-        rules: How many strengths a row has; the more, the fewer rows.
-    """
+    """Return rows for a self-test; the more rules, the fewer rows."""
     limit = max(_FEWEST_ROWS, min(_MOST_ROWS, _STRENGTHS // max(rules, 1)))
     return few_probes(model, limit)
 

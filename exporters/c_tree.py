@@ -34,10 +34,6 @@ def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[Question]:
     """Return the questions of a tree; the first is asked first.
 
     A node of several cuts becomes several questions, by halves.
-
-    Args:
-        tree: The tree.
-        line: The place of each variable's value.
     """
     starts, count = [0], 0
     for node in tree.nodes:
@@ -112,15 +108,7 @@ def tree_code(
     prefix: str,
     axes: str,
 ) -> Iterator[str]:
-    """Yield the tables of a tree and the function that walks through them.
-
-    Args:
-        tree: The tree.
-        line: The place of each variable's value.
-        numbers: The type of values and cuts.
-        prefix: The beginning of all names.
-        axes: Statements that put the values of the variables into `value`, or return.
-    """
+    """Yield the tables of a tree and the function that walks through them."""
     asked = questions_of(tree, line)
     numbered = {label: place for place, label in enumerate(tree.classes)}
     labels = [numbered[leaf.label] for leaf in tree.leaves]

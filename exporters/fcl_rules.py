@@ -63,16 +63,7 @@ def with_conditions(system: FuzzySystem, words: Words) -> FuzzySystem:
 def block_lines(
     block: RuleBlock, name: str, words: Words, speak: Speak, always: str, accu: str
 ) -> Iterator[str]:
-    """Yield the lines of a block of rules.
-
-    Args:
-        block: The block; what the dialect has no words for was refused before.
-        name: Its name.
-        words: The dialect.
-        speak: The words for a variable and one of its labels.
-        always: What a rule without a condition asks.
-        accu: The word for ACCU; empty for none.
-    """
+    """Yield the lines of a block of rules."""
     yield f"RULEBLOCK {name}"
     yield from (f"  {line}" for line in _operators(block, words))
     if block.implication is not None and block.implication in words.acts:

@@ -46,14 +46,7 @@ def number(value: float) -> str:
 def term_text(
     variable: SystemInput | SystemOutput, label: Label, words: Words, names: Names
 ) -> str | None:
-    """Return the curve of a label; None if the dialect has none for it.
-
-    Args:
-        variable: Whose label it is.
-        label: The label; a curve that the dialect lacks has become points.
-        words: The dialect.
-        names: The names of variables in the file, for formulas.
-    """
+    """Return the curve of a label; None if the dialect has none for it."""
     is_weighted = (
         isinstance(variable, SystemOutput) and variable.defuzzifier.is_weighted
     )

@@ -121,13 +121,7 @@ def _pushed(condition: Condition, nots: int) -> Condition:
 
 
 def rule_text(rule: SystemRule, speak: Speak, always: str) -> str:
-    """Return a rule as fuzzylite reads it.
-
-    Args:
-        rule: The rule; of a `speakable` block.
-        speak: The words for variables and labels.
-        always: What a rule without a condition says.
-    """
+    """Return a rule as fuzzylite reads it."""
     when = always if rule.when is None else _condition_text(rule.when, speak, 0)
     then = " and ".join(
         _statement(one.output, one.label, one.hedges, speak) for one in rule.then
@@ -186,15 +180,7 @@ KNOWN: tuple[type, ...] = (
 
 
 def degree_text(label: Label, names: Mapping[str, str]) -> str | None:
-    """Return the class and numbers of a label whose degrees count.
-
-    Args:
-        label: The label.
-        names: The names of variables in the file, for formulas.
-
-    Returns:
-        None if FLL has no such term.
-    """
+    """Return the class and numbers of a term; None if FLL has no such term."""
     match label.curve:
         case Formula(expression=expression):
             if label.height != 1.0:
@@ -223,16 +209,7 @@ def weighted_type(output: SystemOutput) -> str:
 
 
 def number_text(label: Label, kind: str, names: Mapping[str, str]) -> str | None:
-    """Return the class and numbers of a label of a weighted output.
-
-    Args:
-        label: The label.
-        kind: The type of the output.
-        names: The names of variables in the file, for formulas.
-
-    Returns:
-        None if FLL has no such term.
-    """
+    """Return the class and numbers of a term of a weighted output, or None."""
     match label.curve:
         case Singleton(value=value):
             return f"Constant {_number(value)}"

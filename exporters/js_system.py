@@ -44,12 +44,7 @@ function selfTest() {
 
 
 def system_parts(system: FuzzySystem, rows: str) -> Iterator[str]:
-    """Yield the tables and functions of a system.
-
-    Args:
-        system: The system.
-        rows: The functions that look at what is given.
-    """
+    """Yield the tables and functions of a system."""
     program = from_system(system, activations=True)
     steps = Steps(program)
     body = list(steps.body())

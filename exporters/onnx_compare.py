@@ -49,12 +49,7 @@ class Differences(NamedTuple):
 
 
 def differences(content: bytes, model: Model | FuzzySystem) -> Differences:
-    """Return how a file differs from one that is written of a model now.
-
-    Args:
-        content: An ONNX file that fuzzytree wrote (`open_onnx` accepts it).
-        model: The model that it should contain.
-    """
+    """Return how a file differs from one that is written of a model now."""
     import onnx
 
     found = onnx.load_model_from_string(content)

@@ -47,14 +47,9 @@ def axes(
     *,
     is_flat: bool = False,
 ) -> Axes:
-    """Add the values of the variables of a model that matter, and the guard over them.
+    """Add the values of the variables that matter, and the guard over them.
 
-    Args:
-        sheet: Where the nodes go; its source is of shape (rows, columns).
-        model: Whose variables.
-        numbers: The types to compute in.
-        columns: What the columns of the input are, in order.
-        is_flat: Whether the guard has one axis only.
+    The source of the sheet is of shape (rows, columns).
     """
     if not model.variables:
         return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=is_flat))
@@ -87,14 +82,7 @@ def axes(
 def flat_guard(
     sheet: Sheet, model: Model, numbers: Numbers, columns: Sequence[str]
 ) -> Axes:
-    """Add the guard alone, for a model without combinations; rows stay rows.
-
-    Args:
-        sheet: As in `axes`.
-        model: As in `axes`.
-        numbers: As in `axes`.
-        columns: As in `axes`.
-    """
+    """Add the guard alone, for a model without combinations; rows stay rows."""
     if not model.variables:
         return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=True))
     source = sheet.source

@@ -87,12 +87,6 @@ def rules_graph(
     Row 0 of the strengths is `NOTHING` and row k is rule k: the position of the first
     largest is the number of the winning rule, or 0.
 
-    Args:
-        sheet: Where the nodes go.
-        rules: What is written.
-        numbers: The types to compute in.
-        columns: What the columns of `inputs` are, in order.
-
     Returns:
         The values of the variables, and the strengths, of shape (1 + rules, rows).
     """

@@ -107,17 +107,9 @@ def prove(
     is_exact: bool,
     limit: int,
 ) -> None:
-    """Load a file, run it and compare its answers with the reference.
+    """Load a file, run it and compare its predictions with the reference.
 
-    Args:
-        content: The file.
-        model: What it should mean.
-        columns: The columns of its input.
-        names: Its outputs.
-        kind: The type of its input.
-        is_exact: Whether answers must be those of the reference; otherwise only rows
-            with a missing value are compared, and that there is an answer to all.
-        limit: The largest number of rows.
+    If it is not exact, only rows with a missing value are compared.
 
     Raises:
         LossError: If onnxruntime does not load or run the file.

@@ -92,11 +92,6 @@ def missing_functions(program: Program) -> tuple[str, ...]:
 def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[str]:
     """Add the steps of a program to a sheet and return the names of its results.
 
-    Args:
-        sheet: Where the nodes go; its source is of shape (rows, columns).
-        program: The program; `missing_functions` must be empty.
-        columns: What the columns of the source are, in order.
-
     Returns:
         A block of shape (rows,) for each result.
     """

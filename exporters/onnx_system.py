@@ -42,14 +42,6 @@ def write_system(
 ) -> Written:
     """Write a fuzzy system; `fuzzytree.exporters.onnx.write` documents the options.
 
-    Args:
-        system: The system.
-        opset: The version of the operators.
-        ir: The version of the file.
-        outputs: Which outputs, in this order.
-        facts: What every file of ours says about itself.
-        verify: Whether to load the file in onnxruntime and to compare its answers.
-
     Raises:
         LossError: If it needs a function that onnxruntime lacks in double, or if the
             installed onnxruntime does not load the file.

@@ -15,8 +15,7 @@ from typing import Literal
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.reference_tables import targets_of
-from fuzzytree.exporters.st_rules import RuleSteps, decision
-from fuzzytree.exporters.st_steps import SystemSteps
+from fuzzytree.exporters.st_steps import RuleSteps, SystemSteps, decision
 from fuzzytree.exporters.st_text import (
     LONG,
     SINGLE,
@@ -266,12 +265,6 @@ def written_system(
     system: FuzzySystem, numbers: Numbers, name: str, *, allow_loss: bool
 ) -> Written:
     """Return a system as a function block, in ASCII.
-
-    Args:
-        system: The system.
-        numbers: The number type.
-        name: Of the function block; made from the system's if empty.
-        allow_loss: Of no effect.
 
     Raises:
         LossError: If it needs what the language has not.
