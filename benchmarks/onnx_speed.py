@@ -19,7 +19,7 @@ from onnx import TensorProto, helper
 from fuzzytree.benchmarking.clock import measure
 from fuzzytree.benchmarking.machine import machine
 from fuzzytree.exporters.onnx import write
-from fuzzytree.exporters.onnx_graph import Sheet
+from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.exporters.onnx_session import open_session
 from fuzzytree.model.contracts import Dtype
 from fuzzytree.model.rulebase import Band, Flank, Term, Variable
@@ -114,7 +114,7 @@ def study_graph(tree: FuzzyTree) -> bytes:
     `ArgMax`; reciprocals, no cap below 1, no guard: faster operations, other bits.
     """
     rules = rules_from_tree(tree)
-    sheet = Sheet(17)
+    sheet = OnnxGraph(17)
     terms = [(v.name, t.name, t.shape) for v in rules.variables for t in v.terms]
     number = {(v, t): row for row, (v, t, _) in enumerate(terms)}
     block = sheet.node("Transpose", "inputs", perm=[1, 0])
@@ -152,11 +152,11 @@ def study_graph(tree: FuzzyTree) -> bytes:
     return content
 
 
-def _column(sheet: Sheet, values: list[float]) -> str:
+def _column(sheet: OnnxGraph, values: list[float]) -> str:
     return sheet.constant(np.array(values, np.float32).reshape(-1, 1), "column")
 
 
-def _number(sheet: Sheet, value: float) -> str:
+def _number(sheet: OnnxGraph, value: float) -> str:
     return sheet.constant(np.array(value, np.float32), "number")
 
 

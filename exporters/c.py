@@ -22,7 +22,7 @@ from fuzzytree.exporters.c_tables import Tables, tables_of
 from fuzzytree.exporters.c_text import (
     DOUBLE,
     SINGLE,
-    Numbers,
+    CNumbers,
     constants,
     fill,
     prefix_of,
@@ -30,7 +30,7 @@ from fuzzytree.exporters.c_text import (
     remark,
     whole_table,
 )
-from fuzzytree.exporters.c_tree import Question, questions_of, tree_code
+from fuzzytree.exporters.c_tree import CTreeTest, questions_of, tree_code
 from fuzzytree.exporters.reference_tables import places_of
 from fuzzytree.model.contracts import Document, Format, Model, Written
 from fuzzytree.model.losses import narrowing_refusal
@@ -162,7 +162,7 @@ def write(
     lost = losses(model, dtype)
     if lost and not allow_loss:
         raise narrowing_refusal(model.name, "c float32", lost)
-    made = Made(model, _NUMBERS[dtype], prefix)
+    made = CFile(model, _NUMBERS[dtype], prefix)
     return Written("".join(made.text()).encode("ascii"), lost)
 
 
@@ -196,7 +196,7 @@ def _system_text(
     yield "\n#endif\n"
 
 
-def _checks(numbers: Numbers, *, is_arithmetic: bool) -> str:
+def _checks(numbers: CNumbers, *, is_arithmetic: bool) -> str:
     """Return what refuses to compile where numbers are not those of IEEE."""
     limits, exact = "DBL_MANT_DIG != 53 || DBL_MAX_EXP != 1024", "FLT_EVAL_METHOD == 0"
     fuses = "__FP_FAST_FMA"
@@ -211,13 +211,13 @@ def _checks(numbers: Numbers, *, is_arithmetic: bool) -> str:
     return text.replace("KIND", numbers.name).replace("FUSES", fuses)
 
 
-class Made:
+class CFile:
     """A file in the making: the model, and its tables, which several parts read."""
 
-    def __init__(self, model: Model, numbers: Numbers, prefix: str) -> None:
+    def __init__(self, model: Model, numbers: CNumbers, prefix: str) -> None:
         self.model, self.numbers, self.prefix = model, numbers, prefix
         self.line = places_of(model.variables)
-        self.asked: list[Question] = []
+        self.asked: list[CTreeTest] = []
         self.tables: Tables | None = None
         if isinstance(model, RuleBase):
             self.tables = tables_of(model, self.line, numbers)
@@ -397,7 +397,7 @@ def taking(variables: Sequence[Variable]) -> str:
 def axes_code(
     variables: Sequence[Variable],
     line: Mapping[str, int],
-    numbers: Numbers,
+    numbers: CNumbers,
     prefix: str,
 ) -> Iterator[str]:
     """Yield what looks whether all values are there, and computes combinations."""

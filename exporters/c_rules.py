@@ -18,7 +18,7 @@ from fuzzytree.exporters.c_tables import (
     Tables,
 )
 from fuzzytree.exporters.c_text import (
-    Numbers,
+    CNumbers,
     fill,
     place_type,
     real_table,
@@ -281,7 +281,7 @@ GUESS
 
 def rules_code(
     tables: Tables,
-    numbers: Numbers,
+    numbers: CNumbers,
     prefix: str,
     axes: str,
     *,
@@ -301,7 +301,7 @@ def _place_type(tables: Tables) -> str:
     return place_type(max(tallest, len(tables.places.clause), len(tables.label)))
 
 
-def _data(tables: Tables, numbers: Numbers, prefix: str) -> Iterator[str]:
+def _data(tables: Tables, numbers: CNumbers, prefix: str) -> Iterator[str]:
     places = tables.places
     for name, size in (
         ("RULES", len(tables.label)),
@@ -334,7 +334,7 @@ def _data(tables: Tables, numbers: Numbers, prefix: str) -> Iterator[str]:
             yield from whole_table(f"{prefix}_{name}", values or [0], about)
 
 
-def _functions(tables: Tables, numbers: Numbers) -> Iterator[str]:
+def _functions(tables: Tables, numbers: CNumbers) -> Iterator[str]:
     kinds = set(tables.kind)
     has_flank, has_side = kinds & {LOW_END, HIGH_END}, kinds & {LEFT_SIDE, RIGHT_SIDE}
     if has_flank:

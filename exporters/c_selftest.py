@@ -18,8 +18,8 @@ from fuzzytree.exporters.c_tables import (
     POINTS,
     Tables,
 )
-from fuzzytree.exporters.c_text import Numbers, fill
-from fuzzytree.exporters.c_tree import Question
+from fuzzytree.exporters.c_text import CNumbers, fill
+from fuzzytree.exporters.c_tree import CTreeTest
 from fuzzytree.model.contracts import Model
 from fuzzytree.model.rulebase import Variable
 from fuzzytree.model.tree import FuzzyTree
@@ -51,10 +51,10 @@ class Example(msgspec.Struct, frozen=True):
 
 def examples_of(
     model: Model,
-    asked: Sequence[Question],
+    asked: Sequence[CTreeTest],
     tables: Tables | None,
     line: Mapping[str, int],
-    numbers: Numbers,
+    numbers: CNumbers,
 ) -> list[Example]:
     """Return rows and their answers: the reference's in double, else the tables'."""
     found: list[Example] = []
@@ -89,10 +89,10 @@ def _reference(model: Model, row: Row) -> Answer:
 
 def _computed(
     model: Model,
-    asked: Sequence[Question],
+    asked: Sequence[CTreeTest],
     tables: Tables | None,
     line: Mapping[str, int],
-    numbers: Numbers,
+    numbers: CNumbers,
     row: Row,
 ) -> Answer:
     """Return the answer that the tables give in their number type."""
@@ -123,7 +123,7 @@ def rows_of(model: Model, rules: int) -> list[Row]:
     return few_probes(model, limit)
 
 
-def digest_of(strengths: Sequence[float], numbers: Numbers) -> int:
+def digest_of(strengths: Sequence[float], numbers: CNumbers) -> int:
     """Return 32 bits that change if any bit of any strength does.
 
     No number is counted as one, and -0 as 0.
@@ -202,7 +202,7 @@ RULES_CHECK
 
 
 def selftest_code(
-    examples: Sequence[Example], numbers: Numbers, prefix: str, *, has_strengths: bool
+    examples: Sequence[Example], numbers: CNumbers, prefix: str, *, has_strengths: bool
 ) -> Iterator[str]:
     """Yield the self-test, behind a macro."""
     size = max(len(examples[0].row), 1)
@@ -235,7 +235,7 @@ def selftest_code(
     yield "#endif\n"
 
 
-def _bits(row: Sequence[float], numbers: Numbers) -> str:
+def _bits(row: Sequence[float], numbers: CNumbers) -> str:
     """Return the bits of some numbers as constants."""
     size = np.dtype(numbers.kind).itemsize
     array = np.array(row, numbers.kind).view(f"u{size}")
@@ -251,7 +251,7 @@ def axis_values(
     variables: Sequence[Variable],
     line: Mapping[str, int],
     row: Sequence[float],
-    numbers: Numbers,
+    numbers: CNumbers,
 ) -> list[Real] | None:
     """Return the value of each variable; None if one is not finite."""
     given = [numbers.kind(value) for value in row]
@@ -270,7 +270,7 @@ def axis_values(
     return found if all(map(np.isfinite, found)) else None
 
 
-def leaf(asked: Sequence[Question], values: Sequence[Real], numbers: Numbers) -> int:
+def leaf(asked: Sequence[CTreeTest], values: Sequence[Real], numbers: CNumbers) -> int:
     """Return the number of the leaf that a walk arrives at, from 1."""
     place = 0
     while place < len(asked):
@@ -282,7 +282,7 @@ def leaf(asked: Sequence[Question], values: Sequence[Real], numbers: Numbers) ->
 
 @np.errstate(all="ignore")
 def strengths(
-    tables: Tables, values: Sequence[Real], numbers: Numbers, *, is_product: bool
+    tables: Tables, values: Sequence[Real], numbers: CNumbers, *, is_product: bool
 ) -> tuple[float, ...]:
     """Return the strength of each rule."""
     one = numbers.kind(1)
@@ -303,7 +303,7 @@ def strengths(
 
 
 def _clause(
-    tables: Tables, clause: int, values: Sequence[Real], numbers: Numbers
+    tables: Tables, clause: int, values: Sequence[Real], numbers: CNumbers
 ) -> Real:
     first, last = tables.clause_first[clause : clause + 2]
     one = numbers.kind(1)
@@ -317,7 +317,7 @@ def _clause(
     return one - max(degrees) if tables.negated[clause] else max(degrees)
 
 
-def _atom(tables: Tables, atom: int, x: Real, numbers: Numbers) -> Real:
+def _atom(tables: Tables, atom: int, x: Real, numbers: CNumbers) -> Real:
     kind, count, first = tables.kind[atom], tables.count[atom], tables.first[atom]
     after = tables.first[atom + 1] if atom + 1 < len(tables.first) else None
     n = [numbers.kind(value) for value in tables.number[first:after]]
@@ -340,7 +340,7 @@ def _atom(tables: Tables, atom: int, x: Real, numbers: Numbers) -> Real:
 
 
 def _line(
-    values: Sequence[Real], degrees: Sequence[Real], x: Real, numbers: Numbers
+    values: Sequence[Real], degrees: Sequence[Real], x: Real, numbers: CNumbers
 ) -> Real:
     low = sum(1 for value in values if x > value)
     if low in (0, len(values)):

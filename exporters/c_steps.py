@@ -157,7 +157,7 @@ def number_text(value: float) -> str:
     return f"name_bits(UINT64_C({bits:#018x}))"
 
 
-class Steps:
+class CSteps:
     """Writes the steps of one program.
 
     What no input enters is computed here, once: single numbers stand in expressions,
@@ -453,7 +453,7 @@ def system_code(
 ) -> Iterator[str]:
     """Yield the tables, helpers and the function of a system."""
     program = from_system(system, activations=activations)
-    steps = Steps(program)
+    steps = CSteps(program)
     ends = list(_ends(program, steps))
     if steps.needs_library:
         yield "#include <math.h>\n"
@@ -470,7 +470,7 @@ def system_code(
     yield "}\n"
 
 
-def _ends(program: Program, steps: Steps) -> Iterator[str]:
+def _ends(program: Program, steps: CSteps) -> Iterator[str]:
     numbers = [*program.of("output"), *program.of("activation")]
     for line, place in enumerate(numbers):
         yield f"    outputs[{line}] = {steps.value(place)};\n"

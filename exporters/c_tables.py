@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fuzzytree.exporters.c_text import Numbers
+from fuzzytree.exporters.c_text import CNumbers
 from fuzzytree.model.rulebase import (
     LR,
     Band,
@@ -22,7 +22,7 @@ LOW_END, HIGH_END, LEFT_SIDE, RIGHT_SIDE, POINTS = range(5)
 
 
 @dataclass(slots=True)
-class Places:
+class RulePrefixes:
     """The beginnings of all rules, each once, in the order of a walk.
 
     Attributes:
@@ -68,14 +68,14 @@ class Tables:
     clause_first: list[int]
     clause_term: list[int]
     negated: list[int]
-    places: Places
+    places: RulePrefixes
     label: list[int]
 
 
 _ALWAYS = Clause("", ())
 
 
-def tables_of(rules: RuleBase, line: Mapping[str, int], numbers: Numbers) -> Tables:
+def tables_of(rules: RuleBase, line: Mapping[str, int], numbers: CNumbers) -> Tables:
     """Return a rule base as lists of numbers of a type."""
     shapes = shapes_of(rules.variables)
     places, clauses = _places(rules)
@@ -94,7 +94,7 @@ def tables_of(rules: RuleBase, line: Mapping[str, int], numbers: Numbers) -> Tab
     return found
 
 
-def _places(rules: RuleBase) -> tuple[Places, list[Clause]]:
+def _places(rules: RuleBase) -> tuple[RulePrefixes, list[Clause]]:
     """Return the tree of the rules' beginnings, and the distinct clauses.
 
     A rule whose clauses are another's beginning gets a place of its own below, whose
@@ -112,7 +112,7 @@ def _places(rules: RuleBase) -> tuple[Places, list[Clause]]:
             here = children[here][clause]
         ending[here].append(number)
     clauses: dict[Clause, int] = {}
-    found = Places()
+    found = RulePrefixes()
     todo: list[tuple[Clause, int, int, int]] = []  # clause, fork or -1, rule, depth
 
     def expand(fork: int, depth: int) -> None:
@@ -135,7 +135,7 @@ def _places(rules: RuleBase) -> tuple[Places, list[Clause]]:
     return found, list(clauses)
 
 
-def _add_skips(places: Places) -> None:
+def _add_skips(places: RulePrefixes) -> None:
     places.skip = [len(places.depth)] * len(places.depth)
     open_ones: list[int] = []
     for place, depth in enumerate(places.depth):
@@ -144,7 +144,7 @@ def _add_skips(places: Places) -> None:
         open_ones.append(place)
 
 
-def _add_term(found: Tables, shape: Shape, numbers: Numbers) -> None:
+def _add_term(found: Tables, shape: Shape, numbers: CNumbers) -> None:
     match shape:
         case Band(low=low, high=high, left=left, right=right):
             ends = ((LOW_END, low, left), (HIGH_END, high, right))
@@ -170,7 +170,7 @@ def _add(found: Tables, kind: int, count: int, own: list[float]) -> None:
     found.number += own
 
 
-def _edge(bound: float, flank: Flank | None, numbers: Numbers) -> list[float]:
+def _edge(bound: float, flank: Flank | None, numbers: CNumbers) -> list[float]:
     """Return the bound; with a flank also its end, its width and its curve."""
     if flank is None:
         return numbers.nearest([bound])
@@ -181,7 +181,7 @@ def _edge(bound: float, flank: Flank | None, numbers: Numbers) -> list[float]:
     ]
 
 
-def _side(mean: float, sign: float, side: Side, numbers: Numbers) -> list[float]:
+def _side(mean: float, sign: float, side: Side, numbers: CNumbers) -> list[float]:
     """Return mean, signed spread, reach, length of the tail, and the curve."""
     return [
         *numbers.nearest([mean]),
@@ -192,7 +192,7 @@ def _side(mean: float, sign: float, side: Side, numbers: Numbers) -> list[float]
     ]
 
 
-def _points(points: Points, numbers: Numbers) -> list[float]:
+def _points(points: Points, numbers: CNumbers) -> list[float]:
     """Return the values of points, then their degrees; below 1 they stay below 1."""
     degrees = [
         min(near, numbers.below_one) if exact < 1.0 else near

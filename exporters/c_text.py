@@ -22,7 +22,7 @@ _LONGEST_CONSTANT = 63  # and 63 of others
 
 
 @dataclass(frozen=True, slots=True)
-class Numbers:
+class CNumbers:
     """A number type of C.
 
     Attributes:
@@ -66,8 +66,8 @@ class Numbers:
 
 Reals = list[float]
 
-DOUBLE = Numbers("double", np.float64, "", 1.0 - 2.0**-53, float(np.finfo("d").max))
-SINGLE = Numbers("float", np.float32, "f", 1.0 - 2.0**-24, float(np.finfo("f").max))
+DOUBLE = CNumbers("double", np.float64, "", 1.0 - 2.0**-53, float(np.finfo("d").max))
+SINGLE = CNumbers("float", np.float32, "f", 1.0 - 2.0**-24, float(np.finfo("f").max))
 
 
 def fill(template: str, prefix: str) -> str:
@@ -144,7 +144,7 @@ def whole_table(name: str, values: Sequence[int], about: str) -> Iterator[str]:
 
 
 def real_table(
-    name: str, values: Sequence[float], about: str, numbers: Numbers
+    name: str, values: Sequence[float], about: str, numbers: CNumbers
 ) -> Iterator[str]:
     """Yield a table of numbers, with a comment before."""
     yield f"/* {about} */\n"
@@ -158,7 +158,7 @@ def whole_lines(values: Iterable[int]) -> Iterator[str]:
     yield from _wrapped(f"{value}," for value in values)
 
 
-def real_lines(values: Iterable[float], numbers: Numbers) -> Iterator[str]:
+def real_lines(values: Iterable[float], numbers: CNumbers) -> Iterator[str]:
     """Yield lines of numbers, each with its decimal digits beside it."""
     yield from _wrapped(f"{numbers.text(v)}, /* {numbers.shown(v)} */" for v in values)
 

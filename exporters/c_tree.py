@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from fuzzytree.exporters.c_text import (
-    Numbers,
+    CNumbers,
     fill,
     integer_type,
     place_type,
@@ -17,7 +17,7 @@ from fuzzytree.model.tree import FuzzyTree, Node
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class CTreeTest:
     """Whether a value lies above a cut, and where no and yes lead.
 
     A place below the number of questions is a question, and k places behind is leaf
@@ -30,7 +30,7 @@ class Question:
     yes: int
 
 
-def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[Question]:
+def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[CTreeTest]:
     """Return the questions of a tree; the first is asked first.
 
     A node of several cuts becomes several questions, by halves.
@@ -39,7 +39,7 @@ def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[Question]:
     for node in tree.nodes:
         count += len(node.cuts)
         starts.append(count)
-    found: list[Question] = []
+    found: list[CTreeTest] = []
     for node in tree.nodes:
         targets = [
             count + branch.leaf - 1 if branch.leaf else starts[(branch.node or 1) - 1]
@@ -50,17 +50,17 @@ def questions_of(tree: FuzzyTree, line: Mapping[str, int]) -> list[Question]:
     return found
 
 
-def _halved(node: Node, line: int, ends: list[int], start: int) -> list[Question]:
+def _halved(node: Node, line: int, ends: list[int], start: int) -> list[CTreeTest]:
     """Return a node's questions, numbered from `start`, each half behind its whole."""
 
-    def lay(first: int, last: int, place: int) -> list[Question]:
+    def lay(first: int, last: int, place: int) -> list[CTreeTest]:
         middle = (first + last) // 2
         left = lay(first, middle, place + 1) if first < middle else []
         behind = place + 1 + len(left)
         right = lay(middle + 1, last, behind) if middle + 1 < last else []
         no = place + 1 if left else ends[first]
         yes = behind if right else ends[last]
-        return [Question(line, node.cuts[middle], no, yes), *left, *right]
+        return [CTreeTest(line, node.cuts[middle], no, yes), *left, *right]
 
     return lay(0, len(node.cuts), start)
 
@@ -104,7 +104,7 @@ TAKE_AXES
 def tree_code(
     tree: FuzzyTree,
     line: Mapping[str, int],
-    numbers: Numbers,
+    numbers: CNumbers,
     prefix: str,
     axes: str,
 ) -> Iterator[str]:

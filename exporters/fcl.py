@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
 from fuzzytree.exporters.fcl_checklist import check_list
-from fuzzytree.exporters.fcl_dialects import WORDS, Dialect, Words
+from fuzzytree.exporters.fcl_dialects import WORDS, Dialect, FclWords
 from fuzzytree.exporters.fcl_rules import (
     accu_of,
     block_lines,
@@ -139,7 +139,7 @@ def _check_scores(scores: Scores) -> None:
         )
 
 
-def _comment(text: str, words: Words) -> str:
+def _comment(text: str, words: FclWords) -> str:
     if words.name == "iec":
         return f"(*{text} *)"
     return f"//{text}"
@@ -152,7 +152,7 @@ class _FclNames(FileNames, frozen=True):
     blocks: tuple[str, ...] = ()
 
 
-def _naming(system: FuzzySystem, words: Words) -> _FclNames:
+def _naming(system: FuzzySystem, words: FclWords) -> _FclNames:
     def named(names: list[str], taken: Iterable[str] = ()) -> Names:
         return Names.of(
             names,
@@ -175,7 +175,7 @@ def _naming(system: FuzzySystem, words: Words) -> _FclNames:
     )
 
 
-def _refused(system: FuzzySystem, words: Words) -> FuzzySystem:
+def _refused(system: FuzzySystem, words: FclWords) -> FuzzySystem:
     """Return a system that the dialect has words for.
 
     Raises:
@@ -214,7 +214,7 @@ def _refused(system: FuzzySystem, words: Words) -> FuzzySystem:
     return replace(system, blocks=tuple(blocks))
 
 
-def _text(system: FuzzySystem, names: _FclNames, words: Words) -> Iterator[str]:
+def _text(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator[str]:
     """Yield the lines of a file."""
     yield f"FUNCTION_BLOCK {names.title}"
     yield "VAR_INPUT"
@@ -246,7 +246,7 @@ def _text(system: FuzzySystem, names: _FclNames, words: Words) -> Iterator[str]:
     yield "END_FUNCTION_BLOCK"
 
 
-def _range(variable: SystemInput | SystemOutput, words: Words) -> Iterator[str]:
+def _range(variable: SystemInput | SystemOutput, words: FclWords) -> Iterator[str]:
     low, high = variable.low, variable.high
     if low is not None and high is not None:
         yield f"  RANGE := ({number(low)} .. {number(high)});"
@@ -257,7 +257,7 @@ def _range(variable: SystemInput | SystemOutput, words: Words) -> Iterator[str]:
 
 
 def _terms(
-    variable: SystemInput | SystemOutput, names: _FclNames, words: Words
+    variable: SystemInput | SystemOutput, names: _FclNames, words: FclWords
 ) -> Iterator[str]:
     for label in variable.labels:
         name = names.labels[variable.name][label.name]
@@ -265,7 +265,9 @@ def _terms(
         yield f"  TERM {name} := {text};"
 
 
-def _defuzzify(output: SystemOutput, names: _FclNames, words: Words) -> Iterator[str]:
+def _defuzzify(
+    output: SystemOutput, names: _FclNames, words: FclWords
+) -> Iterator[str]:
     yield f"DEFUZZIFY {names.variables[output.name]}"
     yield from _terms(output, names, words)
     yield f"  METHOD : {words.methods[output.defuzzifier.method]};"
@@ -281,7 +283,7 @@ def _defuzzify(output: SystemOutput, names: _FclNames, words: Words) -> Iterator
     yield "END_DEFUZZIFY"
 
 
-def _remarks(system: FuzzySystem, names: _FclNames, words: Words) -> Iterator[str]:
+def _remarks(system: FuzzySystem, names: _FclNames, words: FclWords) -> Iterator[str]:
     """Yield what else has no place in the file or has another form there."""
     yield from names.remarks(system)
     if any(one.unit for one in system.variables) or system.note:

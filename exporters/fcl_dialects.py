@@ -30,7 +30,7 @@ from fuzzytree.model.system import (
 Dialect = Literal["portable", "iec", "fuzzylite", "jfuzzylogic"]
 
 
-class Words(msgspec.Struct, frozen=True):
+class FclWords(msgspec.Struct, frozen=True):
     """The words of a dialect, and what it can do.
 
     Attributes:
@@ -104,9 +104,9 @@ _FUZZYLITE: Final = (
     *("seldom", "previous"),
 )
 
-WORDS: Mapping[Dialect, Words] = MappingProxyType(
+WORDS: Mapping[Dialect, FclWords] = MappingProxyType(
     {
-        "portable": Words(
+        "portable": FclWords(
             name="portable",
             ands=_ANDS,
             ors=_ORS,
@@ -119,7 +119,7 @@ WORDS: Mapping[Dialect, Words] = MappingProxyType(
             reserved=(*_FUZZYLITE, *_JFUZZYLOGIC),
             ignores_case=True,
         ),
-        "iec": Words(
+        "iec": FclWords(
             name="iec",
             ands=_ANDS,
             ors=_ORS,
@@ -129,7 +129,7 @@ WORDS: Mapping[Dialect, Words] = MappingProxyType(
             reserved=_STANDARD,
             ignores_case=True,
         ),
-        "fuzzylite": Words(
+        "fuzzylite": FclWords(
             name="fuzzylite",
             ands=_FUZZYLITE_ANDS,
             ors=_FUZZYLITE_ORS,
@@ -144,7 +144,7 @@ WORDS: Mapping[Dialect, Words] = MappingProxyType(
             has_pair=False,
             reserved=_FUZZYLITE,
         ),
-        "jfuzzylogic": Words(
+        "jfuzzylogic": FclWords(
             name="jfuzzylogic",
             ands=_t_norms("MIN PROD BDIF DMIN NIPMIN HAMACHER"),
             ors=_s_norms("MAX ASUM BSUM DMAX NIPMAX EINSTEIN"),

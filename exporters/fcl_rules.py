@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from msgspec.structs import replace
 
-from fuzzytree.exporters.fcl_dialects import Words
+from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import Speak, hedge_losses, rule_text
 from fuzzytree.formats.fcl.fcl_dialects import DEFUZZIFIERS, JFUZZYLOGIC_PAIRS, PAIRS
 from fuzzytree.formats.fcl.fcl_rules import ALWAYS
@@ -31,7 +31,7 @@ from fuzzytree.model.system import (
 from fuzzytree.semantics.conversion import number_losses
 
 
-def with_conditions(system: FuzzySystem, words: Words) -> FuzzySystem:
+def with_conditions(system: FuzzySystem, words: FclWords) -> FuzzySystem:
     """Return a system whose rules all have a condition.
 
     One that has none asks whether the first input is a term of degree 1 everywhere.
@@ -61,7 +61,7 @@ def with_conditions(system: FuzzySystem, words: Words) -> FuzzySystem:
 
 
 def block_lines(
-    block: RuleBlock, name: str, words: Words, speak: Speak, always: str, accu: str
+    block: RuleBlock, name: str, words: FclWords, speak: Speak, always: str, accu: str
 ) -> Iterator[str]:
     """Yield the lines of a block of rules."""
     yield f"RULEBLOCK {name}"
@@ -80,7 +80,7 @@ def block_lines(
     yield "END_RULEBLOCK"
 
 
-def _operators(block: RuleBlock, words: Words) -> Iterator[str]:
+def _operators(block: RuleBlock, words: FclWords) -> Iterator[str]:
     """Yield the lines for OR and AND: in this order, for the last one counts."""
     uses_or = any(uses(rule.when, Or) for rule in block.rules)
     uses_and = any(uses(rule.when, And) for rule in block.rules)
@@ -95,7 +95,7 @@ def _operators(block: RuleBlock, words: Words) -> Iterator[str]:
         yield f"AND : {words.ands[block.conjunction]};"
 
 
-def _text(rule: SystemRule, words: Words, speak: Speak, always: str) -> str:
+def _text(rule: SystemRule, words: FclWords, speak: Speak, always: str) -> str:
     if words.has_hedges:
         return rule_text(rule, speak, always)
     says = str.lower if words.is_lower else str.upper
@@ -147,7 +147,7 @@ def uses(condition: Condition | None, kind: type[And] | type[Or]) -> bool:
             return False
 
 
-def rule_losses(system: FuzzySystem, words: Words) -> Iterator[Loss]:
+def rule_losses(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
     """Yield what rules say and the dialect has no words for."""
     rules = system.rules
     if words.has_hedges:
@@ -175,7 +175,7 @@ def rule_losses(system: FuzzySystem, words: Words) -> Iterator[Loss]:
             yield Loss(f"rule {number}", what)
 
 
-def norm_losses(block: RuleBlock, number: int, words: Words) -> Iterator[str]:
+def norm_losses(block: RuleBlock, number: int, words: FclWords) -> Iterator[str]:
     """Yield the operators of a block that the dialect has no words for."""
     where = f"rule block {number}"
     uses_and = any(uses(rule.when, And) for rule in block.rules)
@@ -196,7 +196,7 @@ def norm_losses(block: RuleBlock, number: int, words: Words) -> Iterator[str]:
         )
 
 
-def losses_of(system: FuzzySystem, words: Words) -> Iterator[Loss]:
+def losses_of(system: FuzzySystem, words: FclWords) -> Iterator[Loss]:
     """Yield what an answer depends on and the dialect cannot say."""
     default = DEFUZZIFIERS[words.name]
     for one in system.inputs:
@@ -239,7 +239,7 @@ def losses_of(system: FuzzySystem, words: Words) -> Iterator[Loss]:
             yield Loss(f"rule block {k}", what + repr(block.disjunction))
 
 
-def _says_nothing(output: SystemOutput, words: Words) -> bool:
+def _says_nothing(output: SystemOutput, words: FclWords) -> bool:
     """Return whether a file can say what an output answers where no rule fires."""
     return output.default is not None or words.name == "fuzzylite"
 
@@ -265,7 +265,7 @@ def _is_always_concluded(output: SystemOutput, system: FuzzySystem) -> bool:
 
 
 def _accu_losses(
-    output: SystemOutput, system: FuzzySystem, words: Words
+    output: SystemOutput, system: FuzzySystem, words: FclWords
 ) -> Iterator[Loss]:
     """Yield what an output's aggregation means that the dialect cannot say."""
     where = f"output {output.name!r}"
@@ -299,12 +299,12 @@ def _accu_losses(
         yield Loss(where, "the standard has no ACCU that sums; none is written")
 
 
-def has_accu(words: Words) -> bool:
+def has_accu(words: FclWords) -> bool:
     """Return whether ACCU stands in blocks of rules, for all their outputs."""
     return words.name in ("iec", "jfuzzylogic")
 
 
-def accu_of(system: FuzzySystem, outputs: set[str], words: Words) -> SNorm | None:
+def accu_of(system: FuzzySystem, outputs: set[str], words: FclWords) -> SNorm | None:
     """Return the ACCU of a block that concludes some outputs: that of the first."""
     for output in system.outputs:
         norm = output.aggregation

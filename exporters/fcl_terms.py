@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from msgspec.structs import replace
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.fcl_dialects import Words
+from fuzzytree.exporters.fcl_dialects import FclWords
 from fuzzytree.exporters.fll_text import degree_text, number_text, weighted_type
 from fuzzytree.exporters.fuzzy_files import refuse, with_labels
 from fuzzytree.model.contracts import Loss
@@ -44,7 +44,7 @@ def number(value: float) -> str:
 
 
 def term_text(
-    variable: SystemInput | SystemOutput, label: Label, words: Words, names: Names
+    variable: SystemInput | SystemOutput, label: Label, words: FclWords, names: Names
 ) -> str | None:
     """Return the curve of a label; None if the dialect has none for it."""
     is_weighted = (
@@ -137,7 +137,7 @@ def _formula_text(expression: Expression, names: Names) -> str | None:
 
 
 def as_points(
-    system: FuzzySystem, words: Words, tolerance: float
+    system: FuzzySystem, words: FclWords, tolerance: float
 ) -> tuple[FuzzySystem, list[Loss]]:
     """Return a system whose curves the dialect has words for, or points in their place.
 
@@ -167,7 +167,7 @@ def as_points(
 def _pointed(
     label: Label,
     variable: SystemInput | SystemOutput,
-    words: Words,
+    words: FclWords,
     tolerance: float,
     losses: list[Loss],
 ) -> Label:
@@ -189,7 +189,7 @@ def _pointed(
     return Label(label.name, points)
 
 
-def unspeakable(system: FuzzySystem, words: Words) -> Iterator[str]:
+def unspeakable(system: FuzzySystem, words: FclWords) -> Iterator[str]:
     """Yield the terms that a dialect has no words for."""
     names = {one.name: one.name for one in system.variables}
     for variable in system.variables:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, Literal
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.fis_rules import Line, Terms, lines_of
+from fuzzytree.exporters.fis_rules import FisRule, FisTerms, lines_of
 from fuzzytree.exporters.fis_terms import number_of, term_of, with_known_curves
 from fuzzytree.exporters.fuzzy_files import (
     TITLE,
@@ -130,7 +130,7 @@ def write(
     losses += [*lost, *_losses(system, dialect)]
     if isinstance(model, FuzzySystem):  # of scores, a rule always fires
         losses += _default_losses(system, dialect)
-    terms = Terms(system, dialect, tolerance)
+    terms = FisTerms(system, dialect, tolerance)
     lines = _lines(system, terms)
     losses += terms.losses
     if curves == "standard":
@@ -143,7 +143,7 @@ def write(
     return Written(text.encode("utf-8"), tuple(losses), tuple(remarks), names.changed())
 
 
-def _naming(system: FuzzySystem, terms: Terms) -> FileNames:
+def _naming(system: FuzzySystem, terms: FisTerms) -> FileNames:
     labels = {**terms.labels, **{one.name: one.labels for one in system.outputs}}
     return FileNames(
         Names.of([one.name for one in system.variables], reserved=_RESERVED),
@@ -155,13 +155,13 @@ def _naming(system: FuzzySystem, terms: Terms) -> FileNames:
     )
 
 
-def _lines(system: FuzzySystem, terms: Terms) -> list[Line]:
+def _lines(system: FuzzySystem, terms: FisTerms) -> list[FisRule]:
     """Return all rules.
 
     Raises:
         LossError: With every rule that has no place in FIS.
     """
-    lines: list[Line] = []
+    lines: list[FisRule] = []
     reasons: list[str] = []
     placed = [(block, rule) for block in system.blocks for rule in block.rules]
     for number, (block, rule) in enumerate(placed, 1):
@@ -286,7 +286,7 @@ def _s_norm(norm: SNorm, dialect: Dialect) -> str:
     return words[-1] if dialect == "octave" else words[0]
 
 
-def _private_losses(terms: Terms, dialect: Dialect) -> Iterator[Loss]:
+def _private_losses(terms: FisTerms, dialect: Dialect) -> Iterator[Loss]:
     for name, labels in terms.labels.items():
         for label in labels:
             found = term_of(label.curve, dialect)
@@ -306,7 +306,7 @@ def _term(
 
 def _text(
     system: FuzzySystem,
-    rules: tuple[Terms, list[Line]],
+    rules: tuple[FisTerms, list[FisRule]],
     said: tuple[list[str], FileNames],
     dialect: Dialect,
     remarks: list[str],
@@ -396,7 +396,7 @@ def _range(
     return (low, high) if math.isfinite(high - low) else (-1e300, 1e300)
 
 
-def _rule(line: Line, system: FuzzySystem) -> str:
+def _rule(line: FisRule, system: FuzzySystem) -> str:
     asked = " ".join(line.asked.get(one.name, "0") for one in system.inputs)
     concluded = " ".join(line.concluded.get(one.name, "0") for one in system.outputs)
     connection = 2 if line.is_or else 1

@@ -40,7 +40,7 @@ from fuzzytree.semantics.conversion.rule_forms import split
 EVERYWHERE: Final = Points((0.0,), (1.0,))
 
 
-class Line(msgspec.Struct, frozen=True):
+class FisRule(msgspec.Struct, frozen=True):
     """A rule: the codes of its inputs and outputs by name, and how it is joined."""
 
     asked: Mapping[str, str]
@@ -49,7 +49,7 @@ class Line(msgspec.Struct, frozen=True):
     is_or: bool = False
 
 
-class Terms:
+class FisTerms:
     """The terms of all inputs; terms that a rule needs are added."""
 
     def __init__(self, system: FuzzySystem, dialect: Dialect, tolerance: float) -> None:
@@ -163,8 +163,8 @@ class Terms:
 
 
 def lines_of(
-    rule: SystemRule, block: RuleBlock, terms: Terms, number: int
-) -> list[Line]:
+    rule: SystemRule, block: RuleBlock, terms: FisTerms, number: int
+) -> list[FisRule]:
     """Return a rule as lines.
 
     More than one where it concludes an output twice, or mixes and and or.
@@ -187,7 +187,7 @@ def lines_of(
     return lines
 
 
-def _lines(rule: SystemRule, terms: Terms) -> list[Line]:
+def _lines(rule: SystemRule, terms: FisTerms) -> list[FisRule]:
     is_or = isinstance(rule.when, Or)
     asked = _asked(rule.when, terms)
     found: list[dict[str, str]] = []
@@ -195,10 +195,10 @@ def _lines(rule: SystemRule, terms: Terms) -> list[Line]:
         if not found or name in found[-1]:
             found.append({})
         found[-1][name] = code
-    return [Line(asked, concluded, rule.weight, is_or) for concluded in found]
+    return [FisRule(asked, concluded, rule.weight, is_or) for concluded in found]
 
 
-def _asked(condition: Condition | None, terms: Terms) -> dict[str, str]:
+def _asked(condition: Condition | None, terms: FisTerms) -> dict[str, str]:
     if condition is None:
         return {} if terms.dialect == "matlab" else terms.everywhere()
     is_or = isinstance(condition, Or)
@@ -243,7 +243,7 @@ def _simple(condition: Condition) -> Condition:
             return condition
 
 
-def _conclusions(rule: SystemRule, terms: Terms) -> list[tuple[str, str]]:
+def _conclusions(rule: SystemRule, terms: FisTerms) -> list[tuple[str, str]]:
     """Return the outputs that a rule concludes, and their codes."""
     outputs: Mapping[str, SystemOutput] = {
         one.name: one for one in terms.system.outputs

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
-from fuzzytree.exporters.fml_rules import Rule, Rules, rules_of
+from fuzzytree.exporters.fml_rules import FmlRule, FmlRules, rules_of
 from fuzzytree.exporters.fuzzy_files import FileNames, inverse, without_heights
 from fuzzytree.formats.fml.fml_reader import places, reading
 from fuzzytree.formats.fml.fml_words import (
@@ -126,7 +126,7 @@ class _Ids(FileNames, frozen=True):
         return f"{self.variables[variable]}.{self.labels[variable][label]}"
 
 
-def _naming(system: FuzzySystem, rules: Rules) -> _Ids:
+def _naming(system: FuzzySystem, rules: FmlRules) -> _Ids:
     variables = _ids(one.name for one in system.variables)
     labels = {
         one.name: _ids(
@@ -209,7 +209,9 @@ def _losses(system: FuzzySystem) -> Iterator[Loss]:
                 )
 
 
-def _lines(system: FuzzySystem, rules: Rules, names: _Ids, facts: str) -> Iterator[str]:
+def _lines(
+    system: FuzzySystem, rules: FmlRules, names: _Ids, facts: str
+) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     if facts:
         yield f"<!-- {FACTS}{facts} -->"
@@ -244,7 +246,7 @@ def _t(norm: str | None) -> str:
     return inverse(TNORMS, norm, "MIN")
 
 
-def _input(one: SystemInput, rules: Rules, names: _Ids) -> Iterator[str]:
+def _input(one: SystemInput, rules: FmlRules, names: _Ids) -> Iterator[str]:
     yield (f'    <fuzzyVariable {_head(one, names)}{_domain(one)} type="input">')
     for label in one.labels:
         yield from _term("fuzzyTerm", one.name, label, names)
@@ -384,7 +386,7 @@ def _shape(curve: Curve) -> tuple[str, Sequence[float]] | None:
 
 
 def _rule(
-    rule: Rule, number: int, about: tuple[bool, str], names: _Ids
+    rule: FmlRule, number: int, about: tuple[bool, str], names: _Ids
 ) -> Iterator[str]:
     is_tsk, norms = about
     tag = "tskRule" if is_tsk else "rule"

@@ -41,7 +41,7 @@ Clause = tuple[str, str, str]
 _WORDS: Final[dict[Hedge, str]] = {meant: word for word, meant in MODIFIERS.items()}
 
 
-class Made(msgspec.Struct, frozen=True):
+class CircularTerm(msgspec.Struct, frozen=True):
     """A term that is an and or an or of others.
 
     Attributes:
@@ -69,7 +69,7 @@ class Made(msgspec.Struct, frozen=True):
                 yield f"{pad}</{self.word}>"
 
 
-class Rule(msgspec.Struct, frozen=True):
+class FmlRule(msgspec.Struct, frozen=True):
     """A rule with its clauses."""
 
     asked: tuple[Clause, ...]
@@ -78,19 +78,19 @@ class Rule(msgspec.Struct, frozen=True):
     is_or: bool
 
 
-Base = tuple[str, RuleBlock, tuple[Rule, ...]]
+Base = tuple[str, RuleBlock, tuple[FmlRule, ...]]
 """The kind (mamdani, tsk, tsukamoto), the block it comes from, and its rules."""
 
 
-class Rules(msgspec.Struct, frozen=True):
+class FmlRules(msgspec.Struct, frozen=True):
     """All rules, the terms that they need, by variable, and what was lost."""
 
     bases: tuple[Base, ...]
-    made: dict[str, list[Made]]
+    made: dict[str, list[CircularTerm]]
     losses: list[Loss]
 
 
-def rules_of(system: FuzzySystem) -> Rules:
+def rules_of(system: FuzzySystem) -> FmlRules:
     """Return the rules of a system.
 
     Raises:
@@ -98,12 +98,12 @@ def rules_of(system: FuzzySystem) -> Rules:
     """
     kinds = {one.name: _kind(one) for one in system.outputs}
     taken = {one.name: [label.name for label in one.labels] for one in system.inputs}
-    rules = Rules((), {}, [])
+    rules = FmlRules((), {}, [])
     bases: list[Base] = []
     reasons: list[str] = []
     number = 0
     for block in system.blocks:
-        found: dict[str, list[Rule]] = {}
+        found: dict[str, list[FmlRule]] = {}
         for rule in block.rules:
             number += 1
             try:
@@ -128,7 +128,7 @@ def rules_of(system: FuzzySystem) -> Rules:
     if not any(several for _, _, several in bases) and not reasons:
         reasons.append("FML needs at least one rule")
     refuse(system.name, "fml", reasons)
-    return Rules(tuple(bases), rules.made, rules.losses)
+    return FmlRules(tuple(bases), rules.made, rules.losses)
 
 
 def _placed(
@@ -136,8 +136,8 @@ def _placed(
     block: RuleBlock,
     system: FuzzySystem,
     kinds: dict[str, str],
-    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
-) -> list[tuple[str, Rule]]:
+    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
+) -> list[tuple[str, FmlRule]]:
     """Return a rule by the kind of its outputs; several if it mixes and and or."""
     try:
         return [*_rules(rule, block, kinds, known)]
@@ -167,8 +167,8 @@ def _rules(
     rule: SystemRule,
     block: RuleBlock,
     kinds: dict[str, str],
-    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
-) -> Iterator[tuple[str, Rule]]:
+    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
+) -> Iterator[tuple[str, FmlRule]]:
     """Yield a rule for each kind of output that it concludes."""
     if rule.when is None:
         raise LossError("it asks nothing, and a rule of FML must")
@@ -182,14 +182,14 @@ def _rules(
         concluded = tuple(
             (one.output, one.label) for one in rule.then if kinds[one.output] == kind
         )
-        yield kind, Rule(tuple(asked), concluded, rule.weight, is_or)
+        yield kind, FmlRule(tuple(asked), concluded, rule.weight, is_or)
 
 
 def _clause(
     condition: Condition,
     block: RuleBlock,
     kinds: dict[str, str],
-    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
 ) -> Clause:
     match condition:
         case Is(variable=variable) if variable in kinds:
@@ -211,7 +211,7 @@ def _question(
     variable: str,
     label: str | None,
     hedges: Sequence[Hedge],
-    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
 ) -> Clause:
     if hedges[-1:] == ("any",) and len(hedges) == 1:
         names = known[1][variable]
@@ -226,7 +226,7 @@ def _question(
 def _made(
     condition: And | Or,
     block: RuleBlock,
-    known: tuple[dict[str, list[Made]], dict[str, list[str]]],
+    known: tuple[dict[str, list[CircularTerm]], dict[str, list[str]]],
 ) -> Clause:
     """Return a clause that asks a term made of several of one variable."""
     asked = [*questions(condition)]
@@ -262,5 +262,5 @@ def _made(
     shown = f" {word} ".join(f"{'not ' * is_not}{label}" for label, is_not in parts)
     name = unlike(shown[:60], taken[variable])
     taken[variable].append(name)
-    made[variable].append(Made(name, tuple(parts), word, norm))
+    made[variable].append(CircularTerm(name, tuple(parts), word, norm))
     return variable, name, ""

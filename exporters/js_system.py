@@ -46,7 +46,7 @@ function selfTest() {
 def system_parts(system: FuzzySystem, rows: str) -> Iterator[str]:
     """Yield the tables and functions of a system."""
     program = from_system(system, activations=True)
-    steps = Steps(program)
+    steps = JsSteps(program)
     body = list(steps.body())
     outputs = ", ".join(map(steps.value, program.of("output")))
     activations = ", ".join(map(steps.value, program.of("activation")))
@@ -238,7 +238,7 @@ function lowest(numbers) {
 _USES = {"highest": "maximum", "lowest": "minimum"}
 
 
-class Steps:
+class JsSteps:
     """A program as text: first `body`, then `tables` and `needs` are known.
 
     Attributes:

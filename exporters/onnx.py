@@ -25,7 +25,7 @@ from fuzzytree.model.tree import FuzzyTree
 if TYPE_CHECKING:
     import onnx
 
-    from fuzzytree.exporters.onnx_graph import Sheet
+    from fuzzytree.exporters.onnx_graph import OnnxGraph
 
 FORMAT_VERSION = "1"
 """Of the meaning of inputs, outputs and metadata."""
@@ -246,10 +246,10 @@ def _model_proto(
     from onnx import TensorProto, helper
 
     from fuzzytree.exporters.onnx_ends import NUMBERS
-    from fuzzytree.exporters.onnx_graph import Sheet, model_proto
+    from fuzzytree.exporters.onnx_graph import OnnxGraph, model_proto
 
     numbers = NUMBERS[dtype]
-    sheet = Sheet(opset, is_readable=readable)
+    graph = OnnxGraph(opset, is_readable=readable)
     columns = _columns(model, signature)
     axis = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.axis))
     degree = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
@@ -259,9 +259,9 @@ def _model_proto(
         "status": (TensorProto.INT64, ["rows"]),
         "strengths": (degree, ["rows", _rule_count(model)]),
     }
-    _fill(sheet, model, dtype, columns, outputs, plain=plain)
+    _fill(graph, model, dtype, columns, outputs, plain=plain)
     return model_proto(
-        sheet,
+        graph,
         "tree" if _is_tree(model) else "rules",
         (axis, len(columns)),
         {name: kinds[name] for name in outputs},
@@ -272,7 +272,7 @@ def _model_proto(
 
 
 def _fill(
-    sheet: Sheet,
+    graph: OnnxGraph,
     model: Model,
     dtype: Dtype,
     columns: Sequence[str],
@@ -280,7 +280,7 @@ def _fill(
     *,
     plain: bool,
 ) -> None:
-    """Add all nodes of a graph to a sheet."""
+    """Add all nodes of a graph to a graph."""
     from fuzzytree.exporters import onnx_ends
     from fuzzytree.exporters.onnx_ends import NUMBERS
 
@@ -289,13 +289,13 @@ def _fill(
         from fuzzytree.exporters.onnx_tree import needs_plain, tree_graph
 
         is_plain = plain or needs_plain(model)
-        frame = tree_graph(sheet, model, numbers, columns, is_plain=is_plain)
-        onnx_ends.add_tree_outputs(sheet, model, frame, outputs, numbers)
+        frame = tree_graph(graph, model, numbers, columns, is_plain=is_plain)
+        onnx_ends.add_tree_outputs(graph, model, frame, outputs, numbers)
     else:
         from fuzzytree.exporters.onnx_rules import rules_graph
 
-        frame, strengths = rules_graph(sheet, model, numbers, columns)
-        onnx_ends.add_rule_outputs(sheet, model, frame, strengths, outputs, numbers)
+        frame, strengths = rules_graph(graph, model, numbers, columns)
+        onnx_ends.add_rule_outputs(graph, model, frame, strengths, outputs, numbers)
 
 
 def _rule_count(model: Model) -> int:

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from onnx import numpy_helper
 
-from fuzzytree.exporters.onnx_graph import Sheet
+from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import Part, RuleBase, Variable
 from fuzzytree.model.tree import FuzzyTree
@@ -20,7 +20,7 @@ from fuzzytree.numerics.narrowing import Real, RealArray, rounded
 from fuzzytree.semantics.reference import BELOW_ONE, Status
 
 
-class Axes(msgspec.Struct, frozen=True):
+class InputBlock(msgspec.Struct, frozen=True):
     """The values of the variables, features first.
 
     A combination of which an input is not finite is not finite either, for no weight
@@ -40,20 +40,20 @@ class Axes(msgspec.Struct, frozen=True):
 
 
 def axes(
-    sheet: Sheet,
+    graph: OnnxGraph,
     model: Model,
-    numbers: Numbers,
+    numbers: Precision,
     columns: Sequence[str],
     *,
     is_flat: bool = False,
-) -> Axes:
+) -> InputBlock:
     """Add the values of the variables that matter, and the guard over them.
 
-    The source of the sheet is of shape (rows, columns).
+    The source of the graph is of shape (rows, columns).
     """
     if not model.variables:
-        return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=is_flat))
-    source = sheet.node("Transpose", sheet.source, hint="columns", perm=[1, 0])
+        return InputBlock("", {}, _no_guard(graph, numbers.axis, is_flat=is_flat))
+    source = graph.node("Transpose", graph.source, hint="columns", perm=[1, 0])
     direct = _direct(model)
     derived = sorted(
         (v for v in model.variables if v.parts), key=lambda v: len(v.parts)
@@ -62,37 +62,37 @@ def axes(
     if direct == tuple(columns):
         pieces = [source]
     elif direct:
-        pieces = [sheet.take(source, [columns.index(name) for name in direct])]
+        pieces = [graph.take(source, [columns.index(name) for name in direct])]
     if derived:
-        with sheet.about("combinations"):
-            pieces += _combinations(sheet, derived, source, columns, numbers.axis)
+        with graph.about("combinations"):
+            pieces += _combinations(graph, derived, source, columns, numbers.axis)
     block = pieces[0]
     if len(pieces) > 1:
-        block = sheet.node("Concat", *pieces, hint="variables", axis=0)
+        block = graph.node("Concat", *pieces, hint="variables", axis=0)
     names = [*direct, *(variable.name for variable in derived)]
     # 0 * x is 0 for a finite x and NaN otherwise, and NaN survives every addition.
-    zero = scalar(sheet, 0.0, numbers.axis)
-    zeros = sheet.node("Mul", block, zero, hint="zero_if_finite")
+    zero = scalar(graph, 0.0, numbers.axis)
+    zeros = graph.node("Mul", block, zero, hint="zero_if_finite")
     if len(names) > 1 or is_flat:
-        with sheet.about("guard"):
-            zeros = sheet.total(zeros, axis=0, keepdims=0 if is_flat else 1)
-    return Axes(block, {name: row for row, name in enumerate(names)}, zeros)
+        with graph.about("guard"):
+            zeros = graph.total(zeros, axis=0, keepdims=0 if is_flat else 1)
+    return InputBlock(block, {name: row for row, name in enumerate(names)}, zeros)
 
 
 def flat_guard(
-    sheet: Sheet, model: Model, numbers: Numbers, columns: Sequence[str]
-) -> Axes:
+    graph: OnnxGraph, model: Model, numbers: Precision, columns: Sequence[str]
+) -> InputBlock:
     """Add the guard alone, for a model without combinations; rows stay rows."""
     if not model.variables:
-        return Axes("", {}, _no_guard(sheet, numbers.axis, is_flat=True))
-    source = sheet.source
+        return InputBlock("", {}, _no_guard(graph, numbers.axis, is_flat=True))
+    source = graph.source
     if model.inputs != tuple(columns):
-        chosen = sheet.numbers([columns.index(name) for name in model.inputs], "rows")
-        source = sheet.node("Gather", source, chosen, hint="columns", axis=1)
-    zero = scalar(sheet, 0.0, numbers.axis)
-    zeros = sheet.node("Mul", source, zero, hint="zero_if_finite")
-    with sheet.about("guard"):
-        return Axes("", {}, sheet.total(zeros, axis=1, keepdims=0))
+        chosen = graph.numbers([columns.index(name) for name in model.inputs], "rows")
+        source = graph.node("Gather", source, chosen, hint="columns", axis=1)
+    zero = scalar(graph, 0.0, numbers.axis)
+    zeros = graph.node("Mul", source, zero, hint="zero_if_finite")
+    with graph.about("guard"):
+        return InputBlock("", {}, graph.total(zeros, axis=1, keepdims=0))
 
 
 def _direct(model: Model) -> tuple[str, ...]:
@@ -105,33 +105,33 @@ def _direct(model: Model) -> tuple[str, ...]:
     return tuple(n for n in model.inputs if n in asked or n not in guarded)
 
 
-def is_known(sheet: Sheet, frame: Axes, numbers: Numbers) -> str:
+def is_known(graph: OnnxGraph, frame: InputBlock, numbers: Precision) -> str:
     """Return whether all values of a row are finite, in the guard's shape."""
-    zero = scalar(sheet, 0.0, numbers.axis)
-    return sheet.node("Equal", frame.guard, zero, hint="is_row_finite")
+    zero = scalar(graph, 0.0, numbers.axis)
+    return graph.node("Equal", frame.guard, zero, hint="is_row_finite")
 
 
-def scalar(sheet: Sheet, value: float, kind: type[Real]) -> str:
+def scalar(graph: OnnxGraph, value: float, kind: type[Real]) -> str:
     """Return the name of a constant number."""
-    return sheet.constant(np.array(value, kind), "number")
+    return graph.constant(np.array(value, kind), "number")
 
 
-def column(sheet: Sheet, values: RealArray, hint: str) -> str:
+def column(graph: OnnxGraph, values: RealArray, hint: str) -> str:
     """Return the name of a constant with one number for each row of a block."""
-    return sheet.constant(values.reshape(-1, 1), hint)
+    return graph.constant(values.reshape(-1, 1), hint)
 
 
-def _no_guard(sheet: Sheet, kind: type[Real], *, is_flat: bool) -> str:
+def _no_guard(graph: OnnxGraph, kind: type[Real], *, is_flat: bool) -> str:
     """Return 0 for each row, where no variable could be missing."""
-    size = sheet.take(sheet.node("Shape", sheet.source), [0])
+    size = graph.take(graph.node("Shape", graph.source), [0])
     if not is_flat:
-        size = sheet.node("Concat", sheet.numbers([1], "one"), size, axis=0)
+        size = graph.node("Concat", graph.numbers([1], "one"), size, axis=0)
     zero = numpy_helper.from_array(np.zeros(1, kind))
-    return sheet.node("ConstantOfShape", size, value=zero)
+    return graph.node("ConstantOfShape", size, value=zero)
 
 
 def _combinations(
-    sheet: Sheet,
+    graph: OnnxGraph,
     derived: Sequence[Variable],
     source: str,
     columns: Sequence[str],
@@ -150,36 +150,36 @@ def _combinations(
     for position in range(len(derived[-1].parts)):
         ready = sum(1 for v in derived if len(v.parts) <= position)
         if ready > finished:
-            done.append(_rows(sheet, total, 0, ready - finished))
-            total = _rows(sheet, total, ready - finished, len(derived) - finished)
+            done.append(_rows(graph, total, 0, ready - finished))
+            total = _rows(graph, total, ready - finished, len(derived) - finished)
             finished = ready
         parts = [v.parts[position] for v in derived[finished:]]
-        term = _summand(sheet, parts, source, columns, kind)
-        total = sheet.node("Add", total, term) if total else term
+        term = _summand(graph, parts, source, columns, kind)
+        total = graph.node("Add", total, term) if total else term
     return [*done, total]
 
 
 def _summand(
-    sheet: Sheet,
+    graph: OnnxGraph,
     parts: Sequence[Part],
     source: str,
     columns: Sequence[str],
     kind: type[Real],
 ) -> str:
-    value = sheet.take(source, [columns.index(part.input) for part in parts])
+    value = graph.take(source, [columns.index(part.input) for part in parts])
     if any(part.centre for part in parts):  # x - 0.0 is x
         centres = rounded([part.centre for part in parts], kind)
-        value = sheet.node("Sub", value, column(sheet, centres, "centres"))
+        value = graph.node("Sub", value, column(graph, centres, "centres"))
     weights = rounded([part.weight for part in parts], kind)
-    return sheet.node("Mul", value, column(sheet, weights, "weights"))
+    return graph.node("Mul", value, column(graph, weights, "weights"))
 
 
-def _rows(sheet: Sheet, block: str, start: int, end: int) -> str:
-    first, last = sheet.numbers([start], "start"), sheet.numbers([end], "end")
-    return sheet.node("Slice", block, first, last, sheet.numbers([0], "axes"))
+def _rows(graph: OnnxGraph, block: str, start: int, end: int) -> str:
+    first, last = graph.numbers([start], "start"), graph.numbers([end], "end")
+    return graph.node("Slice", block, first, last, graph.numbers([0], "axes"))
 
 
-class Numbers(msgspec.Struct, frozen=True):
+class Precision(msgspec.Struct, frozen=True):
     """The types in which a graph computes.
 
     Attributes:
@@ -198,85 +198,93 @@ class Numbers(msgspec.Struct, frozen=True):
         return self.axis is not self.degree
 
 
-NUMBERS: dict[Dtype, Numbers] = {
-    "float64": Numbers(np.float64, np.float64, BELOW_ONE),
-    "mixed": Numbers(np.float64, np.float32, 1.0 - 2.0**-24),
-    "float32": Numbers(np.float32, np.float32, 1.0 - 2.0**-24),
+NUMBERS: dict[Dtype, Precision] = {
+    "float64": Precision(np.float64, np.float64, BELOW_ONE),
+    "mixed": Precision(np.float64, np.float32, 1.0 - 2.0**-24),
+    "float32": Precision(np.float32, np.float32, 1.0 - 2.0**-24),
 }
 
 
 def add_tree_outputs(
-    sheet: Sheet,
+    graph: OnnxGraph,
     tree: FuzzyTree,
-    frame: Axes,
+    frame: InputBlock,
     outputs: Sequence[str],
-    numbers: Numbers,
+    numbers: Precision,
 ) -> None:
     """Add the outputs of a tree whose leaf numbers are named `rule`."""
     labels = [leaf.label for leaf in tree.leaves]
     if "label" in outputs:
-        table = sheet.texts([tree.semantics.missing or "", *labels], "labels")
-        sheet.node("Gather", table, "rule", axis=0, named="label")
+        table = graph.texts([tree.semantics.missing or "", *labels], "labels")
+        graph.node("Gather", table, "rule", axis=0, named="label")
     if "status" in outputs:
-        decided, missing = (_whole(sheet, s) for s in (Status.DECIDED, Status.MISSING))
-        known = is_known(sheet, frame, numbers)
-        sheet.node("Where", known, decided, missing, named="status")
+        decided, missing = (_whole(graph, s) for s in (Status.DECIDED, Status.MISSING))
+        known = is_known(graph, frame, numbers)
+        graph.node("Where", known, decided, missing, named="status")
 
 
 def add_rule_outputs(
-    sheet: Sheet,
+    graph: OnnxGraph,
     rules: RuleBase,
-    frame: Axes,
+    frame: InputBlock,
     strengths: str,
     outputs: Sequence[str],
-    numbers: Numbers,
+    numbers: Precision,
 ) -> None:
     """Add the outputs of a rule base, given the strengths of no rule and of all."""
-    winner = add_winner(sheet, strengths)
+    winner = add_winner(graph, strengths)
     if "label" in outputs:
-        _add_label(sheet, rules, frame, winner, numbers)
+        _add_label(graph, rules, frame, winner, numbers)
     if "status" in outputs:
-        _add_status(sheet, frame, strengths, winner, numbers)
+        _add_status(graph, frame, strengths, winner, numbers)
     if "strengths" in outputs:
-        ends = [sheet.numbers([end], "end") for end in (1, 1 + len(rules.rules))]
-        with sheet.about("strengths"):
-            real = sheet.node("Slice", strengths, *ends, sheet.numbers([0], "axes"))
-            unknown = scalar(sheet, np.nan, numbers.degree)
-            real = sheet.node("Where", is_known(sheet, frame, numbers), real, unknown)
-        sheet.node("Transpose", real, perm=[1, 0], named="strengths")
+        ends = [graph.numbers([end], "end") for end in (1, 1 + len(rules.rules))]
+        with graph.about("strengths"):
+            real = graph.node("Slice", strengths, *ends, graph.numbers([0], "axes"))
+            unknown = scalar(graph, np.nan, numbers.degree)
+            real = graph.node("Where", is_known(graph, frame, numbers), real, unknown)
+        graph.node("Transpose", real, perm=[1, 0], named="strengths")
 
 
-def add_winner(sheet: Sheet, strengths: str, named: str = "rule") -> str:
+def add_winner(graph: OnnxGraph, strengths: str, named: str = "rule") -> str:
     """Add the number of the first of the strongest rules, 0 where none fires."""
-    return sheet.block("Winner", _winner, {"strengths": strengths}, named=named)
+    return graph.block("Winner", _winner, {"strengths": strengths}, named=named)
 
 
-def _winner(sheet: Sheet, inputs: Sequence[str], named: str) -> str:
-    return sheet.node(
+def _winner(graph: OnnxGraph, inputs: Sequence[str], named: str) -> str:
+    return graph.node(
         "ArgMax", inputs[0], axis=0, keepdims=0, select_last_index=0, named=named
     )
 
 
 def _add_label(
-    sheet: Sheet, rules: RuleBase, frame: Axes, winner: str, numbers: Numbers
+    graph: OnnxGraph,
+    rules: RuleBase,
+    frame: InputBlock,
+    winner: str,
+    numbers: Precision,
 ) -> None:
     semantics = rules.semantics
     labels = [semantics.uncovered or "", *(rule.then for rule in rules.rules)]
     position = winner
     if semantics.missing != semantics.uncovered:
-        missing = _whole(sheet, len(labels))
+        missing = _whole(graph, len(labels))
         labels.append(semantics.missing or "")
-        known = _flat(sheet, frame, numbers)
-        position = sheet.node("Where", known, winner, missing, hint="label_number")
-    table = sheet.texts(labels, "labels")
-    sheet.node("Gather", table, position, axis=0, named="label")
+        known = _flat(graph, frame, numbers)
+        position = graph.node("Where", known, winner, missing, hint="label_number")
+    table = graph.texts(labels, "labels")
+    graph.node("Gather", table, position, axis=0, named="label")
 
 
 def _add_status(
-    sheet: Sheet, frame: Axes, strengths: str, winner: str, numbers: Numbers
+    graph: OnnxGraph,
+    frame: InputBlock,
+    strengths: str,
+    winner: str,
+    numbers: Precision,
 ) -> None:
     """Compare the first with the last of the strongest; no rule is number 0."""
-    last = sheet.node(
+    last = graph.node(
         "ArgMax",
         strengths,
         hint="last_winner",
@@ -284,19 +292,19 @@ def _add_status(
         keepdims=0,
         select_last_index=1,
     )
-    decided, tie, uncovered, missing = (_whole(sheet, status) for status in Status)
-    is_one = sheet.node("Equal", winner, last, hint="is_one_winner")
-    status = sheet.node("Where", is_one, decided, tie, hint="tie_status")
-    is_none = sheet.node("Equal", winner, _whole(sheet, 0), hint="is_uncovered")
-    status = sheet.node("Where", is_none, uncovered, status, hint="status_if_known")
-    sheet.node("Where", _flat(sheet, frame, numbers), status, missing, named="status")
+    decided, tie, uncovered, missing = (_whole(graph, status) for status in Status)
+    is_one = graph.node("Equal", winner, last, hint="is_one_winner")
+    status = graph.node("Where", is_one, decided, tie, hint="tie_status")
+    is_none = graph.node("Equal", winner, _whole(graph, 0), hint="is_uncovered")
+    status = graph.node("Where", is_none, uncovered, status, hint="status_if_known")
+    graph.node("Where", _flat(graph, frame, numbers), status, missing, named="status")
 
 
-def _flat(sheet: Sheet, frame: Axes, numbers: Numbers) -> str:
-    known = is_known(sheet, frame, numbers)
-    shape = sheet.numbers([-1], "flat")
-    return sheet.node("Reshape", known, shape, hint="is_row_finite")
+def _flat(graph: OnnxGraph, frame: InputBlock, numbers: Precision) -> str:
+    known = is_known(graph, frame, numbers)
+    shape = graph.numbers([-1], "flat")
+    return graph.node("Reshape", known, shape, hint="is_row_finite")
 
 
-def _whole(sheet: Sheet, value: int) -> str:
-    return sheet.constant(np.array(value, np.int64), "whole")
+def _whole(graph: OnnxGraph, value: int) -> str:
+    return graph.constant(np.array(value, np.int64), "whole")

@@ -23,7 +23,7 @@ TREES = "ai.onnx.ml"
 """The domain of `TreeEnsemble`."""
 
 Constant = npt.NDArray[np.generic]
-Body = Callable[["Sheet", Sequence[str], str], str]
+Body = Callable[["OnnxGraph", Sequence[str], str], str]
 
 _LONGEST_NAME = 60
 
@@ -72,7 +72,7 @@ def _number_name(value: Constant, hint: str) -> str:
     return identifier(f"{kind}_{text}")
 
 
-class Sheet:
+class OnnxGraph:
     """Nodes, constants and functions, collected; every result is known by its name.
 
     Attributes:
@@ -207,7 +207,7 @@ class Sheet:
 
         Args:
             name: The function's name; one name must always mean the same body.
-            body: Adds nodes to the sheet that it is given, from the names of its
+            body: Adds nodes to the graph that it is given, from the names of its
                 inputs to a result of the given name, and returns that name.
             inputs: For each parameter of the function, the name of its argument.
             named: The name of the result; made unless given.
@@ -217,7 +217,7 @@ class Sheet:
         if not (self.is_readable and is_plain):
             return body(self, list(inputs.values()), named)
         if name not in self.functions:
-            inner = Sheet(self.opset, in_function=True)
+            inner = OnnxGraph(self.opset, in_function=True)
             result = body(inner, list(inputs), "result")
             self.functions[name] = helper.make_function(
                 DOMAIN,
@@ -277,7 +277,7 @@ class Sheet:
 
 
 def model_proto(
-    sheet: Sheet,
+    graph: OnnxGraph,
     name: str,
     columns: tuple[int, int],
     outputs: Mapping[str, tuple[int, list[str | int]]],
@@ -286,10 +286,10 @@ def model_proto(
     text: str,
     facts: Mapping[str, str],
 ) -> onnx.ModelProto:
-    """Return the file of a filled sheet.
+    """Return the file of a filled graph.
 
     Args:
-        sheet: All nodes.
+        graph: All nodes.
         name: The name of the graph.
         columns: The type and the number of columns of `inputs`.
         outputs: The type and shape of each output, in order.
@@ -298,23 +298,23 @@ def model_proto(
         facts: The metadata, by keys without `fuzzytree.`.
     """
     kind, count = columns
-    graph = helper.make_graph(
-        sheet.nodes,
+    body = helper.make_graph(
+        graph.nodes,
         name,
         [helper.make_tensor_value_info("inputs", kind, ["rows", count])],
         [helper.make_tensor_value_info(key, *how) for key, how in outputs.items()],
-        sheet.tensors,
+        graph.tensors,
     )
-    imports = [helper.make_opsetid("", sheet.opset)]
-    if any(node.domain == TREES for node in sheet.nodes):
+    imports = [helper.make_opsetid("", graph.opset)]
+    if any(node.domain == TREES for node in graph.nodes):
         imports.append(helper.make_opsetid(TREES, 5))
-    if sheet.functions:
+    if graph.functions:
         imports.append(helper.make_opsetid(DOMAIN, 1))
     proto = helper.make_model(
-        graph,
+        body,
         opset_imports=imports,
         ir_version=ir,
-        functions=list(sheet.functions.values()),
+        functions=list(graph.functions.values()),
         producer_name="fuzzytree",
         producer_version=facts["version"],
         doc_string=text,
@@ -324,11 +324,11 @@ def model_proto(
     return proto
 
 
-class Table:
+class DegreeRows:
     """Rows of degrees, collected block by block and known by their number."""
 
-    def __init__(self, sheet: Sheet) -> None:
-        self._sheet = sheet
+    def __init__(self, graph: OnnxGraph) -> None:
+        self._graph = graph
         self._blocks: list[tuple[str, int, int]] = []
         self._joined: tuple[int, str] = (0, "")
         self.count = 0
@@ -347,14 +347,14 @@ class Table:
                 local = [row - first for row in rows]
                 if local == list(range(count)):
                     return block
-                return self._sheet.take(block, local)
+                return self._graph.take(block, local)
         if list(rows) == list(range(self.count)):
             return self._all()
-        return self._sheet.take(self._all(), rows)
+        return self._graph.take(self._all(), rows)
 
     def _all(self) -> str:
         """Return all rows as one block."""
         if self._joined[0] != len(self._blocks):
             names = [block for block, _, _ in self._blocks]
-            self._joined = (len(names), self._sheet.node("Concat", *names, axis=0))
+            self._joined = (len(names), self._graph.node("Concat", *names, axis=0))
         return self._joined[1]

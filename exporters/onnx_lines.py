@@ -17,8 +17,8 @@ import msgspec
 import numpy as np
 from onnx import helper
 
-from fuzzytree.exporters.onnx_ends import Numbers
-from fuzzytree.exporters.onnx_graph import Sheet
+from fuzzytree.exporters.onnx_ends import Precision
+from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.model.rulebase import Points
 from fuzzytree.numerics.segments import Segments, segments
 
@@ -29,7 +29,7 @@ MOST_CHAINED = 8
 """Points up to which a chain is the faster way."""
 
 
-class Polyline(msgspec.Struct, frozen=True):
+class PointsPart(msgspec.Struct, frozen=True):
     """Points on one variable, joined by lines."""
 
     variable: str
@@ -37,13 +37,13 @@ class Polyline(msgspec.Struct, frozen=True):
     sign: int = 1
 
 
-def is_chained(polyline: Polyline) -> bool:
+def is_chained(points_part: PointsPart) -> bool:
     """Return whether points are few enough for a chain."""
-    return len(polyline.points.values) <= MOST_CHAINED
+    return len(points_part.points.values) <= MOST_CHAINED
 
 
 def polylines(
-    sheet: Sheet, values: str, shapes: Sequence[Points], numbers: Numbers
+    graph: OnnxGraph, values: str, shapes: Sequence[Points], numbers: Precision
 ) -> str:
     """Add the degrees of shapes, given their finite values, as one block."""
     axis: Real = np.dtype(numbers.axis)
@@ -51,50 +51,56 @@ def polylines(
     lines = segments(shapes, axis, degree)
     longest = max(len(shape.values) for shape in shapes)
     if longest > MOST_CHAINED:
-        return _searched(sheet, values, lines, numbers)
-    return _chained(sheet, values, lines, numbers, longest)
+        return _searched(graph, values, lines, numbers)
+    return _chained(graph, values, lines, numbers, longest)
 
 
 def _chained(
-    sheet: Sheet, values: str, lines: Segments, numbers: Numbers, longest: int
+    graph: OnnxGraph,
+    values: str,
+    lines: Segments,
+    numbers: Precision,
+    longest: int,
 ) -> str:
     """Go from point to point; behind a shape's last one nothing changes."""
-    degree = _column(sheet, lines.far[lines.first], "degrees")
+    degree = _column(graph, lines.far[lines.first], "degrees")
     point_count = 2 * lines.room - 1
     for number in range(longest):
         has_line = number < point_count
         here = lines.first + np.where(has_line, number, 0)
         behind = lines.first + np.where(has_line, number + 1, 0)
         point = np.where(has_line, lines.values[here], lines.values[-1])
-        is_above = sheet.node("Greater", values, _column(sheet, point, "points"))
-        line = far = _column(sheet, lines.far[behind], "degrees")
+        is_above = graph.node("Greater", values, _column(graph, point, "points"))
+        line = far = _column(graph, lines.far[behind], "degrees")
         if (lines.near[behind] != lines.far[behind]).any():
             parts = {
-                "anchor": _column(sheet, lines.anchor[behind], "anchors"),
-                "width": _column(sheet, lines.width[behind], "widths"),
-                "near": _column(sheet, lines.near[behind], "degrees"),
+                "anchor": _column(graph, lines.anchor[behind], "anchors"),
+                "width": _column(graph, lines.width[behind], "widths"),
+                "near": _column(graph, lines.near[behind], "degrees"),
                 "far": far,
             }
-            line = _line(sheet, values, parts, numbers)
-        degree = sheet.node("Where", is_above, line, degree)
+            line = _line(graph, values, parts, numbers)
+        degree = graph.node("Where", is_above, line, degree)
     return degree
 
 
-def _searched(sheet: Sheet, values: str, lines: Segments, numbers: Numbers) -> str:
+def _searched(
+    graph: OnnxGraph, values: str, lines: Segments, numbers: Precision
+) -> str:
     """Halve the room of all shapes at once; a smaller one stays where it is."""
-    points = sheet.constant(lines.values, "points")
+    points = graph.constant(lines.values, "points")
     room = lines.room.astype(np.int32).reshape(-1, 1)
-    place = sheet.constant(lines.first.astype(np.int32).reshape(-1, 1), "firsts")
-    zero = sheet.constant(np.array(0, np.int32), "zero")
+    place = graph.constant(lines.first.astype(np.int32).reshape(-1, 1), "firsts")
+    zero = graph.constant(np.array(0, np.int32), "zero")
     while room.any():
-        before = sheet.constant(room - np.int32(1), "rooms")
-        point = sheet.node("Gather", points, sheet.node("Add", place, before), axis=0)
-        is_above = sheet.node("Greater", values, point)
-        step = sheet.node("Where", is_above, sheet.constant(room, "rooms"), zero)
-        place = sheet.node("Add", place, step)
+        before = graph.constant(room - np.int32(1), "rooms")
+        point = graph.node("Gather", points, graph.node("Add", place, before), axis=0)
+        is_above = graph.node("Greater", values, point)
+        step = graph.node("Where", is_above, graph.constant(room, "rooms"), zero)
+        place = graph.node("Add", place, step)
         room = room >> 1
     parts = {
-        name: sheet.node("Gather", sheet.constant(table, name), place, axis=0)
+        name: graph.node("Gather", graph.constant(table, name), place, axis=0)
         for name, table in (
             ("anchor", lines.anchor),
             ("width", lines.width),
@@ -102,17 +108,19 @@ def _searched(sheet: Sheet, values: str, lines: Segments, numbers: Numbers) -> s
             ("far", lines.far),
         )
     }
-    return _line(sheet, values, parts, numbers)
+    return _line(graph, values, parts, numbers)
 
 
-def _column(sheet: Sheet, table: Reals, hint: str) -> str:
-    return sheet.constant(table.reshape(-1, 1), hint)
+def _column(graph: OnnxGraph, table: Reals, hint: str) -> str:
+    return graph.constant(table.reshape(-1, 1), hint)
 
 
-def _line(sheet: Sheet, values: str, parts: dict[str, str], numbers: Numbers) -> str:
+def _line(
+    graph: OnnxGraph, values: str, parts: dict[str, str], numbers: Precision
+) -> str:
     """Add the degree on a line, as in `fuzzytree.numerics.segments`."""
 
-    def body(inner: Sheet, inputs: Sequence[str], named: str) -> str:
+    def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
         x, anchor, width, near, far = inputs
         position = inner.node("Div", inner.node("Sub", x, anchor), width)
         if numbers.is_mixed:
@@ -123,4 +131,4 @@ def _line(sheet: Sheet, values: str, parts: dict[str, str], numbers: Numbers) ->
         degree = inner.node("Max", degree, inner.node("Min", near, far))
         return inner.node("Min", degree, inner.node("Max", near, far), named=named)
 
-    return sheet.block("Line", body, {"x": values, **parts})
+    return graph.block("Line", body, {"x": values, **parts})

@@ -8,7 +8,7 @@ bit:
   left edge of `-x`: negated operands give negated differences, and equal quotients.
 - At any x at most one edge of a band is below 1, so the smallest edge is the degree.
 - An LR set is two *slopes*, or one of `|x - m|` if both sides are the same.
-- Points are one *polyline* (`onnx_lines.py`).
+- Points are one *points_part* (`onnx_lines.py`).
 - Shorter curves are filled up with zeros at the high end: `0 * q + c` is `c`.
 - Max and min may repeat operands; a product takes them in their stored order.
 """
@@ -22,9 +22,16 @@ import msgspec
 import numpy as np
 from onnx import helper
 
-from fuzzytree.exporters.onnx_ends import Axes, Numbers, axes, column, is_known, scalar
-from fuzzytree.exporters.onnx_graph import Sheet, Table
-from fuzzytree.exporters.onnx_lines import Polyline, is_chained, polylines
+from fuzzytree.exporters.onnx_ends import (
+    InputBlock,
+    Precision,
+    axes,
+    column,
+    is_known,
+    scalar,
+)
+from fuzzytree.exporters.onnx_graph import DegreeRows, OnnxGraph
+from fuzzytree.exporters.onnx_lines import PointsPart, is_chained, polylines
 from fuzzytree.model.rulebase import (
     LR,
     Clause,
@@ -42,7 +49,7 @@ Curve = tuple[float, ...]
 Sequences = list[tuple[int, ...]]
 
 
-class Edge(msgspec.Struct, frozen=True):
+class EdgePart(msgspec.Struct, frozen=True):
     """One end of a band: below it the degree is that of the flank, otherwise 1.
 
     Attributes:
@@ -58,7 +65,7 @@ class Edge(msgspec.Struct, frozen=True):
     flank: Flank | None
 
 
-class Slope(msgspec.Struct, frozen=True):
+class SlopePart(msgspec.Struct, frozen=True):
     """One side of an LR set; with sign 0 both sides, which are the same."""
 
     variable: str
@@ -67,21 +74,24 @@ class Slope(msgspec.Struct, frozen=True):
     side: Side
 
 
-Part = Edge | Slope | Polyline
+Part = EdgePart | SlopePart | PointsPart
 
 GUARD = ""
 """In place of a variable: 0, or NaN in a row with a missing value."""
 
-NOTHING = Edge(GUARD, 1, 1.0, None)
+NOTHING = EdgePart(GUARD, 1, 1.0, None)
 """No rule: degree 0, or 1 where a value is missing: before all rules, as the first."""
 
-ALWAYS = Edge(GUARD, 1, -math.inf, None)
+ALWAYS = EdgePart(GUARD, 1, -math.inf, None)
 """Degree 1."""
 
 
 def rules_graph(
-    sheet: Sheet, rules: RuleBase, numbers: Numbers, columns: Sequence[str]
-) -> tuple[Axes, str]:
+    graph: OnnxGraph,
+    rules: RuleBase,
+    numbers: Precision,
+    columns: Sequence[str],
+) -> tuple[InputBlock, str]:
     """Add a rule base up to the strengths of no rule and of every rule.
 
     Row 0 of the strengths is `NOTHING` and row k is rule k: the position of the first
@@ -90,12 +100,12 @@ def rules_graph(
     Returns:
         The values of the variables, and the strengths, of shape (1 + rules, rows).
     """
-    frame = axes(sheet, rules, numbers, columns)
-    table = Table(sheet)
-    sequences = _degrees(sheet, table, rules, numbers, frame)
+    frame = axes(graph, rules, numbers, columns)
+    table = DegreeRows(graph)
+    sequences = _degrees(graph, table, rules, numbers, frame)
     is_product = rules.semantics.conjunction == "product"
-    with sheet.about("rules"):
-        return frame, _strengths(sheet, table, sequences, is_product=is_product)
+    with graph.about("rules"):
+        return frame, _strengths(graph, table, sequences, is_product=is_product)
 
 
 def _parts(variable: str, shape: Shape) -> list[Part]:
@@ -103,20 +113,27 @@ def _parts(variable: str, shape: Shape) -> list[Part]:
     if isinstance(shape, LR):
         mean, left, right = shape.mean, shape.left, shape.right
         if left == right:
-            return [Slope(variable, 0, mean, left)]
-        return [Slope(variable, -1, mean, left), Slope(variable, 1, mean, right)]
+            return [SlopePart(variable, 0, mean, left)]
+        return [
+            SlopePart(variable, -1, mean, left),
+            SlopePart(variable, 1, mean, right),
+        ]
     if isinstance(shape, Points):
-        return [Polyline(variable, shape)]
+        return [PointsPart(variable, shape)]
     edges: list[Part] = []
     if shape.low is not None:
-        edges.append(Edge(variable, 1, shape.low, shape.left))
+        edges.append(EdgePart(variable, 1, shape.low, shape.left))
     if shape.high is not None:
-        edges.append(Edge(variable, -1, shape.high, shape.right))
+        edges.append(EdgePart(variable, -1, shape.high, shape.right))
     return edges
 
 
 def _degrees(
-    sheet: Sheet, table: Table, rules: RuleBase, numbers: Numbers, frame: Axes
+    graph: OnnxGraph,
+    table: DegreeRows,
+    rules: RuleBase,
+    numbers: Precision,
+    frame: InputBlock,
 ) -> Sequences:
     """Add the degrees of all clauses.
 
@@ -140,9 +157,9 @@ def _degrees(
         for term in clause.terms
         for part in parts[clause.variable, term]
     )
-    row = _primitives(sheet, table, [*wanted, *found], numbers, frame)
-    with sheet.about("terms"):
-        rows_of = _clauses(sheet, table, live, parts, row, numbers)
+    row = _primitives(graph, table, [*wanted, *found], numbers, frame)
+    with graph.about("terms"):
+        rows_of = _clauses(graph, table, live, parts, row, numbers)
     rows_of |= dict.fromkeys(constant - true, (row[NOTHING],))
     always = (row[ALWAYS],) if ALWAYS in row else ()
     sequences = [tuple(r for c in when for r in rows_of[c]) for when in kept]
@@ -150,69 +167,75 @@ def _degrees(
 
 
 def _primitives(
-    sheet: Sheet, table: Table, parts: Sequence[Part], numbers: Numbers, frame: Axes
+    graph: OnnxGraph,
+    table: DegreeRows,
+    parts: Sequence[Part],
+    numbers: Precision,
+    frame: InputBlock,
 ) -> dict[Part, int]:
     """Add a block for each kind of part; return the row of each part."""
-    edges = [part for part in parts if isinstance(part, Edge)]
-    slopes = [part for part in parts if isinstance(part, Slope)]
+    edges = [part for part in parts if isinstance(part, EdgePart)]
+    slopes = [part for part in parts if isinstance(part, SlopePart)]
     slopes.sort(key=lambda slope: abs(slope.sign))  # |x - m| first
-    lines = [part for part in parts if isinstance(part, Polyline)]
+    lines = [part for part in parts if isinstance(part, PointsPart)]
     block = frame.block
     if slopes or lines:  # an edge of NaN is 1, but a slope of NaN is NaN
-        zero = scalar(sheet, 0.0, numbers.axis)
-        known = is_known(sheet, frame, numbers)
-        block = sheet.node("Where", known, block, zero, hint="finite_variables")
-    values, place = Table(sheet), {(GUARD, 1): 0}
+        zero = scalar(graph, 0.0, numbers.axis)
+        known = is_known(graph, frame, numbers)
+        block = graph.node("Where", known, block, zero, hint="finite_variables")
+    values, place = DegreeRows(graph), {(GUARD, 1): 0}
     values.append(frame.guard, 1)
     for sign in (1, -1):
         if any(part.sign in (sign, sign - 1) and part.variable for part in parts):
             signed = block
             if sign < 0:
-                signed = sheet.node("Neg", block, hint="minus_variables")
+                signed = graph.node("Neg", block, hint="minus_variables")
             first = values.append(signed, len(frame.order))
             place |= {(name, sign): first + i for name, i in frame.order.items()}
     row: dict[Part, int] = {}
-    with sheet.about("edges"):
+    with graph.about("edges"):
         taken = values.take([place[edge.variable, edge.sign] for edge in edges])
-        first = table.append(_edges(sheet, taken, edges, numbers), len(edges))
+        first = table.append(_edges(graph, taken, edges, numbers), len(edges))
     row |= {edge: first + number for number, edge in enumerate(edges)}
     if slopes:
-        with sheet.about("slopes"):
+        with graph.about("slopes"):
             taken = values.take([place[s.variable, s.sign or 1] for s in slopes])
-            first = table.append(_slopes(sheet, taken, slopes, numbers), len(slopes))
+            first = table.append(_slopes(graph, taken, slopes, numbers), len(slopes))
         row |= {slope: first + number for number, slope in enumerate(slopes)}
     for is_short in (True, False):
         group = [line for line in lines if is_chained(line) == is_short]
         if group:
             shapes = [line.points for line in group]
-            with sheet.about("points"):
+            with graph.about("points"):
                 taken = values.take([place[line.variable, 1] for line in group])
-                block = polylines(sheet, taken, shapes, numbers)
+                block = polylines(graph, taken, shapes, numbers)
             first = table.append(block, len(group))
             row |= {line: first + number for number, line in enumerate(group)}
     return row
 
 
-def _edges(sheet: Sheet, values: str, edges: Sequence[Edge], numbers: Numbers) -> str:
+def _edges(
+    graph: OnnxGraph, values: str, edges: Sequence[EdgePart], numbers: Precision
+) -> str:
     """Add the degrees of edges, given their values, as one block."""
-    bounds = column(sheet, _bounds(edges, numbers), "bounds")
-    beyond = sheet.node("Less", values, bounds)
-    one = scalar(sheet, 1.0, numbers.degree)
+    bounds = column(graph, _bounds(edges, numbers), "bounds")
+    beyond = graph.node("Less", values, bounds)
+    one = scalar(graph, 1.0, numbers.degree)
     flanks = [(edge.sign, edge.flank) for edge in edges]
     if all(flank is None for _, flank in flanks):
-        return sheet.node("Where", beyond, scalar(sheet, 0.0, numbers.degree), one)
+        return graph.node("Where", beyond, scalar(graph, 0.0, numbers.degree), one)
     ends = rounded([s * f.end if f else 0.0 for s, f in flanks], numbers.axis)
     widths = rounded(
         [s * (f.start - f.end) if f else 1.0 for s, f in flanks],
         numbers.axis,
         is_divisor=True,
     )
-    distance = sheet.node("Sub", values, column(sheet, ends, "ends"))
-    position = sheet.node("Div", distance, column(sheet, widths, "widths"))
+    distance = graph.node("Sub", values, column(graph, ends, "ends"))
+    position = graph.node("Div", distance, column(graph, widths, "widths"))
     curves = [flank.curve if flank else (0.0,) for _, flank in flanks]
-    coefficients = _coefficients(sheet, curves, numbers)
+    coefficients = _coefficients(graph, curves, numbers)
 
-    def body(inner: Sheet, inputs: Sequence[str], named: str) -> str:
+    def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
         beyond, position, *curve = inputs
         zero, one, below_one = (
             scalar(inner, value, numbers.degree)
@@ -225,13 +248,13 @@ def _edges(sheet: Sheet, values: str, edges: Sequence[Edge], numbers: Numbers) -
         degree = inner.node("Clip", degree, zero, below_one)
         return inner.node("Where", beyond, degree, one, named=named)
 
-    given = {"beyond": beyond, "position": _cast(sheet, position, numbers)}
+    given = {"beyond": beyond, "position": _cast(graph, position, numbers)}
     if any(curve != (1.0,) for curve in curves):  # 1 * q is q
         given |= coefficients
-    return sheet.block(f"Edges{len(given) - 2}", body, given)
+    return graph.block(f"Edges{len(given) - 2}", body, given)
 
 
-def _bounds(edges: Sequence[Edge], numbers: Numbers) -> RealArray:
+def _bounds(edges: Sequence[EdgePart], numbers: Precision) -> RealArray:
     """Return for each edge the smallest value, times its sign, at which it is 1."""
     bounds = rounded([edge.sign * edge.bound for edge in edges], numbers.axis)
     is_left = np.array([edge.sign > 0 for edge in edges])
@@ -243,93 +266,96 @@ def _bounds(edges: Sequence[Edge], numbers: Numbers) -> RealArray:
 
 
 def _slopes(
-    sheet: Sheet, values: str, slopes: Sequence[Slope], numbers: Numbers
+    graph: OnnxGraph,
+    values: str,
+    slopes: Sequence[SlopePart],
+    numbers: Precision,
 ) -> str:
     """Add the degrees of slopes, given their values, as one block."""
     means = [-s.mean if s.sign < 0 else s.mean for s in slopes]
-    middle = column(sheet, rounded(means, numbers.axis), "means")
-    distance = sheet.node("Sub", values, middle)
+    middle = column(graph, rounded(means, numbers.axis), "means")
+    distance = graph.node("Sub", values, middle)
     both = sum(1 for slope in slopes if slope.sign == 0)
     if both == len(slopes):
-        distance = sheet.node("Abs", distance)
+        distance = graph.node("Abs", distance)
     elif both:
-        split = Table(sheet)
+        split = DegreeRows(graph)
         split.append(distance, len(slopes))
-        absolute = sheet.node("Abs", split.take(range(both)))
+        absolute = graph.node("Abs", split.take(range(both)))
         others = split.take(range(both, len(slopes)))
-        distance = sheet.node("Concat", absolute, others, axis=0)
+        distance = graph.node("Concat", absolute, others, axis=0)
     sides = [slope.side for slope in slopes]
     spreads = rounded([s.spread for s in sides], numbers.axis, is_divisor=True)
-    u = sheet.node("Div", distance, column(sheet, spreads, "spreads"))
+    u = graph.node("Div", distance, column(graph, spreads, "spreads"))
     reaches = rounded([side.reach for side in sides], numbers.degree)
     rooms = [side.reach - 1.0 for side in sides]
     room = rounded(rooms, numbers.degree, is_divisor=True)
     given = {
-        "u": _cast(sheet, u, numbers),
-        "reach": column(sheet, reaches, "reaches"),
-        "room": column(sheet, room, "rooms"),
+        "u": _cast(graph, u, numbers),
+        "reach": column(graph, reaches, "reaches"),
+        "room": column(graph, room, "rooms"),
     }
-    given |= _coefficients(sheet, [side.curve for side in sides], numbers)
+    given |= _coefficients(graph, [side.curve for side in sides], numbers)
 
-    def body(inner: Sheet, inputs: Sequence[str], named: str) -> str:
+    def body(inner: OnnxGraph, inputs: Sequence[str], named: str) -> str:
         return _slope_body(inner, inputs, named, numbers)
 
-    return sheet.block(f"Slopes{len(given) - 3}", body, given)
+    return graph.block(f"Slopes{len(given) - 3}", body, given)
 
 
 def _slope_body(
-    sheet: Sheet, inputs: Sequence[str], named: str, numbers: Numbers
+    graph: OnnxGraph, inputs: Sequence[str], named: str, numbers: Precision
 ) -> str:
     u, reach, room, *curve = inputs
-    zero, one = (scalar(sheet, value, numbers.degree) for value in (0.0, 1.0))
-    u = sheet.node("Min", sheet.node("Max", u, zero), reach)
-    t = sheet.node("Min", u, one)
+    zero, one = (scalar(graph, value, numbers.degree) for value in (0.0, 1.0))
+    u = graph.node("Min", graph.node("Max", u, zero), reach)
+    t = graph.node("Min", u, one)
     fall = curve[0]
     if len(curve) > 1:
-        two = scalar(sheet, 2.0, numbers.degree)
-        v = sheet.node("Sub", sheet.node("Mul", two, t), one)
-        fall = _horner(sheet, curve, v)
-    body = sheet.node("Sub", one, sheet.node("Mul", t, fall))
-    body = sheet.node("Clip", body, zero, one)
-    w = sheet.node("Div", sheet.node("Sub", reach, u), room)
-    w = sheet.node("Clip", w, zero, one)
-    square = sheet.node("Mul", w, w)
-    return sheet.node("Mul", body, sheet.node("Mul", square, square), named=named)
+        two = scalar(graph, 2.0, numbers.degree)
+        v = graph.node("Sub", graph.node("Mul", two, t), one)
+        fall = _horner(graph, curve, v)
+    body = graph.node("Sub", one, graph.node("Mul", t, fall))
+    body = graph.node("Clip", body, zero, one)
+    w = graph.node("Div", graph.node("Sub", reach, u), room)
+    w = graph.node("Clip", w, zero, one)
+    square = graph.node("Mul", w, w)
+    return graph.node("Mul", body, graph.node("Mul", square, square), named=named)
 
 
-def _cast(sheet: Sheet, value: str, numbers: Numbers) -> str:
+def _cast(graph: OnnxGraph, value: str, numbers: Precision) -> str:
     if not numbers.is_mixed:
         return value
     kind = helper.np_dtype_to_tensor_dtype(np.dtype(numbers.degree))
-    return sheet.node("Cast", value, to=kind)
+    return graph.node("Cast", value, to=kind)
 
 
 def _coefficients(
-    sheet: Sheet, curves: Sequence[Curve], numbers: Numbers
+    graph: OnnxGraph, curves: Sequence[Curve], numbers: Precision
 ) -> dict[str, str]:
     """Return the columns of c0, c1, ... of all curves, of the longest's length."""
     columns: dict[str, str] = {}
     for power in range(max(map(len, curves))):
         values = [curve[power] if power < len(curve) else 0.0 for curve in curves]
         name = f"c{power}"
-        columns[name] = column(sheet, rounded(values, numbers.degree), name)
+        columns[name] = column(graph, rounded(values, numbers.degree), name)
     return columns
 
 
-def _horner(sheet: Sheet, curve: Sequence[str], x: str) -> str:
+def _horner(graph: OnnxGraph, curve: Sequence[str], x: str) -> str:
     *lower, total = curve
     for coefficient in reversed(lower):
-        total = sheet.node("Add", sheet.node("Mul", total, x), coefficient)
+        total = graph.node("Add", graph.node("Mul", total, x), coefficient)
     return total
 
 
 def _clauses(
-    sheet: Sheet,
-    table: Table,
+    graph: OnnxGraph,
+    table: DegreeRows,
     rules: Sequence[Sequence[Clause]],
     parts: dict[Key, list[Part]],
     row: dict[Part, int],
-    numbers: Numbers,
+    numbers: Precision,
 ) -> dict[Clause, tuple[int, ...]]:
     """Add terms of two parts, OR and negation where there are any.
 
@@ -360,7 +386,7 @@ def _clauses(
     double = list(dict.fromkeys(ends.values()))  # terms of one curve are one
     if double:
         left, right = (table.take([pair[i] for pair in double]) for i in (0, 1))
-        block = sheet.node("Min", left, right, hint="terms")
+        block = graph.node("Min", left, right, hint="terms")
         first = table.append(block, len(double))
         place = {pair: first + number for number, pair in enumerate(double)}
         of_term |= {key: place[pair] for key, pair in ends.items()}
@@ -368,19 +394,19 @@ def _clauses(
         c: list(dict.fromkeys(of_term[c.variable, term] for term in c.terms))
         for c in single
     }
-    of_clause = _largest(sheet, table, lists)
+    of_clause = _largest(graph, table, lists)
     negated = [clause for clause in clauses if clause.negated]
     if negated:
         degrees = table.take([of_clause[clause] for clause in negated])
-        one = scalar(sheet, 1.0, numbers.degree)
-        block = sheet.node("Sub", one, degrees, hint="negations")
+        one = scalar(graph, 1.0, numbers.degree)
+        block = graph.node("Sub", one, degrees, hint="negations")
         first = table.append(block, len(negated))
         of_clause |= {clause: first + number for number, clause in enumerate(negated)}
     return pairs | {clause: (found,) for clause, found in of_clause.items()}
 
 
 def _largest(
-    sheet: Sheet, table: Table, lists: dict[Clause, list[int]]
+    graph: OnnxGraph, table: DegreeRows, lists: dict[Clause, list[int]]
 ) -> dict[Clause, int]:
     """Add the maxima of lists of rows, halving all lists at once until one is left."""
     lists = dict(lists)
@@ -391,7 +417,7 @@ def _largest(
             rows = lists[clause]
             right += rows[1::2] + rows[-1:] * (len(rows) % 2)
         either = table.take(left), table.take(right)
-        block = sheet.node("Max", *either, hint="alternatives")
+        block = graph.node("Max", *either, hint="alternatives")
         first = table.append(block, len(left))
         for clause in active:
             half = (len(lists[clause]) + 1) // 2
@@ -437,52 +463,52 @@ def _cost(sequences: Sequence[Sequence[Hashable]]) -> int:
 
 
 def _strengths(
-    sheet: Sheet, table: Table, sequences: Sequences, *, is_product: bool
+    graph: OnnxGraph, table: DegreeRows, sequences: Sequences, *, is_product: bool
 ) -> str:
     """Add the AND of each sequence of rows, in the cheaper of two ways."""
     lengths = {len(rows) for rows in sequences[1:]}
     can_repeat = not is_product or len(lengths) == 1  # NOTHING is 0 or 1
     if can_repeat and _slot_cost(sequences) <= _prefix_cost(sequences):
-        return _by_slots(sheet, table, sequences, is_product=is_product)
-    return _by_prefix(sheet, table, sequences, is_product=is_product)
+        return _by_slots(graph, table, sequences, is_product=is_product)
+    return _by_prefix(graph, table, sequences, is_product=is_product)
 
 
-def _and(sheet: Sheet, operands: Sequence[str], *, is_product: bool) -> str:
+def _and(graph: OnnxGraph, operands: Sequence[str], *, is_product: bool) -> str:
     """Add the minimum of blocks, or their product from left to right."""
     if len(operands) > 1 and not is_product:
-        return sheet.node("Min", *operands)
+        return graph.node("Min", *operands)
     total = operands[0]
     for other in operands[1:]:
-        total = sheet.node("Mul", total, other)
+        total = graph.node("Mul", total, other)
     return total
 
 
 def _by_slots(
-    sheet: Sheet, table: Table, sequences: Sequences, *, is_product: bool
+    graph: OnnxGraph, table: DegreeRows, sequences: Sequences, *, is_product: bool
 ) -> str:
     """Take the k-th rows of all sequences at once; a short one repeats its first."""
     slots = [
         table.take([rows[k] if k < len(rows) else rows[0] for rows in sequences])
         for k in range(max(map(len, sequences)))
     ]
-    return _and(sheet, slots, is_product=is_product)
+    return _and(graph, slots, is_product=is_product)
 
 
 def _by_prefix(
-    sheet: Sheet, table: Table, sequences: Sequences, *, is_product: bool
+    graph: OnnxGraph, table: DegreeRows, sequences: Sequences, *, is_product: bool
 ) -> str:
     """Compute each common beginning of sequences once, one length after another."""
     levels, end = _levels(sequences)
     lengths = {len(rows) for rows in sequences}
-    ends, first = Table(sheet), dict[int, int]()
-    shorter, block = Table(sheet), ""
+    ends, first = DegreeRows(graph), dict[int, int]()
+    shorter, block = DegreeRows(graph), ""
     for length, level in enumerate(levels, 1):
         rows = [row for _, row in level if isinstance(row, int)]
         longer = table.take(rows)
         if length > 1:
             before = shorter.take([number for number, _ in level])
-            longer = _and(sheet, [before, longer], is_product=is_product)
-        shorter, block = Table(sheet), longer
+            longer = _and(graph, [before, longer], is_product=is_product)
+        shorter, block = DegreeRows(graph), longer
         shorter.append(block, len(level))
         if length in lengths:
             first[length] = ends.append(block, len(level))

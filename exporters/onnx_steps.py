@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from fuzzytree.exporters.onnx_graph import Sheet, identifier
+from fuzzytree.exporters.onnx_graph import OnnxGraph, identifier
 from fuzzytree.semantics.programs.evaluate import Found, still_results
 from fuzzytree.semantics.programs.steps import Program, Step
 
@@ -89,13 +89,13 @@ def missing_functions(program: Program) -> tuple[str, ...]:
     return tuple(dict.fromkeys(used))
 
 
-def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[str]:
-    """Add the steps of a program to a sheet and return the names of its results.
+def add_steps(graph: OnnxGraph, program: Program, columns: Sequence[str]) -> list[str]:
+    """Add the steps of a program to a graph and return the names of its results.
 
     Returns:
         A block of shape (rows,) for each result.
     """
-    source = sheet.node("Transpose", sheet.source, hint="columns", perm=[1, 0])
+    source = graph.node("Transpose", graph.source, hint="columns", perm=[1, 0])
     still = still_results(program)
     names: dict[int, str] = {}
     links = {one: list[str]() for one in chain_links(program, still, CHAINS)}
@@ -103,17 +103,17 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
     def named(place: int) -> str:
         known = still[place]
         if known is not None and place not in names:  # only what a node takes
-            names[place] = number_constant(sheet, known)
+            names[place] = number_constant(graph, known)
         return names[place]
 
     for place, step in enumerate(program.steps):
         if still[place] is not None:
             continue
         title = program.titles[place] if program.titles else step.name
-        sheet.topic = identifier(title) if title else ""
+        graph.topic = identifier(title) if title else ""
         if step.operation == "input":
-            row = _whole(sheet, columns.index(step.name))
-            names[place] = sheet.node("Gather", source, row, hint=sheet.topic)
+            row = _whole(graph, columns.index(step.name))
+            names[place] = graph.node("Gather", source, row, hint=graph.topic)
             continue
         first = step.arguments[0]
         given = [
@@ -124,13 +124,13 @@ def add_steps(sheet: Sheet, program: Program, columns: Sequence[str]) -> list[st
             links[place] = given
         elif len(given) > 2 and step.operation in CHAINS:
             chain = CHAINS[step.operation]
-            names[place] = sheet.node(chain, *given, hint=sheet.topic)
+            names[place] = graph.node(chain, *given, hint=graph.topic)
         else:
-            names[place] = add_step(sheet, step, given, program)
-    sheet.topic = ""
+            names[place] = add_step(graph, step, given, program)
+    graph.topic = ""
     places = [result.step for result in program.results]
     return [
-        named(place) if still[place] is None else spread(sheet, source, named(place))
+        named(place) if still[place] is None else spread(graph, source, named(place))
         for place in places
     ]
 
@@ -160,7 +160,7 @@ def chain_links(
     }
 
 
-def number_constant(sheet: Sheet, found: Found) -> str:
+def number_constant(graph: OnnxGraph, found: Found) -> str:
     """Return the name of what no input enters: a number, a truth, or samples."""
     kind: npt.DTypeLike = np.float64
     first = found[0] if isinstance(found, list) else found
@@ -169,108 +169,118 @@ def number_constant(sheet: Sheet, found: Found) -> str:
     value = np.array(found, kind)
     if isinstance(found, list):
         value = value.reshape(-1, 1)
-    return sheet.constant(value, "number")
+    return graph.constant(value, "number")
 
 
-def spread(sheet: Sheet, source: str, name: str) -> str:
+def spread(graph: OnnxGraph, source: str, name: str) -> str:
     """Return a constant once for each row of a source of shape (columns, rows)."""
-    shape = sheet.take(sheet.node("Shape", source), [1])
-    return sheet.node("Expand", name, shape)
+    shape = graph.take(graph.node("Shape", source), [1])
+    return graph.node("Expand", name, shape)
 
 
-def _number(sheet: Sheet, value: float) -> str:
-    return sheet.constant(np.array(value), "number")
+def _number(graph: OnnxGraph, value: float) -> str:
+    return graph.constant(np.array(value), "number")
 
 
-def _whole(sheet: Sheet, value: int) -> str:
-    return sheet.constant(np.array(value, np.int64), "whole")
+def _whole(graph: OnnxGraph, value: int) -> str:
+    return graph.constant(np.array(value, np.int64), "whole")
 
 
-def add_step(sheet: Sheet, step: Step, given: Sequence[str], program: Program) -> str:
+def add_step(
+    graph: OnnxGraph, step: Step, given: Sequence[str], program: Program
+) -> str:
     """Add the nodes of a step, given its arguments, and return the result's name."""
     if step.operation in NODES:
-        return sheet.node(NODES[step.operation], *given, hint=sheet.topic)
+        return graph.node(NODES[step.operation], *given, hint=graph.topic)
     match step.operation:
         case "is_finite":
-            size = sheet.node("Abs", *given)
-            return sheet.node("Less", size, _number(sheet, np.inf))
+            size = graph.node("Abs", *given)
+            return graph.node("Less", size, _number(graph, np.inf))
         case "cosine":
-            return _cosine(sheet, given[0])
+            return _cosine(graph, given[0])
         case "remainder":
-            return sheet.node("Mod", *given, fmod=1)
+            return graph.node("Mod", *given, fmod=1)
         case "below":
-            return _below(sheet, step, given[0])
+            return _below(graph, step, given[0])
         case "pick":
-            return _pick(sheet, step, given[0])
+            return _pick(graph, step, given[0])
         case "running":
-            return sheet.node("CumSum", *given, _whole(sheet, 0))
+            return graph.node("CumSum", *given, _whole(graph, 0))
         case "total":
             count = program.steps[step.arguments[0]].samples
-            return _total(sheet, given[0], count)
+            return _total(graph, given[0], count)
         case "last":
             count = program.steps[step.arguments[0]].samples
-            return sheet.node("Gather", given[0], _whole(sheet, count - 1))
+            return graph.node("Gather", given[0], _whole(graph, count - 1))
         case "highest":
-            return reduced(sheet, "ReduceMax", given[0])
+            return reduced(graph, "ReduceMax", given[0])
         case "lowest":
-            return reduced(sheet, "ReduceMin", given[0])
+            return reduced(graph, "ReduceMin", given[0])
         case _:
             raise ValueError(f"no operator computes {step.operation} in double")
 
 
-def _cosine(sheet: Sheet, angle: str) -> str:
+def _cosine(graph: OnnxGraph, angle: str) -> str:
     """Return 1 - 2 sin^2(a / 2), for many an onnxruntime has no cosine in double."""
-    sine = sheet.node("Sin", sheet.node("Mul", angle, _number(sheet, 0.5)))
-    square = sheet.node("Mul", sine, sine)
-    twice = sheet.node("Mul", square, _number(sheet, 2.0))
-    return sheet.node("Sub", _number(sheet, 1.0), twice)
+    sine = graph.node("Sin", graph.node("Mul", angle, _number(graph, 0.5)))
+    square = graph.node("Mul", sine, sine)
+    twice = graph.node("Mul", square, _number(graph, 2.0))
+    return graph.node("Sub", _number(graph, 1.0), twice)
 
 
-def _below(sheet: Sheet, step: Step, value: str) -> str:
+def _below(graph: OnnxGraph, step: Step, value: str) -> str:
     """Count the numbers of a table below a value, one row of truths for each."""
     ranks = [-1] + [1] * (2 if step.samples else 1)
-    table = sheet.constant(np.array(step.table).reshape(ranks), "table")
-    is_below = sheet.node("Less", table, value)
+    table = graph.constant(np.array(step.table).reshape(ranks), "table")
+    is_below = graph.node("Less", table, value)
     kind = int(np_to_onnx(np.float64))
-    return sheet.total(sheet.node("Cast", is_below, to=kind), axis=0, keepdims=0)
+    return graph.total(graph.node("Cast", is_below, to=kind), axis=0, keepdims=0)
 
 
-def _pick(sheet: Sheet, step: Step, value: str) -> str:
+def _pick(graph: OnnxGraph, step: Step, value: str) -> str:
     """Take the entry at a place; places outside, and NaN, take the first."""
-    inside = sheet.node("LessOrEqual", _number(sheet, 0.0), value)
+    inside = graph.node("LessOrEqual", _number(graph, 0.0), value)
     last = float(len(step.table) - 1)
-    inside = sheet.node(
-        "And", inside, sheet.node("LessOrEqual", value, _number(sheet, last))
+    inside = graph.node(
+        "And", inside, graph.node("LessOrEqual", value, _number(graph, last))
     )
-    place = sheet.node("Where", inside, value, _number(sheet, 0.0))
-    place = sheet.node("Cast", place, to=int(np_to_onnx(np.int64)))
-    return sheet.node("Gather", sheet.constant(np.array(step.table), "table"), place)
+    place = graph.node("Where", inside, value, _number(graph, 0.0))
+    place = graph.node("Cast", place, to=int(np_to_onnx(np.int64)))
+    return graph.node("Gather", graph.constant(np.array(step.table), "table"), place)
 
 
-def _total(sheet: Sheet, samples: str, count: int) -> str:
+def _total(graph: OnnxGraph, samples: str, count: int) -> str:
     """Add the second half of the samples to the first until one is left."""
     size = 1 << (count - 1).bit_length()
     if size > count:
-        pads = sheet.numbers([0, 0, size - count, 0], "pads")
-        samples = sheet.node("Pad", samples, pads)
-    zero, axis = sheet.numbers([0], "start"), sheet.numbers([0], "axes")
+        pads = graph.numbers([0, 0, size - count, 0], "pads")
+        samples = graph.node("Pad", samples, pads)
+    zero, axis = graph.numbers([0], "start"), graph.numbers([0], "axes")
     while size > 1:
-        half, whole = sheet.numbers([size // 2], "end"), sheet.numbers([size], "end")
-        first = sheet.node("Slice", samples, zero, half, axis)
-        second = sheet.node("Slice", samples, half, whole, axis)
-        samples = sheet.node("Add", first, second)
+        half, whole = (
+            graph.numbers([size // 2], "end"),
+            graph.numbers([size], "end"),
+        )
+        first = graph.node("Slice", samples, zero, half, axis)
+        second = graph.node("Slice", samples, half, whole, axis)
+        samples = graph.node("Add", first, second)
         size //= 2
-    return sheet.node("Reshape", samples, sheet.numbers([-1], "flat"))
+    return graph.node("Reshape", samples, graph.numbers([-1], "flat"))
 
 
 def reduced(
-    sheet: Sheet, operator: str, source: str, *, axis: int = 0, keepdims: int = 0
+    graph: OnnxGraph,
+    operator: str,
+    source: str,
+    *,
+    axis: int = 0,
+    keepdims: int = 0,
 ) -> str:
     """Return the largest or smallest along an axis, in the form the opset knows."""
-    if sheet.opset >= 18:
-        axes = sheet.numbers([axis], "axes")
-        return sheet.node(operator, source, axes, keepdims=keepdims)
-    return sheet.node(operator, source, axes=[axis], keepdims=keepdims)
+    if graph.opset >= 18:
+        axes = graph.numbers([axis], "axes")
+        return graph.node(operator, source, axes, keepdims=keepdims)
+    return graph.node(operator, source, axes=[axis], keepdims=keepdims)
 
 
 def np_to_onnx(kind: npt.DTypeLike) -> int:
@@ -306,16 +316,18 @@ class Blocks:
     """The results of a program in a graph: single rows, and rows of blocks.
 
     Attributes:
-        sheet: Where the nodes go.
+        graph: Where the nodes go.
         program: The program.
     """
 
-    def __init__(self, sheet: Sheet, program: Program, columns: Sequence[str]) -> None:
-        self.sheet = sheet
+    def __init__(
+        self, graph: OnnxGraph, program: Program, columns: Sequence[str]
+    ) -> None:
+        self.graph = graph
         self.program = program
         self._still = still_results(program)
-        self._source = sheet.node(
-            "Transpose", sheet.source, hint="columns", perm=[1, 0]
+        self._source = graph.node(
+            "Transpose", graph.source, hint="columns", perm=[1, 0]
         )
         self._columns = columns
         self._names: dict[int, str] = {}
@@ -324,25 +336,25 @@ class Blocks:
         for level in self._levels():
             for group in self._groups(level):
                 self._add(group)
-        sheet.topic = ""
+        graph.topic = ""
 
     def single(self, place: int) -> str:
         """Return the name of a result, of shape (rows,) or of a constant."""
         if place not in self._names:
             found = self._still[place]
             if found is not None:
-                self._names[place] = number_constant(self.sheet, found)
+                self._names[place] = number_constant(self.graph, found)
             else:
                 block, row = self._rows[place]
-                at = self.sheet.constant(np.array(row, np.int64), "whole")
-                self._names[place] = self.sheet.node("Gather", block, at, axis=0)
+                at = self.graph.constant(np.array(row, np.int64), "whole")
+                self._names[place] = self.graph.node("Gather", block, at, axis=0)
         return self._names[place]
 
     def stacked(self, places: Sequence[int]) -> str:
         """Return results as one block, of shape (places, rows) or (places, 1)."""
         if all(self._still[place] is not None for place in places):
             values = np.array([self._still[place] for place in places])
-            return self.sheet.constant(values.reshape(-1, 1), "numbers")
+            return self.graph.constant(values.reshape(-1, 1), "numbers")
         return self.rows(places)
 
     def rows(self, places: Sequence[int]) -> str:
@@ -356,15 +368,15 @@ class Blocks:
         for block, chosen in wanted.items():
             rows = list(chosen)
             is_whole = rows == list(range(self._sizes[block]))
-            pieces.append(block if is_whole else self.sheet.take(block, rows))
+            pieces.append(block if is_whole else self.graph.take(block, rows))
             for row in rows:
                 order[block, row] = len(order)
         whole = pieces[0]
         if len(pieces) > 1:
-            whole = self.sheet.node("Concat", *pieces, axis=0)
+            whole = self.graph.node("Concat", *pieces, axis=0)
         rows = [order[home] for home in homes]
         return (
-            whole if rows == list(range(len(order))) else self.sheet.take(whole, rows)
+            whole if rows == list(range(len(order))) else self.graph.take(whole, rows)
         )
 
     def _home(self, place: int) -> tuple[str, int]:
@@ -372,12 +384,12 @@ class Blocks:
         if place not in self._rows:
             name = self.single(place)
             if self._still[place] is not None:
-                name = spread(self.sheet, self._source, name)
-            axis = self.sheet.numbers([0], "axes")
-            if self.sheet.opset >= 13:
-                block = self.sheet.node("Unsqueeze", name, axis)
+                name = spread(self.graph, self._source, name)
+            axis = self.graph.numbers([0], "axes")
+            if self.graph.opset >= 13:
+                block = self.graph.node("Unsqueeze", name, axis)
             else:
-                block = self.sheet.node("Unsqueeze", name, axes=[0])
+                block = self.graph.node("Unsqueeze", name, axes=[0])
             self._rows[place], self._sizes[block] = (block, 0), 1
         return self._rows[place]
 
@@ -430,14 +442,14 @@ class Blocks:
 
     def _add(self, group: Sequence[_Unit]) -> None:
         """Add one step or chain, or equal operations as one node."""
-        sheet, unit = self.sheet, group[0]
-        sheet.topic = self._title(group)
+        graph, unit = self.graph, group[0]
+        graph.topic = self._title(group)
         if len(group) > 1:
             given = [
                 self.single(places[0]) if len({*places}) == 1 else self.stacked(places)
                 for places in zip(*(one.arguments for one in group), strict=True)
             ]
-            block = sheet.node(NODES[unit.operation], *given, hint=sheet.topic)
+            block = graph.node(NODES[unit.operation], *given, hint=graph.topic)
             self._sizes[block] = len(group)
             self._rows |= {one.place: (block, row) for row, one in enumerate(group)}
         elif unit.is_chain:
@@ -445,26 +457,26 @@ class Blocks:
         elif unit.operation == "input":
             step = self.program.steps[unit.place]
             at = np.array(self._columns.index(step.name), np.int64)
-            column = sheet.constant(at, "whole")
-            name = sheet.node("Gather", self._source, column, hint=sheet.topic)
+            column = graph.constant(at, "whole")
+            name = graph.node("Gather", self._source, column, hint=graph.topic)
             self._names[unit.place] = name
         else:
             names = [self.single(place) for place in unit.arguments]
             step = self.program.steps[unit.place]
-            self._names[unit.place] = add_step(sheet, step, names, self.program)
+            self._names[unit.place] = add_step(graph, step, names, self.program)
 
     def _chain(self, unit: _Unit) -> str:
         """Join many results from left to right; of truths the order is no matter."""
-        sheet = self.sheet
+        graph = self.graph
         block = self.stacked(unit.arguments)
         if unit.operation in _TRUTHS:
-            number = sheet.node("Cast", block, to=np_to_onnx(np.int32))
-            number = reduced(sheet, _TRUTHS[unit.operation], number)
-            return sheet.node("Cast", number, to=np_to_onnx(np.bool_))
-        parts = sheet.split(block, len(unit.arguments))
-        joined = sheet.node(CHAINS[unit.operation], *parts)
-        flat = sheet.numbers([-1], "flat")
-        return sheet.node("Reshape", joined, flat, hint=sheet.topic)
+            number = graph.node("Cast", block, to=np_to_onnx(np.int32))
+            number = reduced(graph, _TRUTHS[unit.operation], number)
+            return graph.node("Cast", number, to=np_to_onnx(np.bool_))
+        parts = graph.split(block, len(unit.arguments))
+        joined = graph.node(CHAINS[unit.operation], *parts)
+        flat = graph.numbers([-1], "flat")
+        return graph.node("Reshape", joined, flat, hint=graph.topic)
 
     def _title(self, group: Sequence[_Unit]) -> str:
         """Return the words that the titles of steps have in common, as a name."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import onnx
 
     from fuzzytree.exporters.onnx import Output
-    from fuzzytree.exporters.onnx_graph import Sheet
+    from fuzzytree.exporters.onnx_graph import OnnxGraph
     from fuzzytree.semantics.programs.steps import Program
 
 _MOST_ROWS_TO_VERIFY = 24
@@ -73,17 +73,17 @@ def _model_proto(
 ) -> onnx.ModelProto:
     from onnx import TensorProto
 
-    from fuzzytree.exporters.onnx_graph import Sheet, model_proto
+    from fuzzytree.exporters.onnx_graph import OnnxGraph, model_proto
 
-    sheet = Sheet(opset)
-    _fill(sheet, system, program, outputs)
+    graph = OnnxGraph(opset)
+    _fill(graph, system, program, outputs)
     kinds: dict[Output, tuple[int, list[str | int]]] = {
         "outputs": (TensorProto.DOUBLE, ["rows", len(system.outputs)]),
         "status": (TensorProto.INT64, ["rows"]),
         "activations": (TensorProto.DOUBLE, ["rows", len(system.rules)]),
     }
     return model_proto(
-        sheet,
+        graph,
         "system",
         (TensorProto.DOUBLE, len(system.columns)),
         {name: kinds[name] for name in outputs},
@@ -94,29 +94,35 @@ def _model_proto(
 
 
 def _fill(
-    sheet: Sheet, system: FuzzySystem, program: Program, outputs: Sequence[Output]
+    graph: OnnxGraph,
+    system: FuzzySystem,
+    program: Program,
+    outputs: Sequence[Output],
 ) -> None:
     from fuzzytree.exporters.onnx_steps import add_steps, is_wide, np_to_onnx
 
     count, rules = len(system.outputs), len(system.rules)
     if is_wide(program):
-        _fill_wide(sheet, system, program, outputs)
+        _fill_wide(graph, system, program, outputs)
         return
-    names = add_steps(sheet, program, system.columns)
+    names = add_steps(graph, program, system.columns)
     if "outputs" in outputs:
-        _columns(sheet, names[:count], "outputs")
+        _columns(graph, names[:count], "outputs")
     if "activations" in outputs:
-        _columns(sheet, names[count : count + rules], "activations")
+        _columns(graph, names[count : count + rules], "activations")
     if "status" in outputs:
-        sheet.node("Cast", names[-1], named="status", to=np_to_onnx("int64"))
+        graph.node("Cast", names[-1], named="status", to=np_to_onnx("int64"))
 
 
 def _fill_wide(
-    sheet: Sheet, system: FuzzySystem, program: Program, outputs: Sequence[Output]
+    graph: OnnxGraph,
+    system: FuzzySystem,
+    program: Program,
+    outputs: Sequence[Output],
 ) -> None:
     from fuzzytree.exporters.onnx_steps import Blocks, np_to_onnx
 
-    blocks = Blocks(sheet, program, system.columns)
+    blocks = Blocks(graph, program, system.columns)
     places = [result.step for result in program.results]
     count, rules = len(system.outputs), len(system.rules)
     wanted: dict[Output, list[int]] = {
@@ -126,24 +132,24 @@ def _fill_wide(
     for name in outputs:
         if name in wanted:
             block = blocks.rows(wanted[name])
-            sheet.node("Transpose", block, perm=[1, 0], named=name)
+            graph.node("Transpose", block, perm=[1, 0], named=name)
     if "status" in outputs:
         status = blocks.single(places[-1])
-        sheet.node("Cast", status, named="status", to=np_to_onnx("int64"))
+        graph.node("Cast", status, named="status", to=np_to_onnx("int64"))
 
 
-def _columns(sheet: Sheet, names: Sequence[str], named: str) -> None:
+def _columns(graph: OnnxGraph, names: Sequence[str], named: str) -> None:
     """Put blocks of shape (rows,) side by side."""
     if len(names) == 1:
-        sheet.node("Reshape", names[0], sheet.numbers([-1, 1], "shape"), named=named)
+        graph.node("Reshape", names[0], graph.numbers([-1, 1], "shape"), named=named)
         return
-    line = sheet.numbers([0], "axes")
-    if sheet.opset >= 13:
-        lines = [sheet.node("Unsqueeze", name, line, hint=name) for name in names]
+    line = graph.numbers([0], "axes")
+    if graph.opset >= 13:
+        lines = [graph.node("Unsqueeze", name, line, hint=name) for name in names]
     else:
-        lines = [sheet.node("Unsqueeze", name, hint=name, axes=[0]) for name in names]
-    block = sheet.node("Concat", *lines, hint=named, axis=0)
-    sheet.node("Transpose", block, perm=[1, 0], named=named)
+        lines = [graph.node("Unsqueeze", name, hint=name, axes=[0]) for name in names]
+    block = graph.node("Concat", *lines, hint=named, axis=0)
+    graph.node("Transpose", block, perm=[1, 0], named=named)
 
 
 def _facts(

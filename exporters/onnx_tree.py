@@ -14,8 +14,14 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
-from fuzzytree.exporters.onnx_ends import Axes, Numbers, axes, flat_guard, is_known
-from fuzzytree.exporters.onnx_graph import TREES, Constant, Sheet
+from fuzzytree.exporters.onnx_ends import (
+    InputBlock,
+    Precision,
+    axes,
+    flat_guard,
+    is_known,
+)
+from fuzzytree.exporters.onnx_graph import TREES, Constant, OnnxGraph
 from fuzzytree.model.tree import FuzzyTree, Node
 from fuzzytree.numerics.narrowing import rounded
 
@@ -23,7 +29,7 @@ _MOST_QUESTIONS = 1_000_000
 _MOST_LEAVES = 2**24  # as float32 counts
 
 
-class Question(msgspec.Struct, frozen=True):
+class OnnxTreeTest(msgspec.Struct, frozen=True):
     """`variable <= cut`: on to the left if so, else to the right.
 
     A way on is the position of a question, or minus the number of a leaf.
@@ -36,14 +42,14 @@ class Question(msgspec.Struct, frozen=True):
 
 
 def tree_graph(
-    sheet: Sheet,
+    graph: OnnxGraph,
     tree: FuzzyTree,
-    numbers: Numbers,
+    numbers: Precision,
     columns: Sequence[str],
     *,
     is_plain: bool,
     named: str = "rule",
-) -> Axes:
+) -> InputBlock:
     """Add a tree up to the leaf's number, or 0 where a value is missing.
 
     Returns:
@@ -54,24 +60,24 @@ def tree_graph(
         variable.parts for variable in tree.variables
     )
     if is_direct:
-        frame = flat_guard(sheet, tree, numbers, columns)
+        frame = flat_guard(graph, tree, numbers, columns)
     else:
-        frame = axes(sheet, tree, numbers, columns, is_flat=True)
+        frame = axes(graph, tree, numbers, columns, is_flat=True)
     if not questions:
-        leaf = sheet.constant(np.array(1, np.int64), "leaf")
+        leaf = graph.constant(np.array(1, np.int64), "leaf")
     elif is_plain:
-        with sheet.about("path"):
-            leaf = _walk(sheet, questions, frame, numbers, start=_root(tree))
+        with graph.about("path"):
+            leaf = _walk(graph, questions, frame, numbers, start=_root(tree))
     else:
         place = {name: columns.index(name) for name in tree.inputs}
-        values = sheet.source
+        values = graph.source
         if not is_direct:
             place = frame.order
-            values = sheet.node("Transpose", frame.block, hint="values", perm=[1, 0])
-        leaf = _ensemble(sheet, questions, values, place, numbers, start=_root(tree))
-    zero = sheet.constant(np.array(0, np.int64), "nothing")
-    known = is_known(sheet, frame, numbers)
-    sheet.node("Where", known, leaf, zero, named=named)
+            values = graph.node("Transpose", frame.block, hint="values", perm=[1, 0])
+        leaf = _ensemble(graph, questions, values, place, numbers, start=_root(tree))
+    zero = graph.constant(np.array(0, np.int64), "nothing")
+    known = is_known(graph, frame, numbers)
+    graph.node("Where", known, leaf, zero, named=named)
     return frame
 
 
@@ -89,7 +95,7 @@ def _root(tree: FuzzyTree) -> int:
     return len(tree.nodes[0].cuts) // 2
 
 
-def questions_of(tree: FuzzyTree) -> list[Question]:
+def questions_of(tree: FuzzyTree) -> list[OnnxTreeTest]:
     """Return the cuts of all nodes in order, each with its two ways on.
 
     A node is entered at its middle cut.
@@ -104,7 +110,7 @@ def questions_of(tree: FuzzyTree) -> list[Question]:
             return -(branch.leaf or 0)
         return first[branch.node - 1] + len(tree.nodes[branch.node - 1].cuts) // 2
 
-    questions: list[Question] = []
+    questions: list[OnnxTreeTest] = []
     for start, node in zip(first, tree.nodes, strict=False):
         ways: dict[int, tuple[int, int]] = {}
         todo = [(0, len(node.cuts))]
@@ -118,17 +124,18 @@ def questions_of(tree: FuzzyTree) -> list[Question]:
             )
             todo += [span for span in (left, right) if span[0] < span[1]]
         questions += [
-            Question(node.variable, cut, *ways[i]) for i, cut in enumerate(node.cuts)
+            OnnxTreeTest(node.variable, cut, *ways[i])
+            for i, cut in enumerate(node.cuts)
         ]
     return questions
 
 
 def _ensemble(
-    sheet: Sheet,
-    questions: Sequence[Question],
+    graph: OnnxGraph,
+    questions: Sequence[OnnxTreeTest],
     values: str,
     place: dict[str, int],
-    numbers: Numbers,
+    numbers: Precision,
     *,
     start: int,
 ) -> str:
@@ -152,7 +159,7 @@ def _ensemble(
     right = [targets[number, False] for number in range(len(order))]
     asked = [questions[position] for position in order]
     cuts = rounded([question.cut for question in asked], numbers.axis)
-    leaf = sheet.node(
+    leaf = graph.node(
         "TreeEnsemble",
         values,
         hint="leaf",
@@ -171,8 +178,8 @@ def _ensemble(
         leaf_targetids=[0] * len(leaves),
         leaf_weights=_tensor(np.array(leaves, numbers.axis)),
     )
-    whole = sheet.node("Cast", leaf, hint="leaf", to=onnx.TensorProto.INT64)
-    return sheet.node("Reshape", whole, sheet.numbers([-1], "flat"), hint="leaf")
+    whole = graph.node("Cast", leaf, hint="leaf", to=onnx.TensorProto.INT64)
+    return graph.node("Reshape", whole, graph.numbers([-1], "flat"), hint="leaf")
 
 
 def _tensor(values: Constant) -> onnx.TensorProto:
@@ -180,10 +187,10 @@ def _tensor(values: Constant) -> onnx.TensorProto:
 
 
 def _walk(
-    sheet: Sheet,
-    questions: Sequence[Question],
-    frame: Axes,
-    numbers: Numbers,
+    graph: OnnxGraph,
+    questions: Sequence[OnnxTreeTest],
+    frame: InputBlock,
+    numbers: Precision,
     *,
     start: int,
 ) -> str:
@@ -197,29 +204,29 @@ def _walk(
     own = range(count, count + leaves)
     places = [frame.order[q.variable] for q in questions] + [0] * leaves
     cuts = rounded([q.cut for q in questions] + [0.0] * leaves, numbers.axis)
-    place = sheet.numbers(places, "variables")
-    cut = sheet.constant(cuts, "cuts")
-    left = sheet.numbers([*(state(q.left) for q in questions), *own], "left")
-    right = sheet.numbers([*(state(q.right) for q in questions), *own], "right")
-    value = sheet.take(frame.block, [places[start]])
-    here = sheet.node("Less", sheet.constant(cuts[[start]], "cut"), value)
-    there = [sheet.numbers([state(w)], "way") for w in _ways(questions[start])]
-    here = sheet.node("Where", here, there[1], there[0])
+    place = graph.numbers(places, "variables")
+    cut = graph.constant(cuts, "cuts")
+    left = graph.numbers([*(state(q.left) for q in questions), *own], "left")
+    right = graph.numbers([*(state(q.right) for q in questions), *own], "right")
+    value = graph.take(frame.block, [places[start]])
+    here = graph.node("Less", graph.constant(cuts[[start]], "cut"), value)
+    there = [graph.numbers([state(w)], "way") for w in _ways(questions[start])]
+    here = graph.node("Where", here, there[1], there[0])
     for _ in range(_depth(questions, start) - 1):
-        asked = sheet.node("Gather", place, here, axis=0)
-        value = sheet.node("GatherElements", frame.block, asked, axis=0)
-        is_right = sheet.node("Less", sheet.node("Gather", cut, here, axis=0), value)
-        onward = [sheet.node("Gather", way, here, axis=0) for way in (right, left)]
-        here = sheet.node("Where", is_right, *onward)
-    flat = sheet.node("Reshape", here, sheet.numbers([-1], "flat"))
-    return sheet.node("Sub", flat, sheet.constant(np.array(count), "questions"))
+        asked = graph.node("Gather", place, here, axis=0)
+        value = graph.node("GatherElements", frame.block, asked, axis=0)
+        is_right = graph.node("Less", graph.node("Gather", cut, here, axis=0), value)
+        onward = [graph.node("Gather", way, here, axis=0) for way in (right, left)]
+        here = graph.node("Where", is_right, *onward)
+    flat = graph.node("Reshape", here, graph.numbers([-1], "flat"))
+    return graph.node("Sub", flat, graph.constant(np.array(count), "questions"))
 
 
-def _ways(question: Question) -> tuple[int, int]:
+def _ways(question: OnnxTreeTest) -> tuple[int, int]:
     return question.left, question.right
 
 
-def _depth(questions: Sequence[Question], start: int) -> int:
+def _depth(questions: Sequence[OnnxTreeTest], start: int) -> int:
     """Return how many questions the longest path asks."""
     level, depth = {start}, 0
     while level:

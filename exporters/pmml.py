@@ -18,8 +18,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from fuzzytree.exporters.pmml_elements import (
-    Element,
     Functions,
+    PmmlElement,
     apply,
     constant,
     derived,
@@ -165,7 +165,7 @@ def _written_system(system: FuzzySystem) -> Written:
     return Written(content, (), (remark,) if made.is_inexact else ())
 
 
-def _content(*parts: Element) -> bytes:
+def _content(*parts: PmmlElement) -> bytes:
     xmlns = "http://www.dmg.org/PMML-4_4"
     root = element("PMML", *parts, version="4.4", xmlns=xmlns)
     text = f'<?xml version="1.0" encoding="UTF-8"?>\n{text_of(root)}\n'
@@ -196,7 +196,7 @@ class _Names(NamedTuple):
         return found
 
 
-def _header(model: Model) -> Element:
+def _header(model: Model) -> PmmlElement:
     kind = "rule base" if isinstance(model, RuleBase) else "tree"
     facts = {
         "fingerprint": fingerprint(model),
@@ -207,7 +207,7 @@ def _header(model: Model) -> Element:
     return _heading(f"A fuzzy {kind}, named {model.name}.", facts)
 
 
-def _heading(description: str, facts: Mapping[str, str]) -> Element:
+def _heading(description: str, facts: Mapping[str, str]) -> PmmlElement:
     return element(
         "Header",
         *(_extension(name, text) for name, text in facts.items()),
@@ -220,11 +220,11 @@ def _answer(label: str | None) -> str:
     return "no class" if label is None else f"class {label}"
 
 
-def _extension(name: str, value: str) -> Element:
+def _extension(name: str, value: str) -> PmmlElement:
     return element("Extension", extender="fuzzytree", name=name, value=value)
 
 
-def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[Element]:
+def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[PmmlElement]:
     for variable in variables:
         if variable.parts:
             continue
@@ -244,7 +244,7 @@ def _columns(variables: Iterable[Variable | SystemInput]) -> Iterator[Element]:
 
 def _axes(
     variables: Sequence[Variable], names: _Names, functions: Functions
-) -> Iterator[Element]:
+) -> Iterator[PmmlElement]:
     """Yield the field of each combination; missing where a summand is not finite."""
     for variable in variables:
         if variable.parts:
@@ -261,13 +261,13 @@ def _axes(
 
 def _usable(
     variables: Sequence[Variable], names: _Names, functions: Functions
-) -> Element:
+) -> PmmlElement:
     """Return 1 where every value is there and finite, and 0 elsewhere."""
     parts = [functions.finite(ref(v.name)) for v in variables]
     return joined("min", parts) if parts else constant(1.0)
 
 
-def _schema(model: Model, names: _Names) -> Element:
+def _schema(model: Model, names: _Names) -> PmmlElement:
     fields = [
         element("MiningField", name=name, invalidValueTreatment="asIs")
         for name in model.inputs
@@ -277,8 +277,11 @@ def _schema(model: Model, names: _Names) -> Element:
 
 
 def _model(
-    model: Model, names: _Names, outputs: Iterable[Element], nodes: Iterable[Element]
-) -> Element:
+    model: Model,
+    names: _Names,
+    outputs: Iterable[PmmlElement],
+    nodes: Iterable[PmmlElement],
+) -> PmmlElement:
     """Return a tree model whose answer is null where no node of the root fits."""
     predicted = element(
         "OutputField",
@@ -309,10 +312,10 @@ def _model(
 
 def _rules(
     rules: RuleBase, names: _Names, functions: Functions, *, is_exact: bool
-) -> tuple[list[Element], Element]:
+) -> tuple[list[PmmlElement], PmmlElement]:
     """Return the derived fields and the model of a rule base."""
     terms: dict[tuple[str, str], str] = {}
-    fields: list[Element] = []
+    fields: list[PmmlElement] = []
     for variable in rules.variables:
         for term in variable.terms:
             name = names.new(f"{variable.name} is {term.name}")
@@ -326,7 +329,7 @@ def _rules(
             fields.append(derived(name, degree))
     strengths = [names.new(f"strength {k}") for k in range(1, len(rules.rules) + 1)]
     how = "product" if rules.semantics.conjunction == "product" else "min"
-    clauses: dict[int, Element] = {}
+    clauses: dict[int, PmmlElement] = {}
     for strength, rule in zip(strengths, rules.rules, strict=True):
         for clause in rule.when:
             if id(clause) not in clauses:
@@ -345,13 +348,13 @@ def _rules(
     return fields, body
 
 
-def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> Element:
+def _clause(clause: Clause, terms: dict[tuple[str, str], str]) -> PmmlElement:
     asked = [ref(terms[clause.variable, term]) for term in clause.terms]
     whole = joined("max", asked)
     return apply("-", constant(1.0), whole) if clause.negated else whole
 
 
-def _winner(strengths: Sequence[str], usable: str, best: str) -> Element:
+def _winner(strengths: Sequence[str], usable: str, best: str) -> PmmlElement:
     """Return the number of the first strongest rule."""
     none = float(len(strengths) + 1)
     candidates = [
@@ -366,11 +369,11 @@ def _winner(strengths: Sequence[str], usable: str, best: str) -> Element:
 
 def _outputs(
     rules: RuleBase, strengths: Sequence[str], usable: str, names: _Names
-) -> Iterator[Element]:
+) -> Iterator[PmmlElement]:
     """Yield the strength of each rule, and of each class's strongest."""
     is_usable = apply("equal", ref(usable), constant(1.0))
 
-    def output(name: str, value: Element) -> Element:
+    def output(name: str, value: PmmlElement) -> PmmlElement:
         return element(
             "OutputField",
             apply("if", is_usable, value),
@@ -382,7 +385,7 @@ def _outputs(
 
     for k, strength in enumerate(strengths, 1):
         yield output(f"strength of rule {k}", ref(strength))
-    own: dict[str, list[Element]] = {name: [] for name in rules.classes}
+    own: dict[str, list[PmmlElement]] = {name: [] for name in rules.classes}
     for strength, rule in zip(strengths, rules.rules, strict=True):
         own[rule.then].append(ref(strength))
     for name, parts in own.items():
@@ -390,8 +393,10 @@ def _outputs(
         yield output(f"strength of class {name}", value)
 
 
-def _rule_nodes(rules: RuleBase, winner: str, names: _Names) -> Iterator[Element]:
-    def node(number: float, label: str, id_: str, count: int | None = None) -> Element:
+def _rule_nodes(rules: RuleBase, winner: str, names: _Names) -> Iterator[PmmlElement]:
+    def node(
+        number: float, label: str, id_: str, count: int | None = None
+    ) -> PmmlElement:
         return element(
             "Node",
             _predicate(winner, "equal", number),
@@ -410,7 +415,7 @@ def _rule_nodes(rules: RuleBase, winner: str, names: _Names) -> Iterator[Element
         yield node(_MISSING, rules.semantics.missing, "missing")
 
 
-def _predicate(field: str, operator: str, value: float) -> Element:
+def _predicate(field: str, operator: str, value: float) -> PmmlElement:
     return element(
         "SimplePredicate", field=field, operator=operator, value=repr(float(value))
     )
@@ -418,15 +423,15 @@ def _predicate(field: str, operator: str, value: float) -> Element:
 
 def _tree(
     tree: FuzzyTree, names: _Names, functions: Functions
-) -> tuple[list[Element], Element]:
+) -> tuple[list[PmmlElement], PmmlElement]:
     """Return the derived fields and the model of a tree."""
     usable = names.new("usable")
     fields = [derived(usable, _usable(tree.variables, names, functions))]
     is_usable = _predicate(usable, "equal", 1.0)
-    made: dict[int, Element] = {}  # by number; a node's children have higher ones
+    made: dict[int, PmmlElement] = {}  # by number; a node's children have higher ones
     for number in range(len(tree.nodes), 0, -1):
         node = tree.nodes[number - 1]
-        children: list[Element] = []
+        children: list[PmmlElement] = []
         for owner, branch in enumerate(node.branches):
             predicate = _owned(node, owner, node.variable)
             if branch.node is not None:
@@ -447,11 +452,13 @@ def _tree(
     return fields, _model(tree, names, (), nodes)
 
 
-def _with_predicate(node: Element, predicate: Element) -> Element:
+def _with_predicate(node: PmmlElement, predicate: PmmlElement) -> PmmlElement:
     return node._replace(children=(predicate, *node.children))
 
 
-def _leaf(tree: FuzzyTree, number: int, predicate: Element, names: _Names) -> Element:
+def _leaf(
+    tree: FuzzyTree, number: int, predicate: PmmlElement, names: _Names
+) -> PmmlElement:
     leaf = tree.leaves[number - 1]
     return element(
         "Node",
@@ -462,13 +469,13 @@ def _leaf(tree: FuzzyTree, number: int, predicate: Element, names: _Names) -> El
     )
 
 
-def _owned(node: Node, owner: int, field: str) -> Element:
+def _owned(node: Node, owner: int, field: str) -> PmmlElement:
     """Return whether a value lies in one of the intervals that a branch owns."""
-    parts: list[Element] = []
+    parts: list[PmmlElement] = []
     for one, (low, high) in zip(node.owners, intervals(node), strict=True):
         if one != owner:
             continue
-        ends: list[Element] = []
+        ends: list[PmmlElement] = []
         if low is not None:
             ends.append(_predicate(field, "greaterThan", low))
         if high is not None:
@@ -477,7 +484,7 @@ def _owned(node: Node, owner: int, field: str) -> Element:
     return _compound("or", parts)
 
 
-def _compound(operator: str, parts: list[Element]) -> Element:
+def _compound(operator: str, parts: list[PmmlElement]) -> PmmlElement:
     if len(parts) == 1:
         return parts[0]
     return element("CompoundPredicate", *parts, booleanOperator=operator)

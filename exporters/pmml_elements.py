@@ -26,16 +26,16 @@ _ESCAPES = {
 _DEEPEST = 20  # levels that are indented further than the one above
 
 
-class Element(NamedTuple):
+class PmmlElement(NamedTuple):
     """An element of XML, with attributes, and with children or a text."""
 
     tag: str
     attributes: dict[str, str]
-    children: tuple[Element, ...] = ()
+    children: tuple[PmmlElement, ...] = ()
     text: str = ""
 
 
-def element(tag: str, *children: Element, **attributes: str | None) -> Element:
+def element(tag: str, *children: PmmlElement, **attributes: str | None) -> PmmlElement:
     """Return an element; attributes that are None are left out.
 
     Example:
@@ -45,16 +45,16 @@ def element(tag: str, *children: Element, **attributes: str | None) -> Element:
         </Node>
     """
     given = {name: text for name, text in attributes.items() if text is not None}
-    return Element(tag, given, children)
+    return PmmlElement(tag, given, children)
 
 
-def text_of(root: Element) -> str:
+def text_of(root: PmmlElement) -> str:
     """Return an element as text, a line for each."""
     return "\n".join(_lines(root))
 
 
-def _lines(root: Element) -> Iterator[str]:
-    todo: list[tuple[int, Element | str]] = [(0, root)]
+def _lines(root: PmmlElement) -> Iterator[str]:
+    todo: list[tuple[int, PmmlElement | str]] = [(0, root)]
     while todo:
         depth, one = todo.pop()
         indent = "  " * min(depth, _DEEPEST)
@@ -78,29 +78,29 @@ def _escaped(text: str) -> str:
     return "".join(_ESCAPES.get(character, character) for character in text)
 
 
-def constant(value: float) -> Element:
+def constant(value: float) -> PmmlElement:
     """Return a number of an expression."""
-    return Element("Constant", {"dataType": "double"}, (), repr(float(value)))
+    return PmmlElement("Constant", {"dataType": "double"}, (), repr(float(value)))
 
 
-def ref(name: str) -> Element:
+def ref(name: str) -> PmmlElement:
     """Return the value of a field, or of a parameter of a function."""
-    return Element("FieldRef", {"field": name})
+    return PmmlElement("FieldRef", {"field": name})
 
 
-def apply(function: str, *arguments: Element) -> Element:
+def apply(function: str, *arguments: PmmlElement) -> PmmlElement:
     """Return a function of some expressions."""
-    return Element("Apply", {"function": function}, arguments)
+    return PmmlElement("Apply", {"function": function}, arguments)
 
 
-def derived(name: str, expression: Element) -> Element:
+def derived(name: str, expression: PmmlElement) -> PmmlElement:
     """Return a field that is computed."""
     return element(
         "DerivedField", expression, name=name, optype="continuous", dataType="double"
     )
 
 
-def joined(function: str, parts: list[Element]) -> Element:
+def joined(function: str, parts: list[PmmlElement]) -> PmmlElement:
     """Return a function of as many expressions as there are; one stays itself."""
     return parts[0] if len(parts) == 1 else apply(function, *parts)
 
@@ -114,9 +114,9 @@ class Functions:
     """
 
     def __init__(self) -> None:
-        self.defined: dict[str, Element] = {}
+        self.defined: dict[str, PmmlElement] = {}
 
-    def degree(self, shape: Shape, field: str) -> Element:
+    def degree(self, shape: Shape, field: str) -> PmmlElement:
         """Return the degree of a field's value."""
         x = ref(field)
         match shape:
@@ -136,7 +136,7 @@ class Functions:
             case Points():
                 return self._points(shape, x)
 
-    def finite(self, x: Element) -> Element:
+    def finite(self, x: PmmlElement) -> PmmlElement:
         """Return 1 where a value is there and finite, and 0 elsewhere."""
         value, zero = ref("value"), constant(0.0)
         is_small = apply(
@@ -146,7 +146,7 @@ class Functions:
         body = apply("if", apply("isMissing", value), zero, known)
         return apply(self._define("finite", ("value",), body), x)
 
-    def total(self, summands: Sequence[Element]) -> Element:
+    def total(self, summands: Sequence[PmmlElement]) -> PmmlElement:
         """Return a sum from left to right, missing if a summand is not finite.
 
         So infinities of both signs never meet: engines differ about what that is.
@@ -160,7 +160,7 @@ class Functions:
         whole = apply("if", apply("equal", usable, constant(1.0)), total)
         return apply(self._define(f"sum{len(names)}", names, whole), *summands)
 
-    def _define(self, name: str, parameters: Sequence[str], body: Element) -> str:
+    def _define(self, name: str, parameters: Sequence[str], body: PmmlElement) -> str:
         if name not in self.defined:
             fields = [
                 element(
@@ -178,12 +178,12 @@ class Functions:
             )
         return name
 
-    def _clipped(self, value: Element, high: Element) -> Element:
+    def _clipped(self, value: PmmlElement, high: PmmlElement) -> PmmlElement:
         held = apply("max", ref("value"), constant(0.0))
         body = apply("min", held, ref("high"))
         return apply(self._define("clip", ("value", "high"), body), value, high)
 
-    def _flank(self, flank: Flank | None, x: Element) -> Element:
+    def _flank(self, flank: Flank | None, x: PmmlElement) -> PmmlElement:
         if flank is None:
             return constant(0.0)
         names = _names(len(flank.curve))
@@ -196,7 +196,7 @@ class Functions:
             curve, self._clipped(q, constant(1.0)), *map(constant, flank.curve)
         )
 
-    def _side(self, side: Side, distance: Element) -> Element:
+    def _side(self, side: Side, distance: PmmlElement) -> PmmlElement:
         names = _names(len(side.curve))
         count = len(names)
         given = tuple(map(ref, names))
@@ -224,12 +224,12 @@ class Functions:
             *map(constant, side.curve),
         )
 
-    def _points(self, points: Points, x: Element) -> Element:
+    def _points(self, points: Points, x: PmmlElement) -> PmmlElement:
         """Return nested questions that halve the points, down to a line or a degree."""
         values, degrees = points.values, points.degrees
         count = len(values)
 
-        def within(first: int, last: int) -> Element:
+        def within(first: int, last: int) -> PmmlElement:
             # Of places 0 (up to the first point), 1, ..., count (behind the last one).
             if first == last:
                 return self._line(points, first, x)
@@ -243,7 +243,7 @@ class Functions:
 
         return within(0, count) if count > 1 else constant(degrees[0])
 
-    def _line(self, points: Points, after: int, x: Element) -> Element:
+    def _line(self, points: Points, after: int, x: PmmlElement) -> PmmlElement:
         values, degrees = points.values, points.degrees
         if after in (0, len(values)):
             return constant(degrees[after and -1])
@@ -269,7 +269,7 @@ class Functions:
         return apply(name, x, *map(constant, numbers))
 
 
-def norm_continuous(points: Points, field: str) -> Element:
+def norm_continuous(points: Points, field: str) -> PmmlElement:
     """Return points as PMML's own lists, one for each stretch between steps.
 
     An engine rounds in its own order: a stretch whose degrees are below 1 is held at
@@ -286,7 +286,7 @@ def norm_continuous(points: Points, field: str) -> Element:
     return found
 
 
-def _run(run: list[tuple[float, float]], field: str) -> Element:
+def _run(run: list[tuple[float, float]], field: str) -> PmmlElement:
     if len({degree for _, degree in run}) == 1:
         return constant(run[0][1])
     norms = [element("LinearNorm", orig=repr(x), norm=repr(d)) for x, d in run]
@@ -299,16 +299,16 @@ def _names(count: int) -> tuple[str, ...]:
     return tuple(f"c{k}" for k in range(count))
 
 
-def _horner(names: Sequence[str], x: Element) -> Element:
+def _horner(names: Sequence[str], x: PmmlElement) -> PmmlElement:
     total = ref(names[-1])
     for name in reversed(names[:-1]):
         total = apply("+", apply("*", total, x), ref(name))
     return total
 
 
-def _up_to(x: Element, value: float) -> Element:
+def _up_to(x: PmmlElement, value: float) -> PmmlElement:
     return apply("lessOrEqual", x, constant(value))
 
 
-def _above(x: Element, value: float) -> Element:
+def _above(x: PmmlElement, value: float) -> PmmlElement:
     return apply("greaterThan", x, constant(value))

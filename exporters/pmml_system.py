@@ -15,7 +15,7 @@ import sys
 from collections.abc import Mapping
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.pmml_elements import Element, apply, constant, element, ref
+from fuzzytree.exporters.pmml_elements import PmmlElement, apply, constant, element, ref
 from fuzzytree.model.naming import unlike
 from fuzzytree.model.system import FuzzySystem
 from fuzzytree.semantics.programs.operations import (
@@ -30,7 +30,7 @@ from fuzzytree.semantics.programs.system_program import from_system
 MOST_FIELDS = 20_000
 """The most derived fields of a file: engines look each other's values up one by one."""
 
-_MISSING = Element("Constant", {"dataType": "double", "missing": "true"})
+_MISSING = PmmlElement("Constant", {"dataType": "double", "missing": "true"})
 _A, _B = ref("a"), ref("b")
 _PLAIN: Mapping[str, str] = {
     "add": "+",
@@ -50,7 +50,7 @@ _PLAIN: Mapping[str, str] = {
 }
 _ZERO, _ONE = constant(0.0), constant(1.0)
 _ENDLESS = apply("greaterThan", apply("abs", _A), constant(sys.float_info.max))
-_PARTIAL: Mapping[str, tuple[Element, Element]] = {
+_PARTIAL: Mapping[str, tuple[PmmlElement, PmmlElement]] = {
     # The result, and where there is none.
     "divide": (
         apply("/", _A, _B),
@@ -81,7 +81,7 @@ _COMPARED: Mapping[str, str] = {
 }
 _LOGIC: Mapping[str, str] = {"and": "and", "or": "or", "not": "not"}
 
-Value = Element | float | bool  # an expression, or what it is
+Value = PmmlElement | float | bool  # an expression, or what it is
 
 
 class SystemFields:
@@ -103,13 +103,13 @@ class SystemFields:
             )
         _refuse_unknown(system.name, program)
         self.is_inexact = any(step.operation in INEXACT for step in program.steps)
-        self.functions: dict[str, Element] = {}
-        self.fields: list[Element] = []
+        self.functions: dict[str, PmmlElement] = {}
+        self.fields: list[PmmlElement] = []
         self._prefix = _prefix(taken)
         values: list[list[Value]] = []
         for place, step in enumerate(program.steps):
             values.append(self._values(place, step, values))
-        self.outputs: list[Element] = []
+        self.outputs: list[PmmlElement] = []
         for place in program.of("output"):
             (found,) = values[place]
             self.outputs.append(_expression(found))
@@ -151,13 +151,13 @@ class SystemFields:
 
     def _one(self, name: str, operation: str, given: list[Value]) -> Value:
         """Return an operation on some values, as a field unless it is known now."""
-        if not any(isinstance(one, Element) for one in given):
+        if not any(isinstance(one, PmmlElement) for one in given):
             known = NUMERIC.get(operation) or LOGICAL[operation]
             return known(*given)
         kind = OPERATIONS[operation].gives
         if operation == "where":
             condition, *others = given
-            if not isinstance(condition, Element):
+            if not isinstance(condition, PmmlElement):
                 return others[0] if condition else others[1]
             expression = apply("if", condition, *map(_expression, others))
         else:
@@ -165,7 +165,7 @@ class SystemFields:
             expression = apply(_own(operation), *map(_expression, given))
         return self._field(name, expression, kind)
 
-    def _field(self, name: str, expression: Element, kind: str) -> Element:
+    def _field(self, name: str, expression: PmmlElement, kind: str) -> PmmlElement:
         full = f"{self._prefix}{name}"
         is_truth = kind == "truth"
         self.fields.append(
@@ -255,7 +255,7 @@ def _prefix(taken: set[str]) -> str:
     return f"{found} "
 
 
-def _body(operation: str, names: tuple[str, ...]) -> Element:
+def _body(operation: str, names: tuple[str, ...]) -> PmmlElement:
     given = [ref(name) for name in names]
     if operation in _LOGIC:
         return apply(_LOGIC[operation], *given)
@@ -275,14 +275,14 @@ def _body(operation: str, names: tuple[str, ...]) -> Element:
     return apply("if", nothing, _MISSING, apply(_PLAIN[operation], *given))
 
 
-def _truth(value: bool) -> Element:
-    return Element("Constant", {"dataType": "boolean"}, (), str(value).lower())
+def _truth(value: bool) -> PmmlElement:
+    return PmmlElement("Constant", {"dataType": "boolean"}, (), str(value).lower())
 
 
-def _expression(value: Value) -> Element:
+def _expression(value: Value) -> PmmlElement:
     """Return a value as an expression; an infinity as what overflows to it."""
     match value:
-        case Element():
+        case PmmlElement():
             return value
         case bool():
             return _truth(value)
@@ -295,12 +295,12 @@ def _expression(value: Value) -> Element:
             return constant(value)
 
 
-def _table(step: Step, value: Value) -> Element:
+def _table(step: Step, value: Value) -> PmmlElement:
     """Return a number that is looked up by halving."""
     table, x = step.table, _expression(value)
     is_pick = step.operation == "pick"
 
-    def within(first: int, last: int) -> Element:
+    def within(first: int, last: int) -> PmmlElement:
         if first == last:
             return constant(table[first] if is_pick else float(first))
         middle = (first + last) // 2

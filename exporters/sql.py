@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, get_args
 
 from fuzzytree.errors import LossError
-from fuzzytree.exporters.sql_expressions import Degrees, Query
+from fuzzytree.exporters.sql_expressions import Query, SqlDegrees
 from fuzzytree.model.contracts import Format, Model, Written
 from fuzzytree.model.rulebase import Clause, RuleBase, fingerprint, sentence, shapes_of
 from fuzzytree.model.tree import FuzzyTree, Node
@@ -225,7 +225,7 @@ def _rule_steps(
     clauses = list(dict.fromkeys(c for rule in rules.rules for c in rule.when))
     keys = list(dict.fromkeys((c.variable, term) for c in clauses for term in c.terms))
     place = {clause: f"d_{number}" for number, clause in enumerate(clauses, 1)}
-    helpers = Degrees(query)
+    helpers = SqlDegrees(query)
     degrees = {key: f"m_{number}" for number, key in enumerate(keys, 1)}
     texts = [
         f"{helpers.degree(shapes[key], line[key[0]])} AS {degrees[key]}"

@@ -138,7 +138,7 @@ def _ratio(value: float) -> str:
     return text
 
 
-class Degrees:
+class SqlDegrees:
     """Degrees as expressions; what a polynomial is asked at is a column before."""
 
     def __init__(self, query: Query) -> None:

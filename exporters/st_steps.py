@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
-from fuzzytree.exporters.st_text import Numbers, remark, table
+from fuzzytree.exporters.st_text import StNumbers, remark, table
 from fuzzytree.model.rulebase import RuleBase, sentence
 from fuzzytree.semantics.programs.evaluate import still_results
 from fuzzytree.semantics.programs.membership import BELOW_ONE
@@ -56,7 +56,7 @@ class SystemSteps:
     """
 
     def __init__(
-        self, program: Program, inputs: Mapping[str, str], numbers: Numbers
+        self, program: Program, inputs: Mapping[str, str], numbers: StNumbers
     ) -> None:
         """Prepare the statements."""
         self.program = program
@@ -330,7 +330,7 @@ class RuleSteps:
     """
 
     def __init__(
-        self, rules: RuleBase, values: Mapping[str, str], numbers: Numbers
+        self, rules: RuleBase, values: Mapping[str, str], numbers: StNumbers
     ) -> None:
         """Prepare the statements."""
         self.rules = rules
@@ -434,7 +434,7 @@ class RuleSteps:
         return self._names[step.table]
 
 
-def decision(rules: RuleBase, numbers: Numbers) -> Iterator[str]:
+def decision(rules: RuleBase, numbers: StNumbers) -> Iterator[str]:
     """Yield statements that find the first of the strongest rules."""
     zero = numbers.literal(0.0)
     uncovered = rules.semantics.uncovered

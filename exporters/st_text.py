@@ -40,7 +40,7 @@ instructions and addresses in old ones."""
 
 
 @dataclass(frozen=True, slots=True)
-class Numbers:
+class StNumbers:
     """A number type of Structured Text.
 
     Attributes:
@@ -98,8 +98,8 @@ class Numbers:
         return f"{self.name}#{text}"
 
 
-LONG = Numbers("LREAL", np.float64, 1.0 - 2.0**-53, float(np.finfo("d").max))
-SINGLE = Numbers("REAL", np.float32, 1.0 - 2.0**-24, float(np.finfo("f").max))
+LONG = StNumbers("LREAL", np.float64, 1.0 - 2.0**-53, float(np.finfo("d").max))
+SINGLE = StNumbers("REAL", np.float32, 1.0 - 2.0**-24, float(np.finfo("f").max))
 
 
 def identifiers(names: Iterable[str], taken: Iterable[str] = ()) -> Names:
@@ -159,7 +159,7 @@ def block_of(opening: str, lines: Sequence[str]) -> Iterator[str]:
         yield "END_VAR\n"
 
 
-def known_inputs(names: Sequence[str], numbers: Numbers) -> Iterator[str]:
+def known_inputs(names: Sequence[str], numbers: StNumbers) -> Iterator[str]:
     """Yield statements that say in `is_known` whether all inputs are finite."""
     largest = numbers.literal(numbers.largest)
     yield "is_known := TRUE;\n"

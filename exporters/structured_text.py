@@ -19,7 +19,7 @@ from fuzzytree.exporters.st_steps import RuleSteps, SystemSteps, decision
 from fuzzytree.exporters.st_text import (
     LONG,
     SINGLE,
-    Numbers,
+    StNumbers,
     block_of,
     identifiers,
     known_inputs,
@@ -117,7 +117,7 @@ def _taken(model: Model, combined: Mapping[str, str]) -> list[str]:
     return [*_OUTPUTS, *_LOCALS, *combined.values(), *steps]
 
 
-def _interface(model: Model, names: Names, numbers: Numbers) -> Iterator[str]:
+def _interface(model: Model, names: Names, numbers: StNumbers) -> Iterator[str]:
     inputs = [variable for variable in model.variables if not variable.parts]
     lines = [
         f"    {names[v.name]} : {numbers.name}; (* {remark(_described(v))} *)\n"
@@ -141,7 +141,7 @@ def _described(variable: Variable) -> str:
 
 
 def _mixed_lines(
-    mixed: list[Variable], combined: Mapping[str, str], numbers: Numbers
+    mixed: list[Variable], combined: Mapping[str, str], numbers: StNumbers
 ) -> Iterator[str]:
     yield "    is_known : BOOL;\n"
     yield "    k : DINT;\n"
@@ -155,7 +155,7 @@ def _guard(
     names: Names,
     mixed: list[Variable],
     combined: Mapping[str, str],
-    numbers: Numbers,
+    numbers: StNumbers,
 ) -> Iterator[str]:
     """Yield statements that find out what is missing, and answer where something is."""
     yield from known_inputs(list(names.accepted.values()), numbers)
@@ -188,7 +188,7 @@ Parts = tuple[list[str], list[str], list[str]]
 """Lines of constants, of variables, and of statements."""
 
 
-def _rules(rules: RuleBase, values: Mapping[str, str], numbers: Numbers) -> Parts:
+def _rules(rules: RuleBase, values: Mapping[str, str], numbers: StNumbers) -> Parts:
     steps = RuleSteps(rules, values, numbers)
     body = [*steps.statements(), *decision(rules, numbers)]
     labels = [str(rules.classes.index(rule.then)) for rule in rules.rules]
@@ -198,7 +198,7 @@ def _rules(rules: RuleBase, values: Mapping[str, str], numbers: Numbers) -> Part
     return constants, local, body
 
 
-def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: Numbers) -> Parts:
+def _tree(tree: FuzzyTree, values: Mapping[str, str], numbers: StNumbers) -> Parts:
     labels = [str(tree.classes.index(leaf.label)) for leaf in tree.leaves]
     constants = [*table("leaf_class", "INT", labels, "places of the leaves' classes")]
     if not tree.nodes:
@@ -262,7 +262,7 @@ _FIXED = ("is_number", "status", "is_known", "k", "halves")
 
 
 def written_system(
-    system: FuzzySystem, numbers: Numbers, name: str, *, allow_loss: bool
+    system: FuzzySystem, numbers: StNumbers, name: str, *, allow_loss: bool
 ) -> Written:
     """Return a system as a function block, in ASCII.
 
@@ -324,7 +324,7 @@ def _formulas(system: FuzzySystem) -> Iterator[str]:
 
 
 def _system_interface(
-    system: FuzzySystem, names: Names, numbers: Numbers
+    system: FuzzySystem, names: Names, numbers: StNumbers
 ) -> Iterator[str]:
     columns = [one for one in system.inputs if not one.parts]
     yield from block_of("VAR_INPUT", list(_declared(columns, names, numbers)))
@@ -336,14 +336,14 @@ def _system_interface(
 
 
 def _declared(
-    variables: Sequence[SystemInput | SystemOutput], names: Names, numbers: Numbers
+    variables: Sequence[SystemInput | SystemOutput], names: Names, numbers: StNumbers
 ) -> Iterator[str]:
     for one in variables:
         about = f"{one.name} ({one.unit})" if one.unit else one.name
         yield f"    {names[one.name]} : {numbers.name}; (* {remark(about)} *)\n"
 
 
-def _nothing(system: FuzzySystem, names: Names, numbers: Numbers) -> Iterator[str]:
+def _nothing(system: FuzzySystem, names: Names, numbers: StNumbers) -> Iterator[str]:
     for number, output in enumerate(system.outputs, 1):
         yield f"    {names[output.name]} := {numbers.literal(0.0)};\n"
         yield f"    is_number[{number}] := FALSE;\n"

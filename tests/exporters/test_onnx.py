@@ -19,7 +19,7 @@ import pytest
 from fuzzytree.errors import DisagreementError, LossError, MissingExtraError
 from fuzzytree.exporters import find_format, onnx_ends
 from fuzzytree.exporters.onnx import FORMAT, IRS, OPSETS, Output, write
-from fuzzytree.exporters.onnx_graph import Sheet
+from fuzzytree.exporters.onnx_graph import OnnxGraph
 from fuzzytree.model.contracts import Dtype, Model
 from fuzzytree.model.rulebase import (
     LR,
@@ -418,7 +418,7 @@ def test_thresholds_are_rounded_to_the_nearest_float32() -> None:
 def test_a_file_with_another_answer_is_not_written(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def wrong(sheet: Sheet, inputs: list[str], named: str) -> str:
+    def wrong(sheet: OnnxGraph, inputs: list[str], named: str) -> str:
         return sheet.node("ArgMin", inputs[0], axis=0, keepdims=0, named=named)
 
     monkeypatch.setattr(onnx_ends, "_winner", wrong)

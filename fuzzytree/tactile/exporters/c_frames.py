@@ -11,8 +11,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Sequence
 
-from fuzzytree.exporters.c import Made, beginning
-from fuzzytree.exporters.c_steps import LIBRARY, Steps
+from fuzzytree.exporters.c import CFile, beginning
+from fuzzytree.exporters.c_steps import LIBRARY, CSteps
 from fuzzytree.exporters.c_text import DOUBLE, fill, remark, whole_lines, whole_table
 from fuzzytree.model.contracts import Model, Written
 from fuzzytree.tactile.features import FrameProgram, Sum, frame_program
@@ -158,13 +158,13 @@ def write_frames_c(
 def _text(
     made: FrameProgram, model: Model, prefix: str, reject: float
 ) -> Iterator[str]:
-    sensor, file = made.sensor, Made(model, DOUBLE, prefix)
+    sensor, file = made.sensor, CFile(model, DOUBLE, prefix)
     yield from file.declarations()
     kind = frame_type(sensor).__name__ + "_t"
     types = _TYPES.replace("ROWSu", f"{sensor.rows}u").replace("CELL ", f"{kind} ")
     yield fill(types.replace("COLUMNSu", f"{sensor.columns}u"), prefix)
     yield from file.definitions(is_arithmetic=True)
-    steps = Steps(made.program, _LIBRARY)
+    steps = CSteps(made.program, _LIBRARY)
     ends = [*_features(made, steps)]
     yield "\n#include <math.h>\n" if steps.needs_library else ""
     yield from steps.helper_text(prefix)
@@ -317,7 +317,7 @@ def _part_loop(count: int, first: int, kind: str) -> Iterator[str]:
 # --- features
 
 
-def _features(made: FrameProgram, steps: Steps) -> Iterator[str]:
+def _features(made: FrameProgram, steps: CSteps) -> Iterator[str]:
     """Yield the functions from the sums to the features."""
     *features, pressed = made.program.results
     yield "\n/* The features of the sums x; return whether anything presses. */\n"

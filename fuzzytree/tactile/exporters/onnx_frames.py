@@ -30,8 +30,8 @@ from fuzzytree.tactile.sensor import Sensor, offsets
 if TYPE_CHECKING:
     import onnx
 
-    from fuzzytree.exporters.onnx_ends import Axes
-    from fuzzytree.exporters.onnx_graph import Sheet
+    from fuzzytree.exporters.onnx_ends import InputBlock
+    from fuzzytree.exporters.onnx_graph import OnnxGraph
 
 Output = Literal["label", "state", "rule", "features", "strengths"]
 
@@ -144,9 +144,9 @@ def _model_proto(
 ) -> onnx.ModelProto:
     from onnx import TensorProto, helper
 
-    from fuzzytree.exporters.onnx_graph import TREES, Sheet
+    from fuzzytree.exporters.onnx_graph import TREES, OnnxGraph
 
-    sheet, sensor = Sheet(opset), made.sensor
+    sheet, sensor = OnnxGraph(opset), made.sensor
     _fill(sheet, made, model, outputs, reject, plain=plain)
     rules = len(model.rules) if isinstance(model, RuleBase) else 0
     kinds: dict[Output, tuple[int, list[str | int]]] = {
@@ -226,7 +226,7 @@ def _in_words(made: FrameProgram, model: Model) -> str:
 
 
 def _fill(
-    sheet: Sheet,
+    sheet: OnnxGraph,
     made: FrameProgram,
     model: Model,
     outputs: Sequence[Output],
@@ -275,7 +275,7 @@ def _fill(
         _all_strengths(sheet, model, strengths, finite)
 
 
-def _sums(sheet: Sheet, made: FrameProgram) -> list[str]:
+def _sums(sheet: OnnxGraph, made: FrameProgram) -> list[str]:
     """Add the sums as the sheet's source, shape (frames, sums); return their names."""
     from fuzzytree.exporters.onnx_ends import scalar
     from fuzzytree.exporters.onnx_steps import np_to_onnx
@@ -304,7 +304,7 @@ def _sums(sheet: Sheet, made: FrameProgram) -> list[str]:
 
 
 def _taken(
-    sheet: Sheet, sums: Sequence[Sum], values: str, is_pressed: str
+    sheet: OnnxGraph, sums: Sequence[Sum], values: str, is_pressed: str
 ) -> list[str]:
     """Add what the sums take from the cells: a product, single cells, the others."""
     from fuzzytree.exporters.onnx_steps import np_to_onnx, reduced
@@ -333,7 +333,7 @@ def _taken(
     return [one.name for one in (*mixed, *single, *others)]
 
 
-def _side_by_side(sheet: Sheet, names: Sequence[str]) -> None:
+def _side_by_side(sheet: OnnxGraph, names: Sequence[str]) -> None:
     """Put the features, of shape (frames,) each, side by side as the source."""
     shape = [-1, 1] if len(names) == 1 else [len(names), -1]
     block = names[0] if len(names) == 1 else sheet.node("Concat", *names, axis=0)
@@ -345,12 +345,12 @@ def _side_by_side(sheet: Sheet, names: Sequence[str]) -> None:
     sheet.source = block
 
 
-def _flat(sheet: Sheet, truth: str) -> str:
+def _flat(sheet: OnnxGraph, truth: str) -> str:
     shape = sheet.numbers([-1], "flat")
     return sheet.node("Reshape", truth, shape, hint="is_row_finite")
 
 
-def _is_answer(sheet: Sheet, model: Model, axes: Axes) -> str:
+def _is_answer(sheet: OnnxGraph, model: Model, axes: InputBlock) -> str:
     """Return whether the model knows an answer to the features."""
     from fuzzytree.exporters.onnx_ends import NUMBERS, is_known
 
@@ -360,7 +360,7 @@ def _is_answer(sheet: Sheet, model: Model, axes: Axes) -> str:
     return sheet.node("Less", _whole(sheet, 0), "winner", hint="is_answer")
 
 
-def _is_strong(sheet: Sheet, strengths: str, reject: float) -> str:
+def _is_strong(sheet: OnnxGraph, strengths: str, reject: float) -> str:
     """Return whether the rule that decides is as strong as the floor, or is none."""
     from fuzzytree.exporters.onnx_ends import scalar
     from fuzzytree.exporters.onnx_steps import reduced
@@ -374,7 +374,11 @@ def _is_strong(sheet: Sheet, strengths: str, reject: float) -> str:
 
 
 def _ends(
-    sheet: Sheet, model: Model, is_pressed: str, known: str, outputs: Sequence[Output]
+    sheet: OnnxGraph,
+    model: Model,
+    is_pressed: str,
+    known: str,
+    outputs: Sequence[Output],
 ) -> None:
     """Add label, state and rule."""
     if "state" in outputs:
@@ -399,7 +403,7 @@ def _ends(
         sheet.node("Gather", table, place, axis=0, named="label")
 
 
-def _all_strengths(sheet: Sheet, model: Model, strengths: str, finite: str) -> None:
+def _all_strengths(sheet: OnnxGraph, model: Model, strengths: str, finite: str) -> None:
     """Add the strengths of all rules, 0 where nothing presses."""
     from fuzzytree.exporters.onnx_ends import scalar
 
@@ -411,5 +415,5 @@ def _all_strengths(sheet: Sheet, model: Model, strengths: str, finite: str) -> N
     sheet.node("Transpose", real, perm=[1, 0], named="strengths")
 
 
-def _whole(sheet: Sheet, value: int) -> str:
+def _whole(sheet: OnnxGraph, value: int) -> str:
     return sheet.constant(np.array(int(value), np.int64), "whole")
